@@ -3,10 +3,10 @@
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.grid import Grid
 from terrainkit.mesh.closed import THICKNESS
@@ -39,6 +39,9 @@ class BoxDecomposition:
     half_sizes: NDArray[np.float64]
     """Half of the size along x, y and z [m], shape (n, 3)."""
 
+    friction: NDArray[np.float32]
+    """Friction of each box, shape (n,)."""
+
     covered: NDArray[np.bool_]
     """Whether the whole cell is the top of a box, shape (nx, ny). The others need a heightfield."""
 
@@ -53,6 +56,7 @@ def decompose_boxes(
     grid: Grid,
     threshold: float,
     patch_edges: tuple[NDArray[np.int64], NDArray[np.int64]],
+    friction: ArrayLike = 1.0,
 ) -> BoxDecomposition:
     """Return the flat parts of the ground as boxes.
 
@@ -69,29 +73,35 @@ def decompose_boxes(
         grid: Positions of the samples.
         threshold: Difference between neighboring samples above which there is a wall [m].
         patch_edges: Cells along x and along y where patches meet. Boxes are searched per patch.
+        friction: Friction of each cell, broadcast to `grid.shape`. The top of a box has one.
     """
     import cv2
+
+    friction = np.broadcast_to(np.asarray(friction, dtype=np.float32), heights.shape)
 
     flat = flat_cells(heights, grid, threshold)
     # A lower bound of the ground in each cell.
     low = np.where(flat, heights, cv2.erode(heights, np.ones((3, 3), dtype=np.uint8)))
     _drop_patches_without_walls(flat, _cells_at_walls(heights, threshold), patch_edges)
     edges = [
-        np.unique(np.concatenate([[0], lines, [n]])).tolist()
-        for lines, n in zip(patch_edges, heights.shape, strict=True)
+        np.union1d(lines, changes(each)).tolist()
+        for lines, each in zip(patch_edges, (friction, friction.T), strict=True)
     ]
     boxes = [
-        (height, i0 + a, i0 + b, j0 + c, j0 + d)
+        (height, i0 + a, i0 + b, j0 + c, j0 + d, friction[i0, j0])
         for i0, i1 in itertools.pairwise(edges[0])
         for j0, j1 in itertools.pairwise(edges[1])
         for height, (a, b, c, d) in _cover_block(flat[i0:i1, j0:j1], low[i0:i1, j0:j1])
     ]
-    table = np.array(boxes, dtype=np.float64).reshape(-1, 5)
+    table = np.array(boxes, dtype=np.float64).reshape(-1, 6)
+    # Only boxes of the same top and friction are merged; their number stands for both.
+    pairs, number = np.unique(table[:, [0, 5]], axis=0, return_inverse=True)
+    table = np.column_stack([number.reshape(-1), table[:, 1:5]])
     short, long = merge_boxes(table, MAX_LENGTH // grid.cell), merge_boxes(table)
     merged = long if 2 * len(long) <= len(short) else short
-    top, i0, i1, j0, j1 = merged.T
-    merged = merged[np.lexsort([i0, top, j0 + j1, i0 + i1])]
-    return _make_boxes(merged, grid, float(heights.min()) - THICKNESS, flat)
+    number, i0, i1, j0, j1 = merged.T
+    merged = merged[np.lexsort([i0, number, j0 + j1, i0 + i1])]
+    return _make_boxes(merged, pairs, grid, float(heights.min()) - THICKNESS, flat)
 
 
 def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
@@ -150,7 +160,7 @@ def _cover_block(
     flat: NDArray[np.bool_], low: NDArray[np.float32]
 ) -> Iterator[tuple[float, tuple[int, int, int, int]]]:
     """Yield the top and the span of each box of a block of cells, in the order of their tops."""
-    x, y = _changes(flat, low), _changes(flat.T, low.T)
+    x, y = (np.union1d(*map(changes, pair)) for pair in ((flat, low), (flat.T, low.T)))
     flat, low = flat[x[:-1]][:, y[:-1]], low[x[:-1]][:, y[:-1]]
     tops = np.unique(low[flat])
     part = (slice(0, flat.shape[0]), slice(0, flat.shape[1]))
@@ -163,10 +173,10 @@ def _cover_block(
             yield float(top), (i[a], i[b], j[c], j[d])
 
 
-def _changes(flat: NDArray[np.bool_], low: NDArray[np.float32]) -> NDArray[np.int64]:
+def changes(values: NDArray[Any]) -> NDArray[np.int64]:
     """Return the rows that differ from the previous one, including both ends."""
-    differ = ((flat[1:] != flat[:-1]) | (low[1:] != low[:-1])).any(axis=1)
-    return np.concatenate([[0], np.flatnonzero(differ) + 1, [len(flat)]])
+    differ = (values[1:] != values[:-1]).any(axis=1)
+    return np.concatenate([[0], np.flatnonzero(differ) + 1, [len(values)]])
 
 
 def _bounds(mask: NDArray[np.bool_]) -> slice:
@@ -179,7 +189,7 @@ def merge_boxes(boxes: NDArray[np.float64], max_cells: float = np.inf) -> NDArra
     """Merge boxes of the same top that share a whole side until none do.
 
     Args:
-        boxes: Top [m] and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
+        boxes: Top or another key, and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
         max_cells: Cells after which a row of merged boxes is divided.
     """
     before = -1
@@ -207,12 +217,21 @@ def _merge_along_x(boxes: NDArray[np.float64], max_cells: float) -> NDArray[np.f
 
 
 def _make_boxes(
-    boxes: NDArray[np.float64], grid: Grid, bottom: float, flat: NDArray[np.bool_]
+    boxes: NDArray[np.float64],
+    pairs: NDArray[np.float64],
+    grid: Grid,
+    bottom: float,
+    flat: NDArray[np.bool_],
 ) -> BoxDecomposition:
-    top, i0, i1, j0, j1 = boxes.T
+    """Return the boxes, given the number of their top [m] and friction in `pairs`, and cells."""
+    number, i0, i1, j0, j1 = boxes.T
+    top, friction = pairs[number.astype(int)].T
     x, y = grid.lower
     lower = np.column_stack([i0 * grid.cell + x, j0 * grid.cell + y, np.full(len(top), bottom)])
     upper = np.column_stack([i1 * grid.cell + x, j1 * grid.cell + y, top])
     return BoxDecomposition(
-        centers=(lower + upper) / 2, half_sizes=(upper - lower) / 2, covered=flat
+        centers=(lower + upper) / 2,
+        half_sizes=(upper - lower) / 2,
+        friction=friction.astype(np.float32),
+        covered=flat,
     )

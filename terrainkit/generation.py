@@ -15,6 +15,7 @@ from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.memory import check_memory
 from terrainkit.patch import Patch, build_patch
+from terrainkit.patch_geometry import uniform_friction
 from terrainkit.seams import Seams, cliffs_text
 from terrainkit.solids import Solids
 from terrainkit.sub_terrain import SubTerrain
@@ -66,7 +67,8 @@ def generate(
     columns = terrain_columns(config)
     heights = np.zeros(grid.shape, dtype=np.float32)
     # A view of one number takes no memory, and most maps have one friction.
-    friction = np.broadcast_to(np.float32(config.static_friction), grid.shape)
+    friction = uniform_friction(config.static_friction, grid.shape)
+    plain = uniform_friction(config.static_friction, config.patch_shape)
     spawns = np.empty(size, dtype=object)
     terrain_types = np.empty(size, dtype=np.int32)
     difficulty = np.empty(size, dtype=np.float32)
@@ -83,7 +85,7 @@ def generate(
             i, j = config.patch_start(row, col)
             block = (slice(i, i + patch.grid.shape[0]), slice(j, j + patch.grid.shape[1]))
             heights[block] = patch.heights
-            if (patch.friction != friction[0, 0]).any():
+            if patch.friction is not plain and (patch.friction != plain).any():
                 friction = friction if friction.flags.writeable else friction.copy()
                 friction[block] = patch.friction
             spawns[row, col] = patch.spawns

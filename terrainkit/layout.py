@@ -56,7 +56,7 @@ def terrain_columns(config: MapConfig) -> list[int]:
     missing = [each.name for each, n in pairs if n == 0 and each.proportion > 0]
     if missing and config.mode != "randomized":
         message = (
-            f"{config.cols} columns are too few for {len(sub_terrains)} sub-terrains at these "
+            f"cols: got {config.cols}, too few for {len(sub_terrains)} sub-terrains at these "
             f"proportions: no column for {listing(missing)}"
         )
         if config.terrains:

@@ -69,7 +69,10 @@ def _values(config: MapConfig) -> dict[str, Any]:
     """Return the values of a config by key; those of sub-terrains as `terrains[0].proportion`."""
     table = config.to_table()
     for k, sub_terrain in enumerate(table.pop("terrains", ())):
-        table |= {f"terrains[{k}].{key}": v for key, v in sub_terrain.to_table().items()}
+        values = sub_terrain.to_table()
+        for number, overlay in enumerate(values.pop("overlays", ())):
+            values |= {f"overlays[{number}].{key}": v for key, v in overlay.to_table().items()}
+        table |= {f"terrains[{k}].{key}": v for key, v in values.items()}
     return table
 
 
@@ -99,6 +102,9 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
     if not (difference == 0).all():
         number = int((difference != 0).sum())
         yield f"heights by up to {difference.max():.3g} m at {number:,} of {difference.size:,}"
+    if not np.array_equal(a.friction, b.friction):
+        number = int((a.friction != b.friction).sum())
+        yield f"friction at {number:,} of {a.friction.size:,}"
     yield from _diff_solids(_in_patch_frame(a), _in_patch_frame(b))
     shift = np.array([*a.grid.lower, 0, 0]) - [*b.grid.lower, 0, 0]
     moved = float(np.linalg.norm(a.origin - b.origin - shift[:3]))

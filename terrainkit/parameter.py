@@ -106,7 +106,7 @@ class Parameter:
         if realized == requested:
             return False
         if isinstance(requested, str | tuple) or isinstance(realized, str):
-            return True
+            return requested != ""  # an empty text requests nothing
         values = realized if isinstance(realized, tuple) else (realized,)
         snapping = {"cells": cell / 2, "centered": cell, "none": 0.05 * requested}[self.snap]
         if self.slopes_away:

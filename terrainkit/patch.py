@@ -15,7 +15,7 @@ from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, patch_rng, terrain_columns
 from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized, Value, parameters_of
-from terrainkit.patch_geometry import PatchGeometry
+from terrainkit.patch_geometry import PatchGeometry, uniform_friction
 from terrainkit.solids import Solids
 from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
@@ -70,7 +70,8 @@ class Patch:
     """Spawn positions x, y, z [m] and headings [rad], shape (k, 4); the origin comes first."""
 
     spawn_offset: float = 0.0
-    """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]."""
+    """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]. It is
+    known for a patch that has just been built; :meth:`TerrainMap.patch` returns 0."""
 
     @property
     def origin(self) -> NDArray[np.float32]:
@@ -168,7 +169,7 @@ def _terrain_geometry(
     return PatchGeometry(
         grid=grid,
         heights=heights,
-        friction=np.broadcast_to(np.float32(friction), grid.shape),
+        friction=uniform_friction(friction, grid.shape),
         solids=solids,
         goals=goals,
         spawn=terrain.spawn(grid),

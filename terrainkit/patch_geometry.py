@@ -1,6 +1,7 @@
 """PatchGeometry: what a terrain puts on a patch, and what overlays change."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -64,6 +65,12 @@ class PatchGeometry:
             spawn=(x, y),
             heading=float(_turn(np.array(self.heading), matrix)),
         )
+
+
+@lru_cache(maxsize=16)
+def uniform_friction(friction: float, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the same friction in all cells: a read-only view of one number."""
+    return np.broadcast_to(np.float32(friction), shape)
 
 
 def _permute(values: NDArray[np.float32], matrix: NDArray[np.int64]) -> NDArray[np.float32]:

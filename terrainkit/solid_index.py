@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.solids import Solids, rotation_matrices
+from terrainkit.solids import Solids, convex_hull, rotation_matrices
 
 _MAX_PAIRS = 2_000_000
 """Candidate pairs of points and solids that are evaluated at once, to bound the memory."""
@@ -167,22 +167,18 @@ def _half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]
 
     Returns:
         Unit normal n and distance d of each, shape (k, 4): the points p with n . p <= d; and the
-        number of half-spaces of each solid, shape (n,). Those of a cylinder are its caps.
+        number of half-spaces of each solid, shape (n,). Those of a cylinder are the sides of the
+        box around it. Widening the round side of a cylinder that lies on the ground would also
+        raise it; the box limits its height.
     """
-    planes = []
-    for shapes, axes in ((solids.boxes, (0, 1, 2)), (solids.cylinders, (2,))):
-        normals = np.swapaxes(rotation_matrices(shapes[:, 6:]), 1, 2)[:, list(axes)]
-        middle = np.einsum("nkj,nj->nk", normals, shapes[:, :3])
-        half = shapes[:, [3 + axis for axis in axes]]
-        sides = [np.dstack([normals, middle + half]), np.dstack([-normals, half - middle])]
-        planes.append(np.concatenate(sides, axis=1).reshape(-1, 4))
-    counts = [np.full(len(solids.boxes), 6), np.full(len(solids.cylinders), 2)]
-    if len(solids.hull_counts):
-        from scipy.spatial import ConvexHull
-
-        for vertices in solids.hulls():
-            # Coplanar facets of a hull repeat their plane.
-            equations = np.unique(ConvexHull(vertices.astype(float)).equations.round(9), axis=0)
-            planes.append(equations * [1, 1, 1, -1])
-            counts.append(np.array([len(equations)]))
+    shapes = np.concatenate([solids.boxes, solids.cylinders])
+    normals = np.swapaxes(rotation_matrices(shapes[:, 6:]), 1, 2)
+    middle, half = np.einsum("nkj,nj->nk", normals, shapes[:, :3]), shapes[:, 3:6]
+    sides = [np.dstack([normals, middle + half]), np.dstack([-normals, half - middle])]
+    planes, counts = [np.concatenate(sides, axis=1).reshape(-1, 4)], [np.full(len(shapes), 6)]
+    for vertices in solids.hulls():
+        # Coplanar facets of a hull repeat their plane.
+        equations = np.unique(convex_hull(vertices).equations.round(9), axis=0)
+        planes.append(equations * [1, 1, 1, -1])
+        counts.append(np.array([len(equations)]))
     return np.concatenate(planes), np.concatenate(counts)

@@ -53,7 +53,9 @@ class SolidRaster:
         """
         i = ((x - self._corner[0]) / PIXEL).astype(np.int64)
         j = ((y - self._corner[1]) / PIXEL).astype(np.int64)
-        inside = (i >= 0) & (j >= 0) & (i < self._shape[0]) & (j < self._shape[1])
+        # The conversion to integers rounds toward 0, so the lower bound is checked before it.
+        above = (x >= self._corner[0]) & (y >= self._corner[1])
+        inside = above & (i < self._shape[0]) & (j < self._shape[1])
         row = self._row[np.where(inside, i, 0), np.where(inside, j, 0)] * inside
         result = np.full(np.broadcast_shapes(row.shape, np.shape(z)), -np.inf, dtype=np.float32)
         hit = np.broadcast_to(row > 0, result.shape)

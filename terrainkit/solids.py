@@ -2,13 +2,20 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.parameter import MAX_VALUE
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
+
+MIN_SIZE = 1e-4
+"""Smallest size of a box, diameter or length of a cylinder, and cube root of the volume of a hull
+[m]. MuJoCo rejects hulls of less than 1e-15 m^3, and an MJCF file has six decimals."""
 
 MAX_HULL_VERTICES = 1000
 """Largest number of vertices of a convex hull."""
@@ -180,7 +187,7 @@ def make_boxes(
         visible: Whether height scans see the box, shape (n,) or ().
 
     Raises:
-        ConfigError: if a value is not finite, or a size is not above 0.
+        ConfigError: if shapes do not match, a value is not finite, or a size is below `MIN_SIZE`.
     """
     return _make("boxes", center, np.asarray(size, float) / 2, rpy, friction, collides, visible)
 
@@ -207,7 +214,8 @@ def make_cylinders(
         visible: See :func:`make_boxes`.
 
     Raises:
-        ConfigError: if a value is not finite, or a radius or length is not above 0.
+        ConfigError: if shapes do not match, a value is not finite, or a diameter or length is below
+            `MIN_SIZE`.
     """
     radius, length = np.broadcast_arrays(np.asarray(radius, float), np.asarray(length, float))
     half_size = np.stack([radius, radius, length / 2], axis=-1)
@@ -244,6 +252,25 @@ def make_hulls(
     )
 
 
+def convex_hull(vertices: NDArray[np.float32]) -> "ConvexHull":
+    """Return the convex hull of `vertices` [m], shape (k, 3).
+
+    Raises:
+        ConfigError: if its volume is too small.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(vertices.astype(float))
+    except (QhullError, ValueError):  # ValueError without points
+        raise ConfigError("hull: got points in one plane; expected points with a volume") from None
+    if hull.volume < MIN_SIZE**3:
+        raise ConfigError(
+            f"hull: got a volume of {hull.volume:g} m^3; expected at least {MIN_SIZE**3:g} m^3"
+        )
+    return hull
+
+
 def rotation_matrices(quaternion: ArrayLike) -> NDArray[np.float64]:
     """Return the rotation matrices (n, 3, 3) of unit quaternions (w, x, y, z), shape (n, 4)."""
     w, x, y, z = np.asarray(quaternion, float).T
@@ -276,17 +303,23 @@ def _make(
     visible: ArrayLike,
 ) -> Solids:
     vectors = [np.asarray(each, float) for each in (center, half_size, rpy)]
-    n = max(
-        [len(each) for each in vectors if each.ndim > 1]
-        + [np.size(each) for each in (friction, collides, visible) if np.ndim(each)]
-        or [1]
-    )
+    vectors = [each if each.size else each.reshape(-1, 3) for each in vectors]
+    flags = [(np.size(each), 1) for each in (friction, collides, visible)]
+    try:
+        n, _ = np.broadcast_shapes((1, 3), *(each.shape for each in vectors), *flags)
+    except ValueError:
+        given = ", ".join(str(each.shape) for each in vectors)
+        raise ConfigError(
+            f"center, size and rpy of {kind}: got shapes {given}; expected (3,) or the same (n, 3)"
+        ) from None
     center, half_size, rpy = (np.broadcast_to(each, (n, 3)) for each in vectors)
     for name, values in (("center", center), ("size", half_size), ("rpy", rpy)):
         if not (np.abs(values) <= MAX_VALUE).all():
-            raise ConfigError(f"{kind}: {name}: expected finite values up to {MAX_VALUE:g}")
-    if n and not half_size.min() > 0:
-        raise ConfigError(f"{kind}: size: got {2 * half_size.min():g} m; expected above 0")
+            raise ConfigError(f"{name} of {kind}: expected finite values up to {MAX_VALUE:g}")
+    if n and not 2 * half_size.min() >= MIN_SIZE:
+        raise ConfigError(
+            f"size of {kind}: got {2 * half_size.min():g} m; expected at least {MIN_SIZE:g} m"
+        )
     shapes = np.hstack([center, half_size, _rpy_quaternions(rpy)]).astype(np.float32)
     arrays = _flags(n, friction, collides, visible) | {kind: shapes}
     return replace(Solids.empty(), **arrays)
@@ -308,11 +341,14 @@ def _rpy_quaternions(rpy: NDArray[np.float64]) -> NDArray[np.float64]:
 def _flags(
     n: int, friction: ArrayLike, collides: ArrayLike, visible: ArrayLike
 ) -> dict[str, NDArray[Any]]:
-    values = np.broadcast_to(np.asarray(friction, np.float32), n).copy()
-    if (values < 0).any() or np.isinf(values).any():
-        raise ConfigError("friction of solids: expected values from 0, or NaN for the ground's")
+    values = np.asarray(friction, float)
+    if ((values < 0) | (values > MAX_VALUE)).any():
+        raise ConfigError(
+            f"friction of solids: got {np.nanmin(values):g} to {np.nanmax(values):g}; expected "
+            f"0 to {MAX_VALUE:g}, or NaN for the friction of the ground"
+        )
     return {
-        "friction": values,
+        "friction": np.broadcast_to(values, n).astype(np.float32),
         "collides": np.broadcast_to(np.asarray(collides, bool), n).copy(),
         "visible": np.broadcast_to(np.asarray(visible, bool), n).copy(),
         "patch": np.zeros((n, 2), np.int32),
@@ -320,14 +356,9 @@ def _flags(
 
 
 def _hull_vertices(points: NDArray[np.float32]) -> NDArray[np.float32]:
-    from scipy.spatial import ConvexHull, QhullError
-
     if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= MAX_VALUE).all():
         raise ConfigError(f"hull: got shape {points.shape}; expected finite points (k, 3)")
-    try:
-        used = ConvexHull(points.astype(float)).vertices
-    except QhullError:
-        raise ConfigError("hull: got points in one plane; expected points with a volume") from None
+    used = convex_hull(points).vertices
     if len(used) > MAX_HULL_VERTICES:
         raise ConfigError(f"hull: got {len(used)} vertices; expected at most {MAX_HULL_VERTICES}")
     hull: NDArray[np.float32] = points[np.sort(used)]

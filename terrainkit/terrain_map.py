@@ -194,7 +194,8 @@ class TerrainMap:
         from terrainkit.box_decomposition import decompose_boxes
 
         config = self.config
-        return decompose_boxes(self.heights, self.grid, config.wall_threshold, self._patch_edges())
+        threshold, edges = config.wall_threshold, self._patch_edges()
+        return decompose_boxes(self.heights, self.grid, threshold, edges, self.friction)
 
     def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
         """Return the heights in the format of Isaac Gym's `add_heightfield`.

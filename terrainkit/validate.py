@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import TerrainkitError, TerrainkitWarning
+from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
 from terrainkit.layout import assign_patch, terrain_columns
 from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.parameter import format_value
-from terrainkit.patch import Patch, build_patch
+from terrainkit.patch import Parameters, Patch, build_patch
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
@@ -128,7 +128,10 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
             "by its config"
         )
     if patch.parameters != expected.parameters:
-        yield f"{location}: the recorded parameters differ from those of its config"
+        yield (
+            f"{location}: the recorded parameters differ from those of its config: "
+            f"{_different(patch.parameters, expected.parameters)}"
+        )
     is_same = {
         "friction coefficients": np.allclose(patch.friction, expected.friction, atol=1e-6),
         "solids": _same_solids(patch.solids, expected.solids),
@@ -152,6 +155,16 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
             f"{location}: heights differ by up to {error:.3f} m from the {expected.terrain} of its "
             "config: edited, moved, or with axes swapped; TerrainMap.edited() makes a custom map"
         )
+
+
+def _different(parameters: Parameters, expected: Parameters) -> str:
+    """Return the names of the parameters that differ."""
+    pairs = (
+        (parameters.requested, expected.requested),
+        (parameters.realized, expected.realized),
+    )
+    names = {n: None for a, b in pairs for n in {**a, **b} if a.get(n) != b.get(n)}
+    return listing(names)
 
 
 def _same_poses(poses: NDArray[np.float32], expected: NDArray[np.float32]) -> bool:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import terrainkit as tk
-from terrainkit import registry
+from terrainkit import presets, registry
 from terrainkit_cli.main import main
 
 README = (Path(__file__).parent.parent / "README.md").read_text()
@@ -30,6 +30,11 @@ def m():
     terrain_map.save("map.npz")
     terrain_map.save("map.xml")
     return terrain_map
+
+
+def test_readme_lists_all_presets():
+    text = README.split("\nPresets: ")[1].split(";")[0]
+    assert re.findall(r"`(\w+)`", text) == list(presets.preset_names())
 
 
 def test_readme_has_two_setup_commands():

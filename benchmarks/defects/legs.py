@@ -55,7 +55,7 @@ def fixed_leg_joint(robot: Mutant) -> Subjects:
     return names
 
 
-@mutation("LEG004", "warning", "foot that Isaac Gym collapses")
+@mutation("LEG004", "info", "foot that Isaac Gym collapses")
 def merged_foot(robot: Mutant) -> Subjects:
     joint = robot.pick(
         j for j in robot.joints() if child(j) in robot.feet() and j.get("dont_collapse")

@@ -99,7 +99,7 @@ def foreign_path(robot: Mutant) -> Subjects:
     return mesh.subjects()
 
 
-@mutation("MSH003", "warning", "package path")
+@mutation("MSH003", "info", "package path")
 def package_path(robot: Mutant) -> Subjects:
     mesh = _pick_mesh(robot)
     path = (robot.folder / mesh.element.get("filename")).resolve()
@@ -108,7 +108,7 @@ def package_path(robot: Mutant) -> Subjects:
     return mesh.subjects()
 
 
-@mutation("MSH003 MSH001", "warning", "missing package with an existing file")
+@mutation("MSH003 MSH001", "info", "missing package with an existing file")
 def missing_package(robot: Mutant) -> Subjects:
     mesh = _pick_mesh(robot)
     name = Path(mesh.element.get("filename")).name

@@ -27,6 +27,16 @@ def _misspell(robot: Mutant, name: str) -> str:
     return name.replace(word, wrong, 1)
 
 
+@mutation("NAM004 SYM007", "warning", "joint that does not turn about the axis in its name")
+def wrong_axis_name(robot: Mutant) -> Subjects:
+    axes = {"pitch": "1 0 0", "roll": "0 1 0", "yaw": "0 1 0"}
+    joint, word = robot.pick(
+        (joint, word) for joint in robot.leg_joints() for word in axes if word in joint.get("name")
+    )
+    joint.find("axis").set("xyz", axes[word])
+    return [joint.get("name")]
+
+
 @mutation("NAM001", "warning", "misspelled joint name")
 def wrong_joint_name(robot: Mutant) -> Subjects:
     joint = robot.pick(robot.leg_joints())

@@ -1,5 +1,6 @@
 """Defects of the text and the XML (XML)."""
 
+import copy
 import re
 
 from defects.mutant import Mutant, NotApplicableError, Subjects, child, mutation, origin
@@ -183,6 +184,16 @@ def wrong_origin(robot: Mutant) -> Subjects:
     joint = robot.pick(j for j in robot.actuated_joints() if j.find("origin") is not None)
     element = joint.find("origin")
     element.set(robot.pick(["xzy", "xyx"]), element.attrib.pop("xyz"))
+    return [joint.get("name")]
+
+
+@mutation("XML015", "error", "element that occurs twice")
+def repeated_element(robot: Mutant) -> Subjects:
+    joint = robot.pick(robot.actuated_joints())
+    element = joint.find(robot.pick(["axis", "limit", "origin"]))
+    if element is None:
+        raise NotApplicableError
+    joint.append(copy.deepcopy(element))
     return [joint.get("name")]
 
 

@@ -66,6 +66,10 @@ class Onboard(Command):
     spec: InputPath = ""
     """A robot.toml whose values override the derived ones, such as one that you have edited."""
 
+    gains: Literal["stand", "train"] = "stand"
+    """PD gains to suggest: those that hold the default pose without a policy; or softer ones for
+    training, as in published configurations, with action scales of about 0.25 rad."""
+
     unsafe_fixes: Flag = False
     """Also apply fixes that change a number, a shape or a mesh. The input file is not changed."""
 
@@ -123,6 +127,7 @@ class Onboard(Command):
             frameworks=tuple(word for words in self.config for word in split_commas(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
             spec=Path(self.spec) if self.spec else None,
+            gains=self.gains,
             unsafe_fixes=self.unsafe_fixes,
             force=self.force,
             overwrite=self.overwrite,

@@ -87,6 +87,9 @@ class CheckRobot(Command):
     strict: Flag = False
     """Exit with code 1 if there are warnings."""
 
+    notes: Flag = False
+    """Print notes in full; the text report has one line for each."""
+
     fix: Flag = False
     """Apply the safe fixes: they do not change the robot for any parser that reads the file."""
 
@@ -188,11 +191,16 @@ class CheckRobot(Command):
             text = diff
             if reports and not text:
                 render.note("there is nothing to fix")
-        elif output is None and self.format == "text" and render.has_colors():
-            from terrainkit_robots.lint.report.text import format_lines
+        elif self.format == "text":
+            from terrainkit_robots.lint.report import text as text_report
 
-            render.styled(format_lines(reports, width=render.width()))
-            return
+            if output is None and render.has_colors():
+                lines = text_report.format_lines(
+                    reports, width=render.width(), notes=bool(self.flag("notes"))
+                )
+                render.styled(lines)
+                return
+            text = text_report.format_reports(reports, notes=bool(self.flag("notes")))
         else:
             text = format_reports(reports, self.format)
         if output is None:

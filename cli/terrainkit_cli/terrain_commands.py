@@ -157,7 +157,7 @@ def _parameter_value(text: str, parameter: Parameter | None) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class List(Command):
-    """List the terrains, overlays and presets, or the parameters of one."""
+    """List terrains, overlays and presets, or the parameters of one."""
 
     terrain: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="[NAME]", help_behavior_hint="")

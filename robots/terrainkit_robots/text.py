@@ -1,5 +1,6 @@
 """Format names, counts and paths for messages."""
 
+import re
 from collections.abc import Container, Iterable
 from pathlib import Path
 
@@ -16,6 +17,23 @@ def names(words: Iterable[str], max_count: int = 6, separator: str = ", ") -> st
 def count(number: int, word: str) -> str:
     """Return a number and a noun, such as `1 leg` or `4 legs`."""
     return f"{number:,} {word}{'' if number == 1 else 's'}"
+
+
+def contrast(value: float, limit: float, spec: str) -> tuple[str, str]:
+    """Return a value and the limit that it exceeds, with enough digits to tell them apart.
+
+    Args:
+        value: The value.
+        limit: The limit.
+        spec: Format of the value, such as `.1f` or `.0%`; more digits are added where necessary.
+    """
+    digits, kind = int(spec[1:-1]), spec[-1]
+    while True:
+        texts = f"{value:.{digits}{kind}}", f"{limit:.{digits}{kind}}"
+        if texts[0] != texts[1] or digits > 15:
+            break
+        digits += 1
+    return texts[0], re.sub(r"\.0+(?=%?$)", "", texts[1])
 
 
 def one_line(text: str) -> str:

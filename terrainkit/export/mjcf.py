@@ -13,7 +13,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.box_decomposition import BoxDecomposition, flat_cells, merge_boxes, neighborhood
+from terrainkit.box_decomposition import (
+    BoxDecomposition,
+    changes,
+    flat_cells,
+    merge_boxes,
+    neighborhood,
+)
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.solid_raster import SolidRaster
@@ -56,7 +62,8 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         collision: hfield: one heightfield, whose walls are slopes over one cell. boxes: boxes with
             vertical walls for the flat ground of patches with walls, and heightfields for the rest,
             if any, whose walls are slopes over one cell. auto: boxes if they cover all of the
-            ground and are so few that a step of a robot is faster than on a heightfield.
+            ground and are so few that a step of a robot is faster than on a heightfield. Boxes and
+            heightfields are divided where the friction changes.
 
     Raises:
         ConfigError: if `collision` is invalid.
@@ -70,19 +77,25 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     _add_default_class(root, terrain_map)
     asset = ET.SubElement(root, "asset")
     world = ET.SubElement(root, "worldbody")
+    heights, static = terrain_map.heights, float(terrain_map.config.static_friction)
     if cover is None:
         x, y = _patch_edges(terrain_map)
-        patches = slice(x[0], x[-1]), slice(y[0], y[-1])
-        _add_hfield(asset, world, "terrain", terrain_map, terrain_map.heights, patches)
+        parts = [(slice(x[0], x[-1]), slice(y[0], y[-1]))]
         for box in _border_boxes(terrain_map):
             _add_box(world, *box)
     else:
-        heights = without_boxes(terrain_map.heights, cover)
-        for k, part in enumerate(_uncovered_parts(terrain_map, cover)):
-            _add_hfield(asset, world, f"terrain_{k}", terrain_map, heights, part)
-        for box in zip(cover.centers, cover.half_sizes, strict=True):
-            _add_box(world, *box)
-    _add_solids(asset, world, terrain_map.solids)
+        heights = without_boxes(heights, cover)
+        parts = _uncovered_parts(terrain_map, cover)
+        boxes = zip(cover.centers, cover.half_sizes, cover.friction, strict=True)
+        for center, half_size, friction in boxes:
+            _set_friction(_add_box(world, center, half_size), friction, static)
+    # Padding provides the samples beyond the map where there is no border.
+    heights = np.pad(heights, _RINGS, mode="edge")
+    split = [each for part in parts for each in _split_by_friction(terrain_map, part)]
+    for k, (part, friction) in enumerate(split):
+        name = "terrain" if cover is None and len(split) == 1 else f"terrain_{k}"
+        _set_friction(_add_hfield(asset, world, name, terrain_map, heights, part), friction, static)
+    _add_solids(asset, world, terrain_map.solids, static)
     ET.indent(root)
     ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
@@ -95,8 +108,10 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
         threshold = terrain_map.config.wall_threshold
         if not flat_cells(terrain_map.heights, terrain_map.grid, threshold).all():
             return None
-        cover = terrain_map.boxes()
-        return cover if len(cover.centers) <= MAX_BOXES else None
+        cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
+        num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
+        # Of two geoms of either kind, a box was measured to be faster than a heightfield.
+        return cover if len(cover.centers) <= max(MAX_BOXES, 2 * num_hfields) else None
     return terrain_map.boxes()
 
 
@@ -160,6 +175,36 @@ def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list
     ]
 
 
+def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Part, float]]:
+    """Return disjoint parts of the quads between the samples of a part, and their friction.
+
+    The friction changes at a sample, half a cell beyond the edge of the cells that have it.
+    """
+    friction = np.pad(terrain_map.friction, _RINGS, mode="edge")[part]
+    x, y = changes(friction), changes(friction.T)
+    i, j = (each.ravel() for each in np.indices((len(x) - 1, len(y) - 1)))
+    values = friction[x[i], y[j]]
+    merged = merge_boxes(np.column_stack([values, x[i], x[i + 1], y[j], y[j + 1]]))
+    first, last = ([each.start for each in part], [each.stop for each in part])
+    result = []
+    for value, i0, i1, j0, j1 in merged.tolist():
+        rows = slice(int(first[0] + i0), min(int(first[0] + i1) + 1, last[0]))
+        cols = slice(int(first[1] + j0), min(int(first[1] + j1) + 1, last[1]))
+        if rows.stop - rows.start > 1 and cols.stop - cols.start > 1:
+            result.append(((rows, cols), value))
+    return result
+
+
+def _set_friction(geom: ET.Element, friction: float, static: float) -> None:
+    """Set the friction of a geom if it is not that of the map.
+
+    Its priority is above that of a robot, since MuJoCo otherwise uses the larger of two frictions.
+    """
+    if np.float32(friction) != np.float32(static):
+        geom.set("friction", _numbers(friction, 0.005, 0.0001))
+        geom.set("priority", "2")
+
+
 def _add_hfield(
     asset: ET.Element,
     world: ET.Element,
@@ -167,10 +212,10 @@ def _add_hfield(
     terrain_map: "TerrainMap",
     heights: NDArray[np.float32],
     part: _Part,
-) -> None:
+) -> ET.Element:
+    """Add a part of the padded heights as a heightfield."""
     cell = terrain_map.config.cell
-    # Padding provides the samples beyond the map where there is no border.
-    samples = np.pad(heights, _RINGS, mode="edge")[part]
+    samples = heights[part]
     low = float(samples.min())
     levels = np.rint((samples - low) / _QUANTUM).astype(np.int32)
     span = max(int(levels.max()), 1) * _QUANTUM  # MuJoCo requires a range above 0
@@ -187,7 +232,8 @@ def _add_hfield(
         elevation="\n".join(" ".join(map(str, row.tolist())) for row in levels.T[::-1]),
     )
     position = _numbers(*np.add(terrain_map.grid.lower, middle), low)
-    ET.SubElement(world, "geom", {"class": "terrain"}, type="hfield", hfield=name, pos=position)
+    about = {"class": "terrain", "type": "hfield", "hfield": name, "pos": position}
+    return ET.SubElement(world, "geom", about)
 
 
 def _border_boxes(
@@ -239,12 +285,12 @@ def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDAr
 
 def _add_box(
     world: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]
-) -> None:
+) -> ET.Element:
     position, size = _numbers(*center), _numbers(*half_size)
-    ET.SubElement(world, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
+    return ET.SubElement(world, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
 
 
-def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids) -> None:
+def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids, static: float) -> None:
     """Add one geom for each solid. Rays of group 3 are off by default, as for hidden geoms."""
     hulls = solids.hulls()
     for k, vertices in enumerate(hulls):
@@ -266,7 +312,7 @@ def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids) -> None:
     for given, (friction, collides, visible) in zip(attributes, flags, strict=True):
         geom = ET.SubElement(world, "geom", {"class": "terrain", **given})
         if not np.isnan(friction):
-            geom.set("friction", _numbers(friction, 0.005, 0.0001))
+            _set_friction(geom, friction, static)
         if not collides:
             geom.set("contype", "0")
             geom.set("conaffinity", "0")

@@ -17,7 +17,7 @@ from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
 from terrainkit.parameter import MAX_VALUE, Value
 from terrainkit.patch import Parameters
-from terrainkit.solids import Solids
+from terrainkit.solids import MAX_HULL_VERTICES, MIN_SIZE, Solids, convex_hull
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -208,10 +208,10 @@ def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
     shapes = np.concatenate([boxes, cylinders])
     is_valid = {
         "boxes and cylinders": (np.abs(shapes) <= MAX_VALUE).all()
-        and (shapes[:, 3:6] > 0).all()
+        and (shapes[:, 3:6] >= np.float32(MIN_SIZE / 2)).all()
         and (np.abs(np.linalg.norm(shapes[:, 6:], axis=1) - 1) < 1e-3).all(),
         "hulls": (np.abs(vertices) <= MAX_VALUE).all()
-        and (counts >= 4).all()
+        and ((counts >= 4) & (counts <= MAX_HULL_VERTICES)).all()
         and counts.sum(dtype=np.int64) == len(vertices),
         "solid_friction": not (solids.friction < 0).any() and not np.isinf(solids.friction).any(),
         "solid_patch": ((solids.patch >= 0) & (solids.patch < size)).all(),
@@ -219,6 +219,11 @@ def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
     for key, valid in is_valid.items():
         if not valid:
             raise MapFileError(f"{archive.path}: {key}: got invalid values or sizes")
+    try:
+        for hull in solids.hulls():
+            convex_hull(hull)
+    except ConfigError as error:
+        raise MapFileError(f"{archive.path}: {error}") from error
     return solids
 
 

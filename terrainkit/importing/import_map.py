@@ -1,5 +1,6 @@
 """Import a file of heights or a mesh as a map."""
 
+import hashlib
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +19,7 @@ from terrainkit.importing.overhangs import overhang_solids
 from terrainkit.importing.source import Source, fill_missing, open_source
 from terrainkit.measured_difficulty import measured_difficulty
 from terrainkit.memory import check_memory
-from terrainkit.parameter import MAX_VALUE
+from terrainkit.parameter import MAX_TEXT_LENGTH, MAX_VALUE
 from terrainkit.patch import Parameters
 from terrainkit.solids import Solids
 from terrainkit.sub_terrain import SubTerrain
@@ -157,7 +158,7 @@ def _make_config(
         patch_size=(sizes[0], sizes[1]),
         cell=cell,
         border=options.border,
-        terrains=(SubTerrain(terrain="flat", name=path.stem),),
+        terrains=(_sub_terrain(path, options),),
         mode="custom",
         slope_threshold=options.slope_threshold,
         spawns_per_patch=options.spawns_per_patch,
@@ -168,6 +169,27 @@ def _make_config(
     return config, origin
 
 
+def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
+    """Return the terrain that records the file and how it was read."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    low, high = options.height_range or (0.0, 0.0)
+    return SubTerrain(
+        terrain="imported",
+        name=path.stem,
+        parameters={
+            "file": path.name[:MAX_TEXT_LENGTH],
+            "sha256": digest,
+            "vertical_exaggeration": 1.0,
+            "file_cell": options.file_cell or 0.0,
+            "height_span": abs(high - low),
+            "scale": options.scale or 0.0,
+            "up": options.up,
+            "missing": options.missing,
+        },
+    )
+
+
 def _moved(columns: Columns, z: float) -> Columns:
     return Columns(top=columns.top - z, floor=columns.floor - z, ceiling=columns.ceiling - z)
 
@@ -176,11 +198,12 @@ def _make_map(config: MapConfig, heights: NDArray[np.float32], solids: Solids) -
     size = (config.rows, config.cols)
     spawns, parameters = np.empty(size, dtype=object), np.empty(size, dtype=object)
     measured = np.empty(size)
+    record = config.sub_terrains[0].at(0.0).requested()
     for row, col in np.ndindex(size):
         x, y = config.patch_grid(row, col).center
         center = np.array([[x, y, 0.0, 0.0]], dtype=np.float32)
         spawns[row, col] = place_patch_spawns(config, heights, solids, row, col, center, _NO_GOALS)
-        parameters[row, col] = Parameters(requested={}, realized={})
+        parameters[row, col] = Parameters(requested=record, realized=record)
         (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
         start = float(spawns[row, col][0, 2])
         measured[row, col] = measured_difficulty(
@@ -191,6 +214,7 @@ def _make_map(config: MapConfig, heights: NDArray[np.float32], solids: Solids) -
         config=config,
         grid=config.grid,
         heights=heights,
+        friction=np.broadcast_to(np.float32(config.static_friction), heights.shape),
         spawns=pad_poses(spawns),
         terrain_types=np.zeros(size, dtype=np.int32),
         terrain_names=(config.sub_terrains[0].name,),

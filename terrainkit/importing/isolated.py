@@ -27,12 +27,12 @@ def run_isolated(
         function: Name of the function.
         path: File that the function reads.
         *arguments: Further arguments of the function.
-        subject: Start of the error; the path by default.
+        subject: Start of the error; the path and "cannot be read" by default.
 
     Raises:
         HeightFileError: if the function fails, crashes, or exceeds a limit.
     """
-    subject = subject or str(path)
+    subject = subject or f"{path}: cannot be read"
     script = Path(__file__).with_name("child_process.py")
     with tempfile.TemporaryDirectory(prefix="terrainkit-") as folder:
         target = Path(folder) / "result.npz"
@@ -47,7 +47,7 @@ def run_isolated(
         except subprocess.CalledProcessError as error:
             lines = error.stderr.decode(errors="replace").strip().splitlines()
             reason = lines[-1] if lines and error.returncode > 0 else "the reader crashed"
-            raise HeightFileError(f"{subject}: cannot be read: {truncate(reason, 200)}") from None
+            raise HeightFileError(f"{subject}: {truncate(reason, 200)}") from None
 
 
 def check_file(path: Path) -> None:

@@ -1,5 +1,6 @@
 """Raster: heights at the centers of square cells."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
-from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.source import Array
+from terrainkit.importing.options import Missing, ReadOptions
+from terrainkit.importing.source import Array, fill_missing, open_source
 from terrainkit.memory import check_memory
 
 _BYTES_PER_VALUE = 24
+_BYTES_PER_SAMPLE = 100
 
 _ALIGNED = 1e-4
 """Distance to a sample below which its height is taken without interpolation [cells]."""
@@ -52,6 +54,35 @@ class Raster:
         grid = np.meshgrid(*index, indexing="ij")
         between: Array = map_coordinates(self.values.astype(float), grid, order=1, mode="nearest")
         return between
+
+
+def read_raster(path: Path, options: ReadOptions, missing: Missing, cell: float) -> Raster:
+    """Return all heights of a file, without missing ones.
+
+    Args:
+        path: The file.
+        options: How it is read.
+        missing: What happens to missing heights.
+        cell: Distance between two samples of a mesh [m].
+
+    Raises:
+        HeightFileError: if the file cannot be read, or heights are missing.
+        ConfigError: if an option is missing or does not apply to the file.
+        MemoryLimitError: if the heights of a mesh would not fit in memory.
+    """
+    source = open_source(path, options)
+    cell = source.cell or cell
+    counts = [
+        max(1, math.floor((high - low) / cell + _ALIGNED))
+        for low, high in zip(source.lower, source.upper, strict=True)
+    ]
+    check_memory(math.prod(counts) * _BYTES_PER_SAMPLE, f"{path} with cells of {cell:g} m")
+    x, y = (
+        low + (np.arange(count, dtype=np.float64) + 0.5) * cell
+        for low, count in zip(source.lower, counts, strict=True)
+    )
+    heights = fill_missing(path, source.heights(x, y), missing, x, y)
+    return Raster(values=heights.astype(np.float32), cell=cell, lower=source.lower)
 
 
 def make_raster(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ExportError
 from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.solids import Solids, rotation_matrices
+from terrainkit.solids import Solids, convex_hull, rotation_matrices
 
 MAX_CHORD_ERROR = 5e-4
 """Largest distance between a cylinder and its mesh, half of it inside and half outside [m]."""
@@ -91,9 +91,7 @@ def _cylinder(radius: float, half_length: float) -> tuple[NDArray[np.float64], N
 
 
 def _hull(vertices: NDArray[np.float32]) -> TriMesh:
-    from scipy.spatial import ConvexHull
-
-    hull = ConvexHull(vertices.astype(float))
+    hull = convex_hull(vertices)
     faces = hull.simplices
     corners = vertices[faces].astype(float)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.features.gradient_noise import perlin_noise
+from terrainkit.features.noise import ValueNoise
 from terrainkit.free_space import CONTACT
-from terrainkit.gradient_noise import perlin_noise
 from terrainkit.grid import Grid
-from terrainkit.noise import ValueNoise
 from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized
 from terrainkit.patch_geometry import PatchGeometry

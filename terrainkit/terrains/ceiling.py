@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.frame import frame_rectangles
+from terrainkit.features.frame import frame_rectangles
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids, make_boxes
 from terrainkit.terrain import Terrain

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
+from terrainkit.features.lane import lane_goals, lane_positions, lane_spawn
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_positions, lane_spawn
 from terrainkit.solids import Solids, make_boxes
 from terrainkit.terrain import Terrain
 
@@ -67,7 +67,7 @@ class Crawl(Terrain):
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the first edge and the depth of each bar along x [m]."""
-        x = lane_positions(grid, self.start, self.max_depth, self.spacing)
+        x = lane_positions("crawl", grid, self.start, self.max_depth, self.spacing)
         if self.min_depth > self.max_depth or not len(x):
             raise ConfigError(
                 f"crawl: got min_depth {self.min_depth:g} m, max_depth {self.max_depth:g} m and "

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import make_ramps
+from terrainkit.features.blocks import make_ramps
+from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.ramp_field import ramp_cells
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_spawn
-from terrainkit.ramp_field import ramp_cells
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 

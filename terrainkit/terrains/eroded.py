@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.erosion import erode
-from terrainkit.gradient_noise import fractal_noise, unit_relief
+from terrainkit.features.erosion import erode
+from terrainkit.features.gradient_noise import fractal_noise, unit_relief
 from terrainkit.grid import Grid
 from terrainkit.terrain import Terrain
 

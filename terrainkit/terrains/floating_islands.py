@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
+from terrainkit.features.pit_ground import pit_around
+from terrainkit.features.scatter import scatter
 from terrainkit.grid import Grid
-from terrainkit.pit_ground import pit_around
-from terrainkit.scatter import scatter
 from terrainkit.solids import Solids, make_boxes, make_cylinders
 from terrainkit.terrain import Terrain
 
@@ -56,7 +56,7 @@ class FloatingIslands(Terrain):
         xy, parent, _ = self._layout(grid, rng)
         z = np.full((len(xy), 1), -self.thickness / 2)
         islands = make_cylinders(np.hstack([xy, z])[1:], self.radius, self.thickness)
-        # Walkways end within the islands and the platform, whose half side is at least this far.
+        # A walkway overlaps both of its ends, so that its corners are not over the pit.
         inside = 0.8 * np.full(len(xy), self.radius)
         inside[0] = 0.4 * grid.length(min(grid.centered(self.platform)))
         start, end = xy[parent[1:]], xy[1:]

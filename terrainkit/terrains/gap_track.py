@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.features.lane import lane_goals, lane_slots, lane_spawn, slot_centers
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_slots, lane_spawn, slot_centers
 from terrainkit.terrain import Terrain
 
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import SINK
+from terrainkit.features.lane import lane_goals, lane_spawn
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_spawn
 from terrainkit.parameter import MAX_COUNT
 from terrainkit.solids import Solids, make_boxes, make_cylinders
 from terrainkit.terrain import Terrain

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import make_walls, number_that_fits
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import make_walls, number_that_fits
+from terrainkit.features.maze_layout import MazeLayout, sample_maze
 from terrainkit.grid import Grid
-from terrainkit.maze_layout import MazeLayout, sample_maze
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 

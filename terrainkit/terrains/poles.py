@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import SINK
+from terrainkit.features.scatter import scatter
 from terrainkit.grid import Grid
-from terrainkit.scatter import scatter
 from terrainkit.solids import Solids, make_cylinders
 from terrainkit.terrain import Terrain
 

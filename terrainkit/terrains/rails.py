@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import make_standing_boxes
 from terrainkit.errors import ConfigError
-from terrainkit.frame import frame_rectangles
+from terrainkit.features.blocks import make_standing_boxes
+from terrainkit.features.frame import frame_rectangles
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain

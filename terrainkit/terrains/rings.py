@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.features.pit_ground import pit_around
 from terrainkit.grid import Grid
-from terrainkit.pit_ground import pit_around
 from terrainkit.terrain import Terrain
 
 

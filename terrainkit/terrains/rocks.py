@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.gradient_noise import fractal_noise, unit_relief
+from terrainkit.features.gradient_noise import fractal_noise, unit_relief
+from terrainkit.features.scatter import scatter
 from terrainkit.grid import Grid
-from terrainkit.scatter import scatter
 from terrainkit.solids import Solids, make_hulls
 from terrainkit.terrain import Terrain
 

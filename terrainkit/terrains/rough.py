@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
+from terrainkit.features.noise import STEP, ValueNoise
 from terrainkit.grid import Grid
-from terrainkit.noise import STEP, ValueNoise
 from terrainkit.parameter import Realized
 from terrainkit.terrain import Terrain
 

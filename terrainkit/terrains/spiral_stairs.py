@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import MAX_PER_AXIS, SINK
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import MAX_PER_AXIS, SINK
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids, make_cylinders, make_hulls
 from terrainkit.terrain import Terrain

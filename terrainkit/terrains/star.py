@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import make_standing_boxes
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
+from terrainkit.features.lane import lane_goals, lane_spawn
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_spawn
 from terrainkit.terrain import Terrain
 
 _POSTS = 10
@@ -21,7 +21,7 @@ class Stepfield(Terrain):
 
     Flat fields, hills and diagonal hills alternate, as in the stepfields of response-robot tests.
     Neighboring posts, and the outermost posts and the ground, differ by at most 2 units. The robot
-    is spawned at low x. There is a goal behind each field.
+    is spawned at low x. There is a goal on each field but the last, and one behind the fields.
     """
 
     unit: float = parameter.height(0.02, 0.1)
@@ -52,19 +52,29 @@ class Stepfield(Terrain):
         levels = 1 + hill + np.floor(rng.random(kind.shape) * np.where(kind == 0, 4, 2))
         levels = np.minimum(levels, _lowest_neighbor(levels) + 2)
         ground = np.zeros(grid.shape)
-        first, last = grid.cells(self.start), (grid.shape[1] - ny * _POSTS * side) // 2
+        i, j = grid.cells(self.start), self._first_across(grid)
         block = np.kron(levels, np.ones((side, side)))
-        ground[first : first + block.shape[0], last : last + block.shape[1]] = self.unit * block
+        ground[i : i + block.shape[0], j : j + block.shape[1]] = self.unit * block
         return ground
 
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
-        """Return a goal on the last posts of each field, and one on the flat strip behind them."""
-        field = _POSTS * grid.length(grid.cells(self.post))
-        x = grid.lower[0] + grid.length(grid.cells(self.start))
-        edges = x + np.arange(1, self._counts(grid)[0] + 1) * field
-        return lane_goals(grid, [*edges[:-1], (edges[-1] + grid.upper[0]) / 2])
+        """Return a goal on a last post of each field but the last, and one behind the fields."""
+        side, (nx, ny) = grid.cells(self.post), self._counts(grid)
+        end = grid.cells(self.start) + _POSTS * side * np.arange(1, nx + 1)
+        middle = self._first_across(grid) + _POSTS * side * ny // 2
+        x = grid.lower[0] + grid.cell * np.append(
+            end[:-1] - side / 2, (end[-1] + grid.shape[0]) / 2
+        )
+        goals = lane_goals(grid, x)
+        # The middle of a field is a wall between two posts.
+        goals[:-1, 1] = grid.lower[1] + grid.cell * (middle - side / 2)
+        return goals
+
+    def _first_across(self, grid: Grid) -> int:
+        """Return the first cell of the fields along y; the fields are centered."""
+        return (grid.shape[1] - self._counts(grid)[1] * _POSTS * grid.cells(self.post)) // 2
 
     def _counts(self, grid: Grid) -> tuple[int, int]:
         """Return the number of fields along x and y."""

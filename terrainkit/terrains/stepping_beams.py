@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import make_standing_boxes
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import make_standing_boxes
+from terrainkit.features.lane import lane_slots, lane_spawn
+from terrainkit.features.pit_ground import pit_between
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_slots, lane_spawn
-from terrainkit.pit_ground import pit_between
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import SINK, make_blocks, number_that_fits
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.pit_ground import pit_between, pit_bounds
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_spawn
-from terrainkit.pit_ground import pit_across, pit_bounds
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 
@@ -47,7 +47,8 @@ class StoneRows(Terrain):
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the pit between the flat strips."""
-        return pit_across(grid, self.depth, self.start)
+        low, high = pit_bounds(grid, self.start)
+        return pit_between(grid, self.depth, low[0], high[0])
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the stones, and the block behind the last pair."""

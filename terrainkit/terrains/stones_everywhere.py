@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.features.pit_ground import pit_around, pit_bounds
 from terrainkit.grid import Grid
-from terrainkit.pit_ground import pit_around, pit_bounds
 from terrainkit.solids import Solids
 from terrainkit.terrain import Terrain
 

@@ -80,7 +80,7 @@ def test_terrain_columns_of_legged_gym():
 
 def test_terrain_columns_reject_missing_custom_sub_terrain():
     with pytest.raises(
-        ConfigError, match=r"2 columns are too few for 3 sub-terrains .*: no column for pit$"
+        ConfigError, match=r"cols: got 2, too few for 3 sub-terrains .*: no column for pit$"
     ):
         terrain_columns(MapConfig(cols=2, terrains=(FLAT, GAP, PIT)))
 
@@ -88,7 +88,7 @@ def test_terrain_columns_reject_missing_custom_sub_terrain():
 def test_terrain_columns_warn_of_missing_preset_sub_terrain():
     with pytest.warns(
         TerrainkitWarning,
-        match=r"4 columns are too few for 5 sub-terrains .*: no column for wave \(preset rough\)",
+        match=r"cols: got 4, too few for 5 sub-terrains .*: no column for wave \(preset rough\)",
     ):
         columns = terrain_columns(MapConfig(cols=4, preset="rough"))
     assert columns == [0, 1, 2, 3]

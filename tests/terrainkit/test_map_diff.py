@@ -6,6 +6,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.map_diff import diff_maps
+from terrainkit.overlays.mirror import Mirror
 from terrainkit.solids import make_boxes, make_cylinders
 
 CRAWL, ROUGH, STAIRS = (SubTerrain(terrain=name) for name in ("crawl", "rough", "stairs"))
@@ -42,6 +43,14 @@ def test_diff_maps_of_equal_maps_is_empty(terrain_map, tmp_path):
             {"terrains": (CRAWL, replace(ROUGH, parameters={"amplitude": 0.1}), STAIRS)},
             ["terrains[1].amplitude: none -> 0.1"],
         ),
+        (
+            {"terrains": (CRAWL, replace(ROUGH, overlays=(Mirror(),), friction=0.5), STAIRS)},
+            [
+                "terrains[1].friction: none -> 0.5",
+                'terrains[1].overlays[0].overlay: none -> "mirror"',
+                'terrains[1].overlays[0].axis: none -> "y"',
+            ],
+        ),
     ],
 )
 def test_diff_maps_names_config_keys(terrain_map, changes, lines):
@@ -60,6 +69,13 @@ def test_diff_maps_compares_heights(terrain_map):
     border = diff_maps(terrain_map, changed(terrain_map, "heights", (2, 3), 0.5))
     assert border.grid == ("the border: heights differ by up to 0.5 m",)
     assert border.patches == {}
+
+
+def test_diff_maps_compares_friction(terrain_map):
+    friction = terrain_map.friction.copy()
+    friction[85 + 3, 6] = friction[85 + 4, 6] = 0.5
+    diff = diff_maps(replace(terrain_map, friction=friction), terrain_map)
+    assert diff.patches == {(1, 0): ("friction at 2 of 6,400",)}
 
 
 def test_diff_maps_reports_invalid_heights(terrain_map):

@@ -112,3 +112,12 @@ def test_spans_agree_with_mujoco(number):
             hits += 1
             assert start + direction * distance == pytest.approx(expected, abs=1e-3)
     assert hits >= 20 * min(number, 10)
+
+
+@pytest.mark.parametrize("rpy", [(np.pi / 2, 0, 0), (0, np.pi / 2, 0), (np.pi / 2, 0, 0.3)])
+def test_spans_radius_does_not_raise_a_cylinder(rpy):
+    index = SolidIndex(make_cylinders((0, 0, 1.2), 0.1, 2.0, rpy=rpy), radius=0.5)
+    xy = np.random.default_rng(0).uniform(-0.2, 0.2, (100, 2))
+    bottom, top = np.moveaxis(index.spans(xy), -1, 0)
+    assert bottom == pytest.approx(np.full((100, 1), 1.1), abs=1e-5)
+    assert top == pytest.approx(np.full((100, 1), 1.3), abs=1e-5)

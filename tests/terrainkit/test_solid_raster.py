@@ -45,3 +45,11 @@ def test_solid_raster_agrees_with_the_index_within_a_pixel():
     ]
     found = SolidRaster(solids).top(xy[:, 0], xy[:, 1], z)
     assert np.isclose(found, near, atol=1e-5).any(axis=0).mean() > 0.99
+
+
+def test_solid_raster_is_empty_outside_of_the_solids():
+    raster = SolidRaster(make_boxes((0, 0, 0), (2, 2, 2)))
+    outside = np.array([-1.02, 1.02], dtype=np.float32)
+    zero = np.zeros(2, dtype=np.float32)
+    assert np.isneginf(raster.top(outside, zero, 0.0)).all()
+    assert np.isneginf(raster.top(zero, outside, 0.0)).all()

@@ -28,19 +28,33 @@ def test_make_boxes_rpy_turns_around_fixed_axes():
     assert rotation_matrices(quarter)[0] == pytest.approx(np.array(expected), abs=1e-7)
 
 
-def test_make_boxes_of_no_centers_is_empty():
-    assert len(make_boxes(np.empty((0, 3)), (1, 1, 1))) == 0
+@pytest.mark.parametrize("center", [[], np.empty((0, 3))], ids=["list", "array"])
+def test_make_solids_without_centers_is_empty(center):
+    assert len(make_boxes(center, (1, 1, 1))) == 0
+    assert len(make_cylinders(center, 0.1, 1.0, friction=0.5)) == 0
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: make_boxes((0, 0, 0), (1, 0, 1)), "size: got 0 m; expected above 0"),
-        (lambda: make_boxes((0, np.nan, 0), (1, 1, 1)), "center: expected finite"),
-        (lambda: make_cylinders((0, 0, 0), -1, 1), "size: got -2 m; expected above 0"),
-        (lambda: make_boxes((0, 0, 0), (1, 1, 1), friction=-1), "friction"),
+        (
+            lambda: make_boxes((0, 0, 0), (1, 0, 1)),
+            "size of boxes: got 0 m; expected at least 0.0001 m",
+        ),
+        (
+            lambda: make_boxes((0, 0, 0), (1, 1e-60, 1)),
+            "size of boxes: got 1e-60 m; expected at least",
+        ),
+        (lambda: make_boxes((0, 0), (1, 1, 1)), r"shapes \(2,\), \(3,\), \(3,\); expected"),
+        (lambda: make_boxes([[0, 0, 0]] * 2, [[1, 1, 1]] * 3), "expected .* or the same"),
+        (lambda: make_boxes((0, np.nan, 0), (1, 1, 1)), "center of boxes: expected finite"),
+        (lambda: make_cylinders((0, 0, 0), -1, 1), "size of cylinders: got -2 m"),
+        (lambda: make_boxes((0, 0, 0), (1, 1, 1), friction=-1), "friction of solids: got -1 to -1"),
+        (lambda: make_boxes((0, 0, 0), (1, 1, 1), friction=1e40), "friction of solids: got 1e"),
         (lambda: make_hulls([TETRAHEDRON[:3]]), "hull"),
         (lambda: make_hulls([TETRAHEDRON * [1, 1, 0]]), "points in one plane"),
+        (lambda: make_hulls([np.empty((0, 3))]), "hull: got points in one plane"),
+        (lambda: make_hulls([TETRAHEDRON * 1e-5]), "hull: got a volume of 1.6.*e-16 m.3; expected"),
     ],
 )
 def test_make_solids_rejects_invalid_values(make, message):

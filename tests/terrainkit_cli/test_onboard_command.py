@@ -41,6 +41,13 @@ def test_onboard_quadruped(here, tmp_path):
     assert (tmp_path / "robot/genesis_config.py").exists()
 
 
+def test_onboard_skips_unsupported_framework(here, tmp_path):
+    code, out, _ = here("arm.urdf", NO_PICTURES, "--config", "legged_gym,isaaclab")
+    assert code == 0
+    assert "skipped   legged_gym: arm has no legs" in out
+    assert (tmp_path / "arm/isaaclab_config.py").exists()
+
+
 def test_onboard_default_folder_is_robot_name(here, tmp_path):
     assert here("arm.urdf", NO_PICTURES)[0] == 0
     assert (tmp_path / "arm/robot.toml").exists()
@@ -96,7 +103,6 @@ def test_onboard_does_not_suggest_force_without_robot(here, tmp_path):
         (["arm.urdf", "-o", "no/where"], "the folder no does not exist"),
         (["arm.urdf", "-o", "arm.urdf"], "is not a folder"),
         (["arm.urdf", "--config", "gym"], "framework: got 'gym'; expected: "),
-        (["arm.urdf", "--config", "legged_gym"], "no legs"),
         (["arm.urdf", "--spec", "arm.urdf"], "arm.urdf: not a TOML file"),
         (["arm.urdf", "--spec", "none.toml"], "cannot read none.toml"),
         (["arm.urdf", "--base", "flying"], "--base"),

@@ -71,7 +71,7 @@ def test_check_robot_exit_code(here, words, code):
 @pytest.mark.usefixtures("folder")
 def test_check_robot_prints_file_and_line(terrainkit):
     run = terrainkit("check-robot", "bad.urdf", "--select", "negative-mass")
-    assert "\nerror INR002 negative-mass\n  bad.urdf:4: " in run.stdout
+    assert "\nerror INR002 negative-mass\n  line 4: " in run.stdout
     assert run.stdout.endswith("\nbad.urdf: 1 error\n")
     assert run.stderr == ""
 
@@ -266,7 +266,7 @@ def test_check_robot_avoids_slow_imports():
 def test_check_robot_fix_writes_file(here, folder):
     run = here("check-robot", "unnamed.urdf", "--fix")
     assert run.returncode == 0
-    assert "\nfixed\n  unnamed.urdf:2: XML003, " in run.stdout
+    assert "\nfixed\n  line 2: XML003, " in run.stdout
     assert run.stdout.endswith("\nunnamed.urdf: no problems found\n")
     text = (folder / "unnamed.urdf").read_text()
     assert re.sub(r"<robot [^>]*>", "<robot>", text) == UNNAMED

@@ -166,7 +166,7 @@ def test_generate_warns_of_preset_without_column(terrainkit):
     run = terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs")
     assert run.returncode == 0
     assert run.stderr == (
-        "terrainkit: warning: 2 columns are too few for 3 sub-terrains at these proportions: "
+        "terrainkit: warning: cols: got 2, too few for 3 sub-terrains at these proportions: "
         "no column for pyramid_stairs_inverted (preset stairs)\n"
     )
 

@@ -22,6 +22,7 @@ from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
     simulator_orders,
 )
+from terrainkit_robots.analysis.symmetry.copies import copied_pairs
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, detect_mirror
 from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.analysis.symmetry.mirror_pairs import (
@@ -223,6 +224,11 @@ class Facts:
     def mirror_pairs(self) -> tuple[MirrorPair, ...]:
         """The pairs of mirrored joints, parents first."""
         return mirror_pairs(self.bodies, self.mirror, self.leg_bodies)
+
+    @cached_property
+    def copied_pairs(self) -> tuple[MirrorPair, ...]:
+        """The pairs of joints of assemblies that are mounted twice, parents first."""
+        return copied_pairs(self.mirror_pairs)
 
     def outlier_first(
         self, left: MirrorSide, right: MirrorSide, value: Callable[[Body], Matrix | None]

@@ -60,6 +60,14 @@ FAMILIES = {
 }
 
 
+IMPORTANCE = (
+    *("XML", "TRE", "SIM", "MSH"),  # the robot cannot be loaded
+    *("INR", "JNT", "COL", "DYN"),  # its physics are wrong
+    *("LEG", "XRF", "SYM", "NAM"),  # it is not what was meant
+)
+"""Families in the order of reports: the most important first."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Violation:
     """One place where a robot violates a rule."""

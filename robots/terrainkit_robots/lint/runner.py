@@ -9,7 +9,15 @@ from typing import Literal
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.lint.rule import Certainty, Measured, Rule, Severity, Violation, rules
+from terrainkit_robots.lint.rule import (
+    IMPORTANCE,
+    Certainty,
+    Measured,
+    Rule,
+    Severity,
+    Violation,
+    rules,
+)
 
 Verdict = Literal["pass", "warn", "fail"]
 
@@ -68,7 +76,7 @@ class Report:
 
     facts: Facts
     findings: tuple[Finding, ...]
-    """Findings sorted by severity, then by file and line."""
+    """Findings, the most important first: by severity, family, rule, file and line."""
 
     skipped: tuple[Skipped, ...] = ()
     """Rules that could not run or were ignored, and suppressed findings."""
@@ -135,9 +143,15 @@ def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool
             # A bug in one rule must not hide the findings of the others. Tests assert on `crashed`.
             reason = f"{INTERNAL_ERROR}: {type(error).__name__}: {error}"
             skipped.append(Skipped(code=rule.code, reason=reason))
-    order = {"error": 0, "warning": 1, "info": 2}
-    findings.sort(key=lambda f: (order[f.severity], str(f.file), f.line, f.code))
+    findings.sort(key=_importance)
     return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped), simulated=simulate)
+
+
+def _importance(finding: Finding) -> tuple[int, int, str, str, int]:
+    """Return the sort key of a finding."""
+    severity = ("error", "warning", "info").index(finding.severity)
+    family = IMPORTANCE.index(finding.code[:3])
+    return severity, family, finding.code, str(finding.file), finding.line
 
 
 def is_applicable(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
@@ -146,7 +160,9 @@ def is_applicable(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
     return missing not in (_NO_AGAINST, _NO_SPEC, _NO_SIMULATION)
 
 
-_NO_LEGS = "no legs detected"
+NO_LEGS = "no legs detected"
+"""Reason of a rule that only applies to legged robots."""
+
 _NO_AGAINST = "no second file to compare with; use --against FILE"
 _NO_SPEC = "no robot.toml to compare with; use --spec FILE"
 _NO_SIMULATION = "simulation is disabled"
@@ -161,7 +177,7 @@ def _missing_need(rule: Rule, facts: Facts, *, simulate: bool) -> str:
     if "spec" in rule.needs and facts.spec is None:
         return _NO_SPEC
     if "legs" in rule.needs and not facts.legs:
-        return _NO_LEGS
+        return NO_LEGS
     return ""
 
 

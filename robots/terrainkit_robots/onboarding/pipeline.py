@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.errors import TerrainkitError
+from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.export.canonical import plain_name
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.runner import Finding, Report
@@ -18,20 +18,23 @@ from terrainkit_robots.onboarding.folder import (
     write_files,
 )
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
+from terrainkit_robots.onboarding.negligible_repairs import with_negligible_repairs
+from terrainkit_robots.onboarding.placeholder_effort import placeholder_efforts
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.robot_files import MJCF, SpecOverride, make_robot_files
 
 if TYPE_CHECKING:
     from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
+    from terrainkit_robots.simulation.gain import GainSet
 
 _BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
 """Codes, or starts of codes, of rules whose errors change the robot that would be written. For
 example, a joint of an unknown type would become fixed."""
 
-_FIXED_BY_EXPORT = frozenset({"MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
-"""Rules whose errors cannot occur in the written files: meshes are converted and renamed, and
-rotations are written as roll, pitch and yaw."""
+_FIXED_BY_EXPORT = frozenset({"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
+"""Rules whose errors cannot occur in the written files: each link has an <inertial>, meshes are
+converted and renamed, and rotations are written as roll, pitch and yaw."""
 
 
 def _no_progress(items: Any, _total: int) -> Any:
@@ -57,6 +60,10 @@ class OnboardOptions:
 
     spec: Path | None = None
     """A robot.toml whose values override the derived ones."""
+
+    gains: "GainSet" = "stand"
+    """PD gains to suggest: `stand` holds the default pose without a policy; `train` is as soft as
+    published training configurations, with action scales of about 0.25 rad."""
 
     unsafe_fixes: bool = False
     """Whether to apply fixes that change a number, a shape or a mesh."""
@@ -131,13 +138,18 @@ def onboard(
         collision=options.collision,
         floating=options.floating,
         user_spec=user_spec,
+        gain_set=options.gains,
+        unknown_efforts=placeholder_efforts(report.facts, report.findings),
         cache_dir=options.cache_dir,
         progress=options.progress,
     )
-    configs = {
-        file: robot_config_text(name, robot.facts, robot.spec).encode()
-        for name, file in config_names.items()
-    }
+    configs: dict[str, bytes] = {}
+    skipped_configs: dict[str, str] = {}
+    for name, file in config_names.items():
+        try:
+            configs[file] = robot_config_text(name, robot.facts, robot.spec).encode()
+        except ConfigError as error:
+            skipped_configs[name] = str(error)
     edits = find_edits(target, {**robot.files, **configs})
     with new_folder(target, overwrite=options.overwrite) as folder:
         options.on_step("simulating the standing pose")
@@ -145,7 +157,8 @@ def onboard(
         # The pictures are rendered by another process at the same time.
         with ThreadPoolExecutor(1) as executor:
             images_job = executor.submit(_render_images, folder, options.render_images)
-            verification = verify(report.facts, robot, folder)
+            is_soft = options.gains == "train" and user_spec is None
+            verification = verify(report.facts, robot, folder, soft_gains=is_soft)
             options.on_step("rendering pictures")
         images, images_error = images_job.result()
         write_files(folder, {**images, **edits})
@@ -156,6 +169,7 @@ def onboard(
             robot=robot,
             verification=verification,
             configs=tuple(configs),
+            skipped_configs=skipped_configs,
             images=tuple(images),
             images_error=images_error,
             edits=tuple(edits),
@@ -171,12 +185,12 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     settings = options.settings.over(read_settings(path.parent))
     # All rules are needed to find blocking errors. The written files are simulated, not this one.
     settings = replace(settings, select=(), simulate=False)
-    report = check_robot(path, settings)
+    report = with_negligible_repairs(check_robot(path, settings))
     fixed: tuple[Finding, ...] = ()
     if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
 
         def check(contents: Mapping[Path, bytes]) -> Report:
-            return check_robot(path, settings, contents=contents)
+            return with_negligible_repairs(check_robot(path, settings, contents=contents))
 
         result = fix_robot(path, check, report=report, unsafe=options.unsafe_fixes)
         report, fixed = result.report, result.fixed

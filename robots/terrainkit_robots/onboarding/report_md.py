@@ -17,6 +17,7 @@ from terrainkit_robots.lint.report.summary import (
     summarize_findings,
 )
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
+from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.text import count, display_path
 
 if TYPE_CHECKING:
@@ -132,12 +133,18 @@ def _standing(checks: "Verification | None", robot: "RobotFiles") -> Iterator[st
         return
     locked = checks.joints_locked
     how = "with locked joints" if locked else "at its default pose, with the gains below"
+    if checks.stand_gains:
+        how = "at its default pose, with the gain set `stand`"
     outcome = "It stands" if checks.is_stable else "It does not stand"
     yield f"**{outcome}**, {how}, in MuJoCo:\n"
     has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)
     unit = "rad or m" if has_slides else "rad"
     rows = _standing_rows(checks.standing, unit, locked=locked)
     yield from _table([("quantity", "value"), *rows])
+    if checks.free_standing is not None:
+        failures = assess(checks.free_standing).failures
+        outcome = f"it does not stand: {'; '.join(failures)}" if failures else "it stands as well"
+        yield f"With the gains below and without a policy, {cell(outcome)}.\n"
 
 
 def _standing_rows(

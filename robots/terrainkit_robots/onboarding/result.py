@@ -1,6 +1,7 @@
 """The result of onboarding a robot."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,9 @@ class OnboardResult:
 
     configs: tuple[str, ...] = ()
     """Names of the framework configurations."""
+
+    skipped_configs: Mapping[str, str] = field(default_factory=dict)
+    """Why the configuration of a requested framework was not written, by framework."""
 
     images: tuple[str, ...] = ()
     """Names of the picture files."""

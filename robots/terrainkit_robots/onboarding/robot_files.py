@@ -5,21 +5,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.keyframe import keyframe_defect
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
 from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.onboarding.placeholder_effort import without_efforts
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
     from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
+    from terrainkit_robots.simulation.gain import GainSet
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 URDF, MJCF, SCENE, SPEC = "robot.urdf", "robot.xml", "scene.xml", "robot.toml"
@@ -66,6 +71,8 @@ def make_robot_files(
     collision: "CollisionMethod" = "keep",
     floating: bool | None = None,
     user_spec: SpecOverride | None = None,
+    gain_set: "GainSet" = "stand",
+    unknown_efforts: frozenset[str] = frozenset(),
     cache_dir: Path | None = None,
     progress: "Progress" = lambda items, _: items,
 ) -> RobotFiles:
@@ -77,6 +84,8 @@ def make_robot_files(
         floating: Whether the base is floating; by default as in the overriding spec or the file,
             or as the legs suggest.
         user_spec: Values that replace the derived ones.
+        gain_set: The PD gains and action scales to suggest.
+        unknown_efforts: Joints whose effort limit in the file is a placeholder.
         cache_dir: Folder that caches convex decompositions between runs.
         progress: Wraps an iterable of collision meshes to display a progress bar.
 
@@ -97,11 +106,12 @@ def make_robot_files(
     )
     exported = export_meshes(simplified.model, simplified.meshes)
     meshes = Meshes({Path(name): data for name, data in exported.files.items()})
+    model, effort_notes = without_efforts(exported.model, unknown_efforts)
     spec_notes: tuple[str, ...] = ()
     if user_spec is not None:
-        spec_notes = _check_user_spec(Facts(exported.model, meshes, spec=user_spec.spec), user_spec)
-    spec = _make_spec(Facts(exported.model, meshes), user_spec)
-    facts = Facts(_set_motor_limits(exported.model, spec), meshes, spec=spec)
+        spec_notes = _check_user_spec(Facts(model, meshes, spec=user_spec.spec), user_spec)
+    spec = _make_spec(Facts(model, meshes), user_spec, gain_set)
+    facts = Facts(_set_motor_limits(model, spec), meshes, spec=spec)
     excluded, contact_notes = _excluded_contacts(facts)
     texts = {
         URDF: urdf_text(facts.model, feet=spec.feet),
@@ -121,26 +131,30 @@ def make_robot_files(
             *exported.notes,
             *contact_notes,
             *imu_notes(facts),
+            *(_keyframe_notes(facts) if user_spec is None else ()),
+            *(effort_notes if user_spec is None else ()),
         ),
     )
 
 
-def _make_spec(facts: Facts, user_spec: SpecOverride | None) -> "RobotSpec":
+def _make_spec(facts: Facts, user_spec: SpecOverride | None, gain_set: "GainSet") -> "RobotSpec":
     """Return the derived spec, with the values of the overriding spec.
 
     Raises:
         ExportError: if the robot cannot be simulated, so that no gains can be derived.
     """
     from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
-    from terrainkit_robots.simulation.pd_gains import suggest_gains
+    from terrainkit_robots.simulation.pd_gains import suggest_gains, suggest_training_gains
     from terrainkit_robots.spec.provenance import with_provenance
 
     try:
-        gains = suggest_gains(facts)
+        gains = suggest_gains(facts) if gain_set == "stand" else suggest_training_gains(facts)
     except CannotCheckError as error:
         raise ExportError(f"{facts.model.file}: cannot derive PD gains: {error}") from None
     floating = bool(facts.model.floating)
-    derived = derive_spec(facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF)
+    derived = derive_spec(
+        facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF, gain_set=gain_set
+    )
     if user_spec is None:
         return derived
     spec = replace(user_spec.spec, floating=floating, urdf=URDF, mjcf=MJCF)
@@ -201,7 +215,8 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         if link not in bodies
     ]
     imu = imu_site(facts)
-    if imu.name in spec.feet:
+    other_frames = [f for f in frames if f.name == imu.name and not _is_same_site(f, imu)]
+    if imu.name in spec.feet or other_frames:
         imu = replace(imu, name=f"{imu.name}_site")
     height = _base_height(facts)
     extras = Extras(
@@ -215,6 +230,21 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         height_at_zero=max(height, _clearance(facts, {})) if facts.stance else None,
     )
     return mjcf_text(merged.model, extras)
+
+
+def _keyframe_notes(facts: Facts) -> tuple[str, ...]:
+    """Return a note if the first keyframe is not the default pose."""
+    defect = keyframe_defect(facts.leg_model)
+    if not defect:
+        return ()
+    return (
+        f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
+        "a standing pose was solved instead",
+    )
+
+
+def _is_same_site(first: Site, second: Site) -> bool:
+    return first.body == second.body and np.allclose(first.pose, second.pose)
 
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:

@@ -1,17 +1,20 @@
 """A summary of the onboarding of a robot: one line per step."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.lint.report.summary import summarize_findings
 from terrainkit_robots.onboarding.equivalence import NUM_POSES
+from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.text import count, names
 
 if TYPE_CHECKING:
+    from terrainkit_robots.lint.runner import Finding
     from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
+    from terrainkit_robots.simulation.standing import StandResult
 
 
 def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
@@ -20,13 +23,18 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
     if result.fixed:
         codes = dict.fromkeys(finding.code for finding in result.fixed)
         yield "fixed", f"{count(len(result.fixed), 'finding')}: {names(codes)}"
+        yield from _repairs(result.fixed)
     if result.robot is None or result.verification is None:
         return
     yield "wrote", _list_files(result.robot)
     yield "compared", _compare_files(result.verification)
     yield "standing", _standing_text(result.verification, result.robot)
+    if result.verification.free_standing is not None:
+        yield "free", _free_standing_text(result.verification.free_standing)
     if result.configs:
         yield "configs", names(result.configs)
+    for framework, reason in result.skipped_configs.items():
+        yield "skipped", f"{framework}: {reason}"
     pictures = f"{count(len(result.images), 'picture')} in report.md"
     yield "pictures", pictures if result.images else f"none: {result.images_error}"
     if result.edits:
@@ -43,6 +51,14 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
         )
     if result.robot.notes:
         yield "notes", f"{count(len(result.robot.notes), 'change')} listed in report.md"
+
+
+def _repairs(fixed: "Sequence[Finding]") -> Iterator[tuple[str, str]]:
+    """Yield the repairs of inertias, which change a number of the robot."""
+    links = [finding.subject for finding in fixed if finding.code in ("INR003", "INR004")]
+    if links:
+        noun = "inertia" if len(links) == 1 else "inertias"
+        yield "repaired", f"the {noun} of {names(links, max_count=3)}; see report.md"
 
 
 def _list_files(robot: "RobotFiles") -> str:
@@ -72,7 +88,17 @@ def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
         return f"not simulated: the robot has {'a fixed base' if robot.facts.legs else 'no legs'}"
     locked = "with locked joints, since bipeds need a controller to balance"
     how = locked if checks.joints_locked else "with the gains of robot.toml"
+    if checks.stand_gains:
+        how = "with the gains of --gains stand, which hold the pose without a policy"
     if checks.failures:
         return f"NO: {standing.seconds:g} s {how}; {'; '.join(checks.failures)}"
     tilt = f"tilt {math.degrees(standing.tilt):.1f} degrees"
     return f"yes: {standing.seconds:g} s {how}, {tilt}, only the feet touch the ground"
+
+
+def _free_standing_text(standing: "StandResult") -> str:
+    failures = assess(standing).failures
+    how = "with the gains of robot.toml and without a policy"
+    if failures:
+        return f"no, a policy has to balance it: {standing.seconds:g} s {how}; {failures[0]}"
+    return f"yes: {standing.seconds:g} s {how}"

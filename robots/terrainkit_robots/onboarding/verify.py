@@ -2,6 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +44,13 @@ class Verification:
     joints_locked: bool = False
     """Whether the joints were locked in the standing test, as for bipeds, which need balance."""
 
+    stand_gains: bool = False
+    """Whether the standing test used the gain set `stand` instead of the softer one of the spec."""
+
+    free_standing: "StandResult | None" = None
+    """Result with the gains of the spec and without locked joints, if the standing test used other
+    gains or locked joints. A failure is expected: the policy has to balance the robot."""
+
     error: str = ""
     """The reason why a robot with legs could not be simulated."""
 
@@ -59,17 +67,21 @@ class Verification:
         return not self.failures
 
 
-def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
+def verify(
+    source: "Facts", robot: "RobotFiles", folder: Path, *, soft_gains: bool = False
+) -> Verification:
     """Compare the files of a folder with their source, and simulate the standing pose.
 
     Args:
         source: Facts of the source file.
         robot: The robot that was written.
         folder: The folder with its files.
+        soft_gains: Whether the gains of the spec do not hold the pose without a policy.
 
     Raises:
         ExportError: if MuJoCo cannot load the files, or they differ from the source.
     """
+    from terrainkit_robots.simulation.pd_gains import suggest_gains
     from terrainkit_robots.simulation.sim_model import SimModel
     from terrainkit_robots.simulation.standing import contact_areas, stand_test
 
@@ -85,18 +97,28 @@ def verify(source: "Facts", robot: "RobotFiles", folder: Path) -> Verification:
     if not robot.facts.legs or not floating:
         return Verification(equivalences=equivalences)
     joints_locked = not is_statically_stable(robot.facts.legs)
+    stand_gains = soft_gains and not joints_locked
+    test = partial(
+        stand_test,
+        SimModel.from_mujoco(scene.result(), base=robot.facts.bodies[0].top.name),
+        positions=robot.facts.positions,
+        areas=contact_areas(robot.facts),
+        seconds=_DURATION,
+    )
+    spec_gains = _gains(robot.spec)
     try:
-        standing = stand_test(
-            SimModel.from_mujoco(scene.result(), base=robot.facts.bodies[0].top.name),
-            _gains(robot.spec),
-            positions=robot.facts.positions,
-            areas=contact_areas(robot.facts),
-            seconds=_DURATION,
-            joints_locked=joints_locked,
-        )
+        gains = suggest_gains(robot.facts) if stand_gains else spec_gains
+        standing = test(gains, joints_locked=joints_locked)
+        free_standing = test(spec_gains) if joints_locked or stand_gains else None
     except CannotCheckError as error:
         return Verification(equivalences=equivalences, error=str(error))
-    return Verification(equivalences=equivalences, standing=standing, joints_locked=joints_locked)
+    return Verification(
+        equivalences=equivalences,
+        standing=standing,
+        joints_locked=joints_locked,
+        stand_gains=stand_gains,
+        free_standing=free_standing,
+    )
 
 
 def _source_with_base(source: "Facts", floating: bool) -> "Facts":

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from terrainkit_robots.simulation.standing import StandResult
-from terrainkit_robots.text import names
+from terrainkit_robots.text import contrast, names
 
 _MAX_TILT, _MAX_LEANING_TILT, _MAX_RECOVERABLE_TILT = map(math.radians, (3, 9, 29))
 """Tilt of a standing robot, of a leaning one, and of one that may recover, at most [rad]. More than
@@ -61,32 +61,37 @@ def _failed_checks(result: StandResult) -> Iterator[tuple[int, str]]:
     """Yield the degree and the description of each failed criterion."""
     tilt, length = result.tilt, result.leg_length
     if tilt > _MAX_TILT:
+        got, expected = contrast(math.degrees(tilt), math.degrees(_MAX_TILT), ".1f")
         yield (
             (tilt > _MAX_LEANING_TILT) + (tilt > _MAX_RECOVERABLE_TILT),
-            f"it tilts by {math.degrees(tilt):.1f} deg (expected at most "
-            f"{math.degrees(_MAX_TILT):g} deg)",
+            f"it tilts by {got} deg (expected at most {expected} deg)",
         )
     if result.height_loss > _MAX_HEIGHT_LOSS * length:
+        got, expected = contrast(result.height_loss, _MAX_HEIGHT_LOSS * length, ".3f")
         yield (
             1 + (result.height_loss > _MAX_RECOVERABLE_HEIGHT_LOSS * length),
-            f"its base sinks by {result.height_loss:.3f} m (expected at most "
-            f"{_MAX_HEIGHT_LOSS * length:.3f} m)",
+            f"its base sinks by {got} m (expected at most {expected} m)",
         )
     if result.drift > _MAX_DRIFT * length:
-        yield (
-            1,
-            f"it drifts by {result.drift:.3f} m (expected at most {_MAX_DRIFT * length:.3f} m)",
-        )
-    if result.other_contacts:
-        verb = "touches" if len(result.other_contacts) == 1 else "touch"
-        yield 1, f"{_join(result.other_contacts)} {verb} the ground (expected only feet)"
-    if result.lifted_feet:
-        verb = "does" if len(result.lifted_feet) == 1 else "do"
-        yield 1, f"{_join(result.lifted_feet)} {verb} not touch the ground (expected all feet)"
+        got, expected = contrast(result.drift, _MAX_DRIFT * length, ".3f")
+        yield 1, f"it drifts by {got} m (expected at most {expected} m)"
+    # A foot without its own link touches the ground beside its tip, such as with the whole shank.
+    beside = tuple(foot for foot in result.lifted_feet if foot in result.other_contacts)
+    others = tuple(body for body in result.other_contacts if body not in beside)
+    lifted = tuple(foot for foot in result.lifted_feet if foot not in beside)
+    if beside:
+        verb, tip = ("rests", "its tip") if len(beside) == 1 else ("rest", "their tips")
+        yield 1, f"{_join(beside)} {verb} on the ground beside {tip} (expected only tips)"
+    if others:
+        verb = "touches" if len(others) == 1 else "touch"
+        yield 1, f"{_join(others)} {verb} the ground (expected only feet)"
+    if lifted:
+        verb = "does" if len(lifted) == 1 else "do"
+        yield 1, f"{_join(lifted)} {verb} not touch the ground (expected all feet)"
     if result.saturation > _MAX_SATURATION:
-        limit = f"(expected at most {_MAX_SATURATION:.0%})"
-        effort = f"{result.saturation:.0%} of its effort limit"
-        yield 1, f"{result.saturated_joint} needs {effort} {limit}"
+        got, expected = contrast(result.saturation, _MAX_SATURATION, ".0%")
+        effort = f"{got} of its effort limit (expected at most {expected})"
+        yield 1, f"{result.saturated_joint} needs {effort}"
 
 
 def _join(bodies: tuple[str, ...]) -> str:

@@ -1,6 +1,11 @@
 """The gains of a PD controller."""
 
 from dataclasses import dataclass
+from typing import Literal
+
+GainSet = Literal["stand", "train"]
+"""Which gains to suggest: `stand` holds the default pose without a policy. `train` is as soft as
+published training configurations, in which the policy holds the pose."""
 
 
 @dataclass(frozen=True, kw_only=True)

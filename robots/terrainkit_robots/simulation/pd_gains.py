@@ -5,7 +5,8 @@ step. The damping is critical. Similar joints share one rounded value. The const
 with the gains that a1, go2, cassie, h1 and g1 are trained with in legged_gym, walk-these-ways,
 unitree_rl_gym and Isaac Lab. The results for bipeds are close. Those for quadrupeds are 1.5 to 3
 times as stiff, the more the lower they stand: with the 20 N m/rad of a go2 or the 80 of an
-anymal_c, legs that are bent as much as here collapse without a policy.
+anymal_c, legs that are bent as much as here collapse without a policy. The gain set `train` is as
+soft as these.
 """
 
 import math
@@ -15,7 +16,7 @@ from dataclasses import replace
 
 from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.gain import Gain, GainSet
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
 from terrainkit_robots.simulation.stiffness import (
     GainTarget,
@@ -27,6 +28,9 @@ from terrainkit_robots.simulation.units import REVOLUTE, JointUnits
 
 _MIN_STIFFNESS_RATIO = 20.0
 """Stiffness over damping, at least [1/s]. A joint with more damping returns too slowly."""
+
+_TRAIN_STIFFNESS_RATIO = 40.0
+"""The same ratio for training, as in legged_gym for a1 (20 and 0.5) and anymal_c (80 and 2)."""
 
 _MAX_SIMILAR_RATIO = 1.3
 """Joints of legs whose stiffness differs by a smaller factor share one value."""
@@ -45,21 +49,36 @@ _Groups = dict[tuple[str, str], list[str]]
 
 @cached_fact
 def suggest_gains(facts: Facts) -> Mapping[str, Gain]:
-    """Return gains for each actuated joint, in actuator order.
+    """Return gains for each actuated joint, in actuator order, that hold the default pose.
 
     Raises:
         CannotCheckError: if the robot cannot be simulated.
     """
+    return _compute_gains(facts, "stand")
+
+
+@cached_fact
+def suggest_training_gains(facts: Facts) -> Mapping[str, Gain]:
+    """Return gains for each actuated joint, in actuator order, with softer legs for training.
+
+    Raises:
+        CannotCheckError: if the robot cannot be simulated.
+    """
+    return _compute_gains(facts, "train")
+
+
+def _compute_gains(facts: Facts, gain_set: GainSet) -> Mapping[str, Gain]:
     sim = make_sim_model(facts)
     inertias = joint_inertias(sim)
     wheels = _wheels(facts, sim)
     found = {name: _wheel_gain(facts, sim, inertias, name) for name in wheels}
     legs, others = _group_joints(facts, [name for name in sim.actuated if name not in wheels])
     leg_targets = {
-        key: leg_gain_target(facts, sim, inertias, joints) for key, joints in legs.items()
+        key: leg_gain_target(facts, sim, inertias, joints, gain_set) for key, joints in legs.items()
     }
+    ratio = _MIN_STIFFNESS_RATIO if gain_set == "stand" else _TRAIN_STIFFNESS_RATIO
     for target in _merge_similar(leg_targets):
-        found |= dict.fromkeys(target.joints, _make_gain(target, target.inertia))
+        found |= dict.fromkeys(target.joints, _make_gain(target, target.inertia, ratio))
     # Other joints of the same stiffness get the same damping.
     similar: dict[tuple[float, float, JointUnits], list[GainTarget]] = defaultdict(list)
     for joints in others.values():
@@ -72,14 +91,14 @@ def suggest_gains(facts: Facts) -> Mapping[str, Gain]:
     return {name: found[name] for name in sim.actuated}
 
 
-def _make_gain(target: GainTarget, inertia: float) -> Gain:
+def _make_gain(target: GainTarget, inertia: float, min_ratio: float = _MIN_STIFFNESS_RATIO) -> Gain:
     stiffness = _round(target.stiffness)
     critical = 2 * math.sqrt(target.stiffness * inertia)
-    limit = target.stiffness / _MIN_STIFFNESS_RATIO
+    limit = target.stiffness / min_ratio
     reason = f"kp {target.reason}; kd " + (
         f"critical for the lightest inertia of these joints, {inertia:.2g} {target.units.inertia}"
         if critical <= limit
-        else f"kp / {_MIN_STIFFNESS_RATIO:g}, below critical for a fast response"
+        else f"kp / {min_ratio:g}, below critical for a fast response"
     )
     if target.extra_armature:
         reason += f"; armature for stability at a time step of {1000 * TIME_STEP:g} ms"

@@ -13,6 +13,7 @@ import numpy as np
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
+from terrainkit_robots.simulation.gain import GainSet
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel
 from terrainkit_robots.simulation.time_step import (
     JointInertia,
@@ -24,6 +25,10 @@ from terrainkit_robots.simulation.units import PRISMATIC, JointUnits
 _UPRIGHT_FACTOR = 1.5
 """Stiffness of a leg over m g l / n, the rate at which gravity tips it over: weight times leg
 length over the number of legs. A weaker spring does not hold it upright."""
+
+_TRAIN_FACTOR = 0.36
+"""Stiffness for training over weight times leg length. It is 0.30 to 0.39 for the gains that a1 and
+go2 (20), h1 (150) and g1 (80 to 100) are trained with, and 0.24 for those of anymal_c (80)."""
 
 _MIN_LEG_ERROR = 1.0
 """Error at which a joint of a leg reaches its effort limit, at least [rad]. Published gains of all
@@ -85,7 +90,11 @@ class _RequiredStiffness:
 
 
 def leg_gain_target(
-    facts: Facts, sim: SimModel, inertias: Mapping[str, JointInertia], joints: Sequence[str]
+    facts: Facts,
+    sim: SimModel,
+    inertias: Mapping[str, JointInertia],
+    joints: Sequence[str],
+    gain_set: GainSet = "stand",
 ) -> GainTarget:
     """Return the target of joints of legs with the same role and units."""
     count = len(facts.legs)
@@ -96,6 +105,13 @@ def leg_gain_target(
         stiffness = weight / count / (_MAX_LEG_SAG * length)
         reason = f"to sink by {_MAX_LEG_SAG:.0%} of the leg under the weight = {stiffness:.3g}"
         required = [_RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_ERROR)]
+    elif gain_set == "train":
+        stiffness = _TRAIN_FACTOR * weight * length
+        reason = f"{_TRAIN_FACTOR:g} x weight x leg length = {stiffness:.3g}"
+        required = [
+            _RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_LEG_ERROR)
+        ]
+        return _make_target(sim, inertias, joints, required)
     else:
         stiffness = _UPRIGHT_FACTOR * weight * length / count
         reason = f"{_UPRIGHT_FACTOR:g} x weight x leg length / {count} legs = {stiffness:.3g}"

@@ -1,3 +1,4 @@
+import dataclasses
 import os
 import re
 from pathlib import Path
@@ -9,6 +10,7 @@ from scipy.ndimage import binary_dilation
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
+from terrainkit.overlays.friction_patches import FrictionPatches
 from terrainkit.walls import wall_edges
 
 ROOT = Path(__file__).parents[3]
@@ -298,3 +300,109 @@ def test_mjcf_ball_lands_on_the_first_solid_that_collides(solid_map, tmp_path):
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, 1500)
     assert data.xpos[-2:, 2] == pytest.approx([0.65, 0.05], abs=2e-3)
+
+
+# ---- friction ----------------------------------------------------------------------------------
+
+
+def friction_map(terrain, overlays=(), **rest):
+    """Return a map whose second column has its own friction, and a third one overlays."""
+    terrains = (
+        SubTerrain(terrain=terrain, name="plain"),
+        SubTerrain(terrain=terrain, name="icy", friction=(0.5, 0.25)),
+        SubTerrain(terrain=terrain, name="patchy", overlays=overlays),
+    )
+    size = {"rows": 2, "cols": 3, "patch_size": (6.0, 4.0), "border": 1.0, "seed": 3}
+    return generate(MapConfig(terrains=terrains, static_friction=0.8, **size | rest))
+
+
+def friction_below(model, xy):
+    """Return the friction of the highest geom at each point."""
+    data, geom = mujoco.MjData(model), np.zeros(1, dtype=np.int32)
+    mujoco.mj_forward(model, data)
+    found = []
+    for x, y in xy:
+        mujoco.mj_ray(model, data, [x, y, 20.0], [0, 0, -1], None, 1, -1, geom, None)
+        found.append(model.geom_friction[geom[0], 0])
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("terrain", "overlays"),
+    [("flat", FrictionPatches()), ("stairs", FrictionPatches()), ("rough", FrictionPatches())],
+)
+@pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+def test_mjcf_has_friction_of_each_cell(tmp_path, terrain, overlays, collision):
+    terrain_map = friction_map(terrain, (overlays,))
+    model = loaded(terrain_map, tmp_path, collision=collision)
+    cells = np.random.default_rng(0).integers(0, terrain_map.heights.shape, (1000, 2))
+    # A heightfield ends at a sample, half a cell beyond the edge.
+    friction = np.pad(terrain_map.friction, 1, mode="edge")
+    block = np.array([friction[i : i + 3, j : j + 3] for i, j in cells])
+    cells = cells[(block == block[:, 1:2, 1:2]).all(axis=(1, 2))]
+    xy = terrain_map.first_sample + (cells + 0.1) * terrain_map.grid.cell
+    expected = terrain_map.friction[tuple(cells.T)]
+    assert friction_below(model, xy) == pytest.approx(expected, abs=1e-6)
+    assert len(np.unique(expected)) > 10
+
+
+@every_collision
+def test_mjcf_with_several_frictions_has_the_same_ground(tmp_path, collision):
+    terrain_map = friction_map("rough_slope", (FrictionPatches(),))
+    cells = points_in(terrain_map, np.ones(terrain_map.heights.shape, dtype=bool))
+    uniform = np.broadcast_to(np.float32(0.8), terrain_map.friction.shape)
+    plain = dataclasses.replace(terrain_map, friction=uniform)
+    expected = ray_cast(loaded(plain, tmp_path, collision=collision), cells)
+    found = ray_cast(loaded(terrain_map, tmp_path, collision=collision, overwrite=True), cells)
+    assert found == pytest.approx(expected, abs=2e-4)
+
+
+def test_mjcf_boxes_have_exact_friction_edges(tmp_path):
+    terrain_map = friction_map("flat", (FrictionPatches(),))
+    model = loaded(terrain_map, tmp_path, collision="boxes")
+    assert model.nhfield == 0
+    cells = np.random.default_rng(0).integers(0, terrain_map.heights.shape, (1000, 2))
+    xy = terrain_map.first_sample + (cells + 0.45) * terrain_map.grid.cell
+    expected = terrain_map.friction[tuple(cells.T)]
+    assert friction_below(model, xy) == pytest.approx(expected, abs=1e-6)
+
+
+def test_mjcf_auto_uses_boxes_for_level_friction_patches(tmp_path):
+    terrain_map = friction_map("flat", (FrictionPatches(side=0.3),), cols=9)
+    model = loaded(terrain_map, tmp_path)
+    assert model.nhfield == 0
+    assert model.ngeom > 200
+
+
+def test_mjcf_one_friction_per_patch_splits_the_heightfield(tmp_path):
+    model = loaded(friction_map("rough", rows=1, seed=0), tmp_path, collision="hfield")
+    # Border and two plain columns: four rectangles around the icy patch and the patch itself.
+    own = model.geom_friction[:, 0] == 0.5
+    assert own.sum() == 1
+    assert model.geom_priority[own].tolist() == [2]
+    assert (model.geom_priority[~own] == 0).all()
+    assert model.nhfield <= 5
+
+
+def test_mjcf_slippery_patch_lets_a_box_slide(tmp_path):
+    """A box on a slope of 0.3 slides where the friction is 0.1, and stays where it is 0.8."""
+    slope = {"terrain": "pyramid_slope", "parameters": {"grade": 0.3, "platform": 2.0}}
+    terrains = (SubTerrain(**slope), SubTerrain(**slope, name="icy", friction=0.1))
+    config = MapConfig(rows=1, cols=2, border=1.0, static_friction=0.8, terrains=terrains)
+    terrain_map = generate(config)
+    spec = mujoco.MjSpec.from_file(str(terrain_map.save(tmp_path / "map.xml")))
+    for col in (0, 1):
+        x, y = config.patch_grid(0, col).center
+        start = [x - 2.0, y, float(terrain_map.height((x - 2.0, y))) + 0.12]
+        body = spec.worldbody.add_body(pos=start)
+        body.add_freejoint()
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.05], priority=1)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    start = data.xpos[1:, 0].copy()
+    while data.time < 1.0:
+        mujoco.mj_step(model, data)
+    slid = start - data.xpos[1:, 0]
+    assert abs(slid[0]) < 0.1
+    assert slid[1] > 0.4

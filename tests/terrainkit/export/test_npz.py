@@ -439,6 +439,13 @@ def test_npz_inconsistent_solids_are_rejected(good, bad, key, value):
     assert "expected" in refusal(bad)
 
 
+def test_npz_degenerate_hull_is_rejected(solid_map, bad, tmp_path):
+    good = solid_map.save(tmp_path / "good.npz")
+    flat = solid_map.solids.hull_vertices * np.float32([1, 1, 0])
+    repack(good, bad, {"hull_vertices": npy(flat)})
+    assert "hull: got points in one plane; expected points with a volume" in refusal(bad)
+
+
 def test_npz_without_solids_is_readable(good, tmp_path):
     """Maps of version 0.1 have an empty array of boxes, and no other key of solids."""
     old = tmp_path / "old.npz"

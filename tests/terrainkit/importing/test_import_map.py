@@ -1,3 +1,5 @@
+import hashlib
+
 import cv2
 import numpy as np
 import pytest
@@ -35,6 +37,16 @@ def test_import_whole_file_is_one_patch(tmp_path):
     assert terrain_map.height([4.55, 0.55]) == pytest.approx(0.2)
     assert terrain_map.height([0.55, 3.55]) == pytest.approx(0.1)
     assert validate(terrain_map) == []
+
+
+def test_import_records_the_file(tmp_path):
+    terrain_map = import_array(tmp_path, steps()).terrain_map
+    digest = hashlib.sha256((tmp_path / "a.npy").read_bytes()).hexdigest()
+    loaded = tk.TerrainMap.load(terrain_map.save(tmp_path / "map.npz"))
+    parameters = loaded.patch(0, 0).parameters.requested
+    assert (parameters["file"], parameters["sha256"]) == ("a.npy", digest)
+    assert parameters["file_cell"] == 0.1
+    assert loaded.config.terrains[0].terrain == "imported"
 
 
 def test_import_split_into_patches(tmp_path):
@@ -228,6 +240,24 @@ def test_import_table_has_legs_and_solids(tmp_path):
     assert terrain_map.clearance([2.0, 1.5]) == pytest.approx(0.7, abs=0.02)
     assert terrain_map.height([2.0, 1.5]) == pytest.approx(0.0, abs=1e-6)
     assert terrain_map.height([1.525, 1.225]) == pytest.approx(0.75, abs=1e-3)
+    assert validate(terrain_map) == []
+
+
+def test_import_arch_is_decomposed(tmp_path):
+    ring = trimesh.creation.annulus(1.0, 1.4, 2.0)
+    ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))
+    ring.apply_translation((3, 2, 0))
+    trimesh.util.concatenate([box((6, 4, 1), (3, 2, -0.5)), ring]).export(tmp_path / "a.stl")
+    imported = import_map(tmp_path / "a.stl", ImportOptions(solids=True))
+    terrain_map, report = imported.terrain_map, imported.report
+    # The opening is 2 m wide and 2 m deep.
+    assert report.overhang_area == pytest.approx(4.0)
+    assert report.lost_area == 0.0
+    assert report.largest_error < 0.02
+    assert len(terrain_map.solids) > 3
+    assert terrain_map.clearance([3.0, 2.0]) == pytest.approx(1.0, abs=0.02)
+    assert terrain_map.clearance([3.6, 2.0]) == pytest.approx(0.8, abs=0.02)
+    assert terrain_map.scan([3.0, 2.0, 5.0]) == pytest.approx(1.4, abs=0.02)
     assert validate(terrain_map) == []
 
 

@@ -1,3 +1,6 @@
+import json
+import struct
+
 import numpy as np
 import pytest
 import trimesh
@@ -84,6 +87,25 @@ def test_mesh_file_claiming_many_vertices_is_rejected(tmp_path):
     path = tmp_path / "a.ply"
     trimesh.creation.box().export(path)
     path.write_bytes(path.read_bytes().replace(b"element vertex 8", b"element vertex 900000000000"))
+    with pytest.raises(HeightFileError, match=str(path)):
+        read(path, ReadOptions())
+
+
+def test_mesh_file_claiming_large_accessor_is_rejected(tmp_path):
+    # Without a buffer view, an accessor of glTF is an array of zeros of any size.
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "accessors": [{"componentType": 5126, "count": 3 * 10**10, "type": "VEC3"}],
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunk = struct.pack("<II", len(text), 0x4E4F534A) + text
+    path = tmp_path / "a.glb"
+    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunk)) + chunk)
     with pytest.raises(HeightFileError, match=str(path)):
         read(path, ReadOptions())
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import SINK
 from terrainkit.terrains.boxes import Boxes
 
 

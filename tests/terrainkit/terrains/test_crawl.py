@@ -47,3 +47,9 @@ def test_crawl_draws_the_same_bars_at_every_difficulty(grid):
 def test_crawl_rejects_bars_that_do_not_fit(values, grid, rng):
     with pytest.raises(ConfigError, match="expected min_depth <= max_depth, and a bar that fits"):
         Crawl.at(0.0, values).solids(grid, np.zeros(grid.shape, np.float32), rng)
+
+
+def test_crawl_limits_the_number_of_bars(grid, rng):
+    tiny = dict.fromkeys(("spacing", "min_depth", "max_depth"), 1e-9)
+    with pytest.raises(ConfigError, match="crawl: got 2e-09 m from one to the next; expected at"):
+        Crawl.at(0.0, tiny).solids(grid, np.zeros(grid.shape, np.float32), rng)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import SINK
 from terrainkit.grid import Grid
 from terrainkit.solids import rotation_matrices
 from terrainkit.terrains.k_rails import KRails

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from terrainkit.blocks import SINK
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import SINK
 from terrainkit.terrains.poles import Poles
 
 

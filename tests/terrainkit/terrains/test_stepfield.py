@@ -44,11 +44,16 @@ def test_stepfield_posts_are_whole_cells():
     assert (np.ptp(posts, axis=(1, 3)) == 0).all()
 
 
-def test_stepfield_goals_lie_on_the_ground_behind_the_fields():
-    config = MapConfig(rows=1, cols=1, terrains=(SubTerrain(terrain="stepfield"),))
-    patch = generate(config).patch(0, 0)
-    assert patch.goals[:, 0] - patch.grid.lower[0] == pytest.approx([3.0, 4.0, 5.0, 6.0, 7.5])
-    assert patch.goals[-1, 2] == 0
+@pytest.mark.parametrize("width", [8.0, 7.9])
+def test_stepfield_goals_lie_on_posts_and_behind_the_fields(width):
+    terrains = (SubTerrain(terrain="stepfield", parameters={"unit": 0.1}),)
+    terrain_map = generate(MapConfig(rows=1, cols=1, terrains=terrains, patch_size=(8.0, width)))
+    x, y, z, _ = terrain_map.patch(0, 0).goals.T
+    assert x == pytest.approx([2.95, 3.95, 4.95, 5.95, 7.5])
+    assert y == pytest.approx([*[width / 2 - (0.05 if width == 8.0 else 0.1)] * 4, width / 2])
+    for offset in ([0.04, 0.04], [-0.04, -0.04]):
+        assert terrain_map.height(np.column_stack([x, y]) + offset) == pytest.approx(z, abs=1e-6)
+    assert z[-1] == 0
 
 
 def test_stepfield_rejects_fields_that_do_not_fit(rng):

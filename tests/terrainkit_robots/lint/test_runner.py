@@ -75,6 +75,13 @@ def test_violation_severity_overrides_rule():
     assert [each.severity for each in found] == ["info"]
 
 
+def test_findings_that_prevent_loading_come_first():
+    found = report(
+        *(rule([violation()], f"{family}099") for family in ("COL", "NAM", "XML", "SIM"))
+    )
+    assert [each.code[:3] for each in found.findings] == ["XML", "SIM", "COL", "NAM"]
+
+
 def test_findings_are_sorted():
     found = report(
         rule([violation("a", 9), violation("b", 3)], "INR099", "warning"),

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from terrainkit.errors import ConfigError, ExportError, TerrainkitError
+from terrainkit.errors import ExportError, TerrainkitError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
@@ -205,10 +205,54 @@ def test_onboard_arm_without_legs(tmp_path):
     assert (model.nq, model.nu) == (1, 1)
 
 
-def test_onboard_arm_rejects_legged_framework(tmp_path):
-    with pytest.raises(ConfigError, match="no legs"):
-        onboard_arm(tmp_path, frameworks=("legged_gym",))
-    assert not (tmp_path / "robot").exists()
+def test_onboard_skips_unsupported_framework(tmp_path):
+    result = onboard_arm(tmp_path, frameworks=("legged_gym", "isaaclab"))
+    assert result.configs == ("isaaclab_config.py",)
+    assert "no legs" in result.skipped_configs["legged_gym"]
+    assert dict(summarize(result))["skipped"].startswith("legged_gym: arm has no legs")
+    assert not (result.folder / "legged_gym_config.py").exists()
+
+
+IMU = """<link name="imu"><inertial><mass value="{mass}"/>
+    <inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="{i}" ixz="{i}" iyz="{i}"/></inertial></link>
+  <joint name="imu_joint" type="fixed"><parent link="upper"/><child link="imu"/></joint></robot>"""
+"""A sensor whose inertia has three equal products: two principal moments are 0."""
+
+
+def test_onboard_repairs_negligible_inertia(tmp_path):
+    imu = IMU.format(mass="1e-3", i="1e-6")
+    result = onboard_arm(tmp_path, ("</robot>", imu), unsafe_fixes=False)
+    assert result.folder is not None
+    assert [(f.code, f.subject) for f in result.fixed] == [("INR003", "imu")]
+    assert dict(summarize(result))["repaired"] == "the inertia of imu; see report.md"
+    assert "the inertia of body upper changes by" in (result.folder / "report.md").read_text()
+
+
+def test_onboard_keeps_frame_named_imu(tmp_path):
+    imu = IMU.replace('type="fixed">', 'type="fixed"><origin xyz="0 0 0.3"/>')
+    imu = imu.replace('ixy="{i}" ixz="{i}" iyz="{i}"', 'ixy="0" ixz="0" iyz="0"')
+    result = onboard_arm(tmp_path, ("</robot>", imu.format(mass="1e-3", i="1e-6")))
+    with quiet_mujoco():
+        model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
+    np.testing.assert_allclose(model.site("imu").pos, [0, 0, 0.3], atol=1e-9)
+    assert model.site("imu").bodyid[0] == model.body("upper").id
+
+
+def test_onboard_keeps_considerable_invalid_inertia(tmp_path):
+    imu = IMU.format(mass="1e-3", i="1e-3")
+    result = onboard_arm(tmp_path, ("</robot>", imu), unsafe_fixes=False)
+    assert result.folder is None
+
+
+def test_onboard_accepts_links_without_inertial(tmp_path):
+    cover = """<link name="cover"><collision><geometry><box size="0.1 0.1 0.1"/></geometry>
+      </collision></link><joint name="cover_joint" type="fixed"><parent link="stand"/>
+      <child link="cover"/><origin xyz="0.15 0 0"/></joint></robot>"""
+    result = onboard_arm(tmp_path, ("</robot>", cover))
+    assert [f.code for f in result.fixed] == ["INR011"]
+    with quiet_mujoco():
+        model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.urdf"))
+    assert model.body_mass.sum() == pytest.approx(6, rel=1e-3)
 
 
 def test_onboard_stops_at_blocking_errors(tmp_path):
@@ -286,6 +330,53 @@ def test_onboard_converts_quaternion_to_rpy(tmp_path, suffix):
     assert 'rpy="0 0 1.570796327"' in (result.folder / "robot.urdf").read_text()
     quat = mujoco.MjModel.from_xml_path(str(result.folder / "robot.urdf")).body_quat
     np.testing.assert_allclose(quat[-1], [0.5**0.5, 0, 0, 0.5**0.5], atol=1e-9)
+
+
+def test_onboard_replaces_crouching_keyframe(tmp_path):
+    text = QUADRUPED.with_suffix(".xml").read_text()
+    file = tmp_path / "quadruped.xml"
+    file.write_text(text.replace("0 0.9 -1.8", "0 2.6 -2.6"))
+    result = onboard(file, tmp_path / "robot", options())
+    assert result.robot.spec.provenance["default_pose"].origin == "solved"
+    assert result.verification.is_stable
+    assert any("keyframe is not the default pose" in note for note in result.robot.notes)
+
+
+def test_onboard_training_gains(onboarded, tmp_path):
+    stiff = onboarded(QUADRUPED)
+    result = onboard(QUADRUPED, tmp_path / "robot", options(gains="train"))
+    assert result.robot.spec.stiffness["FL_calf_joint"] == 20.0
+    assert result.robot.spec.action_scale["FL_calf_joint"] == 0.25
+    checks = result.verification
+    assert checks.is_stable
+    assert checks.stand_gains
+    assert checks.standing == stiff.verification.standing
+    assert checks.free_standing != checks.standing
+    summary = dict(summarize(result))
+    assert "--gains stand" in summary["standing"]
+    assert "with the gains of robot.toml and without a policy" in summary["free"]
+    assert "gain set `stand`" in (result.folder / "report.md").read_text()
+
+
+def test_onboard_biped_reports_free_standing(onboarded):
+    result = onboarded(bundled.urdf_path("biped"))
+    summary = dict(summarize(result))
+    assert summary["standing"].startswith("yes: 5 s with locked joints")
+    assert summary["free"].startswith("no, a policy has to balance it: ")
+    assert "without a policy, it does not stand" in (result.folder / "report.md").read_text()
+
+
+def test_onboard_replaces_placeholder_efforts(tmp_path):
+    file = tmp_path / "quadruped.urdf"
+    file.write_text(QUADRUPED.read_text().replace('effort="23.7"', 'effort="1000"'))
+    result = onboard(file, tmp_path / "robot", options())
+    effort = result.robot.spec.effort
+    assert effort["FL_hip_joint"] == 33.0
+    assert effort["FL_calf_joint"] == 45.43
+    assert "x weight x leg length" in str(result.robot.spec.provenance)
+    assert any("is a placeholder (1000 N m)" in note for note in result.robot.notes)
+    model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
+    assert model.actuator_forcerange[0, 1] == 33.0
 
 
 def test_onboard_keeps_existing_folder(tmp_path):

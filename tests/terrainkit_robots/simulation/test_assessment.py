@@ -47,6 +47,15 @@ def test_assess_reports_value_and_limit(stood, changes, fault, degree):
     assert assessment.degree == degree
 
 
+def test_assess_reports_shank_on_ground_once(stood):
+    contacts = {"other_contacts": ("trunk", "shin"), "lifted_feet": ("shin", "toe")}
+    assert assess(replace(stood, **contacts)).failures == (
+        "shin rests on the ground beside its tip (expected only tips)",
+        "trunk touches the ground (expected only feet)",
+        "toe does not touch the ground (expected all feet)",
+    )
+
+
 def test_assess_reports_every_failure_unless_diverged(stood):
     wrong = {
         "tilt": 1.0,

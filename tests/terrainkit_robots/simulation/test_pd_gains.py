@@ -10,7 +10,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.pd_gains import suggest_gains, suggest_training_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import max_stable_time_step
 from tests.robots import BUNDLED
@@ -137,6 +137,40 @@ def test_gains_are_close_to_published_gains(name, robot_file):
             gain = found[joint]
             assert softest / 2 <= gain.stiffness <= 2 * stiffest, (joint, gain)
             assert least / 2.1 <= gain.damping <= 2.1 * most, (joint, gain)
+
+
+# Those that the robots are trained with, within a factor of about 1.3.
+TRAINED = {
+    "a1/urdf/a1.urdf": {".*": ((20, 35), (0.5, 1))},
+    "go2/urdf/go2.urdf": {".*": ((20, 35), (0.5, 1))},
+    "anymal_c/urdf/anymal_c.urdf": {".*": ((80, 80), (2, 2))},
+    "h1/urdf/h1.urdf": {".*(hip|knee).*": ((100, 150), (2, 4))},
+    "g1/g1_29dof.urdf": {".*(hip|knee).*": ((100, 150), (2, 4))},
+}
+
+
+@pytest.mark.parametrize("name", TRAINED)
+def test_training_gains_are_close_to_published_gains(name, robot_file):
+    path = robot_file(name)
+    found = suggest_training_gains(repaired(path) if "anymal" in name else read(path))
+    for pattern, ((softest, stiffest), (least, most)) in TRAINED[name].items():
+        for joint in (joint for joint in found if re.fullmatch(pattern, joint)):
+            gain = found[joint]
+            assert softest / 1.3 <= gain.stiffness <= 1.3 * stiffest, (joint, gain)
+            assert least / 1.3 <= gain.damping <= 1.3 * most, (joint, gain)
+
+
+@every_robot
+def test_training_gains_soften_legs_only(name, robot_file):
+    facts = facts_of(name, robot_file)
+    stand, train = suggest_gains(facts), suggest_training_gains(facts)
+    legs = {joint.name for joint in facts.leg_joints}
+    for joint in stand:
+        if joint in legs:
+            assert train[joint].stiffness <= stand[joint].stiffness
+        else:
+            assert train[joint] == stand[joint]
+    assert max_stable_time_step(make_sim_model(facts), train).seconds > 1.1 * TIME_STEP
 
 
 @every_robot

@@ -9,6 +9,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.inertia.physical import (
+    MIN_INERTIA,
     box_inertia,
     gyration_radius,
     is_zero,
@@ -48,18 +49,41 @@ class InertiaRepair:
         source = inertial.inertia_source or inertial.source
         if source.element is None or source == link.source:
             return None  # it cannot be edited, or MuJoCo derived it
-        for inertia, description in (
+        inertia, description = self._repaired(link, inertial, inertial.inertia)
+        if inertia is None:
+            return None
+        return Fix(
+            safety="unsafe",
+            description=f"Replace the inertia of link {link.name} by {description}.",
+            edits=tuple(_edits(inertial, inertia)),
+        )
+
+    def relative_change(self, link: Link) -> float:
+        """Return how much the fix of a link changes the inertia of its body.
+
+        Returns:
+            The largest change of a moment over the smallest principal moment of the body; infinite
+            if there is no fix, or the inertia of the body itself is invalid.
+        """
+        inertial = link.inertial
+        if inertial is None or inertial.inertia is None or link.name not in self._location:
+            return np.inf
+        inertia, _ = self._repaired(link, inertial, inertial.inertia)
+        smallest = float(self._location[link.name][0].principal[0])
+        if inertia is None or not smallest > MIN_INERTIA:
+            return np.inf
+        return float(np.linalg.norm(inertia - inertial.inertia, 2)) / smallest
+
+    def _repaired(
+        self, link: Link, inertial: Inertial, declared: Matrix
+    ) -> tuple[Matrix | None, str]:
+        """Return a physical inertia in the inertial frame of a link, and what it is."""
+        candidates = (
             (self._mirror_inertia(link), "that of its mirror image"),
-            (self._nearest(link, inertial.inertia), "the nearest physical one"),
+            (self._nearest(link, declared), "the nearest physical one"),
             (self._solid_box(link, inertial), "that of a solid box around the body"),
-        ):
-            if inertia is not None:
-                return Fix(
-                    safety="unsafe",
-                    description=f"Replace the inertia of link {link.name} by {description}.",
-                    edits=tuple(_edits(inertial, inertia)),
-                )
-        return None
+        )
+        return next((each for each in candidates if each[0] is not None), (None, ""))
 
     @cached_property
     def _location(self) -> Mapping[str, tuple[Body, int]]:

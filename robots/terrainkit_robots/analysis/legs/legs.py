@@ -27,6 +27,10 @@ _MIN_LEG_SCORE = 1.5
 _MIN_PARALLEL_COSINE = 0.9
 """Cosine from which two axes count as parallel: 26 degrees, more than legs are splayed."""
 
+_MIN_BENDING_COSINE = 0.8
+"""Cosine from which an axis bends the leg in its plane: 37 degrees. The hip pitch of some humanoids
+is tilted by 30 degrees."""
+
 _FOOT_NAME = re.compile(r"foot|feet|toe|sole", re.IGNORECASE)
 
 
@@ -90,7 +94,7 @@ def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg
     ]
     points = limb.points[waist:]
     pitch = _pitch_axis([axis for axis in axes if axis is not None])
-    bending = [k for k, axis in enumerate(axes) if axis is not None and _is_parallel(axis, pitch)]
+    bending = [k for k, axis in enumerate(axes) if axis is not None and _bends(axis, pitch)]
     path = [_project(points[k], pitch) for k in bending] + [_project(limb.tip, pitch)]
     return Leg(
         limb=limb,
@@ -103,6 +107,10 @@ def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg
 
 def _is_parallel(axis: Matrix, other: Matrix) -> bool:
     return bool(abs(axis @ other) > _MIN_PARALLEL_COSINE)
+
+
+def _bends(axis: Matrix, pitch: Matrix) -> bool:
+    return bool(abs(axis @ pitch) > _MIN_BENDING_COSINE)
 
 
 def _pitch_axis(axes: Sequence[Matrix]) -> Matrix:

@@ -14,6 +14,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.contact import contact_points, flat_foot_angle
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis, joint_motion
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint
@@ -60,11 +61,10 @@ _MIN_KNEE_HEIGHT = 0.15
 def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
     """Return the position of each moving joint in the standing pose [rad] or [m], by name.
 
-    A keyframe with positions of all joints of the legs is used unchanged.
+    A keyframe in which the robot stands on its feet is used unchanged.
     """
-    keyframe = robot.keyframe
-    if keyframe and all(j.name in keyframe for leg in robot.legs for j in leg.joints):
-        return {joint.name: keyframe.get(joint.name, 0.0) for joint in robot.joints}
+    if is_standing_keyframe(robot):
+        return {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
     positions = {joint.name: clip_to_limits(joint, joint.reference) for joint in robot.joints}
     # The center of mass moves with the legs, hence a second pass.
     for _ in range(2 if robot.legs else 0):

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.kinematics import joint_axis
+from terrainkit_robots.analysis.bodies.kinematics import ancestors, joint_axis
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
@@ -204,11 +204,22 @@ def _pairs_by_name(
             other = index_of.get(swap_sides(name)) if name else None
             if other is None or other == index:
                 continue
+            chains = ancestors(bodies, index), ancestors(bodies, other)
+            if index in chains[1] or other in chains[0]:
+                continue  # links S, L, E, U, R of an arm: L carries R
+            if _has_lone_letter(name) and len(chains[0]) != len(chains[1]):
+                continue
             # If a sign is wrong, both may be on one side; they still are a pair.
             left, right = points[[index, other]] @ mirror.normal
             is_left = any(word.lower() in _LEFT_TO_RIGHT for word in _TOKEN.findall(name))
             if left >= right and is_left:
                 yield index, other
+
+
+def _has_lone_letter(name: str) -> bool:
+    """Return whether the only side in a name is the letter l or r."""
+    sides = [word.lower() for word in _TOKEN.findall(name) if word.lower() in _SIDES]
+    return sides in (["l"], ["r"])
 
 
 def swap_sides(name: str) -> str:

@@ -28,7 +28,12 @@ from terrainkit_robots.description.model import (
 )
 from terrainkit_robots.description.package_resolver import PackageResolver
 from terrainkit_robots.description.urdf.colors import Color, color_of, named_colors
-from terrainkit_robots.description.urdf.tags import has_variable, misspelled_names, unexpanded_xacro
+from terrainkit_robots.description.urdf.tags import (
+    has_variable,
+    misspelled_names,
+    repeated_children,
+    unexpanded_xacro,
+)
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.number_text import place_text
 from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers, replace_commas
@@ -97,6 +102,11 @@ class _Reader:
             what = f"attribute {attribute} of <{element.tag}>" if attribute else f"<{element.tag}>"
             message = f"{what} is unknown and ignored; did you mean {known}?"
             self._report("XML007", element, message, attribute=attribute, known=known)
+        for element in repeated_children(root):
+            parent = element.getparent()
+            owner = "" if parent is None else parent.tag
+            message = f"second <{element.tag}> in a <{owner}>; expected one, and the first is read"
+            self._report("XML015", element, message)
 
     # Numbers
 

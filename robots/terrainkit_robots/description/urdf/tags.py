@@ -48,6 +48,18 @@ _CHILDREN: Mapping[str, frozenset[str]] = {
 """Known children of elements; tools may add others."""
 
 
+_SINGLE_CHILDREN: Mapping[str, tuple[str, ...]] = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass", "inertia"),
+    "visual": ("origin", "geometry"),
+    "collision": ("origin", "geometry"),
+    "joint": (
+        *("origin", "parent", "child", "axis", "limit", "mimic"),
+        *("dynamics", "calibration", "safety_controller"),
+    ),
+}
+"""Children that an element may have only once. XML008 reports repeated materials."""
+
 _MIN_ATTRIBUTE_SIMILARITY, _MIN_TAG_SIMILARITY = 0.6, 0.75
 """Minimum difflib ratio of a misspelled name. Tools add elements of their own, so elements have to
 be more similar than attributes."""
@@ -66,6 +78,24 @@ def unexpanded_xacro(root: "etree._Element") -> Iterator[tuple["etree._Element",
         if unexpanded is not None:
             yield element, repr(unexpanded)
             return
+
+
+def repeated_children(root: "etree._Element") -> Iterator["etree._Element"]:
+    """Yield elements of links and joints of which the parent already has one."""
+    for parent in root.iter(*_SINGLE_CHILDREN):
+        if _is_described(parent):
+            seen: set[str] = set()
+            for child in parent.iterchildren(*_SINGLE_CHILDREN[parent.tag]):
+                if child.tag in seen:
+                    yield child
+                seen.add(child.tag)
+
+
+def _is_described(element: "etree._Element") -> bool:
+    """Return whether an element is a link or joint of the robot, or belongs to a link."""
+    parent = element.getparent()
+    expected = "robot" if element.tag in ("link", "joint") else "link"
+    return parent is not None and str(parent.tag) == expected
 
 
 def has_variable(text: str) -> bool:

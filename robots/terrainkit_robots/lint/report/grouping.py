@@ -11,6 +11,7 @@ _MAX_LISTED = 12
 """Maximum number of elements that the list of a group shows."""
 
 _TOKEN = re.compile(r"[\w./+%-]*[\w%]")
+_LIST = re.compile(rf"{_TOKEN.pattern}(?:, {_TOKEN.pattern})*(?:, \.\.\.)?")
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?%?")
 
 _SUBJECT, _VALUE = "\0", "\1"
@@ -82,6 +83,13 @@ def _template(text: str, subject: str, names: Set[str]) -> tuple[str, list[str]]
     if subject:
         text = re.sub(rf"(?<!\w){re.escape(subject)}(?!\w)", _SUBJECT, text)
 
+    def replace_list(match: re.Match[str]) -> str:
+        items = match[0].removesuffix(", ...").split(", ")
+        if len(items) > 1 and names >= set(items):
+            values.append(match[0])
+            return _VALUE
+        return _TOKEN.sub(replace, match[0])
+
     def replace(match: re.Match[str]) -> str:
         token = match[0]
         if basename and token.rpartition("/")[2] == basename:
@@ -91,7 +99,7 @@ def _template(text: str, subject: str, names: Set[str]) -> tuple[str, list[str]]
             return _VALUE
         return token
 
-    return _TOKEN.sub(replace, text), values
+    return _LIST.sub(replace_list, text), values
 
 
 def _list_others(members: Sequence[tuple[Finding, list[str]]]) -> tuple[str, ...]:

@@ -46,7 +46,9 @@ def titled_list(title: str, items: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Yield the lines of a list with a title, or nothing if there are no items."""
     if items:
         yield f"{title}:\n"
-        yield from (f"- {cell(head)}: {cell(text)}" for head, text in items)
+        yield from (
+            f"- {cell(head)}: {cell(text)}" if head else f"- {cell(text)}" for head, text in items
+        )
         yield ""
 
 

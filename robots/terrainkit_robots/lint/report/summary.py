@@ -5,12 +5,15 @@ from collections.abc import Sequence
 
 from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.rule import Severity
-from terrainkit_robots.lint.runner import Finding, Report, Skipped
+from terrainkit_robots.lint.runner import NO_LEGS, Finding, Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
 from terrainkit_robots.text import count, display_path, names
 
 SEVERITY_LABELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 """Label of each severity, in the order of reports."""
+
+_MAX_CODES = 6
+"""Maximum number of rules that are listed for one reason."""
 
 LIKELY = "likely: the finding depends on a heuristic, such as leg detection"
 """Explanation of the mark `(likely)`."""
@@ -53,6 +56,8 @@ def format_location(finding: Finding) -> str:
 def group_skipped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
     """Return one entry per reason: whether it is a warning, the codes of the rules, the reason.
 
+    Many codes are counted instead of listed; the JSON report lists all.
+
     An unused suppression comment is a warning. The findings that one comment suppresses are one
     entry.
     """
@@ -69,4 +74,13 @@ def group_skipped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
         reason = f"suppressed for {subjects}: {members[0].comment.reason}"
         reason = members[0].reason if len(members) == 1 else reason
         reasons.setdefault((False, reason), {})[members[0].code] = None
-    return [(warn, ", ".join(codes), reason) for (warn, reason), codes in reasons.items()]
+    entries = []
+    for (is_warning, reason), codes in reasons.items():
+        listed = ", ".join(codes)
+        if reason == NO_LEGS:
+            does = "rule does" if len(codes) == 1 else "rules do"
+            listed, reason = "", f"not a legged robot: {len(codes)} {does} not apply"
+        elif len(codes) > _MAX_CODES:
+            listed = f"{len(codes)} rules"
+        entries.append((is_warning, listed, reason))
+    return entries

@@ -4,7 +4,9 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from pathlib import Path
 
+from terrainkit.text import truncate
 from terrainkit_robots.lint.report.escape import escape_control
 from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
@@ -45,26 +47,30 @@ class Span:
 Line = tuple[Span, ...]
 
 
-def format_reports(reports: Sequence[Report]) -> str:
+def format_reports(reports: Sequence[Report], *, notes: bool = False) -> str:
     """Return the reports without colors."""
-    return "".join("".join(span.text for span in line) + "\n" for line in format_lines(reports))
+    lines = format_lines(reports, notes=notes)
+    return "".join("".join(span.text for span in line) + "\n" for line in lines)
 
 
-def format_lines(reports: Sequence[Report], width: int = DEFAULT_WIDTH) -> Iterator[Line]:
+def format_lines(
+    reports: Sequence[Report], width: int = DEFAULT_WIDTH, *, notes: bool = False
+) -> Iterator[Line]:
     """Yield the lines of the reports, wrapped at `width` characters.
 
-    A finding that repeats over joints or links is one entry with a list.
+    A finding that repeats over joints or links is one entry with a list. A note is one line unless
+    `notes` is set.
     """
     for index, report in enumerate(reports):
         if index:
             yield ()
-        yield from _robot(report, width)
+        yield from _robot(report, width, notes=notes)
     if len(reports) > 1:
         yield ()
         yield _counts(f"{count(len(reports), 'file')}: ", reports)
 
 
-def _robot(report: Report, width: int) -> Iterator[Line]:
+def _robot(report: Report, width: int, *, notes: bool) -> Iterator[Line]:
     model = report.facts.model
     file = escape_control(display_path(model.file))
     yield (Span(file, "bold"),)
@@ -77,35 +83,45 @@ def _robot(report: Report, width: int) -> Iterator[Line]:
     if fixed:
         yield (Span("fixed", "bold green"),)
         for group in fixed:
-            yield from _entry(group, f"{group.first.code}, {group.text}", width)
+            yield from _entry(group, f"{group.first.code}, {group.text}", model.file, width)
         yield ()
-    for (severity, code, name), groups in _by_rule(group_findings(model, report.findings)):
+    groups = group_findings(model, report.findings)
+    short = [] if notes else [group for group in groups if group.first.severity == "info"]
+    by_rule = groupby(
+        (group for group in groups if group not in short),
+        lambda group: (group.first.severity, group.first.code, group.first.name),
+    )
+    for (severity, code, name), members in by_rule:
         yield Span(SEVERITY_LABELS[severity], _STYLES[severity]), Span(f" {code} {name}")
-        yield from _rule(groups, width)
+        yield from _rule(list(members), model.file, width)
         yield ()
-    footer = [*_help(report.findings), *_skipped(report, width)]
+    for group in short:
+        yield _note(group, width)
+    if short:
+        yield ()
+    footer = [*_help(report.findings, notes=notes), *_skipped(report, width)]
     yield from footer
     if footer:
         yield ()
     yield _counts(f"{file}: ", [report])
 
 
-def _by_rule(
-    groups: Sequence[FindingGroup],
-) -> Iterator[tuple[tuple[Severity, str, str], list[FindingGroup]]]:
-    """Yield severity, code and name of each rule with its entries, errors first."""
-    order = list(SEVERITY_LABELS)
-    ranked = sorted(groups, key=lambda g: (order.index(g.first.severity), g.first.code))  # stable
-    for key, members in groupby(ranked, lambda g: (g.first.severity, g.first.code, g.first.name)):
-        yield key, list(members)
+def _note(group: FindingGroup, width: int) -> Line:
+    """Return a note on one line, cut at `width` characters."""
+    first = group.first
+    label, code = Span(SEVERITY_LABELS["info"], _STYLES["info"]), f" {first.code}"
+    more = f" (+{len(group.others)})" if group.others else ""
+    text = " ".join(escape_control(group.text[:_MAX_LENGTH]).split())
+    room = max(width - len(f"{label.text}{code} {more}"), 20)
+    return label, Span(code), Span(f" {truncate(text, room)}{more}")
 
 
-def _rule(groups: Sequence[FindingGroup], width: int) -> Iterator[Line]:
+def _rule(groups: Sequence[FindingGroup], robot_file: Path, width: int) -> Iterator[Line]:
     shown = groups[:_MAX_ENTRIES]
     hints = [escape_control(group.first.hint) for group in shown]
     for i, group in enumerate(shown):
         likely = " (likely)" if group.first.certainty == "likely" else ""
-        yield from _entry(group, group.text + likely, width)
+        yield from _entry(group, group.text + likely, robot_file, width)
         # The help of notes is left to `terrainkit rule`.
         is_note = group.first.severity == "info"
         if not is_note and hints[i] and hints[i + 1 : i + 2] != [hints[i]]:
@@ -115,10 +131,13 @@ def _rule(groups: Sequence[FindingGroup], width: int) -> Iterator[Line]:
         yield (Span(f"  and {more}; use --format json for all", "dim"),)
 
 
-def _entry(group: FindingGroup, text: str, width: int) -> Iterator[Line]:
-    location = Span(f"  {escape_control(format_location(group.first))}: ", "cyan")
-    # The length of the file's path decides, so that all entries of a file look the same.
-    if len(escape_control(display_path(group.first.file))) > width // 3:
+def _entry(group: FindingGroup, text: str, robot_file: Path, width: int) -> Iterator[Line]:
+    first = group.first
+    place = escape_control(format_location(first))
+    if first.file == robot_file:  # its path is in the header
+        place = f"line {first.line}" if first.line else ""
+    location = Span(f"  {place}: " if place else "  ", "cyan")
+    if len(place) > width // 3:
         yield (Span(location.text.rstrip(), location.style),)
         location = Span(" " * 6)
     yield from _wrap(location, escape_control(text), width, indent=6)
@@ -132,12 +151,15 @@ def _fix_description(finding: Finding) -> str:
     return f"{finding.subject}: {description}" if finding.subject else description
 
 
-def _help(findings: Sequence[Finding]) -> Iterator[Line]:
+def _help(findings: Sequence[Finding], *, notes: bool) -> Iterator[Line]:
     """Yield what `(likely)` means, and how to get help on notes, which are listed without help."""
-    if any(finding.certainty == "likely" for finding in findings):
+    shown = [finding for finding in findings if notes or finding.severity != "info"]
+    if any(finding.certainty == "likely" for finding in shown):
         label, text = LIKELY.split(" ", 1)
         yield Span(f"{label} ", "dim"), Span(text)
-    codes = sorted(finding.code for finding in findings if finding.severity == "info")
+    codes = [finding.code for finding in findings if finding.severity == "info"]
+    if codes and not notes:
+        yield Span("notes in full: ", "dim"), Span("--notes")
     if codes:
         yield Span("details of a note: ", "dim"), Span(f"terrainkit rule CODE, such as {codes[0]}")
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
+from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.text import count
+from terrainkit_robots.text import contrast, count
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.bodies.overlap import Overlap
@@ -29,6 +30,9 @@ _MAX_OVERLAP_ERROR = 0.01
 _MIN_FOOT_DEPTH = 0.005
 """How much lower a shape without contacts may be than those with contacts [m], such as a rubber
 skin."""
+
+_MIN_RANGE = 0.01
+"""Distance of zero from the end of a range below which zero is the folded pose [rad] or [m]."""
 
 _NUM_SAMPLES = 64
 """Number of joint configurations that are tested for overlaps."""
@@ -188,6 +192,9 @@ def overlap(robot: Facts) -> Iterator[Violation]:
     compared as they are, meshes by their convex hulls, as in most simulators. An overlap above 1 mm
     is a warning, and above 10 mm an error on a robot with legs. The severity is one level lower if
     a convex hull is involved, since other simulators may use the mesh itself or its convex parts.
+    Without a keyframe, it is a note on arms, grippers and hands if a convex hull is involved or if
+    zero is at the end or outside of the range of a joint between the two bodies: nobody starts them
+    there.
 
     Fix:
         Shrink or move one of the shapes, or disable contacts of this pair (<exclude> in MJCF,
@@ -201,18 +208,37 @@ def overlap(robot: Facts) -> Iterator[Violation]:
     for pair, deepest in _group_by_pair(robot, robot.overlap_scene.detect(robot.positions)).items():
         if deepest.depth <= _MAX_OVERLAP:
             continue
+        got, expected = contrast(1000 * deepest.depth, 1000 * _MAX_OVERLAP, ".1f")
         # Fixed-base arms often disable contacts of pairs that always touch, so no error for them.
         levels: tuple[Severity, ...] = ("info", "warning", "error" if robot.legs else "warning")
+        level = 1 + (deepest.depth > _MAX_OVERLAP_ERROR) - deepest.has_mesh
+        if _is_arbitrary_pose(robot, pair, deepest):
+            level = 0
         yield Violation(
             subject=" and ".join(pair),
             source=deepest.second.geometry.source,
             message=f"overlap of {'the convex hulls of ' if deepest.has_mesh else ''}"
             f"{deepest.first.link} and {deepest.second.link} at the default pose: got "
-            f"{1000 * deepest.depth:.1f} mm; expected at most {1000 * _MAX_OVERLAP:.0f} mm",
-            severity=levels[1 + (deepest.depth > _MAX_OVERLAP_ERROR) - deepest.has_mesh],
+            f"{got} mm; expected at most {expected} mm",
+            severity=levels[level],
             certainty="likely" if deepest.has_mesh else "proven",
             measured={"depth": round(deepest.depth, 5)},
         )
+
+
+def _is_arbitrary_pose(robot: Facts, pair: tuple[str, str], overlap: "Overlap") -> bool:
+    """Return whether neither a leg nor a keyframe defines the pose in which two bodies overlap."""
+    first, second = (robot.body_of[name].index for name in pair)
+    if robot.model.home or not robot.leg_bodies.isdisjoint((first, second)):
+        return False
+    if overlap.has_mesh:
+        return True
+    between = set(ancestors(robot.bodies, first)) ^ set(ancestors(robot.bodies, second))
+    ranges = (joint.range for k in between if (joint := robot.bodies[k].joint) is not None)
+    return any(
+        limits is not None and not limits[0] + _MIN_RANGE < 0 < limits[1] - _MIN_RANGE
+        for limits in ranges
+    )
 
 
 def _group_by_pair(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Overlap]":
@@ -255,11 +281,12 @@ def overlap_in_range(robot: Facts) -> Iterator[Violation]:
     for pair, number in counts.items():
         share = number / _NUM_SAMPLES
         if share > _MAX_OVERLAP_SHARE:
+            got, expected = contrast(share, _MAX_OVERLAP_SHARE, ".0%")
             yield Violation(
                 subject=" and ".join(pair),
                 source=robot.tree.links[pair[0]].source,
                 message=f"part of the joint range in which {pair[0]} and {pair[1]} overlap: got "
-                f"{share:.0%}; expected at most {_MAX_OVERLAP_SHARE:.0%}",
+                f"{got}; expected at most {expected}",
                 certainty="likely",
                 measured={"share": share},
             )

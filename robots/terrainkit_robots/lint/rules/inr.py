@@ -29,7 +29,7 @@ from terrainkit_robots.analysis.inertia.placeholder import is_identity, placehol
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.lint.rule import Severity, Violation, rule
-from terrainkit_robots.text import names
+from terrainkit_robots.text import contrast, names
 from terrainkit_robots.transforms import Matrix
 
 _MIN_TRIANGLE_RATIO = 0.99
@@ -486,13 +486,14 @@ def com_outside_body(robot: Facts) -> Iterator[Violation]:
         if box is None:
             continue
         distance, limit = _distance(body.center, box), _max_distance(box)
+        got, expected = contrast(distance, limit, ".3g")
         yield Violation(
             subject=body.name,
             source=mass_source(body.main_link),
             severity="error" if distance > _COM_ERROR * limit else "warning",
-            message=f"center of mass of body {body.name}: got {distance:.3g} m outside of the "
+            message=f"center of mass of body {body.name}: got {got} m outside of the "
             f"bounding box, whose diagonal is {2 * half_diagonal(box):.3g} m; expected at most "
-            f"{limit:.3g} m",
+            f"{expected} m",
             measured={"outside": distance, "allowed": limit},
         )
 
@@ -538,8 +539,8 @@ def mass_ratio(robot: Facts) -> Iterator[Violation]:
             subject=light.name,
             source=mass_source(light.main_link),
             message=f"mass ratio of {heavy.name} ({heavy.mass:.4g} kg) and its neighbor "
-            f"{light.name} ({light.mass:.3g} kg): got {ratio:.0f}; expected at most "
-            f"{_MAX_MASS_RATIO:.0f}",
+            f"{light.name} ({light.mass:.3g} kg): got "
+            f"{contrast(ratio, _MAX_MASS_RATIO, '.0f')[0]}; expected at most {_MAX_MASS_RATIO:.0f}",
             measured={"ratio": ratio, "mass": light.mass, "neighbor": heavy.mass},
         )
 

@@ -19,7 +19,7 @@ from terrainkit_robots.lint.rules.inr import (
     implausible_density,
     negative_mass,
 )
-from terrainkit_robots.text import count, names
+from terrainkit_robots.text import contrast, count, names
 from terrainkit_robots.transforms import Matrix
 
 _MIN_AXIS_LENGTH = 1e-6
@@ -324,10 +324,11 @@ def wide_range(robot: Facts) -> Iterator[Violation]:
             continue
         lower, upper = _limits(joint.limit)
         if upper - lower > _MAX_RANGE:
+            turns, _ = contrast((upper - lower) / (2 * math.pi), 2.0, ".3g")
             yield Violation(
                 subject=joint.name,
                 source=joint.limit.source,
-                message=f"range of joint {joint.name}: got {(upper - lower) / (2 * math.pi):.3g} "
+                message=f"range of joint {joint.name}: got {turns} "
                 f"turns ({lower:g} to {upper:g} rad); expected at most 2 turns",
                 measured={"lower": lower, "upper": upper},
             )
@@ -431,18 +432,25 @@ def placeholder_limit(robot: Facts) -> Iterator[Violation]:
     for joint in _joints_with_limit(robot):
         assert joint.limit is not None
         max_velocity = _MAX_SPIN_VELOCITY if joint.kind == "continuous" else _MAX_VELOCITY
-        for name, value, limit, unit in (
-            ("effort", joint.limit.effort, max_effort[joint.effort_unit], joint.effort_unit),
-            ("velocity", joint.limit.velocity, max_velocity, joint.speed_unit),
-        ):
-            if value is not None and (value > limit or (name == "effort" and value == limit)):
-                yield Violation(
-                    subject=joint.name,
-                    source=joint.limit.source,
-                    message=f"{name} limit of joint {joint.name}: got {value:g} {unit}; expected "
-                    f"less than {limit:.4g} {unit} for a robot of {robot.total_mass:.4g} kg",
-                    measured={name: value, "most": limit},
-                )
+        limits = {
+            "effort": (joint.limit.effort, max_effort[joint.effort_unit], joint.effort_unit),
+            "velocity": (joint.limit.velocity, max_velocity, joint.speed_unit),
+        }
+        too_large = {
+            name: (value, most, unit)
+            for name, (value, most, unit) in limits.items()
+            if value is not None and (value > most or (name == "effort" and value == most))
+        }
+        if too_large:
+            got = " and ".join(f"{value:g} {unit}" for value, _, unit in too_large.values())
+            expected = " and ".join(f"{most:.4g} {unit}" for _, most, unit in too_large.values())
+            yield Violation(
+                subject=joint.name,
+                source=joint.limit.source,
+                message=f"{' and '.join(too_large)} limit of joint {joint.name}: got {got}; "
+                f"expected less than {expected} for a robot of {robot.total_mass:.4g} kg",
+                measured={name: value for name, (value, _, _) in too_large.items()},
+            )
 
 
 @rule("JNT012", "zero-outside-limits", "info")
@@ -450,7 +458,7 @@ def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
     """Position zero is outside the limits of a joint.
 
     A simulator that starts all joints at zero starts in an invalid pose, and the limit constraints
-    push the joint out of it. If the robot has a standing pose or a keyframe, this is only a note.
+    push the joint out of it. The elbows of many arms and the knees of most legs exclude zero.
 
     Fix:
         Start from a pose within the limits: set the default joint positions in the simulator.
@@ -459,30 +467,18 @@ def zero_outside_limits(robot: Facts) -> Iterator[Violation]:
         Isaac Lab rejects default positions outside the limits; MuJoCo starts at zero.
     """
     outside = [joint for joint in robot.joints if joint.mimic is None and _excludes_zero(joint)]
-    with_pose = [joint for joint in outside if joint.name in robot.model.home or robot.legs]
-    if with_pose:
-        first = with_pose[0]
+    if outside:
+        first = outside[0]
         assert first.limit is not None
         lower, upper = _limits(first.limit)
         yield Violation(
             subject=first.name,
             source=first.limit.source,
-            message=f"limits of {names(joint.name for joint in with_pose)}: got a range without 0 "
-            f"({first.name}: {lower:.5g} to {upper:.5g} {first.unit}); start from the default pose",
-            measured={"joints": len(with_pose), "lower": lower, "upper": upper},
+            message=f"limits of {names(joint.name for joint in outside)}: got a range without "
+            f"{first.reference:g} ({first.name}: {lower:.5g} to {upper:.5g} {first.unit}); start "
+            "from the default pose",
+            measured={"joints": len(outside), "lower": lower, "upper": upper},
         )
-    for joint in outside:
-        if joint not in with_pose:
-            assert joint.limit is not None
-            lower, upper = _limits(joint.limit)
-            yield Violation(
-                subject=joint.name,
-                source=joint.limit.source,
-                severity="warning",
-                message=f"limits of joint {joint.name}: got {lower:.5g} to {upper:.5g} "
-                f"{joint.unit}; expected a range with {joint.reference:g}, or a keyframe",
-                measured={"lower": lower, "upper": upper},
-            )
 
 
 def _excludes_zero(joint: Joint) -> bool:
@@ -613,14 +609,15 @@ def insufficient_torque(robot: Facts) -> Iterator[Violation]:
     named = any(leg.limb.has_leg_names for leg in robot.legs)
     for joint, torque, effort in overloaded:
         share, unit = torque / effort, joint.effort_unit
+        got, expected = contrast(share, _MAX_LOAD, ".0%")
         yield Violation(
             subject=joint.name,
             source=joint.limit.source if joint.limit else joint.source,
             severity="error" if share > _MAX_LOAD_ERROR and named else "warning",
             certainty="likely",
             message=f"static load of joint {joint.name} at the standing pose: got {torque:.3g} "
-            f"{unit}, {share:.0%} of its effort limit of {effort:.4g} {unit}; expected at most "
-            f"{_MAX_LOAD:.0%}",
+            f"{unit}, {got} of its effort limit of {effort:.4g} {unit}; expected at most "
+            f"{expected}",
             measured={"torque": torque, "effort": effort, "share": share},
         )
 

@@ -17,9 +17,12 @@ from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec
-from terrainkit_robots.text import names
+from terrainkit_robots.text import contrast, names
 
 _LEG_COUNTS = (2, 4, 6, 8)
+
+_MAX_MASS_DIFFERENCE = 0.02
+"""Allowed relative difference between the masses of two equal limbs."""
 
 _MAX_RISE = 0.3
 """A leg points up if its end is higher than its start by this share of the distance."""
@@ -109,7 +112,8 @@ def leg_count(robot: Facts) -> Iterator[Violation]:
     """The number of legs is not 2, 4, 6 or 8.
 
     A leg that is not detected usually has a joint that is misnamed or fixed, or ends at another
-    height than the other legs.
+    height than the other legs. Limbs that equal the legs but are not counted are reported as well:
+    a robot whose z axis does not point up stands on two of its four legs.
 
     Fix:
         Compare the missing leg with the others, from the trunk to the foot.
@@ -118,7 +122,18 @@ def leg_count(robot: Facts) -> Iterator[Violation]:
         All legged robots in simulation suites have an even number of legs.
     """
     count = len(robot.legs)
-    if count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
+    uncounted = _uncounted_legs(robot)
+    if uncounted:
+        yield Violation(
+            subject=robot.model.title,
+            source=robot.model.source,
+            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
+            f"expected {count + len(uncounted)}, since {names(uncounted)} have the joints and "
+            "masses of a leg, but do not end near the ground; check that z points up",
+            certainty="likely",
+            measured={"legs": count, "uncounted": len(uncounted)},
+        )
+    elif count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
@@ -127,6 +142,26 @@ def leg_count(robot: Facts) -> Iterator[Violation]:
             certainty="likely",
             measured={"legs": count},
         )
+
+
+def _uncounted_legs(robot: Facts) -> list[str]:
+    """Return the last bodies of limbs that have the joints and the masses of a leg."""
+    legs = [leg.limb for leg in robot.legs]
+    used = robot.leg_bodies
+    inverted = _inverted_legs(robot)
+    return [
+        robot.bodies[limb.chain[-1]].name
+        for limb in robot.limbs
+        if limb not in inverted and used.isdisjoint(limb.chain)
+        if any(_is_equal_limb(robot, limb, leg) for leg in legs)
+    ]
+
+
+def _is_equal_limb(robot: Facts, limb: Limb, leg: Limb) -> bool:
+    if _joint_types(limb) != _joint_types(leg) or len(limb.chain) != len(leg.chain):
+        return False
+    own, other = ([robot.bodies[index].mass for index in each.chain] for each in (limb, leg))
+    return min(own) > 0 and bool(np.allclose(own, other, rtol=_MAX_MASS_DIFFERENCE))
 
 
 @rule("LEG003", "missing-leg-joint", "warning", needs=("legs",))
@@ -156,15 +191,15 @@ def missing_leg_joint(robot: Facts) -> Iterator[Violation]:
             )
 
 
-@rule("LEG004", "foot-collapsed", "warning", fixes="safe", needs=("legs",))
+@rule("LEG004", "foot-collapsed", "info", fixes="safe", needs=("legs",))
 def foot_collapsed(robot: Facts) -> Iterator[Violation]:
-    """Isaac Gym merges a foot into its shank.
+    """Isaac Gym merges the feet into their shanks.
 
-    Isaac Gym collapses fixed joints by default. The foot is then not a rigid body: a search for
-    feet by name finds nothing, and their contact forces belong to the shank.
+    Isaac Gym collapses fixed joints by default. A foot is then not a rigid body: a search for feet
+    by name finds nothing, and their contact forces belong to the shank.
 
     Fix:
-        Add dont_collapse="true" to the fixed joint above the foot.
+        Add dont_collapse="true" to the fixed joints above the feet. Other simulators ignore it.
 
     Source:
         Isaac Gym's asset option collapse_fixed_joints; the descriptions of Unitree and ANYbotics
@@ -172,25 +207,33 @@ def foot_collapsed(robot: Facts) -> Iterator[Violation]:
     """
     if robot.model.kind == "mjcf":
         raise CannotCheckError("Isaac Gym's URDF importer does not read MJCF")
+    merged = []
     for leg in robot.legs:
         joint = robot.tree.parent_joint.get(leg.foot)
         has_shapes = bool(robot.tree.links[leg.foot].collisions)
-        if joint is None or joint.kind != "fixed" or joint.dont_collapse or not has_shapes:
-            continue
-        edit = SetAttribute(source=joint.source, name="dont_collapse", value="true")
-        fix = Fix(
-            safety="safe",
-            description=f'Add dont_collapse="true" to joint {joint.name}.',
-            edits=(edit,),
-        )
-        yield Violation(
-            subject=leg.foot,
-            source=joint.source,
-            message=f"fixed joint {joint.name} above foot {leg.foot}: got no dont_collapse; "
-            'expected dont_collapse="true", or Isaac Gym merges the foot into its parent',
-            certainty="likely",
-            fix=None if joint.source.element is None else fix,
-        )
+        if joint is not None and joint.kind == "fixed" and not joint.dont_collapse and has_shapes:
+            merged.append((leg.foot, joint))
+    if not merged:
+        return
+    foot, first = merged[0]
+    joints = names(joint.name for _, joint in merged)
+    sources = [joint.source for _, joint in merged]
+    fix = Fix(
+        safety="safe",
+        description=f'Add dont_collapse="true" to {joints}.',
+        edits=tuple(
+            SetAttribute(source=source, name="dont_collapse", value="true") for source in sources
+        ),
+    )
+    yield Violation(
+        subject=foot,
+        source=first.source,
+        message=f"fixed joints above the feet ({joints}): got no dont_collapse; expected "
+        'dont_collapse="true", or Isaac Gym merges the feet into their parents',
+        certainty="likely",
+        measured={"feet": len(merged)},
+        fix=None if any(source.element is None for source in sources) else fix,
+    )
 
 
 @rule("LEG005", "forward-axis", "warning", needs=("legs",))
@@ -272,12 +315,13 @@ def com_outside_support(robot: Facts) -> Iterator[Violation]:
         return
     trunk = robot.bodies[0]
     outside = stance.margin < 0
+    got, expected = contrast(1000 * abs(stance.margin), 1000 * limit, ".0f")
     yield Violation(
         subject=trunk.name,
         source=robot.tree.links[trunk.name].source,
         message="distance of the center of mass from the edge of the support polygon at the "
-        f"standing pose: got {1000 * abs(stance.margin):.0f} mm "
-        f"{'outside' if outside else 'inside'}; expected at least {1000 * limit:.0f} mm inside",
+        f"standing pose: got {got} mm {'outside' if outside else 'inside'}; expected at least "
+        f"{expected} mm inside",
         severity="error" if outside else "warning",
         certainty="likely",
         measured={"margin": round(stance.margin, 5)},

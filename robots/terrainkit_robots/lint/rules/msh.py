@@ -161,13 +161,14 @@ def _read_or_empty(path: Path) -> bytes:
         return b""
 
 
-@rule("MSH003", "package-uri", "warning", fixes="safe")
+@rule("MSH003", "package-uri", "info", fixes="safe")
 def package_uri(robot: Facts) -> Iterator[Violation]:
     """A mesh path refers to a ROS package.
 
     `package://`, `model://` and `$(find ...)` work only where ROS or Gazebo is installed and the
     package is on its path. MuJoCo looks for a folder called `package:`, and other readers guess.
-    A relative path after `file://` does not work either: its first part is read as a host name.
+    A package path of a file that was found is a note. A relative path after `file://` is a warning:
+    its first part is read as a host name, so that no tool finds the file.
 
     Fix:
         Use a path relative to the robot's file. --fix does this for every mesh that was found.
@@ -194,6 +195,7 @@ def package_uri(robot: Facts) -> Iterator[Violation]:
             message=f"path of {len(members)} mesh{'es' * (len(members) > 1)} "
             f"({names((each.name for each, _ in members), 2)}): refers to {scheme}; expected a "
             "relative path, which MuJoCo can load",
+            severity="warning" if scheme == "a host" else None,
             measured={"meshes": len(members)},
             fix=None if fix is None else _fix(fix.safety, description, edits),
         )

@@ -1,5 +1,6 @@
 """NAM: rules on the names of links and joints."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -7,11 +8,14 @@ from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cached_property
 
+import numpy as np
+
 from terrainkit.text import truncate
+from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
-from terrainkit_robots.lint.rule import Violation, rule
-from terrainkit_robots.text import names
+from terrainkit_robots.lint.rule import Severity, Violation, rule
+from terrainkit_robots.text import count, names
 
 _MIN_PAIRS = 4
 """Minimum number of mirrored pairs from which a naming pattern is derived."""
@@ -251,7 +255,8 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
 
     USD, which Isaac Sim and Isaac Lab use, supports letters, digits and underscores. It replaces
     all other characters by underscores. Patterns in a configuration that was written for the URDF
-    then match nothing, and two names may become the same, which is an error.
+    then match nothing, and two names may become the same, which is an error. On fixed joints and in
+    MJCF, other characters are only a note.
 
     Fix:
         Use letters, digits and underscores, and start with a letter.
@@ -263,7 +268,8 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
     joints = [joint for joint in robot.model.joints if joint.name and joint.kind != "fixed"]
     if robot.model.kind != "mjcf":
         joints = [joint for joint in robot.model.joints if joint.name]
-    renamed: dict[str, Link | Joint] = {}
+    fixed = {id(joint) for joint in joints if joint.kind == "fixed"}
+    renamed: dict[Severity, dict[str, Link | Joint]] = {"warning": {}, "info": {}}
     kinds: tuple[tuple[str, Sequence[Link | Joint]], ...] = (("links", links), ("joints", joints))
     for kind, items in kinds:
         conflicts = _conflicts(items)
@@ -272,17 +278,20 @@ def invalid_name(robot: Facts) -> Iterator[Violation]:
         reported = {item.name for same in conflicts.values() for item in same}
         for item in items:
             if item.name not in reported and not _IDENTIFIER.fullmatch(item.name):
-                renamed.setdefault(item.name, item)
-    if renamed:
-        first = next(iter(renamed.values()))
-        count = f"{len(renamed)} names" if len(renamed) > 1 else "1 name"
+                is_note = robot.model.kind == "mjcf" or id(item) in fixed
+                renamed["info" if is_note else "warning"].setdefault(item.name, item)
+    for severity, found in renamed.items():
+        if not found:
+            continue
+        first = next(iter(found.values()))
         yield Violation(
             subject=first.name,
             source=first.source,
-            message=f"{count} with other characters than letters, digits and underscores: "
-            f"{names(renamed)}; USD renames {truncate(first.name)} to "
+            severity=severity,
+            message=f"{count(len(found), 'name')} with other characters than letters, digits and "
+            f"underscores: {names(found)}; USD renames {truncate(first.name)} to "
             f"{truncate(_valid(first.name))}",
-            measured={"names": len(renamed)},
+            measured={"names": len(found)},
         )
 
 
@@ -382,3 +391,58 @@ def _other_matches(robot: Facts) -> Iterator[str]:
         extra = [name for name in links if word in name and name not in in_legs | trunk]
         if extra:
             yield f"'{word}' also matches {names(extra)}, not part of a leg"
+
+
+# NAM004: names of axes.
+
+_MIN_COSINE = 0.5
+"""Cosine from which a leg bends about the lateral axis."""
+
+_MAX_COSINE = 0.3
+"""Cosine below which a joint does not turn about the axis in its name: more than 72 degrees."""
+
+
+@rule("NAM004", "wrong-axis-name", "warning", needs=("legs",))
+def wrong_axis_name(robot: Facts) -> Iterator[Violation]:
+    """A joint of a leg does not turn about the axis in its name.
+
+    The name says pitch, roll or yaw, but the joint turns about another axis. Default positions,
+    gains and symmetries are assigned by name, so the wrong joint gets them.
+
+    Fix:
+        Compare the <axis> and the rotation of the <origin> with the joints of the other legs, or
+        rename the joint.
+
+    Source:
+        The axis at joint positions 0, compared with the axis about which the leg bends (pitch), the
+        vertical axis (yaw) and the axis perpendicular to both (roll).
+    """
+    up = np.array([0.0, 0.0, 1.0])
+    lateral = robot.mirror.normal
+    bend_laterally = [abs(float(leg.pitch @ lateral)) > _MIN_COSINE for leg in robot.legs]
+    reported: set[str] = set()
+    for leg, bends_laterally in zip(robot.legs, bend_laterally, strict=True):
+        # A wrong axis may outvote the others of its leg, but not those of the other legs.
+        pitch = leg.pitch if bends_laterally or not any(bend_laterally) else lateral
+        roll = np.cross(pitch, up)
+        expected = {"pitch": pitch, "yaw": up, "roll": roll / np.linalg.norm(roll)}
+        for joint in leg.joints:
+            stated = {word.lower() for word in _words(joint.name)} & expected.keys()
+            if len(stated) != 1 or joint.kind == "prismatic" or joint.name in reported:
+                continue
+            (word,) = stated
+            body = robot.body_of_joint[joint.name]
+            _, axis = joint_axis(body, body.zero_pose)
+            cosines = {name: abs(float(axis @ other)) for name, other in expected.items()}
+            if cosines[word] < _MAX_COSINE:
+                reported.add(joint.name)
+                best = max(cosines, key=cosines.__getitem__)
+                yield Violation(
+                    subject=joint.name,
+                    source=joint.axis_source or joint.source,
+                    certainty="likely",
+                    message=f"axis of joint {joint.name}: got {best} "
+                    f"({math.degrees(math.acos(cosines[word])):.0f} deg from {word}); "
+                    f"expected {word}, as its name says",
+                    measured={"cosine": cosines[word]},
+                )

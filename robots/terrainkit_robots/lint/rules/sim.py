@@ -41,7 +41,7 @@ _EXPLAINED_BY: tuple[tuple[str, str], ...] = (
     (r"no decoder found|unknown or unsupported mesh", "MSH005 MSH013"),
     (r"_decoder", "MSH006 MSH007 MSH008 MSH010 MSH013"),
     (r"coplanar|mesh volume is too small", "MSH010"),
-    (r"repeated element: 'material'", "XML008"),
+    (r"repeated element", "XML008 XML015"),
     (r"repeated URDF name|repeated name|repeated joint|repeated body", "TRE001 XML011"),
     (r"joint parent or child missing", "TRE002 XML013"),
     (r"multiple parents", "TRE003"),

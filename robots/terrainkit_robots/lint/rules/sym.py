@@ -25,7 +25,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     has_flipped_axes,
     limits_match,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Check, Measured, Violation, rule
 from terrainkit_robots.lint.rules.inr import (
@@ -45,6 +45,7 @@ from terrainkit_robots.lint.rules.jnt import (
     wide_range,
     zero_axis,
 )
+from terrainkit_robots.text import contrast
 from terrainkit_robots.transforms import Matrix
 
 _MAX_MASS_DIFFERENCE = 0.02
@@ -76,7 +77,7 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     other_checks = _OtherChecks(robot, implausible_density, mass_ratio, massless_body)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         difference = _relative_difference(left.body.mass, right.body.mass)
         if not _has_mass(left, right) or difference <= _MAX_MASS_DIFFERENCE:
@@ -87,12 +88,19 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
         yield _report(
             odd.body.name,
             other.body.name,
-            f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, {difference:.1%} from the "
+            f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
+            f"{contrast(difference, _MAX_MASS_DIFFERENCE, '.1%')[0]} from the "
             f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
             f"{_MAX_MASS_DIFFERENCE:.0%}",
             {"mass": odd.body.mass, "other": other.body.mass},
             mass_source(odd.body.main_link),
         )
+
+
+def _mirrored(robot: Facts) -> list[MirrorPair]:
+    """Return the pairs of mirrored joints without those of copied assemblies."""
+    copied = {pair.left.body.index for pair in robot.copied_pairs}
+    return [pair for pair in robot.mirror_pairs if pair.left.body.index not in copied]
 
 
 def _has_mass(left: MirrorSide, right: MirrorSide) -> bool:
@@ -135,9 +143,9 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         plus 10 % of the radius of gyration.
     """
     _check_joint_types(robot)
-    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    _, displaced = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
     other_checks = _OtherChecks(robot, com_outside_body)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         if pair.indices & displaced or not _has_mass(left, right):
             continue
@@ -150,13 +158,13 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         if _is_same_part(robot, left.body, right.body):
             continue
         odd, other = robot.outlier_first(left, right, lambda body: body.center)
+        got, expected = contrast(1000 * error, 1000 * limit, ".3g")
         yield _report(
             odd.body.name,
             other.body.name,
             f"center of mass of body {odd.body.name}: got {_format_point(odd.body.center)} mm, and "
             f"{_format_point(other.body.center)} mm for its mirror image {other.body.name}, each "
-            f"in its own frame: {1000 * error:.3g} mm from mirrored; expected at most "
-            f"{1000 * limit:.2g} mm",
+            f"in its own frame: {got} mm from mirrored; expected at most {expected} mm",
             {"gap": error, "allowed": limit},
             mass_source(odd.body.main_link),
         )
@@ -240,7 +248,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     other_checks = _OtherChecks(robot, *_INERTIA_RULES)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         if not _has_mass(left, right) or not _has_same_parts(robot, left, right):
             continue
@@ -258,8 +266,8 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
             other.body.name,
             f"principal moments of body {odd.body.name}: got {_format(odd.body.principal)} kg m2, "
             f"and {_format(other.body.principal)} kg m2 for its mirror image {other.body.name}: "
-            f"{difference:.1%} of the largest apart; expected at most "
-            f"{_MAX_MOMENT_DIFFERENCE:.0%}",
+            f"{contrast(difference, _MAX_MOMENT_DIFFERENCE, '.1%')[0]} of the largest apart; "
+            f"expected at most {_MAX_MOMENT_DIFFERENCE:.0%}",
             {"gap": difference},
             inertia_source(odd.body.main_link),
         )
@@ -308,7 +316,7 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     other_checks = _OtherChecks(robot, wide_range)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
@@ -321,12 +329,11 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
         own, mirror = (a, b) if odd is left else (b, a)
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
-        kind = "" if pair.sign > 0 else "negated "
         yield _report(
             odd.joint.name,
             name,
             f"limits of joint {odd.joint.name}: got {_format_limits(own)} {unit}; expected "
-            f"{_format_limits(expected)} {unit}, the {kind}limits of its mirror image {name}, "
+            f"{_format_limits(expected)} {unit}, mirrored from those of {name}, "
             f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range",
             {"lower": own[0], "upper": own[1], "other_lower": mirror[0], "other_upper": mirror[1]},
             _limit_source(odd.joint),
@@ -360,33 +367,46 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     other_checks = _OtherChecks(robot, placeholder_limit)
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
+        differences: dict[str, tuple[float, float, float, _LimitOf]] = {}
         for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
             a, b = limit_of(robot, left.joint), limit_of(robot, right.joint)
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = _relative_difference(a, b)
-            if difference <= _MAX_LIMIT_DIFFERENCE or other_checks.report(left, right):
-                continue
+            if difference > _MAX_LIMIT_DIFFERENCE:
+                differences[name] = (a, b, difference, limit_of)
+        if not differences or other_checks.report(left, right):
+            continue
 
-            def value(body: Body, limit_of: _LimitOf = limit_of) -> Matrix | None:
-                limit = limit_of(robot, body.joint) if body.joint else None
-                return None if limit is None else np.array([limit])
+        _, _, _, first = next(iter(differences.values()))
 
-            odd, other = robot.outlier_first(left, right, value)
+        def value(body: Body, limit_of: _LimitOf = first) -> Matrix | None:
+            limit = limit_of(robot, body.joint) if body.joint else None
+            return None if limit is None else np.array([limit])
+
+        odd, other = robot.outlier_first(left, right, value)
+        joint, parts = odd.joint, list[str]()
+        measured: dict[str, float | int | str] = {}
+        for name, (a, b, difference, _) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
-            joint = odd.joint
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
-            yield _report(
-                joint.name,
-                other.joint.name,
-                f"{name} limit of joint {joint.name}: got {own:g} {unit}, {difference:.1%} from "
-                f"the {mirror:g} {unit} of its mirror image {other.joint.name}; expected at most "
-                f"{_MAX_LIMIT_DIFFERENCE:.0%}",
-                {name: own, "other": mirror},
-                _limit_source(joint),
-            )
+            parts.append(f"{own:g} {unit}, {_percent(difference)} from the {mirror:g} {unit}")
+            measured[name], measured[f"other_{name}"] = own, mirror
+        yield _report(
+            joint.name,
+            other.joint.name,
+            f"{' and '.join(differences)} limit of joint {joint.name}: got {' and '.join(parts)} "
+            f"of its mirror image {other.joint.name}; expected at most "
+            f"{_MAX_LIMIT_DIFFERENCE:.0%}",
+            measured,
+            _limit_source(joint),
+        )
+
+
+def _percent(difference: float) -> str:
+    return contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")[0]
 
 
 _LimitOf = Callable[[Facts, Joint], float | None]
@@ -410,7 +430,7 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
         The joint origins of tested robots without defects agree to 0.1 mm.
     """
     _check_joint_types(robot)
-    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    errors, _ = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
     for error in errors:
         if not error.is_axis:
             yield _report_pair(robot, error)
@@ -431,7 +451,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         Tested robots have either the same axis on all legs, or mirrored axes on all legs.
     """
     _check_joint_types(robot)
-    errors, _ = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
+    errors, _ = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
     for error in errors:
         if error.is_axis:
             yield _report_pair(robot, error)
@@ -456,7 +476,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
 
 def _opposite_axes(robot: Facts, reported: set[str]) -> Iterator[Violation]:
     """Yield joints whose axis is opposite to that of the mirror image, but should not be."""
-    for pair in robot.mirror_pairs:
+    for pair in _mirrored(robot):
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None:
@@ -474,9 +494,7 @@ def _opposite_axes(robot: Facts, reported: set[str]) -> Iterator[Violation]:
                 "expected the negated axis or the negated limits",
                 {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
             )
-    opposed_pairs = find_flipped_pairs(
-        robot.legs, robot.mirror, robot.mirror_pairs, robot.leg_bodies
-    )
+    opposed_pairs = find_flipped_pairs(robot.legs, robot.mirror, _mirrored(robot), robot.leg_bodies)
     for pair, others in opposed_pairs:
         left, right = pair.left, pair.right
         if right.joint.name not in reported:
@@ -537,6 +555,50 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         )
     source = (odd.joint.axis_source if error.is_axis else None) or odd.joint.source
     return _report(name, mirror, message, {"gap": error.distance, "angle": error.angle}, source)
+
+
+@rule("SYM008", "copied-assembly", "info")
+def copied_assembly(robot: Facts) -> Iterator[Violation]:
+    """The left and the right side are the same assembly, mounted twice.
+
+    Two arms of one product are equal in their own frames, and are not mirror images of each other.
+    The other rules on symmetry do not apply to them, and a policy cannot be mirrored by swapping
+    joints with a sign.
+
+    Fix:
+        No action if the real robot is built like this. Otherwise mirror one side: centers of mass,
+        products of inertia, origins and limits.
+
+    Source:
+        Both sides have the same meshes, inertials, joint axes, origins and limits, and at least one
+        center of mass or range is not mirrored.
+    """
+    copied = robot.copied_pairs
+    differing = [
+        pair
+        for pair in copied
+        if (
+            _has_mass(pair.left, pair.right)
+            and _com_error(robot, pair.left, pair.right) > _max_com_error(pair.left, pair.right)
+        )
+        or (
+            pair.sign != 0
+            and (a := pair.left.joint.range) is not None
+            and (b := pair.right.joint.range) is not None
+            and not limits_match(a, b, pair.sign)
+        )
+    ]
+    if differing:
+        first = copied[0]
+        yield _report(
+            first.left.body.name,
+            first.right.body.name,
+            f"assemblies on both sides: got {len(copied)} equal pairs of bodies, from "
+            f"{first.left.body.name} and {first.right.body.name} on; {len(differing)} of them are "
+            "not mirror images",
+            {"pairs": len(copied), "differing": len(differing)},
+            first.left.body.top.source,
+        )
 
 
 def _check_joint_types(robot: Facts) -> None:

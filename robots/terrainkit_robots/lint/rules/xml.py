@@ -291,6 +291,23 @@ def unsupported_quaternion(robot: Facts) -> Iterator[Violation]:
         yield _violation(robot, problem, fix)
 
 
+@rule("XML015", "repeated-element", "error")
+def repeated_element(robot: Facts) -> Iterator[Violation]:
+    """An element that may occur once occurs twice.
+
+    Examples are two <inertial> in a link and two <axis> in a joint, often left behind when a file
+    was merged. MuJoCo rejects most of them; other readers silently take the first or the last.
+
+    Fix:
+        Remove the one that is wrong.
+
+    Source:
+        wiki.ros.org/urdf/XML; MuJoCo 4.0: "repeated element".
+    """
+    for problem in _problems(robot, "XML015"):
+        yield _violation(robot, problem)
+
+
 @rule("XML018", "rotation-in-degrees", "warning")
 def rotation_in_degrees(robot: Facts) -> Iterator[Violation]:
     """A rotation is in degrees, but is read as radians.

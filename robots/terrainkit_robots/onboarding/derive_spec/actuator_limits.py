@@ -5,15 +5,20 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.gain import Gain
+    from terrainkit_robots.simulation.gain import Gain, GainSet
 
 _DEFAULT_ERROR = {"revolute": 1.0, "prismatic": 0.1}
 """Position error at which a motor of unknown effort saturates [rad] or [m]."""
+
+_LEG_FACTOR = 0.5
+"""Unknown effort of a leg joint over weight times leg length. It is 0.24 for anymal_c, 0.36 to 0.7
+for go2, h1 and g1, and 0.4 to 1.1 for a1."""
 
 _HOLDING_FACTOR = 2.0
 """Smallest ratio of an unknown effort to the holding torque."""
@@ -27,6 +32,13 @@ _ACTION_FACTOR = 0.25
 
 _MAX_ACTION_SCALE = {"revolute": 0.5, "prismatic": 0.05}
 """Largest action scale [rad] or [m]; legged_gym uses 0.25 rad."""
+
+_TRAIN_ACTION_FACTOR = 0.5
+"""Share of the effort that an action of 1 commands with training gains, at most."""
+
+_TRAIN_ACTION_SCALE = {"revolute": 0.25, "prismatic": 0.025}
+"""Action scale for training gains [rad] or [m], as in legged_gym: an action of 3 moves a thigh far
+enough for a step."""
 
 _MAX_RANGE_FACTOR = 0.25
 """Largest ratio of the action scale to the joint range."""
@@ -44,18 +56,29 @@ def effort_column(
     """
     in_file = {joint.name: _valid_limit(robot.effort_limit(joint)) for joint in robot.actuated}
     torques = robot.stance.torques if robot.stance is not None else {}
+    leg_effort = _leg_effort(robot)
     column = Column()
     for joint in robot.actuated:
         if not _add_from_file(column, robot, joint, in_file, mirror):
-            error = _by_kind(_DEFAULT_ERROR, joint)
-            value = gains[joint.name].stiffness * error
-            reason = f"the stiffness at an error of {error:g} {joint.unit}"
+            if joint in robot.leg_joints and joint.kind != "prismatic" and leg_effort > 0:
+                value, reason = leg_effort, f"{_LEG_FACTOR:g} x weight x leg length"
+            else:
+                error = _by_kind(_DEFAULT_ERROR, joint)
+                value = gains[joint.name].stiffness * error
+                reason = f"the stiffness at an error of {error:g} {joint.unit}"
             holding = _HOLDING_FACTOR * abs(torques.get(joint.name, 0.0))
             if math.isfinite(holding) and holding > value:
                 value, reason = holding, f"{_HOLDING_FACTOR:g} times the holding torque"
             origin = _suggested(f"not in the file; {reason}")
-            column.add(joint.name, rounded(value, 3) or 1.0, origin)
+            column.add(joint.name, rounded(value, 2) or 1.0, origin)
     return column
+
+
+def _leg_effort(robot: Facts) -> float:
+    """Return an estimate of the effort of a leg joint [N m]; 0 if the mass or length is unknown."""
+    lengths = [leg.length for leg in robot.legs]
+    effort = _LEG_FACTOR * robot.total_mass * GRAVITY * sum(lengths) / max(len(lengths), 1)
+    return effort if 0 < effort < math.inf else 0.0
 
 
 def velocity_column(robot: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
@@ -92,7 +115,11 @@ def armature_column(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
 
 
 def action_scale_column(
-    robot: Facts, gains: "Mapping[str, Gain]", effort: Column, velocity: Column
+    robot: Facts,
+    gains: "Mapping[str, Gain]",
+    effort: Column,
+    velocity: Column,
+    gain_set: "GainSet" = "stand",
 ) -> Column:
     """Return the change of each joint target for an action of 1 [rad] or [m].
 
@@ -105,17 +132,18 @@ def action_scale_column(
         gains: PD gains of each joint.
         effort: Effort limits.
         velocity: Velocity limits.
+        gain_set: The set that the gains belong to.
     """
     column = Column()
+    share = _ACTION_FACTOR if gain_set == "stand" else _TRAIN_ACTION_FACTOR
+    max_scale = _MAX_ACTION_SCALE if gain_set == "stand" else _TRAIN_ACTION_SCALE
     for joint in robot.actuated:
         stiffness = gains[joint.name].stiffness
         if stiffness > 0:
-            largest = _by_kind(_MAX_ACTION_SCALE, joint)
+            largest = _by_kind(max_scale, joint)
             scales = {
                 largest: f"{largest:g} {joint.unit}, the largest suggested scale",
-                _ACTION_FACTOR * effort.values[joint.name] / stiffness: (
-                    f"{_ACTION_FACTOR:g} * effort / stiffness"
-                ),
+                share * effort.values[joint.name] / stiffness: (f"{share:g} * effort / stiffness"),
             }
             lower, upper = joint.range or (-math.inf, math.inf)
             if math.isfinite(upper - lower):

@@ -8,6 +8,7 @@ import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.onboarding.derive_spec import named_bodies
 from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
@@ -22,7 +23,7 @@ from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.gain import Gain
+    from terrainkit_robots.simulation.gain import Gain, GainSet
 
 _SOFT_LIMIT_FACTOR = 0.9
 """Share of the joint range within the soft limits, as in legged_gym and Isaac Lab."""
@@ -38,6 +39,7 @@ def derive_spec(
     floating: bool,
     urdf: str = "robot.urdf",
     mjcf: str = "robot.xml",
+    gain_set: "GainSet" = "stand",
 ) -> RobotSpec:
     """Return the spec of a robot.
 
@@ -47,6 +49,7 @@ def derive_spec(
         floating: Whether the base is floating.
         urdf: Name of the URDF file in the folder of the spec.
         mjcf: Name of the MJCF file in the folder of the spec.
+        gain_set: The set that the gains belong to.
 
     Raises:
         ConfigError: if the robot has no bodies, or gains are missing.
@@ -63,7 +66,7 @@ def derive_spec(
     columns["velocity"] = velocity_column(facts, mirror)
     columns["armature"] = armature_column(facts, gains)
     columns["action_scale"] = action_scale_column(
-        facts, gains, columns["effort"], columns["velocity"]
+        facts, gains, columns["effort"], columns["velocity"], gain_set
     )
     pose = columns["default_pose"].values
     reset, reset_reason = _reset_range(facts, pose)
@@ -123,14 +126,16 @@ def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
 
 
 def _pose_provenance(facts: Facts) -> Provenance:
-    home = facts.model.home
-    joints = [joint for leg in facts.legs for joint in leg.joints] or facts.actuated
-    if home and all(joint.name in home for joint in joints):
-        return _provenance("declared", f"first keyframe of {facts.model.file.name}")
+    declared = _provenance("declared", f"first keyframe of {facts.model.file.name}")
     if facts.legs:
+        if is_standing_keyframe(facts.leg_model):
+            return declared
         return Provenance(
             origin="solved", reason="legs bent, feet below the center of mass, other joints near 0"
         )
+    home = facts.model.home
+    if home and all(joint.name in home for joint in facts.actuated):
+        return declared
     return _provenance("suggested", "closest to 0 within the limits")
 
 

@@ -393,6 +393,10 @@ def test_leg_with_prismatic_joint():
         (("0 0 1", "1 0 0", "0 1 0", "0 1 0", "0 1 0"), ("yaw", "roll", "hip", "knee", "ankle")),
         (("0 1 0", "1 0 0", "0 1 0"), ("hip", "roll", "knee")),
         (("0 -1 0", "0 1 0"), ("hip", "knee")),
+        (
+            ("0 0.866 0.5", "1 0 0", "0 0 1", "0 1 0", "0 1 0"),
+            ("hip", "roll", "yaw", "knee", "ankle"),
+        ),
     ],
 )
 def test_roles_follow_axes(axes, roles):

@@ -54,6 +54,29 @@ def pairs(robot):
 # Names
 
 
+def test_link_of_a_chain_is_no_mirror_image():
+    chain = facts(
+        ("trunk", "link_s", "0 0.1 0.1", "0 0 1"),
+        ("link_s", "link_l", "0 0.2 0.1", "0 1 0"),
+        ("link_l", "link_u", "0 0 0.3", "0 1 0"),
+        ("link_u", "link_r", "0 -0.1 0.1", "1 0 0"),
+    )
+    assert pairs(chain) == []
+
+
+def test_lone_letter_is_a_side_at_the_same_depth():
+    arms = facts(
+        ("trunk", "link_l", "0 0.1 0.1", "0 0 1"), ("trunk", "link_r", "0.1 -0.2 0.1", "0 0 1")
+    )
+    assert pairs(arms) == [("link_l", "link_r", -1)]
+    chain = facts(
+        ("trunk", "link_l", "0 0.1 0.1", "0 0 1"),
+        ("trunk", "link_t", "0 0 0.3", "0 1 0"),
+        ("link_t", "link_r", "0 -0.2 0.1", "1 0 0"),
+    )
+    assert pairs(chain) == []
+
+
 @pytest.mark.parametrize(
     ("name", "other"),
     [

@@ -48,6 +48,14 @@ def test_other_names_are_listed(groups):
     assert group.also == "also 1 link: RL_calf (RR_calf)"
 
 
+def test_lists_of_names_are_one_value(groups):
+    text = "mesh {} of {}: got 9 faces"
+    one = {"subject": "x.stl", "message": text.format("x.stl", "FL_calf")}
+    many = {"subject": "y.stl", "message": text.format("y.stl", "FL_calf, FR_calf, ...")}
+    (group,) = groups(one, many)
+    assert group.also == "also 1 more: y.stl (FL_calf, FR_calf, ...)"
+
+
 def test_paths_of_the_subject_are_ignored(groups):
     text = "mesh {}: searched at /robots/{}"
     files = ("meshes/a.stl", "meshes/b.stl")

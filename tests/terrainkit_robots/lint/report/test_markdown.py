@@ -22,7 +22,7 @@ def test_each_finding_is_a_row(report):
         "Weigh it.",
     ]
     assert len(rows(text)) == 4
-    assert "\n- SYM001, SYM002: no legs detected\n" in text
+    assert "\n- not a legged robot: 2 rules do not apply\n" in text
 
 
 def test_names_are_escaped(nasty):

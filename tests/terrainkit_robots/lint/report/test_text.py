@@ -8,24 +8,43 @@ from terrainkit_robots.lint.selection import Suppressed
 
 
 def test_rules_are_headings_sorted_by_severity(report):
-    text = format_reports([report])
+    text = format_reports([report], notes=True)
     headings = [
-        line for line in text.splitlines() if line.startswith(("error", "warning ", "note"))
+        line for line in text.splitlines() if line.startswith(("error", "warning ", "note "))
     ]
     assert headings == [
         "error INR002 negative-mass",
         "warning JNT007 degrees",
         "note LEG001 legs",
     ]
-    assert "  robot.urdf:12: the mass is -1 kg; expected > 0\n      help: Weigh it.\n" in text
+    assert "  line 12: the mass is -1 kg; expected > 0\n      help: Weigh it.\n" in text
 
 
-def test_finding_without_line_shows_file_only(report):
-    assert "\n  robot.urdf: the mass" in format_reports([report])
+def test_notes_are_one_line_by_default(report, finding):
+    message = "position of " + ", ".join(f"joint_{k}" for k in range(40))
+    note = finding("LEG001", "legs", "info", message=message)
+    both = dataclasses.replace(report, findings=(finding(), note))
+    (line,) = [each for each in format_reports([both]).splitlines() if each.startswith("note ")]
+    assert line.startswith("note LEG001 position of joint_0, joint_1")
+    assert line.endswith("...")
+    assert len(line) <= 100
+    assert "\nnotes in full: --notes\n" in format_reports([both])
+    full = " ".join(format_reports([both], notes=True).split())
+    assert f"note LEG001 legs line 12: {message}" in full
+    assert "--notes" not in full
+
+
+def test_finding_without_line_shows_message_only(report):
+    assert "\n  the mass" in format_reports([report], notes=True)
+
+
+def test_finding_in_another_file_shows_file(report, finding):
+    other = dataclasses.replace(report, findings=(finding(file=Path("other.xml")),))
+    assert "\n  other.xml:12: the mass" in format_reports([other])
 
 
 def test_likely_finding_is_marked(report):
-    assert "robot.urdf:40: the mass is -1 kg; expected > 0 (likely)\n" in format_reports([report])
+    assert "line 40: the mass is -1 kg; expected > 0 (likely)\n" in format_reports([report])
     assert "\nlikely: the finding depends on a heuristic" in format_reports([report])
     proven = dataclasses.replace(report, findings=report.findings[:1])
     assert "likely" not in format_reports([proven])
@@ -76,7 +95,7 @@ def test_repeated_findings_are_one_entry(report, finding):
         for i in range(1, 31)
     )
     text = format_reports([dataclasses.replace(report, findings=many)])
-    assert "robot.urdf:1: mass of leg_1: got -1 kg; expected > 0\n" in text
+    assert "  line 1: mass of leg_1: got -1 kg; expected > 0\n" in text
     assert "      also 29 more: leg_2 (-2), leg_3 (-3), " in text
     assert "leg_13 (-13), and 17 more\n" in text
     assert text.endswith("robot.urdf: 1 error\n")
@@ -84,7 +103,7 @@ def test_repeated_findings_are_one_entry(report, finding):
 
 def test_skipped_rules_are_grouped_by_reason(report):
     text = format_reports([report])
-    assert "skipped: SYM001, SYM002: no legs detected\n" in text
+    assert "skipped: not a legged robot: 2 rules do not apply\n" in text
     assert "skipped: INR002: suppressed: so\n" in text
     assert "warning: INR999: comment at robot.urdf:3: unknown rule\n" in text
 
@@ -113,7 +132,7 @@ def test_several_files_have_total_counts(report):
 
 def test_fixed_and_unfixed_findings_are_listed(fixed_report):
     text = format_reports([fixed_report])
-    assert "fixed\n  robot.urdf:12: XML003, calf: name it\n" in text
+    assert "fixed\n  line 12: XML003, calf: name it\n" in text
     assert "not fixed: JNT009 calf: no space\n" in text
 
 

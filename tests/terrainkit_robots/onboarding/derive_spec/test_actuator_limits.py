@@ -8,6 +8,7 @@ from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
     effort_column,
     velocity_column,
 )
+from tests.robots import ARM
 
 HIP = 'effort="23.7" velocity="30.1"'
 FIRST = '<limit lower="-1.0472" upper="1.0472" effort="23.7" velocity="30.1"/>'
@@ -43,16 +44,13 @@ def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
     assert origins["effort.FL_hip_joint"].reason == "not in the file; copied from FR_hip_joint"
 
 
-def test_derive_effort_from_stiffness_or_torque(bundled, gains, tmp_path):
+def test_derive_effort_of_leg_from_mass_and_length(bundled, gains, tmp_path):
     facts = bundled("quadruped.urdf", (HIP, ""), tmp_path=tmp_path)
     twins = facts.mirror_map
-    column = effort_column(facts, gains(facts, stiffness=40.0), twins)
-    assert column.values["FL_hip_joint"] == 40.0
-    assert "the stiffness at an error of 1 rad" in column.origins["FL_hip_joint"].reason
-    held = abs(facts.stance.torques["FL_thigh_joint"])
-    weak = effort_column(facts, gains(facts, stiffness=0.1), twins)
-    assert weak.values["FL_thigh_joint"] == pytest.approx(2 * held, rel=0.01)
-    assert "2 times the holding torque" in weak.origins["FL_thigh_joint"].reason
+    column = effort_column(facts, gains(facts), twins)
+    # 0.5 * 15.0 kg * 9.81 m/s2 * 0.448 m
+    assert column.values["FL_hip_joint"] == 33.0
+    assert column.origins["FL_hip_joint"].reason.endswith("0.5 x weight x leg length")
     speeds = velocity_column(facts, twins)
     assert speeds.values["FL_hip_joint"] == 20.0
     assert speeds.origins["FL_hip_joint"].origin == "suggested"
@@ -69,6 +67,26 @@ def test_derive_armature_from_file_or_gains(bundled, gains):
     assert kept.values == pytest.approx(declared)
     more = armature_column(mjcf, gains(mjcf, armature=1.0))
     assert set(more.values.values()) == {1.0}
+
+
+def test_derive_effort_from_stiffness(gains, tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.replace('effort="30" ', ""))
+    facts = Facts(load_robot(path))
+    column = effort_column(facts, gains(facts, stiffness=40.0), {})
+    assert column.values["shoulder"] == 40.0
+    assert "the stiffness at an error of 1 rad" in column.origins["shoulder"].reason
+
+
+def test_derive_action_scale_for_training(bundled, gains):
+    facts = bundled("quadruped.urdf")
+    gain, twins = gains(facts, stiffness=25.0), facts.mirror_map
+    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
+    column = action_scale_column(facts, gain, effort, velocity, "train")
+    assert set(column.values.values()) == {0.25}
+    stiff = gains(facts, stiffness=100.0)
+    column = action_scale_column(facts, stiff, effort, velocity, "train")
+    assert column.values["FL_hip_joint"] == pytest.approx(0.5 * 23.7 / 100, rel=0.01)
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.blocks import number_that_fits
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import number_that_fits
 from terrainkit.grid import Grid
 
 

@@ -18,15 +18,6 @@ def pit_around(grid: Grid, depth: float, platform: float) -> NDArray[np.float64]
     return ground
 
 
-def pit_across(grid: Grid, depth: float, start: float) -> NDArray[np.float64]:
-    """Return the heights of a pit between two strips of length `start` along x [m]."""
-    low, high = pit_bounds(grid, start)
-    first, last = (round((x - grid.lower[0]) / grid.cell) for x in (low[0], high[0]))
-    ground = np.zeros(grid.shape)
-    ground[first:last, 1:-1] = -depth
-    return ground
-
-
 def pit_between(grid: Grid, depth: float, first: float, last: float) -> NDArray[np.float64]:
     """Return the heights of a pit from x = `first` to `last` [m], shape `grid.shape`."""
     ground = np.zeros(grid.shape)

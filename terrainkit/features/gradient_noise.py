@@ -77,17 +77,24 @@ def fractal_noise(
 def unit_relief(
     grid: Grid, noise: NDArray[np.float64], platform: float, blend: float
 ) -> NDArray[np.float64]:
-    """Return `noise` with its largest absolute value scaled to 1.
+    """Return :func:`faded_relief` with its largest absolute value scaled to 1."""
+    relief = faded_relief(grid, noise, platform, blend)
+    return np.asarray(relief / max(np.abs(relief).max(), 1e-12))
 
-    Before, it is faded to 0 at the platform and at the outermost cells.
+
+def faded_relief(
+    grid: Grid, noise: NDArray[np.float64], platform: float, blend: float
+) -> NDArray[np.float64]:
+    """Return heights faded to 0 at the platform and at the outermost cells.
 
     Args:
         grid: Grid of the patch.
         noise: Heights, shape `grid.shape`.
         platform: Side of the flat square at the center [m].
-        blend: Distance over which the noise fades [m].
+        blend: Distance over which the heights fade [m].
     """
     x, y = (np.minimum(np.arange(n), np.arange(n)[::-1]) for n in grid.shape)
     from_edge = np.minimum.outer(x, y) * (grid.cell / max(blend, grid.cell))
-    relief = noise * np.minimum(from_edge, 1.0) * grid.fade(grid.centered(platform), blend)
-    return np.asarray(relief / max(np.abs(relief).max(), 1e-12))
+    return np.asarray(
+        noise * np.minimum(from_edge, 1.0) * grid.fade(grid.centered(platform), blend)
+    )

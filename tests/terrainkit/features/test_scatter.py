@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from terrainkit.features.scatter import scatter
 from terrainkit.grid import Grid
-from terrainkit.scatter import scatter
 
 GRIDS = [Grid(shape=(80, 80), cell=0.1, lower=(8.0, -4.0)), Grid(shape=(80, 40), cell=0.1)]
 

@@ -1,8 +1,8 @@
 import pytest
 
 from terrainkit.errors import ConfigError
+from terrainkit.features.ramp_field import ramp_cells
 from terrainkit.grid import Grid
-from terrainkit.ramp_field import ramp_cells
 
 
 def test_ramp_cells_are_centered_across_the_lane():

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.gradient_noise import fractal_noise, perlin_noise, unit_relief
+from terrainkit.features.gradient_noise import fractal_noise, perlin_noise, unit_relief
 from terrainkit.grid import Grid
 
 

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from terrainkit.blocks import (
+from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import (
     SINK,
     make_blocks,
     make_ramps,
@@ -9,7 +10,6 @@ from terrainkit.blocks import (
     make_walls,
     number_that_fits,
 )
-from terrainkit.errors import ConfigError
 from terrainkit.solid_index import SolidIndex
 
 

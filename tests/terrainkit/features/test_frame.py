@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.frame import frame_rectangles
+from terrainkit.features.frame import frame_rectangles
 
 
 def test_frame_rectangles_by_hand():

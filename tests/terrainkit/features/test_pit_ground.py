@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
+from terrainkit.features.pit_ground import pit_around, pit_between, pit_bounds
 from terrainkit.grid import Grid
-from terrainkit.pit_ground import pit_across, pit_around, pit_between, pit_bounds
 
 
 def test_pit_around_leaves_platform_and_rim():
@@ -14,9 +14,10 @@ def test_pit_around_leaves_platform_and_rim():
     assert (ground == expected).all()
 
 
-def test_pit_across_leaves_strips_and_rim():
+def test_pit_between_bounds_leaves_strips_and_rim():
     grid = Grid(shape=(8, 4), cell=0.5, lower=(3.0, -1.0))
-    ground, (low, high) = pit_across(grid, 0.7, 1.5), pit_bounds(grid, 1.5)
+    low, high = pit_bounds(grid, 1.5)
+    ground = pit_between(grid, 0.7, low[0], high[0])
     assert (ground[3:5, 1:3] == -0.7).all()
     assert (ground != 0).sum() == 4
     assert [*low, *high] == [4.5, -0.5, 5.5, 0.5]

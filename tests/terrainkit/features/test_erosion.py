@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.erosion import TALUS, erode
+from terrainkit.features.erosion import TALUS, erode
 
 
 def test_erode_keeps_all_material():

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from terrainkit.features.noise import ValueNoise
 from terrainkit.grid import Grid
-from terrainkit.noise import ValueNoise
 
 PLOT = Grid(shape=(60, 40), cell=0.1)
 

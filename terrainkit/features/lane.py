@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.blocks import MAX_PER_AXIS
 from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import MAX_PER_AXIS, number_that_fits
 from terrainkit.grid import Grid
 
 
@@ -13,17 +13,23 @@ def lane_spawn(grid: Grid, start: float) -> tuple[float, float]:
     return grid.lower[0] + grid.length(grid.cells(start)) / 2, grid.center[1]
 
 
-def lane_positions(grid: Grid, start: float, length: float, gap: float) -> NDArray[np.float64]:
+def lane_positions(
+    name: str, grid: Grid, start: float, length: float, gap: float
+) -> NDArray[np.float64]:
     """Return the x of the first edge of as many elements as fit behind the start [m], shape (n,).
 
     Args:
+        name: Name of the terrain, for the error message.
         grid: Grid of the patch.
         start: Length of the flat start [m].
         length: Length of an element along x [m].
         gap: Distance between two elements, and at least behind the last one [m].
+
+    Raises:
+        ConfigError: if there are more than `MAX_PER_AXIS`.
     """
     first = grid.length(grid.cells(start))
-    number = max(0, int((grid.size[0] - first + 1e-9) // (length + gap)))
+    number = number_that_fits(name, length + gap, grid.size[0] - first)
     return np.float64(grid.lower[0] + first) + np.arange(number) * (length + gap)
 
 

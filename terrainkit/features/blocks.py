@@ -19,7 +19,7 @@ def number_that_fits(name: str, pitch: float, extent: float) -> int:
     """Return how many elements of length `pitch` fit in `extent` [m].
 
     Args:
-        name: Name of the element, for the error message.
+        name: Name of the terrain, for the error message.
         pitch: Length of an element, including the gap to the next one [m].
         extent: Length that the elements share [m].
 

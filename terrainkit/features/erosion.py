@@ -42,7 +42,8 @@ def erode(heights: NDArray[np.float64], cell: float, iterations: int) -> NDArray
         water += RAIN
         drops = [np.maximum(drop, 0.0) for drop in _drops(ground + water)]
         total = drops[0] + drops[1] + drops[2] + drops[3]
-        # Half of the difference levels two samples; a sample gives at most all of its water.
+        # Moving half of a difference would level two samples. Since all samples exchange water at
+        # once, half of that keeps the surface from oscillating.
         moving = np.minimum(water, 0.25 * total)
         capacity = CAPACITY * moving * np.minimum(total / cell, 1.0)
         change = RATE * (sediment - capacity)

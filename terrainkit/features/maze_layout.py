@@ -46,7 +46,7 @@ def sample_maze(shape: tuple[int, int], opened: float, rng: np.random.Generator)
 
     Args:
         shape: Number of cells along x and y.
-        opened: Part of the walls between two cells that is removed afterward, 0 to 1.
+        opened: Fraction of the walls between two cells that is removed afterward, 0 to 1.
         rng: Generator of the random numbers.
     """
     nx, ny = shape

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
+from terrainkit.features.lane import lane_goals, lane_slots, slot_centers
 from terrainkit.grid import Grid
-from terrainkit.lane import lane_goals, lane_slots, slot_centers
 
 GRID = Grid(shape=(80, 40), cell=0.1, lower=(10.0, -2.0))
 

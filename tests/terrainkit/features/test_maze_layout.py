@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.maze_layout import MazeLayout, sample_maze
+from terrainkit.features.maze_layout import MazeLayout, sample_maze
 
 
 @pytest.mark.parametrize("shape", [(5, 5), (2, 7), (1, 1)])

@@ -1,0 +1,37 @@
+"""Repairs of inertias that have no noticeable effect, which onboarding applies by itself."""
+
+from dataclasses import replace
+
+from terrainkit_robots.lint.runner import Finding, Report
+
+_RULES = ("INR003", "INR004")
+"""Rules on the inertia of a single link."""
+
+_MAX_CHANGE = 0.01
+"""Largest change of the inertia of a rigid body, over its smallest principal moment. CAD inertias
+are less accurate than this."""
+
+
+def with_negligible_repairs(report: Report) -> Report:
+    """Return a report in which the fixes of negligible inertias are safe.
+
+    A sensor frame with a placeholder inertia prevents MuJoCo from loading a robot, but has no
+    effect on the motion of the body that it is fixed to.
+    """
+    findings = tuple(_with_safe_fix(report, finding) for finding in report.findings)
+    return replace(report, findings=findings)
+
+
+def _with_safe_fix(report: Report, finding: Finding) -> Finding:
+    body = report.facts.body_of.get(finding.subject)
+    if finding.code not in _RULES or finding.fix is None or body is None:
+        return finding
+    link = next(link for link in body.links if link.name == finding.subject)
+    change = report.facts.inertia_repair.relative_change(link)
+    if change > _MAX_CHANGE:
+        return finding
+    description = (
+        f"{finding.fix.description.rstrip('.')}; the inertia of body {body.name} changes by "
+        f"{change:.2g} of its smallest moment."
+    )
+    return replace(finding, fix=replace(finding.fix, safety="safe", description=description))

@@ -1,0 +1,60 @@
+"""Remove placeholder efforts of leg joints, so that they are estimated."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from terrainkit_robots.text import names
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.description.model import RobotModel
+    from terrainkit_robots.lint.runner import Finding
+
+_RULE = "JNT011"
+"""The rule that finds placeholder limits."""
+
+
+def placeholder_efforts(facts: "Facts", findings: "Iterable[Finding]") -> frozenset[str]:
+    """Return the joints of legs whose effort limit is a placeholder, such as 1000 N m."""
+    legs = {joint.name for joint in facts.leg_joints if joint.kind != "prismatic"}
+    return frozenset(
+        finding.subject
+        for finding in findings
+        if finding.code == _RULE and "effort" in finding.measured and finding.subject in legs
+    )
+
+
+def without_efforts(
+    model: "RobotModel", joints: frozenset[str]
+) -> tuple["RobotModel", tuple[str, ...]]:
+    """Return a model in which the efforts of some joints are unknown, and a note on them."""
+    if not joints:
+        return model, ()
+    efforts = sorted(
+        {
+            joint.limit.effort
+            for joint in model.joints
+            if joint.name in joints and joint.limit is not None and joint.limit.effort is not None
+        }
+    )
+    changed = replace(
+        model,
+        joints=tuple(
+            replace(joint, limit=replace(joint.limit, effort=None))
+            if joint.name in joints and joint.limit is not None
+            else joint
+            for joint in model.joints
+        ),
+        actuators=tuple(
+            replace(each, effort=None) if each.joint in joints else each for each in model.actuators
+        ),
+    )
+    listed = names((joint.name for joint in model.joints if joint.name in joints), max_count=4)
+    got = names(f"{effort:g}" for effort in efforts)
+    note = (
+        f"the effort limit of {listed} is a placeholder ({got} N m); it was replaced by an "
+        "estimate from the mass and the leg length, see [effort] in robot.toml"
+    )
+    return changed, (note,)
