@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rendering import appearance
-from terrainkit_robots.rendering.child_process import Frame, RenderError, stream_frames
+from terrainkit_robots.rendering.child_process import RenderError, stream_frames
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.text import one_line
 
@@ -31,20 +31,13 @@ def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, 
     Raises:
         RenderError: if MuJoCo cannot render on this machine, or cannot render this robot.
     """
-    images = stream_frames(partial(robot_images, file.absolute(), size))
+    images = stream_frames(partial(render_views, file.absolute(), size))
     return {name: image.tobytes() for name, image in zip(VIEWS, images, strict=True)}
 
 
-def robot_images(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
-    """Yield the bytes of a PNG of each view of a robot."""
+def render_views(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
+    """Yield the bytes of a PNG of each view; raise a RenderError if the robot is invalid."""
     import cv2
-
-    for frame in robot_frames(file, size):
-        yield cv2.imencode(".png", frame[:, :, ::-1])[1]
-
-
-def robot_frames(file: Path, size: tuple[int, int]) -> Iterator[Frame]:
-    """Yield a frame of each view of a robot; raise a RenderError if it is invalid or too large."""
     import mujoco
 
     try:
@@ -72,7 +65,7 @@ def robot_frames(file: Path, size: tuple[int, int]) -> Iterator[Frame]:
             appearance.update_scene(renderer, data, target, distance, *view)
             frame = renderer.render()
             appearance.add_caption(frame, f"grid {cell:g} m", size[1] / 1100)
-            yield frame
+            yield cv2.imencode(".png", frame[:, :, ::-1])[1]
 
 
 def _load_model(file: Path) -> Any:

@@ -15,7 +15,7 @@ from terrainkit_robots.rendering.robot_images import (
     box_corners,
     fit_camera,
     render_robot,
-    robot_frames,
+    render_views,
     show_robot_geoms,
 )
 from tests.robots import QUADRUPED
@@ -84,10 +84,10 @@ def world(content):
         (world('<geom type="mesh" mesh="m"/>'), "mesh"),
     ],
 )
-def test_robot_frames_rejects_model(tmp_path, text, message):
+def test_robot_images_rejects_model(tmp_path, text, message):
     (tmp_path / "robot.xml").write_text(text)
     with pytest.raises(RenderError, match=message):
-        next(robot_frames(tmp_path / "robot.xml", SIZE))
+        next(render_views(tmp_path / "robot.xml", SIZE))
 
 
 def test_render_robot_does_not_retry_after_rejected_model(tmp_path, monkeypatch):
