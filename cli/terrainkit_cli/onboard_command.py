@@ -39,8 +39,8 @@ class Onboard(Command):
     robot.xml, scene.xml, meshes, and report.md with pictures. The robot is then simulated to test
     that it stands. The input file is never changed.
 
-    Exit code 0: success. 1: errors remain in the file, or the robot does not stand. 2: a file
-    cannot be read or written, or an option is invalid.
+    Exit code 0: success. 1: errors remain in the file; with --strict, also if the robot does not
+    stand or a framework was skipped. 2: a file cannot be read or written, or an option is invalid.
     """
 
     file: Annotated[
@@ -77,6 +77,10 @@ class Onboard(Command):
     """Continue even if errors remain in the XML, the tree, joints, meshes or masses. The result
     may differ from the robot."""
 
+    strict: Flag = False
+    """Exit with code 1 also if the robot does not stand, or does not fit a framework of --config.
+    The folder is written anyway."""
+
     overwrite: Flag = False
     """Replace the folder if it contains an onboarded robot."""
 
@@ -110,10 +114,12 @@ class Onboard(Command):
         render.result(f"wrote {result.folder}; view the robot with:")
         scene = quote(str(result.folder / "scene.xml"))
         render.result(f"  python -m mujoco.viewer --mjcf={scene}")
-        problems = _problems(result)
-        for problem in problems:
-            render.error(f"{self.file}: {problem}")
-        return int(bool(problems))
+        errors, warnings = _remaining_errors(result), _warnings(result)
+        for error in errors:
+            render.error(f"{self.file}: {error}")
+        for warning in warnings:
+            render.note(f"warning: {self.file}: {warning}")
+        return int(bool(errors or (self.strict and warnings)))
 
     def _options(self, steps: render.Steps) -> "OnboardOptions":
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (
@@ -157,17 +163,21 @@ def _blocking_errors(result: "OnboardResult") -> str:
     return format_reports([replace(result.report, findings=errors)], "text")
 
 
-def _problems(result: "OnboardResult") -> list[str]:
-    """Return why a robot that was written is not ready for training."""
+def _remaining_errors(result: "OnboardResult") -> list[str]:
+    """Return a summary of the errors of a robot that was written."""
     from terrainkit_robots.text import count
 
     errors = [finding for finding in result.report.findings if finding.severity == "error"]
     codes = ", ".join(dict.fromkeys(finding.code for finding in errors))
     remain = "remains" if len(errors) == 1 else "remain"
-    problems = (
-        [f"{count(len(errors), 'error')} {remain} ({codes}); see report.md"] if errors else []
-    )
+    return [f"{count(len(errors), 'error')} {remain} ({codes}); see report.md"] if errors else []
+
+
+def _warnings(result: "OnboardResult") -> list[str]:
+    """Return what was skipped, and why a robot that was written may not be ready for training."""
+    skipped = result.skipped_configs.items()
+    warnings = [f"no configuration for {framework}: {reason}" for framework, reason in skipped]
     verification = result.verification
     if verification is not None and not verification.is_stable:
-        problems.append(f"the robot does not stand: {'; '.join(verification.failures)}")
-    return problems
+        warnings.append(f"the robot does not stand: {'; '.join(verification.failures)}")
+    return warnings

@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from terrainkit_cli.main import main
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from tests.robots import ARM
 
@@ -42,9 +43,12 @@ def test_onboard_quadruped(here, tmp_path):
 
 
 def test_onboard_skips_unsupported_framework(here, tmp_path):
-    code, out, _ = here("arm.urdf", NO_PICTURES, "--config", "legged_gym,isaaclab")
+    words = ("arm.urdf", NO_PICTURES, "--config", "legged_gym,isaaclab")
+    code, out, err = here(*words)
     assert code == 0
     assert "skipped   legged_gym: arm has no legs" in out
+    assert "warning: arm.urdf: no configuration for legged_gym" in err
+    assert here(*words, "--overwrite", "--strict")[0] == 1
     assert (tmp_path / "arm/isaaclab_config.py").exists()
 
 
@@ -73,6 +77,18 @@ def test_onboard_reports_other_errors(here, tmp_path):
     assert code == 1
     assert "1 error remains (JNT006)" in one_line(err)
     assert (tmp_path / "arm/report.md").exists()
+
+
+def test_onboard_warns_of_failed_standing_test(here, tmp_path, monkeypatch):
+    def fail(*_arguments, **_options):
+        raise CannotCheckError("300 contacts at once")
+
+    monkeypatch.setattr("terrainkit_robots.simulation.standing.stand_test", fail)
+    code, _, err = here("quadruped", NO_PICTURES)
+    assert code == 0
+    assert "warning: quadruped: the robot does not stand: it could not be simulated" in err
+    assert (tmp_path / "quadruped/robot.toml").exists()
+    assert here("quadruped", NO_PICTURES, "--overwrite", "--strict")[0] == 1
 
 
 @pytest.mark.parametrize(
