@@ -146,7 +146,7 @@ class _Reader:
         for node in self._mjcf.nodes():
             text = node.attributes.get("euler", "")
             angles = parse_numbers(text, 3) if text else None
-            if angles is not None and is_in_degrees(angles):
+            if angles is not None and is_in_degrees(angles.tolist()):
                 message = f"euler of <{node.tag}>: got {text} rad; expected radians"
                 report(self._mjcf, node, "XML018", message)
 
@@ -155,8 +155,7 @@ class _Reader:
 
         option = self._spec.option
         nodes = [node for node in self._mjcf.nodes() if node.tag == "option"]
-        bits = (("contact", "CONTACT"), ("constraint", "CONSTRAINT"), ("limit", "LIMIT"))
-        bits += (("actuation", "ACTUATION"), ("gravity", "GRAVITY"), ("equality", "EQUALITY"))
+        names = ("contact", "constraint", "limit", "actuation", "gravity", "equality")
         x, y, z = map(float, option.gravity)
         return PhysicsOptions(
             source=nodes[-1].source if nodes else self._mjcf.root.source,
@@ -164,8 +163,8 @@ class _Reader:
             timestep=float(option.timestep),
             disabled=frozenset(
                 name
-                for name, bit in bits
-                if option.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{bit}")
+                for name in names
+                if option.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")
             ),
             degrees=bool(self._spec.compiler.degree),
         )

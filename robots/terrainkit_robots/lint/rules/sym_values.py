@@ -205,12 +205,12 @@ def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         http://wiki.ros.org/urdf/XML/joint: mimic.
     """
-    images = {}
-    signs = {}
+    images: dict[str, str] = {}
+    signs: dict[str, int] = {}
     for pair in robot.mirror_pairs:
-        left, right = pair.left.joint.name, pair.right.joint.name
-        images |= {left: right, right: left}
-        signs |= {left: pair.sign, right: pair.sign}
+        names = pair.left.joint.name, pair.right.joint.name
+        images |= dict(zip(names, names[::-1], strict=True))
+        signs |= dict.fromkeys(names, pair.sign)
     for pair in robot.mirror_pairs:
         left, right = pair.left.joint, pair.right.joint
         a, b = left.mimic, right.mimic
@@ -219,7 +219,8 @@ def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
         odd, problem = right, ""
         if a is None or b is None:
             odd, other = (left, right) if b is None else (right, left)
-            problem = f"got a mimic of {(a or b).joint}, and none for its mirror image {other.name}"  # type: ignore[union-attr]
+            assert odd.mimic is not None
+            problem = f"got {odd.mimic.joint}, and no mimic for its mirror image {other.name}"
         elif a.joint in images and b.joint not in (images[a.joint], a.joint):
             problem = f"got {b.joint}; expected {images[a.joint]}, as {left.name} follows {a.joint}"
         elif a.joint in images and b.joint == images[a.joint]:
