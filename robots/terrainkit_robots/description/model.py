@@ -157,6 +157,12 @@ class Geometry:
     color: tuple[float, float, float, float] | None = None
     """RGBA color in [0, 1]; None if the file sets no color."""
 
+    friction: float | None = None
+    """Coefficient of sliding friction; MJCF only."""
+
+    priority: int = 0
+    """Priority of `friction` over that of the other geometry of a contact; MJCF only."""
+
     @property
     def contacts(self) -> bool:
         """Whether the geometry can collide with anything."""
@@ -348,6 +354,32 @@ class Actuator:
     effort: float | None = None
     """Maximum torque [N m] or force [N] on the joint; None if unlimited."""
 
+    gear: float = 1.0
+    """Factor from the force of the actuator to that on the joint."""
+
+    commands: tuple[float, float] | None = None
+    """Range of the commanded force of a motor; None if it is unlimited or commands something
+    else."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhysicsOptions:
+    """Settings of the simulation; MJCF only."""
+
+    source: Source
+
+    gravity: tuple[float, float, float]
+    """Acceleration of gravity in the world frame [m/s2]."""
+
+    timestep: float
+    """Time step [s]."""
+
+    disabled: frozenset[str] = frozenset()
+    """Attributes of <flag> that are set to disable."""
+
+    degrees: bool = False
+    """Whether angles of the file are in degrees."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RobotModel:
@@ -372,6 +404,9 @@ class RobotModel:
 
     actuators: tuple[Actuator, ...] = ()
     """Actuators in document order; MJCF only."""
+
+    options: PhysicsOptions | None = None
+    """Settings of the simulation; None for URDF."""
 
     home: Mapping[str, float] = field(default_factory=dict)
     """Joint positions [rad] or [m] of the first keyframe by joint name; MJCF only."""

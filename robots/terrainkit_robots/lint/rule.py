@@ -55,6 +55,7 @@ FAMILIES = {
     "NAM": "names",
     "XRF": "comparison with another file or with the spec",
     "SIM": "simulator compatibility",
+    "OPT": "physics options of MJCF",
     "DYN": "simulation",
 }
 

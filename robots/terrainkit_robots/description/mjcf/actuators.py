@@ -30,6 +30,12 @@ class ActuatorData:
     armature: float
     """Inertia that it adds to the armature of the joint [kg m2] or [kg]."""
 
+    gear: float
+    """Factor from the force of the actuator to that on the joint."""
+
+    commands: tuple[float, float] | None
+    """Range of the commanded force; None if it is unlimited or commands something else."""
+
     def actuator(self, factor: float, max_effort: float | None) -> Actuator:
         """Return the actuator of the model.
 
@@ -40,7 +46,14 @@ class ActuatorData:
         effort = None if self.effort is None else self.effort * factor
         if max_effort is not None:
             effort = max_effort if effort is None else min(effort, max_effort)
-        return Actuator(name=self.name, source=self.source, joint=self.joint, effort=effort)
+        return Actuator(
+            name=self.name,
+            source=self.source,
+            joint=self.joint,
+            effort=effort,
+            gear=self.gear,
+            commands=self.commands,
+        )
 
 
 def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Iterator[ActuatorData]:
@@ -52,15 +65,19 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
         node = node_of(each)
         gear = float(each.gear[0])
         joint = each.target if each.trntype in joints else ""
-        force = None if "plugin" in node.written else _max_commanded_force(each)
+        commanded = None if "plugin" in node.written else _max_commanded_force(each)
         limit = _limit(each.forcelimited, each.forcerange, each.compiler.autolimits)
-        force = limit if force is None else force if limit is None else min(force, limit)
+        force = min((f for f in (commanded, limit) if f is not None), default=None)
         yield ActuatorData(
             name=each.name or (f"{joint}_actuator" if joint else node.tag),
             source=node.source,
             joint=joint,
             effort=None if force is None else force * abs(gear),
             armature=float(getattr(each, "armature", 0.0)) * gear**2,
+            gear=gear,
+            commands=None
+            if commanded is None
+            else (float(each.ctrlrange[0]), float(each.ctrlrange[1])),
         )
 
 

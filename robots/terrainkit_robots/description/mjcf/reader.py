@@ -49,10 +49,12 @@ from terrainkit_robots.description.model import (
     Joint,
     Limit,
     Link,
+    PhysicsOptions,
     RobotModel,
     Source,
 )
 from terrainkit_robots.description.xml.document import XmlDocument
+from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
@@ -123,11 +125,14 @@ class _Reader:
         bounds = float(compiler.boundmass), float(compiler.boundinertia)
         links = [replace(each, inertial=_apply_minimums(each, *bounds)) for each in links]
         dangling_references(self._mjcf, self._spec)
+        if not compiler.degree:
+            self._check_euler_angles()
         return replace(
             robot,
             links=_scale_to_total_mass(links, float(compiler.settotalmass)),
             joints=joints,
             actuators=self._scaled_actuators(joints),
+            options=self._options(),
             home=self._home_positions(joints),
             imu=self._imu(),
             excluded=frozenset(
@@ -135,6 +140,34 @@ class _Reader:
                 for each in self._spec.excludes
                 if each.bodyname1 != each.bodyname2
             ),
+        )
+
+    def _check_euler_angles(self) -> None:
+        for node in self._mjcf.nodes():
+            text = node.attributes.get("euler", "")
+            angles = parse_numbers(text, 3) if text else None
+            if angles is not None and is_in_degrees(angles):
+                message = f"euler of <{node.tag}>: got {text} rad; expected radians"
+                report(self._mjcf, node, "XML018", message)
+
+    def _options(self) -> PhysicsOptions:
+        import mujoco
+
+        option = self._spec.option
+        nodes = [node for node in self._mjcf.nodes() if node.tag == "option"]
+        bits = (("contact", "CONTACT"), ("constraint", "CONSTRAINT"), ("limit", "LIMIT"))
+        bits += (("actuation", "ACTUATION"), ("gravity", "GRAVITY"), ("equality", "EQUALITY"))
+        x, y, z = map(float, option.gravity)
+        return PhysicsOptions(
+            source=nodes[-1].source if nodes else self._mjcf.root.source,
+            gravity=(x, y, z),
+            timestep=float(option.timestep),
+            disabled=frozenset(
+                name
+                for name, bit in bits
+                if option.disableflags & getattr(mujoco.mjtDisableBit, f"mjDSBL_{bit}")
+            ),
+            degrees=bool(self._spec.compiler.degree),
         )
 
     def _node(self, element: Any, default: Node | None = None) -> Node:
@@ -306,6 +339,8 @@ class _Reader:
             contype=contype,
             conaffinity=conaffinity,
             color=color_of(geom, self._materials),
+            friction=float(geom.friction[0]),
+            priority=int(geom.priority),
         )
         if shape == "mesh" or fitted:
             geometry = replace(self._with_mesh(geometry, geom, scale), fit_to_mesh=fitted)

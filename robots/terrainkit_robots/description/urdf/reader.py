@@ -36,7 +36,7 @@ from terrainkit_robots.description.urdf.tags import (
 )
 from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.number_text import place_text
-from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
+from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers, replace_commas
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
 
 
@@ -159,6 +159,9 @@ class _Reader:
             pose[:3, 3] = xyz
         if rpy is not None:
             pose[:3, :3] = rpy_to_matrix(rpy)
+            if is_in_degrees(rpy.tolist()):
+                got = truncate(origin.get("rpy", ""), 40)
+                self._report("XML018", origin, f"rpy of <origin>: got {got} rad; expected radians")
         elif rotation is not None:
             pose[:3, :3] = rotation
         return pose

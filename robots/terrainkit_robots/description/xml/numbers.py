@@ -1,6 +1,8 @@
 """Parse numbers in attributes."""
 
+import math
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -35,3 +37,19 @@ def replace_commas(text: str, count: int) -> str:
         if "," in text and parse_numbers(meant, count) is not None:
             return meant
     return ""
+
+
+_MAX_ANGLE = 6.35
+"""Largest plausible Euler angle [rad]: one turn, with a margin for rounding."""
+
+
+def is_in_degrees(angles: Sequence[float]) -> bool:
+    """Return whether an angle [rad] is probably in degrees: over a turn, and no multiple of 90 deg.
+
+    Exporters sometimes write 9.4248 or 7.854, which are whole quarter turns.
+    """
+    quarter = math.pi / 2
+    return any(
+        _MAX_ANGLE < abs(angle) < 1e4 and abs(angle - quarter * round(angle / quarter)) > 1e-3
+        for angle in angles
+    )

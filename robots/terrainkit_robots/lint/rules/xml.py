@@ -306,3 +306,22 @@ def repeated_element(robot: Facts) -> Iterator[Violation]:
     """
     for problem in _problems(robot, "XML015"):
         yield _violation(robot, problem)
+
+
+@rule("XML018", "rotation-in-degrees", "warning")
+def rotation_in_degrees(robot: Facts) -> Iterator[Violation]:
+    """A rotation is in degrees, but is read as radians.
+
+    An angle of 90 is read as 14 turns and 117 degrees. The part points in a direction that looks
+    random.
+
+    Fix:
+        Write the angles in radians: 90 degrees are 1.5708. MJCF with <compiler angle="degree"/>
+        takes degrees.
+
+    Source:
+        http://wiki.ros.org/urdf/XML/link: rpy in radians. Angles of more than a turn are reported,
+        unless they are whole quarter turns.
+    """
+    for problem in _problems(robot, "XML018"):
+        yield _violation(robot, problem)

@@ -1,0 +1,215 @@
+"""Rules on the pose, size and friction of collision shapes (COL)."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
+from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds, min_height
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Geometry
+from terrainkit_robots.lint.rule import Violation, rule
+from terrainkit_robots.transforms import Matrix
+
+_MAX_OFFSET = 0.005
+"""Allowed distance between a mesh as visual and as collision shape [m]."""
+
+_MAX_ANGLE = math.radians(3)
+"""Allowed angle between them [rad]."""
+
+_MIN_FRICTION, _MAX_FRICTION = 0.1, 10.0
+"""Plausible sliding friction of a foot: ice and rubber, with a margin for models with sticky
+feet."""
+
+_MIN_SHARE_INSIDE = 0.5
+"""Share of a collision shape's bounding box that has to be inside of the visible robot around
+it."""
+
+_VISUAL_MARGIN = 0.01
+"""Margin of the visible robot [m]."""
+
+
+@rule("COL008", "foot-friction", "warning", needs=("legs",))
+def foot_friction(robot: Facts) -> Iterator[Violation]:
+    """The friction of a foot is implausible, or differs from that of the other feet.
+
+    MuJoCo uses the larger friction of the two geoms of a contact, or that of the geom with the
+    higher priority. A foot without friction slides; one with a friction of 100 never slips, and a
+    policy that relies on it falls on real ground.
+
+    Fix:
+        Give the geoms of all feet the same sliding friction, between 0.4 and 1.2.
+
+    Source:
+        MuJoCo's documentation, contact parameters. Published legged robots have 0.4 to 2.
+    """
+    if robot.model.kind != "mjcf":
+        return
+    feet: dict[str, tuple[float, Geometry]] = {}
+    for leg in robot.legs:
+        body = robot.bodies[leg.limb.chain[-1]]
+        shapes = [s for s in body.collisions if has_bounds(s.geometry, robot.meshes)]
+        if shapes:
+            pose, meshes = body.zero_pose, robot.meshes
+            lowest = min(shapes, key=lambda s: min_height(s, pose, meshes)).geometry
+            if lowest.friction is not None:
+                feet[leg.foot] = lowest.friction, lowest
+    values = [value for value, _ in feet.values()]
+    for foot, (value, geometry) in feet.items():
+        common = sorted(values)[len(values) // 2]
+        if not _MIN_FRICTION <= value <= _MAX_FRICTION:
+            expected = f"expected {_MIN_FRICTION:g} to {_MAX_FRICTION:g}"
+        elif len(values) > 2 and values.count(value) == 1 and values.count(common) > 1:
+            expected = f"expected {common:g}, as on the other feet"
+        else:
+            continue
+        yield Violation(
+            subject=foot,
+            source=geometry.source,
+            certainty="likely",
+            message=f"sliding friction of foot {foot}: got {value:g}; {expected}",
+            measured={"friction": value},
+        )
+
+
+@rule("COL009", "displaced-collision-mesh", "warning")
+def displaced_collision_mesh(robot: Facts) -> Iterator[Violation]:
+    """A mesh has another pose or scale as collision shape than as visual shape of the same link.
+
+    The origin or the scale was changed in one of the two elements only. The robot collides where
+    it cannot be seen, for example with its own thighs.
+
+    Fix:
+        Copy <origin> and scale from the correct element to the other one.
+
+    Source:
+        Issue 184 of OrbbecSDK_ROS2 and issue 2969 of realsense-ros.
+    """
+    for link in robot.links:
+        for collision in link.collisions:
+            same = [v for v in link.visuals if _is_same_file(collision, v)]
+            if not same or collision.fit_to_mesh:
+                continue
+            differences = [_difference(collision, visual) for visual in same]
+            if not all(differences):
+                continue
+            assert collision.mesh is not None
+            yield Violation(
+                subject=link.name,
+                source=collision.source,
+                message=f"collision mesh {Path(collision.mesh.filename).name} of link {link.name}: "
+                f"got {differences[0]} the same mesh of the visual; expected the same pose and "
+                "scale",
+            )
+
+
+def _is_same_file(a: Geometry, b: Geometry) -> bool:
+    return (
+        a.mesh is not None and b.mesh is not None and a.mesh.path == b.mesh.path
+    ) and a.shape == b.shape == "mesh"
+
+
+def _difference(a: Geometry, b: Geometry) -> str:
+    """Return how the poses and scales of two shapes with the same mesh differ."""
+    assert a.mesh is not None
+    assert b.mesh is not None
+    scales = np.array(a.mesh.scale), np.array(b.mesh.scale)
+    if np.abs(scales[0] - scales[1]).max() > 0.02 * np.abs(scales[1]).max():
+        return f"scale {_format(scales[0])} instead of {_format(scales[1])} of"
+    relative = np.linalg.inv(b.origin) @ a.origin
+    distance = float(np.linalg.norm(a.origin[:3, 3] - b.origin[:3, 3]))
+    angle = math.acos(min(1.0, max(-1.0, (float(np.trace(relative[:3, :3])) - 1) / 2)))
+    if distance > _MAX_OFFSET:
+        return f"a distance of {1000 * distance:.3g} mm to"
+    return f"an angle of {math.degrees(angle):.3g} deg to" if angle > _MAX_ANGLE else ""
+
+
+def _format(values: Matrix) -> str:
+    return " ".join(f"{value:g}" for value in values)
+
+
+@rule("COL010", "collision-outside-visual", "warning", needs=("legs",))
+def collision_outside_visual(robot: Facts) -> Iterator[Violation]:
+    """Most of a collision shape is outside of the visible robot.
+
+    The shape is turned, or on the wrong side of the joint: an origin was lost, has a wrong sign, or
+    is in degrees. The visible part passes through obstacles and invisible air hits them.
+
+    Fix:
+        Correct the <origin> of the <collision>. Show collision shapes in a viewer.
+
+    Source:
+        Bounding boxes at position 0 of the shape and of the visual shapes of its body and of the
+        bodies next to it. Checked are the legs and the trunk of robots with visual shapes on most
+        bodies, without meshes and spheres, which have no direction.
+    """
+    drawn = [body for body in robot.bodies if body.visuals]
+    if 2 * len(drawn) < len(robot.bodies):
+        return
+    for body in robot.bodies:
+        if not body.visuals or body.index not in robot.leg_bodies | {0}:
+            continue
+        suspects = [shape for shape in body.collisions if _needs_check(robot, body, shape)]
+        for shape in suspects:
+            box = bounds([shape], robot.meshes)
+            visible = _visible_box(robot, body)
+            if box is None or visible is None:
+                continue
+            share = _share_inside(box, visible)
+            if share < _MIN_SHARE_INSIDE:
+                yield Violation(
+                    subject=shape.link,
+                    source=shape.geometry.source,
+                    certainty="likely",
+                    message=f"part of the collision {shape.geometry.shape} of link {shape.link} "
+                    f"inside of the visible robot: got {share:.0%}; expected at least "
+                    f"{_MIN_SHARE_INSIDE:.0%}",
+                    measured={"share": share},
+                )
+
+
+def _needs_check(robot: Facts, body: Body, shape: BodyShape) -> bool:
+    """Return whether a primitive is not between the joints of its body.
+
+    Opening visual meshes is slow, and the segment between the joints settles most shapes.
+    """
+    if shape.geometry.shape in ("mesh", "plane", "sphere", "unknown"):
+        return False
+    if not has_bounds(shape.geometry, robot.meshes):
+        return False
+    box = bounds([shape], robot.meshes)
+    points = [np.zeros(3), *(b.origin[:3, 3] for b in robot.bodies if b.parent == body.index)]
+    points += [pose[:3, 3] for pose in body.poses]
+    joints = np.array([np.min(points, axis=0), np.max(points, axis=0)])
+    size = 0.15 * float(np.linalg.norm(joints[1] - joints[0])) + _VISUAL_MARGIN
+    joints += np.array([[-size], [size]])
+    return box is not None and _share_inside(box, joints) < _MIN_SHARE_INSIDE
+
+
+def _visible_box(robot: Facts, body: Body) -> Matrix | None:
+    """Return the bounding box of the visuals of a body, its parent and its children.
+
+    None if one of them cannot be read. Shape (2, 3), in the frame of the body [m].
+    """
+    near = [
+        b for b in robot.bodies if b.parent == body.index or b.index in (body.index, body.parent)
+    ]
+    inverse = np.linalg.inv(body.zero_pose)
+    shapes = [
+        BodyShape(geometry=v.geometry, link=v.link, pose=inverse @ b.zero_pose @ v.pose)
+        for b in near
+        for v in b.visuals
+    ]
+    if not all(has_bounds(shape.geometry, robot.meshes) for shape in shapes):
+        return None
+    box = bounds(shapes, robot.meshes)
+    return None if box is None else box + np.array([[-_VISUAL_MARGIN], [_VISUAL_MARGIN]])
+
+
+def _share_inside(box: Matrix, outer: Matrix) -> float:
+    """Return the share of the volume of a box that is inside of another one."""
+    size = box[1] - box[0]
+    inside = np.minimum(box[1], outer[1]) - np.maximum(box[0], outer[0])
+    return float(np.prod(np.clip(inside, 0, None) / np.maximum(size, 1e-9)))

@@ -1,0 +1,138 @@
+"""Rules on meshes that belong to other links (MSH)."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import PurePosixPath
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Geometry, Link
+from terrainkit_robots.lint.rule import Violation, rule
+
+_SUFFIX = re.compile(r"[_-]?(link|body|visual|collision|vis|col|\d+)$", re.IGNORECASE)
+
+
+def _stem(geometry: Geometry) -> str:
+    """Return the file name of a mesh without folder and suffix; empty for primitives."""
+    if geometry.mesh is None:
+        return ""
+    return PurePosixPath(geometry.mesh.filename.replace("\\", "/")).stem
+
+
+def _part(name: str) -> str:
+    """Return a name without suffixes such as _link."""
+    short = _SUFFIX.sub("", name.lower())
+    return short or name.lower()
+
+
+def _letters(name: str) -> str:
+    return re.sub(r"[^a-z]", "", name)
+
+
+def _shapes(link: Link) -> list[tuple[str, Geometry]]:
+    return [("visual", g) for g in link.visuals] + [("collision", g) for g in link.collisions]
+
+
+@rule("MSH015", "mesh-of-another-link", "warning")
+def mesh_of_another_link(robot: Facts) -> Iterator[Violation]:
+    """A link has the mesh of another link.
+
+    The file of the mesh has the name of another link that uses it as well, while a file with the
+    name of the link itself exists. A file name was not changed after copying a link, often that of
+    the other side.
+
+    Fix:
+        Use the mesh with the name of the link.
+
+    Source:
+        Issue 109 of ros-industrial/fanuc and the discussion of icub-models 70.
+    """
+    users: dict[str, list[str]] = {}
+    for link in robot.links:
+        for part in {_part(_stem(g)) for _, g in _shapes(link) if g.mesh is not None}:
+            users.setdefault(part, []).append(link.name)
+    parts = Counter(_part(link.name) for link in robot.links)
+    for link in robot.links:
+        own = _part(link.name)
+        for kind, geometry in _shapes(link):
+            used = _part(_stem(geometry))
+            if geometry.mesh is None or parts[used] != 1 or parts[own] != 1:
+                continue
+            if _letters(used) == _letters(own):
+                continue  # the fingers of a hand share their meshes
+            owners = [name for name in users[used] if _part(name) == used]
+            others = [g for _, g in _shapes(link) if _part(_stem(g)) == own]
+            path = geometry.mesh.path
+            beside = path.with_name(path.name.replace(_stem(geometry), _own_stem(geometry, link)))
+            has_own = bool(others) or (beside != path and robot.meshes.exists(beside))
+            if not owners or not has_own or _has_both(link, kind, own):
+                continue
+            yield Violation(
+                subject=link.name,
+                source=geometry.source,
+                certainty="likely",
+                message=f"{kind} mesh of link {link.name}: got {_stem(geometry)}, the mesh of link "
+                f"{owners[0]}; expected {_own_stem(geometry, link)}, which exists",
+            )
+
+
+def _own_stem(geometry: Geometry, link: Link) -> str:
+    """Return the name that the mesh of a link would have."""
+    stem = _stem(geometry)
+    suffix = _SUFFIX.search(stem)
+    return _SUFFIX.sub("", link.name) + (suffix.group() if suffix else "")
+
+
+def _has_both(link: Link, kind: str, own: str) -> bool:
+    """Return whether a link has a mesh of its own among the shapes of a kind.
+
+    It then consists of several parts.
+    """
+    return any(_part(_stem(g)) == own for k, g in _shapes(link) if k == kind)
+
+
+@rule("MSH016", "odd-leg-mesh", "warning", needs=("legs",))
+def odd_leg_mesh(robot: Facts) -> Iterator[Violation]:
+    """One leg has another mesh than the three legs that share one.
+
+    Meshes are shared by all legs, by the legs of one side, or by the front and the rear legs. If
+    three legs share one and the fourth has its own, a file name was not changed after copying.
+
+    Fix:
+        Use the same mesh as on the opposite leg of the same side, or its mirrored version.
+
+    Source:
+        Of the published quadrupeds that were tested, none has such meshes.
+    """
+    if len(robot.legs) != 4:
+        return
+    chains = [leg.limb.chain for leg in robot.legs]
+    if len({len(chain) for chain in chains}) != 1:
+        return
+    for kind in ("visuals", "collisions"):
+        for bodies in zip(*chains, strict=True):
+            found = [
+                tuple(sorted(_stem(s.geometry) for s in getattr(robot.bodies[i], kind)))
+                for i in bodies
+            ]
+            groups = Counter(found)
+            if len(set(bodies)) < 4 or sorted(groups.values()) != [1, 3]:
+                continue
+            common, odd = (names for names, _ in groups.most_common(2))
+            if not any(common) or not any(odd) or len(common) != len(odd):
+                continue
+            body = robot.bodies[bodies[found.index(odd)]]
+            others = [
+                robot.bodies[i].name
+                for i, names in zip(bodies, found, strict=True)
+                if names == common
+            ]
+            a = ", ".join(name for name in odd if name and name not in common)
+            b = ", ".join(name for name in common if name and name not in odd)
+            yield Violation(
+                subject=body.name,
+                source=getattr(body, kind)[0].geometry.source,
+                certainty="likely",
+                message=f"{kind[:-1]} mesh of {body.name}: got {a}, and {b} for {', '.join(others)}"
+                "; expected two legs with each, or one mesh for all",
+            )
