@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.memory import check_memory
 from terrainkit.solid_index import SolidIndex
 from terrainkit.solids import Solids
 
@@ -18,11 +19,17 @@ class SolidRaster:
     """
 
     def __init__(self, solids: Solids) -> None:
-        """Sample `solids` every `PIXEL` [m]."""
+        """Sample `solids` every `PIXEL` [m].
+
+        Raises:
+            MemoryLimitError: if the samples would not fit in memory.
+        """
         lower, upper = (corners[:, :2] for corners in solids.bounds())
         self._corner = lower.min(axis=0, initial=0.0)
         extent = upper.max(axis=0, initial=0.0) - self._corner
         self._shape = np.ceil(extent / PIXEL).astype(np.int64) + 1
+        pixels_total = int(self._shape.prod())
+        check_memory(pixels_total * 5, f"a height scan of solids with {pixels_total} pixels")
         covered = np.zeros(self._shape, dtype=bool)
         first = np.floor((lower - self._corner) / PIXEL).astype(np.int64)
         last = np.ceil((upper - self._corner) / PIXEL).astype(np.int64)

@@ -161,7 +161,7 @@ def test_generate_beyond_memory_is_rejected_early():
     needed = float(re.search(r"needs (\S+) GB of memory; \S+ GB free", str(caught.value))[1])
     # 800500 x 800500 heights of 4 bytes are 2563 GB.
     assert 2563 <= needed < 3500
-    assert peak < 2**20
+    assert peak < 2**24  # imports included
 
 
 @pytest.mark.parametrize(
@@ -310,7 +310,9 @@ def test_generate_warns_of_moved_spawn(terrain, given):
 
 
 def test_generate_warns_once_of_missing_columns():
-    with pytest.warns(TerrainkitWarning, match="2 columns .*no column for rough_slope, ") as caught:
+    with pytest.warns(
+        TerrainkitWarning, match="cols: got 2, .*no column for rough_slope, "
+    ) as caught:
         generate(MapConfig(rows=2, cols=2, preset="rough", border=0.0))
     assert len(caught) == 1
 

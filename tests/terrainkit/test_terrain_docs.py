@@ -4,6 +4,7 @@ import pytest
 
 from terrainkit import parameter, registry
 from terrainkit.errors import ConfigError
+from terrainkit.parameter import parameters_of
 from terrainkit.terrain_docs import overlay_doc, overlay_summaries, terrain_doc, terrain_summaries
 
 
@@ -13,7 +14,9 @@ def test_terrain_doc_has_text_and_unit(name):
     assert about.text.partition("\n")[0].endswith(".")
     assert [p.name for p in about.parameters] == list(registry.get_terrain(name).at(0).requested())
     unitless = {"grade", "number", "layers", "octaves", "opening", "opened", "iterations"}
-    unitless |= {"inverted", "half"}
+    unitless |= {"vertical_exaggeration", "scale"}
+    declared = parameters_of(registry.get_terrain(name))
+    unitless |= {each for each, p in declared.items() if isinstance(p.easy, str | bool)}
     for each in about.parameters:
         assert each.text.endswith(".")
         has_unit = "[m]" in each.text or "[rad]" in each.text

@@ -114,14 +114,20 @@ class PackageResolver:
 
     def _search_by_name(self, name: str) -> Path | None:
         """Return a file with this name in a nearby folder of meshes."""
-        for folder in self._search_folders[:2]:
-            for sub in (
+        paths = (folder / name for folder in self._mesh_folders)
+        return next((path for path in paths if exists(path)), None)
+
+    @cached_property
+    def _mesh_folders(self) -> tuple[Path, ...]:
+        """The nearest folders, each followed by its folders of meshes."""
+        return tuple(
+            path
+            for folder in self._search_folders[:2]
+            for path in (
                 folder,
                 *(f for f in _list_folders(folder) if f.name.lower() in _MESH_FOLDERS),
-            ):
-                if exists(sub / name):
-                    return sub / name
-        return None
+            )
+        )
 
     def _resolve_in_package(self, name: str, rest: str) -> tuple[Path, FoundBy]:
         if not rest:  # a file name in the place of the package

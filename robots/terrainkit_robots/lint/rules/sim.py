@@ -229,7 +229,8 @@ def mujoco_load_failure(robot: Facts) -> Iterator[Violation]:
 def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
     """The library yourdfpy cannot load the unmodified file.
 
-    Python tools for retargeting, planning and visualization load URDF with yourdfpy.
+    Python tools for retargeting, planning and visualization load URDF with yourdfpy. It is only
+    tried on files with XML problems, since importing it takes longer than all other rules.
 
     Fix:
         Correct the reported element. The message is from yourdfpy.
@@ -242,7 +243,7 @@ def yourdfpy_load_failure(robot: Facts) -> Iterator[Violation]:
         yourdfpy_load_error,
     )
 
-    if robot.model.kind == "mjcf":
+    if robot.model.kind == "mjcf" or not robot.model.problems:
         return
     _require_saved(robot)
     try:
