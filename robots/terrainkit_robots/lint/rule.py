@@ -62,7 +62,7 @@ FAMILIES = {
 
 IMPORTANCE = (
     *("XML", "TRE", "SIM", "MSH"),  # the robot cannot be loaded
-    *("INR", "JNT", "COL", "DYN"),  # its physics are wrong
+    *("OPT", "INR", "JNT", "COL", "DYN"),  # its physics are wrong
     *("LEG", "XRF", "SYM", "NAM"),  # it is not what was meant
 )
 """Families in the order of reports: the most important first."""
