@@ -32,7 +32,8 @@ def keyframe_defect(robot: LegModel) -> str:
     if not has_leg_positions(robot) or not robot.legs:
         return ""
     positions = {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
-    poses = body_poses(robot.bodies, positions | dict(mimic_positions(robot.joints, positions)))
+    followers = {name: float(q) for name, q in mimic_positions(robot.joints, positions).items()}
+    poses = body_poses(robot.bodies, positions | followers)
     lowest = {
         body.index: min(min_height(shape, pose, robot.meshes) for shape in body.collisions)
         for body, pose in zip(robot.bodies, poses, strict=True)

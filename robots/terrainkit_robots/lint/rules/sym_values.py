@@ -10,6 +10,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.link_source import inertia_source
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.symmetry.asymmetry import find_misalignments
 from terrainkit_robots.analysis.symmetry.mirror import swap_sides
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Joint
@@ -144,8 +145,12 @@ def product_asymmetry(robot: Facts) -> Iterator[Violation]:
         Pull request 160 of mujoco_menagerie and pull request 511 of jsk_aerial_robot. Bodies that
         both sides share without mirroring them are not checked.
     """
+    # The frames of bodies behind a misaligned joint are turned; SYM006 reports the joint.
+    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
+        if displaced & pair.indices:
+            continue
         a, b = _inertia(left.body), _inertia(right.body)
         if a is None or b is None:
             continue
@@ -266,9 +271,11 @@ def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
     Source:
         Bounding boxes at position 0. Those of published robots agree to 30 % of their diagonal.
     """
+    # Bodies behind a misaligned joint are elsewhere; SYM006 reports the joint.
+    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
     for pair in robot.mirror_pairs:
         left, right = pair.left, pair.right
-        if not {left.body.index, right.body.index} <= robot.leg_bodies:
+        if displaced & pair.indices or not pair.indices <= robot.leg_bodies:
             continue
         a, b = _box(robot, left), _box(robot, right)
         if a is None or b is None:
