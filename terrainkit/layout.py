@@ -91,9 +91,9 @@ def patch_rng(config: MapConfig, terrain: Terrain, row: int, col: int) -> "np.ra
     """Return the random number generator of the terrain on patch (row, col).
 
     It depends on the seed and the patch only. In mode curriculum, all rows of a column share it for
-    terrains with :attr:`~terrainkit.terrain.Terrain.has_column_layout`.
+    terrains with :attr:`~terrainkit.terrain.Terrain.has_column_seed`.
     """
-    if config.mode == "curriculum" and terrain.has_column_layout:
+    if config.mode == "curriculum" and terrain.has_column_seed:
         seed = np.random.SeedSequence([config.seed, col], spawn_key=_COLUMN_STREAM)
     else:
         seed = np.random.SeedSequence([config.seed, row, col])

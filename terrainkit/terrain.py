@@ -37,7 +37,7 @@ class Terrain(Parameterized, ABC):
     constructed directly takes the hard end of each range by default.
     """
 
-    has_column_layout: ClassVar[bool] = False
+    has_column_seed: ClassVar[bool] = False
     """Whether the rows of a column have the same random numbers in mode curriculum.
 
     Set it where single random objects decide how hard a patch is. Otherwise a row could be easier

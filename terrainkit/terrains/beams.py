@@ -24,7 +24,7 @@ class Beams(Terrain):
     rows of a column have gaps at the same places.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     width: float = parameter.size(0.5, 0.2)
     """Width of a beam [m]."""

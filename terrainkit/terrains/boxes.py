@@ -23,7 +23,7 @@ class Boxes(Terrain):
     each. In mode curriculum, the rows of a column differ only in `height`.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     height: float = parameter.height(0.05, 1.0)
     """Height of a box or a pyramid [m]."""

@@ -24,7 +24,7 @@ class FloatingIslands(Terrain):
     before, or fewer.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     walkway: float = parameter.size(0.4, 0.25)
     """Width of the walkways [m]."""

@@ -20,7 +20,7 @@ class GapTrack(Terrain):
     each. In mode curriculum, the rows of a column differ only in `length` and `depth`.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     length: float = parameter.length(0.05, 1.0)
     """Length of a gap along x [m]."""

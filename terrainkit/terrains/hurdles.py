@@ -20,7 +20,7 @@ class Hurdles(Terrain):
     behind each. In mode curriculum, the rows of a column differ only in `height`.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     height: float = parameter.height(0.05, 0.5)
     """Height of the hurdles [m]."""

@@ -33,7 +33,7 @@ class Imported(Terrain):
     makes a whole map of a file instead.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     file: str = parameter.text()
     """The file (.png, .tif, .npy, .asc, .obj, .stl, .ply, .glb), relative to the working folder;

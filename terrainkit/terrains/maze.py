@@ -23,7 +23,7 @@ class Maze(Terrain):
     x. The walls are solids; the ground is flat.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     corridor: float = parameter.size(1.5, 0.8)
     """Width of the corridors [m]."""

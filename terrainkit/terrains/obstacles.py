@@ -20,7 +20,7 @@ class Obstacles(Terrain):
     curriculum, the rows of a column differ only in `height`.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     height: float = parameter.height(0.05, 0.25)
     """Height of the highest block and depth of the deepest trench [m]."""

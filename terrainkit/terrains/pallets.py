@@ -30,7 +30,7 @@ class Pallets(Terrain):
     heights of the stacks.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     layers: int = parameter.count(1, 3)
     """Largest number of pallets in a stack."""

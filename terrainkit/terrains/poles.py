@@ -24,7 +24,7 @@ class Poles(Terrain):
     of the row before, and more.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     gap: float = parameter.size(1.2, 0.6)
     """Minimum distance between the sides of two poles [m]."""

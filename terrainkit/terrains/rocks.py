@@ -26,7 +26,7 @@ class Rocks(Terrain):
     have the same rocks, which become higher.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     height: float = parameter.size(0.15, 0.6)
     """Height above the ground of a rock of `max_radius` [m]; others are lower in proportion."""

@@ -22,7 +22,7 @@ class Rooms(Terrain):
     and the goals lead through the doors toward high x. The walls are solids; the ground is flat.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     door: float = parameter.size(1.5, 0.8)
     """Width of a door [m]."""

@@ -23,7 +23,7 @@ class Slit(Terrain):
     that the openings are exact. In mode curriculum, the rows of a column differ only in `opening`.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     opening: float = parameter.scalar(1.3, 0.85, allows_zero=False)
     """Width of an opening, in body widths."""

@@ -25,7 +25,7 @@ class SteppingBeams(Terrain):
     of a column have the same random numbers.
     """
 
-    has_column_layout: ClassVar[bool] = True
+    has_column_seed: ClassVar[bool] = True
 
     width: float = parameter.size(0.5, 0.2)
     """Width of a beam along x, if it is straight [m]."""
