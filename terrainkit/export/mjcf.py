@@ -69,6 +69,13 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         ConfigError: if `collision` is invalid.
         MemoryLimitError: if the map would not fit in memory.
     """
+    root = model_element(terrain_map, collision)
+    ET.indent(root)
+    ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def model_element(terrain_map: "TerrainMap", collision: Collision = "auto") -> ET.Element:
+    """Return the model that :func:`export` writes."""
     collision = convert("collision", collision, Collision)
     samples = terrain_map.heights.size
     check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
@@ -96,8 +103,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         name = "terrain" if cover is None and len(split) == 1 else f"terrain_{k}"
         _set_friction(_add_hfield(asset, world, name, terrain_map, heights, part), friction, static)
     _add_solids(asset, world, terrain_map.solids, static)
-    ET.indent(root)
-    ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    return root
 
 
 def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
