@@ -51,7 +51,7 @@ def test_find_spawn_is_in_the_map_frame():
 
 
 @pytest.mark.parametrize("wanted", [(0.1, 2.0), (3.95, 2.0), (2.0, 0.3), (4.0, 4.0), (-1.0, 2.0)])
-def test_find_spawn_disc_is_inside_the_patch(wanted):
+def test_find_spawn_disk_is_inside_the_patch(wanted):
     x, y, _ = spawn(level(), wanted)
     assert min(x, y) >= 0.5
     assert max(x, y) <= 3.5
@@ -88,7 +88,7 @@ def test_find_spawn_avoids_one_high_sample():
 @pytest.mark.parametrize(
     ("sample", "height"), [((25, 22), 0.07), ((24, 24), -5.0), ((14, 17), -5.0)]
 )
-def test_find_spawn_disc_is_level_along_diagonals(sample, height):
+def test_find_spawn_disk_is_level_along_diagonals(sample, height):
     heights = level()
     heights[sample] = height
     ground = disk(heights, spawn(heights, threshold=math.inf), threshold=math.inf)

@@ -229,7 +229,7 @@ def test_friction_and_damping(tmp_path, written, wanted):
 
 
 @pytest.mark.parametrize(
-    ("leads", "notes"),
+    ("leads", "changes"),
     [
         (("k", "j"), ("j", "k")),
         (("j", "j"), ("j",)),

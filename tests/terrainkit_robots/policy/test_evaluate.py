@@ -28,7 +28,7 @@ def run_still(run, config, seconds=0.1, **options):
     return rollout, commands
 
 
-def test_evaluation_task_keeps_custom_configs():
+def test_eval_task_keeps_custom_configs():
     @dataclass(frozen=True, kw_only=True)
     class Jumping(Commands):
         height: float = 0.3

@@ -35,19 +35,19 @@ def quadruped():
     return make_sim_model(facts), suggest_gains(facts)
 
 
-def test_joint_inertias_of_pendulum(pendulum):
+def test_joint_inertia_of_pendulum(pendulum):
     found = joint_inertia(pendulum)["j"]
     assert found.free == pytest.approx(INERTIA)
     assert found.locked == pytest.approx(INERTIA)
 
 
-def test_joint_inertias_free_are_smaller():
+def test_joint_inertia_free_is_smaller():
     sim, _ = quadruped()
     for found in joint_inertia(sim).values():
         assert 0 < found.free < found.locked
 
 
-def test_joint_inertias_match_impulse_response():
+def test_joint_inertia_matches_impulse_response():
     sim, _ = quadruped()
     data = mujoco.MjData(sim.model)
     model = sim.model.__copy__()

@@ -84,7 +84,7 @@ class TestRemoved:
         assert not done.files
 
     @pytest.mark.parametrize(
-        ("given", "note"),
+        ("given", "change"),
         [
             (shape("plane"), "removed a plane of leg: it has no valid size"),
             (
