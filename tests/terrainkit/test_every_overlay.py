@@ -122,6 +122,7 @@ def test_overlays_are_applied_in_order():
 
 
 def test_overlay_hook_with_wrong_heights_is_rejected():
+    @dataclasses.dataclass(frozen=True, kw_only=True)
     class Careless(Mirror):
         def apply(self, patch, rng):  # noqa: ARG002
             return dataclasses.replace(patch, heights=patch.heights[1:])
