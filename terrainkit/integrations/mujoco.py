@@ -1,9 +1,9 @@
 """Maps in MuJoCo models."""
 
+from io import StringIO
 from typing import TYPE_CHECKING
-from xml.etree import ElementTree as ET
 
-from terrainkit.export.mjcf import Collision, model_element
+from terrainkit.export.mjcf import Collision, write_model
 from terrainkit.integrations import load_map
 
 if TYPE_CHECKING:
@@ -25,9 +25,9 @@ def make_spec(
     """
     import mujoco
 
-    return mujoco.MjSpec.from_string(
-        ET.tostring(model_element(load_map(source), collision), encoding="unicode")
-    )
+    file = StringIO()
+    write_model(load_map(source), file, collision)
+    return mujoco.MjSpec.from_string(file.getvalue())
 
 
 def add_map(
