@@ -425,4 +425,5 @@ def int16_heights(heights: NDArray[np.floating], vertical_scale: float) -> NDArr
             f"heights from {heights.min():g} to {heights.max():g} m do not fit in "
             f"int16 at vertical_scale {vertical_scale:g}; expected at least {minimum:.3g}"
         )
-    return units.astype(np.int16)
+    result: NDArray[np.int16] = units.astype(np.int16)
+    return result

@@ -92,7 +92,7 @@ class MapGeneratorCfg(TerrainGeneratorCfg):
 
     class_type: type = MapGenerator
 
-    path: str = MISSING
+    path: str = MISSING  # type: ignore[assignment]
     """Path of the map."""
 
 

@@ -134,12 +134,12 @@ def _with_narrow_border(terrain_map: TerrainMap) -> TerrainMap:
     if removed <= 0:
         return terrain_map
     config = replace(terrain_map.config, border=_BORDER_CELLS * terrain_map.config.cell)
-    lower = tuple(each + removed * terrain_map.grid.cell for each in terrain_map.grid.lower)
+    x, y = (each + removed * terrain_map.grid.cell for each in terrain_map.grid.lower)
     inside = slice(removed, -removed)
     return replace(
         terrain_map,
         config=config,
-        grid=replace(config.grid, lower=lower),
+        grid=replace(config.grid, lower=(x, y)),
         heights=terrain_map.heights[inside, inside],
         friction=terrain_map.friction[inside, inside],
     )
