@@ -57,7 +57,8 @@ def assert_same_geometry(patch, other):
 @every_terrain
 def test_every_overlay_on_every_terrain_is_valid(terrain, overlays):
     sub_terrain = SubTerrain(terrain=terrain, overlays=overlays)
-    terrain_map = generate(MapConfig(rows=2, cols=1, border=1.0, seed=4, terrains=(sub_terrain,)))
+    size = {"rows": 2, "cols": 1, "border": 1.0, "cell": 0.2, "seed": 4}
+    terrain_map = generate(MapConfig(terrains=(sub_terrain,), **size))
     # The mesh, the spawn origins, and a second build of each patch.
     issues = [issue for issue in validate(terrain_map) if issue.check != "realized"]
     assert [issue for issue in issues if "no flat disk" not in issue.message] == []
