@@ -25,6 +25,7 @@ from terrainkit.box_decomposition import (
 )
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.solid_raster import SolidRaster
 from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
@@ -124,7 +125,8 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
         return None
     if collision == "auto":
         threshold = terrain_map.config.wall_threshold
-        if not flat_cells(terrain_map.heights, terrain_map.grid, threshold).all():
+        grid = NodeGrid.from_heights(terrain_map.heights, terrain_map.grid, threshold)
+        if not flat_cells(grid).all():
             return None
         cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
         num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
@@ -202,7 +204,8 @@ def _divide(part: _Part, max_length: float) -> list[_Part]:
         cells = each.stop - each.start - 1
         lines = np.linspace(each.start, each.stop - 1, max(1, round(cells / max_length)) + 1)
         spans.append([slice(a, b + 1) for a, b in itertools.pairwise(lines.astype(int).tolist())])
-    return list(itertools.product(*spans))
+    x, y = spans
+    return [(i, j) for i in x for j in y]
 
 
 def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:
