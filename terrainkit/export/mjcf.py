@@ -197,7 +197,7 @@ def _divide(part: _Part, max_length: float) -> list[_Part]:
         cells = each.stop - each.start - 1
         lines = np.linspace(each.start, each.stop - 1, max(1, round(cells / max_length)) + 1)
         spans.append([slice(a, b + 1) for a, b in itertools.pairwise(lines.astype(int).tolist())])
-    return list(itertools.product(*spans))
+    return [(x, y) for x in spans[0] for y in spans[1]]
 
 
 def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:
