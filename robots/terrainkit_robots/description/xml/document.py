@@ -96,6 +96,10 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
                 subject=file.name,
             )
         )
+    version = _VERSION.match(text)
+    if version is not None:
+        problems.append(_version_problem(file, data, text, version))
+        text = text[: version.start(1)] + b"1.0" + text[version.end(1) :]
     parser = etree.XMLParser(
         recover=True, resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
     )
@@ -134,6 +138,31 @@ def _rejected(
 
 def _unparsed(file: Path, data: bytes, problems: Sequence[Problem]) -> XmlDocument:
     return XmlDocument(file=file, data=data, root=None, sources={}, problems=tuple(problems))
+
+
+_VERSION = re.compile(rb"<\?xml\s+version\s*=\s*[\"'](?!1\.\d+[\"'])([^\"']{3})[\"']")
+"""XML declaration with a version that does not exist."""
+
+
+def _version_problem(file: Path, data: bytes, text: bytes, match: re.Match[bytes]) -> Problem:
+    start = len(data) - len(text) + match.start(1)
+    return Problem(
+        code="XML001",
+        message=f"version in <?xml?>: got {match[1].decode('ascii', 'replace')!r}; expected 1.0, "
+        "or strict readers reject the file",
+        source=Source(file=file, line=1),
+        subject=file.name,
+        details={"start": str(start), "end": str(start + 3)},
+    )
+
+
+def version_fix(problem: Problem) -> Fix | None:
+    """Return the fix of a wrong version in the XML declaration; None for other problems."""
+    if "end" not in problem.details:
+        return None
+    start, end = int(problem.details["start"]), int(problem.details["end"])
+    edit = ReplaceBytes(source=problem.source, start=start, end=end, replacement=b"1.0")
+    return Fix(safety="safe", description="Set the version of the XML to 1.0.", edits=(edit,))
 
 
 def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> bytes:
