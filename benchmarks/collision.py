@@ -81,7 +81,7 @@ def _standing(terrain: Terrain, origins: np.ndarray) -> tuple[mujoco.MjModel, li
     states = []
     for k in np.linspace(0, len(origins) - 1, _NUM_PLACES).astype(int):
         data = mujoco.MjData(scene.model)
-        data.qpos[:] = scene.home
+        data.qpos[:] = scene.default_qpos
         data.qpos[:3] = 0.0 if isinstance(terrain, Plane) else origins[k]
         data.qpos[2] += 0.35
         data.ctrl[:] = robot.default_pose

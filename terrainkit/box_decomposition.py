@@ -185,22 +185,22 @@ def _bounds(mask: NDArray[np.bool_]) -> slice:
     return slice(index[0], index[-1] + 1)
 
 
-def merge_boxes(boxes: NDArray[np.float64], max_cells: float = np.inf) -> NDArray[np.float64]:
+def merge_boxes(boxes: NDArray[np.float64], max_length: float = np.inf) -> NDArray[np.float64]:
     """Merge boxes of the same top that share a whole side until none do.
 
     Args:
         boxes: Top or another key, and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
-        max_cells: Cells after which a row of merged boxes is divided.
+        max_length: Cells after which a row of merged boxes is divided.
     """
     before = -1
     while len(boxes) != before:
         before = len(boxes)
         for _ in "xy":
-            boxes = _merge_along_x(boxes, max_cells)[:, [0, 3, 4, 1, 2]]
+            boxes = _merge_along_x(boxes, max_length)[:, [0, 3, 4, 1, 2]]
     return boxes
 
 
-def _merge_along_x(boxes: NDArray[np.float64], max_cells: float) -> NDArray[np.float64]:
+def _merge_along_x(boxes: NDArray[np.float64], max_length: float) -> NDArray[np.float64]:
     """Merge boxes of the same top, j0 and j1 that touch, shape (n, 5)."""
     top, i0, i1, j0, j1 = boxes[np.lexsort(boxes.T[[2, 1, 4, 3, 0]])].T
     other = np.ones(len(top), dtype=bool)
@@ -211,7 +211,7 @@ def _merge_along_x(boxes: NDArray[np.float64], max_cells: float) -> NDArray[np.f
     first = other.copy()
     first[1:] |= i0[1:] > reach[:-1]
     start = i0[np.maximum.accumulate(np.where(first, np.arange(len(i0)), 0))]
-    first[1:] |= np.diff((i0 - start) // max_cells) > 0
+    first[1:] |= np.diff((i0 - start) // max_length) > 0
     last = np.roll(first, -1)
     return np.column_stack([top[first], i0[first], reach[last], j0[first], j1[first]])
 

@@ -82,7 +82,7 @@ class PolicyCommand(Command):
 
         return open_run(self.policy, optional_number(self.checkpoint))
 
-    def evaluation_config(self, seconds: float) -> "EvaluationConfig":
+    def eval_config(self, seconds: float) -> "EvaluationConfig":
         """Return the settings of the rollout.
 
         Raises:
@@ -136,7 +136,7 @@ class Evaluate(PolicyCommand):
         with render.steps() as steps:
             result = evaluate(
                 run,
-                self.evaluation_config(self.seconds),
+                self.eval_config(self.seconds),
                 lambda fraction: steps.update(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
         if self.format == "json":

@@ -56,7 +56,7 @@ class Play(PolicyCommand):
             require_training("imageio_ffmpeg")  # before the rollout
         run = self.load_run()
         target = Path(self.output or f"{run.folder.resolve().name}.mp4")
-        config = self.evaluation_config(self.seconds)
+        config = self.eval_config(self.seconds)
         from terrainkit_robots.policy.play import play, view
         from terrainkit_robots.rendering.video import check_video_path, check_video_size
 

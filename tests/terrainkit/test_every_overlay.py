@@ -60,7 +60,7 @@ def test_every_overlay_on_every_terrain_is_valid(terrain, overlays):
         terrain_map = generate(config_of(terrain, overlays, difficulty))
         # The mesh, the spawn origin, and a second build of the patch.
         issues = [issue for issue in validate(terrain_map) if issue.check != "realized"]
-        assert [issue for issue in issues if "no flat disc" not in issue.message] == []
+        assert [issue for issue in issues if "no flat disk" not in issue.message] == []
 
 
 @every_terrain
@@ -122,6 +122,7 @@ def test_overlays_are_applied_in_order():
 
 
 def test_overlay_hook_with_wrong_heights_is_rejected():
+    @dataclasses.dataclass(frozen=True, kw_only=True)
     class Careless(Mirror):
         def apply(self, patch, rng):  # noqa: ARG002
             return dataclasses.replace(patch, heights=patch.heights[1:])

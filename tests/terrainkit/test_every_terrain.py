@@ -60,12 +60,12 @@ def map_of(terrain, parameters, grid, **rest):
 
 
 def assert_spawns_are_level(terrain_map, radius):
-    """Look at the ground itself all over the disc around each origin."""
+    """Look at the ground itself all over the disk around each origin."""
     x, y, z = terrain_map.env_origins.astype(float).reshape(-1, 3, 1, 1).transpose(1, 0, 2, 3)
     r = np.linspace(0.0, radius, 21)[:, None]
     angle = np.linspace(0.0, 2 * np.pi, 64, endpoint=False)
-    disc = np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=-1)
-    ground = terrain_map.height(disc)
+    disk = np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=-1)
+    ground = terrain_map.height(disk)
     assert np.abs(ground[:, :1] - z).max() < 1e-3
     assert np.abs(ground - z).max() <= terrain_map.config.spawn_tolerance + 1e-5
     assert np.ptp(ground, axis=(1, 2)).max() <= terrain_map.config.spawn_tolerance + 1e-5

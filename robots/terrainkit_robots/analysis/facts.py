@@ -182,7 +182,7 @@ class Facts:
             joints=self.joints,
             legs=self.legs,
             mirror=self.mirror,
-            keyframe=self.model.home,
+            keyframe=self.model.keyframe,
             meshes=self.meshes,
         )
 

@@ -127,14 +127,14 @@ def evaluate(
             read, or changed after the training; if the device does not exist.
     """
     config = config or EvaluationConfig()
-    env, commands = make_evaluation_env(run, config)
+    env, commands = make_eval_env(run, config)
     rollout = EvaluationRollout(env)
     rollout.run(load_policy(run, env), config.seconds, commands, progress)
     has_grid = env.terrain.is_flat and config.command is None
     return summarize(run, config, rollout, commands if has_grid else None)
 
 
-def make_evaluation_env(
+def make_eval_env(
     run: Run, config: EvaluationConfig, *, max_patch_envs: int = MAX_MAP_ENVS
 ) -> tuple[LeggedEnv, FloatArray | None]:
     """Return an environment to evaluate a policy in, and commands of shape (n, 3).
@@ -165,7 +165,7 @@ def make_evaluation_env(
     elif n is None:
         per_patch = max(1, min(max_patch_envs, MAX_MAP_ENVS // patches))
         n = SINGLE_PATCH_ENVS if patches == 1 else min(MAX_MAP_ENVS, patches * per_patch)
-    task = evaluation_task(task, n, seconds=config.seconds, seed=config.seed)
+    task = eval_task(task, n, seconds=config.seconds, seed=config.seed)
     task = replace(task, terrain=replace(task.terrain, collision=collision, measure_heights=scan))
     env = LeggedEnv(task, run.robot, terrain, device)
     levels_and_columns = np.divmod(_assign(patches, n, config.seed), cols)
@@ -186,7 +186,7 @@ def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
     return np.arange(num_envs) % count
 
 
-def evaluation_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
+def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
     """Return a task without noise, randomization, pushes, curricula and timeouts in `seconds`."""
     off: dict[str, Any] = dict.fromkeys(["friction", "added_mass", "gains", "motor_strength"])
     off |= dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)

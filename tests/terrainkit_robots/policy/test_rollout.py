@@ -8,7 +8,7 @@ from terrainkit_robots.policy.evaluate import (
     SETTLING_TIME,
     EvaluationRollout,
     command_schedule,
-    evaluation_task,
+    eval_task,
     rollout,
 )
 from terrainkit_robots.rl.config import Commands, Env, Task
@@ -21,7 +21,7 @@ FORWARD = np.array([[1, 0, 0]], np.float32)
 @pytest.fixture
 def env(quadruped):
     task = Task(env=Env(num_envs=2, num_threads=1))
-    return LeggedEnv(evaluation_task(task, 2), quadruped, Plane())
+    return LeggedEnv(eval_task(task, 2), quadruped, Plane())
 
 
 def still(obs):

@@ -67,7 +67,7 @@ class TestSampleCommands:
         speed, turn = np.hypot(commands[:, 0], commands[:, 1]), np.abs(commands[:, 2])
         assert (speed[speed > 0] >= 0.4).all()
         assert (turn[turn > 0] >= 0.4).all()
-        # The area of a disc of radius 0.4 in a square of side 2, and 0.4 of the yaw range.
+        # The area of a disk of radius 0.4 in a square of side 2, and 0.4 of the yaw range.
         assert (speed == 0).mean() == pytest.approx(np.pi * 0.16 / 4, abs=0.01)
         assert (turn == 0).mean() == pytest.approx(0.4, abs=0.015)
         assert ((speed == 0) & (turn > 0)).any()

@@ -447,7 +447,7 @@ def torques(cart, nominal_task):
     def act(action, offset=(0.0, 0.0, 0.0), **settings):
         env = LeggedEnv(nominal_task(1, control=Control(**settings)), cart, Plane())
         sim, scene = env.sim, env.scene
-        sim.qpos[0] = scene.home
+        sim.qpos[0] = scene.default_qpos
         sim.qpos[0, 2] = 5.0
         sim.qpos[0, scene.joint_qpos] = Q
         sim.qvel[0] = 0

@@ -40,30 +40,30 @@ from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbe
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
 
 
-def read_urdf(document: XmlDocument, *, packages: Mapping[str, Path]) -> RobotModel:
+def read_urdf(doc: XmlDocument, *, packages: Mapping[str, Path]) -> RobotModel:
     """Return the robot of a document whose root is <robot>.
 
     Args:
-        document: The XML document.
+        doc: The XML document.
         packages: Folders of ROS packages by name.
     """
-    return _Reader(document, packages).robot()
+    return _Reader(doc, packages).robot()
 
 
 class _Reader:
     """Read one document and collect its problems."""
 
-    def __init__(self, document: XmlDocument, packages: Mapping[str, Path]) -> None:
-        self._document = document
-        self._packages = PackageResolver(document.file, packages)
-        self._problems = list(document.problems)
+    def __init__(self, doc: XmlDocument, packages: Mapping[str, Path]) -> None:
+        self._doc = doc
+        self._packages = PackageResolver(doc.file, packages)
+        self._problems = list(doc.problems)
         self._colors: Mapping[str, Color] = {}
 
     def robot(self) -> RobotModel:
         """Return the robot."""
-        root = self._document.root
+        root = self._doc.root
         assert root is not None
-        source = self._document.source(root)
+        source = self._doc.source(root)
         if not root.get("name", "").strip():
             self._report("XML003", root, "the robot has no name; expected <robot name=...>")
         self._check_names(root)
@@ -73,12 +73,12 @@ class _Reader:
         return RobotModel(
             name=root.get("name", "").strip(),
             kind="urdf",
-            file=self._document.file,
+            file=self._doc.file,
             source=source,
             links=links,
             joints=joints,
             problems=tuple(self._problems),
-            sources=(self._document.file,),
+            sources=(self._doc.file,),
         )
 
     def _report(
@@ -88,7 +88,7 @@ class _Reader:
             Problem(
                 code=code,
                 message=message,
-                source=self._document.source(element),
+                source=self._doc.source(element),
                 subject=subject or _owner(element),
                 details=details,
             )
@@ -194,7 +194,7 @@ class _Reader:
     def _link(self, element: "etree._Element") -> Link:
         return Link(
             name=self._required(element, "name", element),
-            source=self._document.source(element),
+            source=self._doc.source(element),
             inertial=self._inertial(element.find("inertial")),
             collisions=tuple(self._geometries(element, "collision")),
             visuals=tuple(self._geometries(element, "visual")),
@@ -213,11 +213,11 @@ class _Reader:
             ]
             inertia = _symmetric(values)
         return Inertial(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             mass=self._parse_number(element.find("mass"), "value"),
             origin=self._origin(element),
             inertia=inertia,
-            inertia_source=None if tensor is None else self._document.source(tensor),
+            inertia_source=None if tensor is None else self._doc.source(tensor),
             missing=tuple(n for n in _DIAGONAL if tensor is None or tensor.get(n) is None),
         )
 
@@ -230,14 +230,14 @@ class _Reader:
             yield geometry if color is None else replace(geometry, color=color)
 
     def _geometry(self, element: "etree._Element") -> Geometry:
-        source, name = self._document.source(element), element.get("name", "")
+        source, name = self._doc.source(element), element.get("name", "")
         origin = self._origin(element)
         geometry = element.find("geometry")
         shape = None if geometry is None else next(geometry.iterchildren(etree.Element), None)
         if shape is None:
             self._report("XML013", element, f"<{element.tag}> has no shape in a <geometry>")
             return Geometry(source=source, name=name, shape="unknown", origin=origin)
-        size_source = self._document.source(shape)
+        size_source = self._doc.source(shape)
         if shape.tag == "mesh":
             mesh = self._mesh(shape)
             return Geometry(source=source, name=name, shape="mesh", origin=origin, mesh=mesh)
@@ -273,7 +273,7 @@ class _Reader:
         scale = self._parse_numbers(element, "scale", 3)
         x, y, z = (1.0, 1.0, 1.0) if scale is None else map(float, scale)
         return MeshFile(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             filename=filename,
             path=path,
             found_by=found_by,
@@ -292,13 +292,13 @@ class _Reader:
             direction = np.zeros(3)  # an invalid axis, not a missing one
         return Joint(
             name=name,
-            source=self._document.source(element),
+            source=self._doc.source(element),
             kind=self._required(element, "type", element),
             parent=self._required(parent, "link", element),
             child=self._required(child, "link", element),
             origin=self._origin(element),
             axis=direction,
-            axis_source=None if axis is None else self._document.source(axis),
+            axis_source=None if axis is None else self._doc.source(axis),
             limit=self._limit(element.find("limit")),
             mimic=self._mimic(element.find("mimic")),
             dynamics=self._dynamics(element.find("dynamics")),
@@ -310,7 +310,7 @@ class _Reader:
         if element is None:
             return None
         return Dynamics(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             damping=self._parse_number(element, "damping"),
             friction=self._parse_number(element, "friction"),
         )
@@ -319,7 +319,7 @@ class _Reader:
         if element is None:
             return None
         return SafetyController(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             k_position=self._parse_number(element, "k_position"),
             k_velocity=self._parse_number(element, "k_velocity"),
             lower=self._parse_number(element, "soft_lower_limit"),
@@ -330,7 +330,7 @@ class _Reader:
         if element is None:
             return None
         return Limit(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             lower=self._parse_number(element, "lower"),
             upper=self._parse_number(element, "upper"),
             effort=self._parse_number(element, "effort"),
@@ -345,7 +345,7 @@ class _Reader:
             self._parse_number(element, "offset"),
         )
         return Mimic(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             joint=element.get("joint", ""),
             multiplier=1.0 if multiplier is None else multiplier,
             offset=offset or 0.0,

@@ -156,7 +156,7 @@ def cycle(robot: Facts) -> Iterator[Violation]:
     closing = {joint.child: joint for joint, reason in robot.tree.rejected if reason == "cycle"}
     for links in robot.tree.cycles:
         if with_two_parents.isdisjoint(links):
-            path = names([links[0], *links[:0:-1], links[0]], separator=" > ")
+            path = names([links[0], *links[:0:-1], links[0]], sep=" > ")
             size = f"{len(links)} links" if links[1:] else "1 link"
             yield Violation(
                 subject=links[0],
@@ -280,7 +280,7 @@ def no_free_joint(robot: Facts) -> Iterator[Violation]:
     ):
         return
     fix = None
-    if root.source.element is not None and not model.home:
+    if root.source.element is not None and not model.keyframe:
         edit = InsertChild(source=root.source, xml="<freejoint/>", first=True)
         fix = Fix(safety="safe", description=f"Add <freejoint/> to {root.name}.", edits=(edit,))
     yield Violation(

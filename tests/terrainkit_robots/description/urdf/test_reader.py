@@ -54,7 +54,7 @@ def test_minimal_robot():
     model = robot('<link name="l"/>')
     assert (model.name, model.kind, model.file, model.sources) == ("r", "urdf", FILE, (FILE,))
     assert [each.name for each in model.links] == ["l"]
-    assert (model.joints, model.problems, model.actuators, model.home) == ((), (), (), {})
+    assert (model.joints, model.problems, model.actuators, model.keyframe) == ((), (), (), {})
 
 
 def test_link_with_only_a_name():
