@@ -390,6 +390,4 @@ def _same_content(first: "etree._Element", second: "etree._Element") -> bool:
     """Return whether two elements have the same attributes and children."""
     if first.attrib != second.attrib or len(first) != len(second):
         return False
-    return all(
-        a.tag == b.tag and _same_content(a, b) for a, b in zip(first, second, strict=True)
-    )
+    return all(a.tag == b.tag and _same_content(a, b) for a, b in zip(first, second, strict=True))
