@@ -86,7 +86,8 @@ def test_map_patches_get_equal_numbers_of_robots(
     counts = np.unique(list(patches), axis=0, return_counts=True)[1]
     assert (counts == per_patch).all()
     assert len(counts) == min(6, env.num_envs)
-    assert (commands == np.float32([0.75 * env.cfg.commands.lin_vel_x[1], 0, 0])).all()
+    directions = np.float32([[0.75, 0, 0], [-0.75, 0, 0], [0, 0.375, 0], [0, -0.375, 0]])
+    assert commands.tolist() == directions[np.arange(env.num_envs) // 6 % 4].tolist()
     origins = env.terrain.env_origins[env.curriculum.levels, env.curriculum.columns]
     distance = np.abs(env.state.base_pos - origins)[:, :2].max()
     assert distance <= env.cfg.init_state.position + 1e-5
@@ -172,6 +173,8 @@ def test_summary_groups_by_command(make_run):
     assert document["all"]["lin_vel_error"] is None  # nothing is measured before settling
     assert len(document["by_command"]) == 75
     assert document["by_command"][0]["command"] == [-1.0, -0.5, -1.0]
+    assert document["all"]["followed"] == 0
+    assert document["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     assert "by_terrain" not in document
 
 
@@ -186,6 +189,8 @@ def test_summary_groups_by_terrain_and_level(make_run, map_file):
         for group in document["by_terrain_and_level"]
     ]
     assert groups == [(name, k, 2) for name in ("stairs", "rough_slope") for k in range(3)]
+    directions = [(group["direction"], group["robots"]) for group in document["by_direction"]]
+    assert directions == [("forward", 6), ("backward", 6)]
     assert "by_command" not in document
 
 
@@ -211,6 +216,10 @@ def test_bundled_quadruped_follows_commands():
     assert result.metrics.falls == 0
     assert result.metrics.lin_vel_error < 0.25
     assert result.metrics.ang_vel_error < 0.25
+    assert result.metrics.followed == 1
+    assert 1 < result.metrics.step_frequency < 6
+    assert all(0 < height < 0.15 for height in result.metrics.swing_height)
+    assert {len(each) for each in result.contacts.values()} == {100}
 
 
 def test_evaluate_uses_single_torch_thread():
