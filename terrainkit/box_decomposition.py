@@ -19,9 +19,11 @@ MAX_HEIGHTS_PER_BLOCK = 50
 height, since the time would grow with its square. Below it, a box may extend under higher ground to
 the edge of the block, where it can merge with one in the next block."""
 
-MAX_LENGTH = 24.0
-"""Distance at which a row of merged boxes is divided [m]. Long boxes enlarge many nodes of MuJoCo's
-bounding volume hierarchy, all of which are tested for a robot near such a box."""
+MAX_LENGTHS = (16.0, 32.0)
+"""Distances along x and y at which a row of merged boxes is divided [m]. Long boxes enlarge many
+nodes of MuJoCo's bounding volume hierarchy, all of which are tested for a robot near such a box.
+Heights differ along x, with the difficulty, so that mostly level ground merges along it; along y,
+boxes of all heights merge, and fewer of them save more time."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
 
@@ -62,7 +64,7 @@ def decompose_boxes(
 
     A cell is flat if its whole square is flat. Within a patch, the boxes of each height are found
     by :func:`~terrainkit.rectangle_cover.rectangle_cover`, and may extend under higher ground.
-    Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTH`
+    Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTHS`
     unless that doubles their number. They are sorted by their centers, since MuJoCo's bounding
     volume hierarchy divides boxes with equal centers along an axis in this order.
 
@@ -97,7 +99,8 @@ def decompose_boxes(
     # Only boxes of the same top and friction are merged; their number stands for both.
     pairs, number = np.unique(table[:, [0, 5]], axis=0, return_inverse=True)
     table = np.column_stack([number.reshape(-1), table[:, 1:5]])
-    short, long = merge_boxes(table, MAX_LENGTH // grid.cell), merge_boxes(table)
+    x, y = MAX_LENGTHS
+    short, long = merge_boxes(table, (x // grid.cell, y // grid.cell)), merge_boxes(table)
     merged = long if 2 * len(long) <= len(short) else short
     number, i0, i1, j0, j1 = merged.T
     merged = merged[np.lexsort([i0, number, j0 + j1, i0 + i1])]
@@ -185,18 +188,20 @@ def _bounds(mask: NDArray[np.bool_]) -> slice:
     return slice(index[0], index[-1] + 1)
 
 
-def merge_boxes(boxes: NDArray[np.float64], max_length: float = np.inf) -> NDArray[np.float64]:
+def merge_boxes(
+    boxes: NDArray[np.float64], max_length: tuple[float, float] = (np.inf, np.inf)
+) -> NDArray[np.float64]:
     """Merge boxes of the same top that share a whole side until none do.
 
     Args:
         boxes: Top or another key, and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
-        max_length: Cells after which a row of merged boxes is divided.
+        max_length: Cells along x and y after which a row of merged boxes is divided.
     """
     before = -1
     while len(boxes) != before:
         before = len(boxes)
-        for _ in "xy":
-            boxes = _merge_along_x(boxes, max_length)[:, [0, 3, 4, 1, 2]]
+        for each in max_length:
+            boxes = _merge_along_x(boxes, each)[:, [0, 3, 4, 1, 2]]
     return boxes
 
 

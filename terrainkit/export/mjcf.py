@@ -6,6 +6,7 @@ geoms of any other body. All geoms have one class that sets every attribute, sin
 defaults would apply otherwise.
 """
 
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -46,13 +47,17 @@ _RINGS = 2
 """Samples around the patches that belong to the heightfield. The ground of the border's first cell
 slopes toward the patch, so the heightfield has to extend beyond that cell."""
 
+_HFIELD_LENGTH = 16.0
+"""Length at which heightfields beside boxes are divided [m]; a long one enlarges many nodes of
+MuJoCo's bounding volume hierarchy."""
+
 _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
 
 MAX_BOXES = 100
 """Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
-step of the bundled quadruped takes about 1.75 times that on a plane. Four runs of
-benchmarks/collision.py gave 50 to 130."""
+step of the bundled quadruped takes about 1.8 times that on a plane. Two runs of
+benchmarks/collision.py gave 91."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -174,13 +179,25 @@ def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list
     row, col = np.nonzero(patches)
     merged = merge_boxes(np.column_stack([0.0 * row, row, row + 1, col, col + 1]))
     # The surface at the edge of a patch depends on the next sample, too.
-    return [
+    parts = [
         (
             slice(edges_x[r0] - (r0 > 0), edges_x[r1] + (r1 < len(edges_x) - 1)),
             slice(edges_y[c0] - (c0 > 0), edges_y[c1] + (c1 < len(edges_y) - 1)),
         )
         for _, r0, r1, c0, c1 in merged.astype(int).tolist()
     ]
+    max_length = max(_HFIELD_LENGTH / terrain_map.config.cell, 1.0)
+    return [each for part in parts for each in _divide(part, max_length)]
+
+
+def _divide(part: _Part, max_length: float) -> list[_Part]:
+    """Divide a part into equal parts of about `max_length`, which share samples where they meet."""
+    spans = []
+    for each in part:
+        cells = each.stop - each.start - 1
+        lines = np.linspace(each.start, each.stop - 1, max(1, round(cells / max_length)) + 1)
+        spans.append([slice(a, b + 1) for a, b in itertools.pairwise(lines.astype(int).tolist())])
+    return list(itertools.product(*spans))
 
 
 def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:
