@@ -121,8 +121,8 @@ class _Reader:
             message = f"material {name}: has no color or texture anywhere; expected a definition"
             self._report("XML016", element, message)
         if not any(problem.code in ("XML001", "XML004") for problem in self._problems):
-            self._problems += invalid_references(self._document)
-            self._problems += invalid_srdf(self._document)
+            self._problems += invalid_references(self._doc)
+            self._problems += invalid_srdf(self._doc)
 
     # Numbers
 
