@@ -10,7 +10,7 @@ import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -25,6 +25,7 @@ from terrainkit.box_decomposition import (
 )
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.solid_raster import SolidRaster
 from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
@@ -76,6 +77,12 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         ConfigError: if `collision` is invalid.
         MemoryLimitError: if the map would not fit in memory.
     """
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        write_model(terrain_map, file, collision)
+
+
+def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -> None:
+    """Write the map as MJCF to an open file; see :func:`export`."""
     collision = convert("collision", collision, Collision)
     samples = terrain_map.heights.size
     check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
@@ -105,12 +112,11 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     ET.indent(root)
     # The elevation data are the larger part of the file. They are written row by row.
     texts = re.split('(?<=elevation=")([0-9]+)(?=")', ET.tostring(root, encoding="unicode"))
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write('<?xml version="1.0" encoding="utf-8"?>\n')
-        for text, number in zip(texts[::2], [*texts[1::2], ""], strict=True):
-            file.write(text)
-            if number:
-                file.writelines(_elevation_rows(heights, split[int(number)][0]))
+    file.write('<?xml version="1.0" encoding="utf-8"?>\n')
+    for text, number in zip(texts[::2], [*texts[1::2], ""], strict=True):
+        file.write(text)
+        if number:
+            file.writelines(_elevation_rows(heights, split[int(number)][0]))
 
 
 def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
@@ -119,7 +125,8 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
         return None
     if collision == "auto":
         threshold = terrain_map.config.wall_threshold
-        if not flat_cells(terrain_map.heights, terrain_map.grid, threshold).all():
+        grid = NodeGrid.from_heights(terrain_map.heights, terrain_map.grid, threshold)
+        if not flat_cells(grid).all():
             return None
         cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
         num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
@@ -197,7 +204,8 @@ def _divide(part: _Part, max_length: float) -> list[_Part]:
         cells = each.stop - each.start - 1
         lines = np.linspace(each.start, each.stop - 1, max(1, round(cells / max_length)) + 1)
         spans.append([slice(a, b + 1) for a, b in itertools.pairwise(lines.astype(int).tolist())])
-    return list(itertools.product(*spans))
+    x, y = spans
+    return [(i, j) for i in x for j in y]
 
 
 def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:

@@ -7,6 +7,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.box_decomposition import decompose_boxes, flat_cells
 from terrainkit.grid import Grid
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.surface import surface_at
 
 SMALL = arrays(
@@ -34,7 +35,8 @@ def cover_of(heights, threshold):
 
 
 def level_of(heights, threshold):
-    return flat_cells(heights, Grid(shape=heights.shape, cell=1.0), threshold)
+    grid = Grid(shape=heights.shape, cell=1.0)
+    return flat_cells(NodeGrid.from_heights(heights, grid, threshold))
 
 
 def patch(terrain, *, size=(6.0, 4.0), **parameters):
