@@ -99,10 +99,7 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
                 subject=file.name,
             )
         )
-    version = _VERSION.match(text)
-    if version is not None:
-        problems.append(_version_problem(file, data, text, version))
-        text = text[: version.start(1)] + b"1.0" + text[version.end(1) :]
+    text = _with_version(file, data, text, problems)
     parser = etree.XMLParser(
         recover=True, resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
     )
@@ -147,16 +144,24 @@ _VERSION = re.compile(rb"<\?xml\s+version\s*=\s*[\"'](?!1\.\d+[\"'])([^\"']{3})[
 """XML declaration with a version that does not exist."""
 
 
-def _version_problem(file: Path, data: bytes, text: bytes, match: re.Match[bytes]) -> Problem:
+def _with_version(file: Path, data: bytes, text: bytes, problems: list[Problem]) -> bytes:
+    """Return `text` with version 1.0 in its XML declaration, and report another version."""
+    match = _VERSION.match(text)
+    if match is None:
+        return text
     start = len(data) - len(text) + match.start(1)
-    return Problem(
-        code="XML001",
-        message=f"version in <?xml?>: got {match[1].decode('ascii', 'replace')!r}; expected 1.0, "
-        "or strict readers reject the file",
-        source=Source(file=file, line=1),
-        subject=file.name,
-        details={"start": str(start), "end": str(start + 3)},
+    version = match[1].decode("ascii", "replace")
+    problems.append(
+        Problem(
+            code="XML001",
+            message=f"version in <?xml?>: got {version!r}; expected 1.0, or strict readers reject "
+            "the file",
+            source=Source(file=file, line=1),
+            subject=file.name,
+            details={"start": str(start), "end": str(start + 3)},
+        )
     )
+    return text[: match.start(1)] + b"1.0" + text[match.end(1) :]
 
 
 def version_fix(problem: Problem) -> Fix | None:
