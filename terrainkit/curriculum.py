@@ -149,8 +149,8 @@ def update_levels(
         Levels after, shape (n,).
 
     Raises:
-        ConfigError: if `top_levels` is below 1, a level is not on the map, a distance is not a
-            number, or `seed` is negative.
+        ConfigError: if `top_levels` is below 1, a level is not on the map, the distances are
+            not numbers, or `seed` is negative.
     """
     before = _indices("levels", levels, rows)
     top_levels = convert("top_levels", top_levels, PositiveInt)
@@ -181,7 +181,10 @@ def _indices(
     name: str, values: ArrayLike, size: int, number: int | None = None
 ) -> NDArray[np.int64]:
     """Return rows or columns of a map with `size` of them, one for each environment."""
-    given = _one_per_environment(name, values, number)
+    given = _to_array(name, values)
+    if given.ndim != 1 or len(given) != (len(given) if number is None else number):
+        expected = "(n,)" if number is None else f"({number},)"
+        raise ConfigError(f"{name}: got shape {given.shape}; expected {expected}")
     if given.size and given.dtype.kind not in "iu":
         raise ConfigError(f"{name}: got values of {given.dtype}; expected integers")
     if given.size and not (given.min() >= 0 and given.max() < size):
@@ -190,19 +193,17 @@ def _indices(
 
 
 def _distances(name: str, values: ArrayLike, number: int) -> NDArray[np.float64]:
-    """Return the distances of the environments [m]."""
-    given = _one_per_environment(name, values, number)
-    if given.dtype.kind not in "fiu" or np.isnan(given).any():
-        raise ConfigError(f"{name}: got values that are not numbers; expected meters")
+    """Return the distances of the environments [m], or the one of all of them."""
+    given = _to_array(name, values)
+    if given.dtype.kind not in "fiu":
+        raise ConfigError(f"{name}: got values of {given.dtype}; expected numbers")
+    if given.shape not in ((), (number,)):
+        raise ConfigError(f"{name}: got shape {given.shape}; expected ({number},)")
     return given.astype(np.float64)
 
 
-def _one_per_environment(name: str, values: ArrayLike, number: int | None) -> NDArray[Any]:
+def _to_array(name: str, values: ArrayLike) -> NDArray[Any]:
     try:
-        given = np.asarray(values)
-    except ValueError:  # lists of different lengths
-        given = np.empty((0, 0))
-    if given.ndim != 1 or len(given) != (len(given) if number is None else number):
-        expected = "(n,)" if number is None else f"({number},)"
-        raise ConfigError(f"{name}: got shape {given.shape}; expected {expected}")
-    return given
+        return np.asarray(values)
+    except ValueError:
+        raise ConfigError(f"{name}: got lists of different lengths; expected one list") from None
