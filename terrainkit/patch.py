@@ -21,7 +21,7 @@ from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
 
 if TYPE_CHECKING:
-    from terrainkit.spawn import Disc
+    from terrainkit.spawn import Disk
 
 EDGE_TOLERANCE = 1e-3
 """Distance by which a solid may extend beyond its patch [m]."""
@@ -112,9 +112,9 @@ def build_patch(
     spawn_offset = 0.0
     if overlays:
         geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
-    heights, preferred = geometry.heights, geometry.spawn
+    heights, position = geometry.heights, geometry.spawn
     solids, goals = _finish(config, name, geometry, (row, col))
-    spawns = place_spawns(config, name, grid, heights, solids, preferred, partial(child_rng, 1))
+    spawns = place_spawns(config, name, grid, heights, solids, position, partial(child_rng, 1))
     x, y, _ = spawns[0].tolist()
     requested, realized = terrain.requested(), terrain.realized(grid)
     for k, overlay in enumerate(overlays):
@@ -130,7 +130,7 @@ def build_patch(
         solids=solids,
         goals=goals,
         spawns=with_headings(spawns, goals, geometry.heading),
-        spawn_offset=spawn_offset + max(abs(x - preferred[0]), abs(y - preferred[1])),
+        spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
     )
 
 
@@ -188,8 +188,8 @@ def _apply_overlays(
 
     The overlays keep the ground level at the spawn origin of the terrain without overlays.
     """
-    grid, preferred = geometry.grid, geometry.spawn
-    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, preferred)
+    grid, position = geometry.grid, geometry.spawn
+    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, position)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
     for k, overlay in enumerate(overlays):
         geometry = overlay.apply(geometry, child_rng(2 + k))
@@ -200,7 +200,7 @@ def _apply_overlays(
                 f"{grid.shape} with finite values"
             )
         geometry = dataclasses.replace(geometry, heights=heights)
-    return geometry, max(abs(x - preferred[0]), abs(y - preferred[1]))
+    return geometry, max(abs(x - position[0]), abs(y - position[1]))
 
 
 def place_spawns(
@@ -209,7 +209,7 @@ def place_spawns(
     grid: Grid,
     heights: NDArray[np.float32],
     solids: Solids,
-    preferred: tuple[float, float],
+    position: tuple[float, float],
     rng: Callable[[], np.random.Generator],
 ) -> NDArray[np.float64]:
     """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.spawn`.
@@ -220,7 +220,7 @@ def place_spawns(
         grid: Grid of the patch.
         heights: Heights of the patch [m], shape `grid.shape`.
         solids: Solids on the patch.
-        preferred: Preferred position of the first, x and y [m].
+        position: Preferred position of the first, x and y [m].
         rng: Returns the random number generator of the others; slow, so called only if needed.
 
     Raises:
@@ -228,11 +228,11 @@ def place_spawns(
     """
     from terrainkit.spawn import sample_spawns
 
-    origin = _find_origin(config, name, grid, heights, solids, preferred)
+    origin = _find_origin(config, name, grid, heights, solids, position)
     if config.spawns_per_patch == 1:
         return np.array([origin])
-    disc, number = spawn_disc(config), config.spawns_per_patch
-    return sample_spawns(heights, grid, origin, disc, number, solids=solids, rng=rng())
+    disk, number = spawn_disk(config), config.spawns_per_patch
+    return sample_spawns(heights, grid, origin, disk, number, solids=solids, rng=rng())
 
 
 def _find_origin(
@@ -241,18 +241,18 @@ def _find_origin(
     grid: Grid,
     heights: NDArray[np.float32],
     solids: Solids,
-    preferred: tuple[float, float],
+    position: tuple[float, float],
 ) -> tuple[float, float, float]:
     """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
     from terrainkit.spawn import find_spawn
 
-    disc = spawn_disc(config)
+    disk = spawn_disk(config)
     origin = find_spawn(
-        heights, grid, preferred, disc, solids=solids, threshold=config.wall_threshold
+        heights, grid, position, disk, solids=solids, threshold=config.wall_threshold
     )
     if origin is None:
         raise ConfigError(
-            f"{name}: no disc of radius {config.spawn_radius:g} m is flat within "
+            f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
             f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
@@ -260,11 +260,11 @@ def _find_origin(
     return origin
 
 
-def spawn_disc(config: MapConfig) -> "Disc":
+def spawn_disk(config: MapConfig) -> "Disk":
     """Return the free place that a robot needs on a map."""
-    from terrainkit.spawn import Disc
+    from terrainkit.spawn import Disk
 
-    return Disc(
+    return Disk(
         radius=config.spawn_radius,
         tolerance=config.spawn_tolerance,
         headroom=config.spawn_headroom,

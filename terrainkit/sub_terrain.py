@@ -96,8 +96,8 @@ class SubTerrain(Config):
             "friction": self.friction,
             "overlays": self.overlays,
         }
-        given = {key: value for key, value in optional.items() if value not in ("", None, ())}
-        return {"terrain": self.terrain, "proportion": self.proportion, **given, **self.parameters}
+        raw = {key: value for key, value in optional.items() if value not in ("", None, ())}
+        return {"terrain": self.terrain, "proportion": self.proportion, **raw, **self.parameters}
 
     @cached_property
     def terrain_class(self) -> type[Terrain]:
@@ -110,8 +110,8 @@ class SubTerrain(Config):
 
     def friction_at(self, difficulty: float) -> float | None:
         """Return the friction of the patches at `difficulty`, 0 to 1; None for the map's."""
-        given: Any = self.friction
-        return _FRICTION.value_at(given, difficulty)  # type: ignore[return-value]
+        raw: Any = self.friction
+        return _FRICTION.value_at(raw, difficulty)  # type: ignore[return-value]
 
     @cached_property
     def declarations(self) -> dict[str, Parameter]:

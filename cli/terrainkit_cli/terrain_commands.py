@@ -39,7 +39,8 @@ class Generate(ConfigCommand):
 
     output: Output
     """File to write. The suffix selects the format: .npz for a complete map, which the other
-    commands read; .xml (MuJoCo), .stl, .ply, .obj, .glb or .png for other programs."""
+    commands read; .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png for other
+    programs."""
 
     config: Annotated[str, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = ""
     """Map config (.toml), or a map (.npz) whose config is used; options override it."""

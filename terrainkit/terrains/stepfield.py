@@ -42,7 +42,7 @@ class Stepfield(Lane):
         ridge = np.stack([0 * x, 1 - np.abs(2 * x - 1), 1 - np.abs(x - y)])
         hill = np.rint(2 * np.choose(kind, ridge))
         levels = 1 + hill + np.floor(rng.random(kind.shape) * np.where(kind == 0, 4, 2))
-        levels = np.minimum(levels, _lowest_neighbor(levels) + 2)
+        levels = np.minimum(levels, _min_neighbor(levels) + 2)
         ground = np.zeros(grid.shape)
         i, j = grid.cells(self.start), self._first_across(grid)
         block = np.kron(levels, np.ones((side, side)))
@@ -82,7 +82,7 @@ class Stepfield(Lane):
         return nx, ny
 
 
-def _lowest_neighbor(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+def _min_neighbor(levels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the lowest of the eight neighbors of each post; the ground around is at level 0."""
     padded = np.pad(levels, 1)
     shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
