@@ -258,18 +258,19 @@ def _print_map(terrain_map: TerrainMap) -> None:
     }
     render.table(list(facts.items()))
     render.result("")
-    rows = [("column", "terrain", "difficulty", "measured difficulty")]
+    rows = [("column", "terrain", "difficulty", "measured difficulty of the ground")]
     for col in range(config.cols):
         patches = [terrain_map.patch(row, col) for row in range(config.rows)]
         hard = [measured_difficulty(t.heights, config.cell, float(t.origin[2])) for t in patches]
         names = ", ".join(dict.fromkeys(patch.terrain for patch in patches))
         levels = [patch.difficulty for patch in patches]
+        hint = ", without its solids" if any(len(patch.solids) for patch in patches) else ""
         rows.append(
             (
                 str(col),
                 names,
                 f"{min(levels):.2f} to {max(levels):.2f}",
-                f"{min(hard):.3f} to {max(hard):.3f} m",
+                f"{min(hard):.3f} to {max(hard):.3f} m{hint}",
             )
         )
     render.table(rows)

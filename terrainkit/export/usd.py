@@ -43,24 +43,24 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         ) from None
     terrain_map.require_one_ground_friction("a USD mesh")
     config = terrain_map.config
-    stage = Usd.Stage.CreateNew(str(path))
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
-    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-    root = UsdGeom.Xform.Define(stage, "/terrain")
-    stage.SetDefaultPrim(root.GetPrim())
+    usd_stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(usd_stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(usd_stage, 1.0)
+    root = UsdGeom.Xform.Define(usd_stage, "/terrain")
+    usd_stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
-    ground = _add_mesh(stage, "/terrain/ground", terrain_map.ground_mesh())
-    _set_collider(ground, "none", _material(stage, "ground_material", config.contact))
-    _add_solids(stage, terrain_map.solids, config.contact)
-    _add_points(stage, "/terrain/spawns", terrain_map.spawns)
-    _add_points(stage, "/terrain/goals", terrain_map.goals)
-    stage.GetRootLayer().Save()
+    ground = _add_mesh(usd_stage, "/terrain/ground", terrain_map.ground_mesh())
+    _set_collider(ground, "none", _material(usd_stage, "ground_material", config.contact))
+    _add_solids(usd_stage, terrain_map.solids, config.contact)
+    _add_points(usd_stage, "/terrain/spawns", terrain_map.spawns)
+    _add_points(usd_stage, "/terrain/goals", terrain_map.goals)
+    usd_stage.GetRootLayer().Save()
 
 
-def _add_mesh(stage: Any, path: str, mesh: TriMesh) -> Any:
+def _add_mesh(usd_stage: Any, path: str, mesh: TriMesh) -> Any:
     from pxr import UsdGeom, Vt
 
-    prim = UsdGeom.Mesh.Define(stage, path)
+    prim = UsdGeom.Mesh.Define(usd_stage, path)
     prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.vertices)))
     prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.triangles.ravel()))
     counts = np.full(len(mesh.triangles), 3, dtype=np.int32)
@@ -70,10 +70,10 @@ def _add_mesh(stage: Any, path: str, mesh: TriMesh) -> Any:
     return prim
 
 
-def _material(stage: Any, name: str, contact: dict[str, float]) -> Any:
+def _material(usd_stage: Any, name: str, contact: dict[str, float]) -> Any:
     from pxr import UsdPhysics, UsdShade
 
-    material = UsdShade.Material.Define(stage, f"/terrain/materials/{name}")
+    material = UsdShade.Material.Define(usd_stage, f"/terrain/materials/{name}")
     physics = UsdPhysics.MaterialAPI.Apply(material.GetPrim())
     physics.CreateStaticFrictionAttr(contact["static_friction"])
     physics.CreateDynamicFrictionAttr(contact["dynamic_friction"])
@@ -93,7 +93,7 @@ def _set_collider(prim: Any, approximation: str, material: Any) -> None:
     binding.Bind(material, UsdShade.Tokens.weakerThanDescendants, "physics")
 
 
-def _add_solids(stage: Any, solids: Solids, contact: dict[str, float]) -> None:
+def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> None:
     """Add a prim for each solid. Those that are not visible are drawn only as guides."""
     from pxr import Gf, UsdGeom
 
@@ -102,15 +102,15 @@ def _add_solids(stage: Any, solids: Solids, contact: dict[str, float]) -> None:
     for k, (mesh, friction) in enumerate(zip(meshes, solids.friction.tolist(), strict=True)):
         path = f"/terrain/solids/solid_{k}"
         if k < len(solids.boxes):
-            prim = UsdGeom.Cube.Define(stage, path)
+            prim = UsdGeom.Cube.Define(usd_stage, path)
             prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
             prim.CreateSizeAttr(2.0)
         elif k < len(shapes):
-            prim = UsdGeom.Cylinder.Define(stage, path)
+            prim = UsdGeom.Cylinder.Define(usd_stage, path)
             prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
             prim.CreateHeightAttr(2.0)
         else:
-            prim = _add_mesh(stage, path, mesh)
+            prim = _add_mesh(usd_stage, path, mesh)
         if k < len(shapes):
             pose = shapes[k].tolist()
             prim.AddTranslateOp().Set(Gf.Vec3d(*pose[:3]))
@@ -123,17 +123,17 @@ def _add_solids(stage: Any, solids: Solids, contact: dict[str, float]) -> None:
             if not np.isnan(friction):
                 name = f"friction_{friction:g}".replace(".", "_").replace("-", "_")
                 values = contact | {"static_friction": friction, "dynamic_friction": friction}
-            _set_collider(prim, "convexHull", _material(stage, name, values))
+            _set_collider(prim, "convexHull", _material(usd_stage, name, values))
 
 
-def _add_points(stage: Any, path: str, points: NDArray[np.float32]) -> None:
+def _add_points(usd_stage: Any, path: str, points: NDArray[np.float32]) -> None:
     """Add the positions of all patches in the order of the rows, if there are any."""
     from pxr import UsdGeom, Vt
 
     positions = points[..., :3].reshape(-1, 3)
     positions = np.ascontiguousarray(positions[~np.isnan(positions).any(axis=1)])
     if len(positions):
-        prim = UsdGeom.Points.Define(stage, path)
+        prim = UsdGeom.Points.Define(usd_stage, path)
         prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(positions))
         prim.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.full(len(positions), 0.1, np.float32)))
         prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(prim.GetPointsAttr().Get()))
