@@ -119,11 +119,8 @@ def of(*elements: Element) -> Mutant:
 
 def is_solid(geom: Element) -> bool:
     """Return whether an MJCF geom is a collision shape, by the conventions of the robots."""
-    return (
-        geom.get("contype") != "0"
-        and geom.get("class") != "visual"
-        and geom.getparent().tag == "body"
-    )
+    is_visual = geom.get("contype") == "0" or geom.get("class") == "visual"
+    return bool(geom.getparent().tag == "body" and not is_visual)
 
 
 def feet(tree: Element) -> list[Element]:
