@@ -140,24 +140,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="regular expression for the kinds")
     parser.add_argument("--output", type=Path, help="write the results as JSON")
-    parser.add_argument("--apply", action="store_true", help="only build the mutants")
     options = parser.parse_args()
     sys.path[:0] = [str(options.tree / part) for part in ("", "robots", "cli")]
     everything = {}
     for name in options.sets:
         module = __import__(f"benchmarks.held_out.set_{name}", fromlist=["DEFECTS"])
         chosen = [d for d in module.DEFECTS if re.search(options.only, d.name)]
-        if options.apply:
-            for defect in chosen:
-                for robot in defect.robots:
-                    tree = read(robot)
-                    before = etree.tostring(tree)
-                    if defect.prepare:
-                        defect.prepare(tree)
-                    mutant = defect.apply(tree, Random(f"{defect.name} {robot} {options.seed}"))
-                    same = etree.tostring(tree) == before and not mutant.encode
-                    print(defect.name, robot, mutant.names, mutant.about, "SAME" if same else "")
-            continue
         results = [r for d in chosen for r in measure(d, options.seed)]
         everything[name] = results
         print(f"set {name.upper()}\n{table(results)}\nmissed:")
