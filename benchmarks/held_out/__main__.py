@@ -36,7 +36,7 @@ ROBOTS = {
     "biped.xml": BUNDLED / "biped/biped.xml",
 }
 SEVERITIES = ("error", "warning")
-BASELINES: dict[str, list[dict[str, Any]]] = {}
+ORIGINALS: dict[str, list[dict[str, Any]]] = {}
 
 
 def read(robot: str) -> Any:
@@ -106,9 +106,9 @@ def measure(defect: Defect, seed: int) -> Iterator[dict[str, Any]]:
             yield result | {"found": "refused", "rules": [], "names": mutant.names}
             continue
         key = robot + defect.name * bool(defect.prepare)
-        if key not in BASELINES:
-            BASELINES[key] = check(robot, original, Mutant()) or []
-        before = BASELINES[key]
+        if key not in ORIGINALS:
+            ORIGINALS[key] = check(robot, original, Mutant()) or []
+        before = ORIGINALS[key]
         new = new_findings(before, found, mutant)
         severities = {f["severity"] for f in new}
         level = next((s for s in (*SEVERITIES, "info") if s in severities), "")

@@ -89,7 +89,7 @@ def numbers(text: str) -> list[float]:
     return [float(word) for word in text.split()]
 
 
-def spell(values: Iterable[float]) -> str:
+def format_numbers(values: Iterable[float]) -> str:
     """Return an attribute's text for numbers."""
     return " ".join(f"{value:.9g}" for value in values)
 
@@ -97,7 +97,7 @@ def spell(values: Iterable[float]) -> str:
 def multiply(element: Element, factor: float, *attributes: str) -> None:
     """Multiply every number in some attributes."""
     for attribute in attributes:
-        element.set(attribute, spell(factor * x for x in numbers(element.get(attribute))))
+        element.set(attribute, format_numbers(factor * x for x in numbers(element.get(attribute))))
 
 
 def of(*elements: Element) -> Mutant:

@@ -12,13 +12,13 @@ from benchmarks.held_out.defect import (
     Mutant,
     add,
     feet,
+    format_numbers,
     is_solid,
     multiply,
     named,
     numbers,
     of,
     option,
-    spell,
 )
 
 DEFECTS = DefectSet()
@@ -39,7 +39,7 @@ def controller_gains_as_dynamics(tree: Element, rng: Random) -> Mutant:
         effort = float(joint.find("limit").get("effort"))
         dynamics = joint.find("dynamics")
         dynamics.set("damping", "0.5")
-        dynamics.set("friction", spell([0.85 * effort]))
+        dynamics.set("friction", format_numbers([0.85 * effort]))
     return of(*joints)
 
 
@@ -86,7 +86,7 @@ def velocity_in_rpm(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("dynamics", "a1 g1 quadruped", "columns of a spreadsheet of motors are exchanged")
-def effort_and_velocity_exchanged(tree: Element, rng: Random) -> Mutant:
+def effort_and_velocity_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange the effort and the velocity of one knee."""
     joint = rng.choice(named(tree, "joint", KNEE))
     limit = joint.find("limit")
@@ -166,7 +166,7 @@ def damping_negative(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("mjcf_joint", "quadruped.xml h1.xml", "a list of motors is sorted, one is edited by hand")
-def motors_exchanged(tree: Element, rng: Random) -> Mutant:
+def motors_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange the joints of the left and the right knee's motors."""
     left, right = named(tree, "motor", "(FL_calf|FR_calf|knee)")[:2]
     a, b = left.get("joint"), right.get("joint")
@@ -198,7 +198,7 @@ def position_without_gain(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("option", "quadruped.xml h1.xml", "a sign slips; z is down in the CAD program")
-def gravity_upward(tree: Element, rng: Random) -> Mutant:
+def gravity_positive(tree: Element, rng: Random) -> Mutant:
     """Let gravity pull upward."""
     option(tree, gravity="0 0 9.81")
     return Mutant(about="gravity")
@@ -278,7 +278,7 @@ def collision_angle_in_degrees(tree: Element, rng: Random) -> Mutant:
         if any(numbers(origin.get("rpy", "0 0 0")))
     ]
     origin = rng.choice(turned)
-    origin.set("rpy", spell(round(x * DEGREES) for x in numbers(origin.get("rpy"))))
+    origin.set("rpy", format_numbers(round(x * DEGREES) for x in numbers(origin.get("rpy"))))
     return of(origin.getparent().getparent())
 
 
@@ -301,7 +301,7 @@ def collision_in_millimeters(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("units", "h1.xml quadruped.xml biped.xml", "MuJoCo takes degrees unless angle is given")
-def angle_lost(tree: Element, rng: Random) -> Mutant:
+def angle_missing(tree: Element, rng: Random) -> Mutant:
     """Drop angle="radian" from <compiler>."""
     tree.find("compiler").attrib.pop("angle")
     names = of(*named(tree, "joint", "joint")).names
@@ -322,7 +322,7 @@ def limits_shifted_by_turn(tree: Element, rng: Random) -> Mutant:
     joint = rng.choice(named(tree, "joint", KNEE))
     limit = joint.find("limit")
     for side in ("lower", "upper"):
-        limit.set(side, spell([float(limit.get(side)) + 2 * math.pi]))
+        limit.set(side, format_numbers([float(limit.get(side)) + 2 * math.pi]))
     return of(joint)
 
 
@@ -332,8 +332,8 @@ def knee_limits_lose_sign(tree: Element, rng: Random) -> Mutant:
     joint = rng.choice(named(tree, "joint", KNEE))
     limit = joint.find("limit")
     lower, upper = float(limit.get("lower")), float(limit.get("upper"))
-    limit.set("lower", spell([-upper]))
-    limit.set("upper", spell([-lower]))
+    limit.set("lower", format_numbers([-upper]))
+    limit.set("upper", format_numbers([-lower]))
     return of(joint)
 
 
@@ -358,7 +358,7 @@ def mass_in_grams(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("collision", "a1 go2 quadruped", "the origin of a primitive is forgotten")
-def collision_origin_lost(tree: Element, rng: Random) -> Mutant:
+def collision_origin_missing(tree: Element, rng: Random) -> Mutant:
     """Put the shape of one thigh at the joint."""
     link = rng.choice(named(tree, "link", "thigh$"))
     link.find("collision/origin").set("xyz", "0 0 0")
@@ -366,7 +366,7 @@ def collision_origin_lost(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("collision", "a1 go2", "the rotation of a primitive is forgotten: it lies along x")
-def collision_not_turned(tree: Element, rng: Random) -> Mutant:
+def collision_not_aligned(tree: Element, rng: Random) -> Mutant:
     """Drop the rotation of the box of one thigh."""
     link = rng.choice(named(tree, "link", "thigh$"))
     link.find("collision/origin").set("rpy", "0 0 0")
@@ -563,7 +563,7 @@ def parent_of_other_leg(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("copy_paste", "a1 h1 quadruped", "the axis is mirrored in one leg, the limits are not")
-def axis_of_one_leg_reversed(tree: Element, rng: Random) -> Mutant:
+def axis_of_one_leg_flipped(tree: Element, rng: Random) -> Mutant:
     """Reverse the axis of one pitch joint."""
     joint = rng.choice(named(tree, "joint", KNEE))
     multiply(joint.find("axis"), -1, "xyz")
@@ -571,7 +571,7 @@ def axis_of_one_leg_reversed(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("copy_paste", "quadruped.xml go2.xml biped.xml", "an axis is mirrored in one leg only")
-def mjcf_axis_reversed(tree: Element, rng: Random) -> Mutant:
+def mjcf_axis_flipped(tree: Element, rng: Random) -> Mutant:
     """Reverse the axis of one pitch joint in MJCF."""
     joint = rng.choice(named(tree, "joint", KNEE))
     joint.set("axis", "0 -1 0")
@@ -579,23 +579,23 @@ def mjcf_axis_reversed(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("copy_paste", "a1 go2 biped", "the sign of y is not changed after copying")
-def offset_not_mirrored(tree: Element, rng: Random) -> Mutant:
+def offset_not_mirror_image(tree: Element, rng: Random) -> Mutant:
     """Give a joint of the right leg the offset of the left one."""
     joint = rng.choice(named(tree, "joint", "(FR_thigh|RR_thigh|right_hip_roll)_joint$"))
     x, y, z = numbers(joint.find("origin").get("xyz"))
-    joint.find("origin").set("xyz", spell((x, -y, z)))
+    joint.find("origin").set("xyz", format_numbers((x, -y, z)))
     return of(joint)
 
 
 @DEFECTS("copy_paste", "quadruped.xml h1.xml g1.xml", "the sign of y is not changed after copying")
-def body_not_mirrored(tree: Element, rng: Random) -> Mutant:
+def body_not_mirror_image(tree: Element, rng: Random) -> Mutant:
     """Give a body of the right leg the offset of the left one."""
     body = rng.choice(named(tree, "body", "(FR_thigh|RR_thigh|right_hip_(pitch|roll)_link)$"))
     x, y, z = numbers(body.get("pos"))
     if not y:
         body = body.getparent()
         x, y, z = numbers(body.get("pos"))
-    body.set("pos", spell((x, -y, z)))
+    body.set("pos", format_numbers((x, -y, z)))
     return of(body)
 
 
@@ -622,7 +622,7 @@ def mesh_of_left_on_right(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("copy_paste", "a1 go2", "thigh_mirror is for the right legs only")
-def mirrored_thigh_on_left(tree: Element, rng: Random) -> Mutant:
+def mirror_thigh_on_left(tree: Element, rng: Random) -> Mutant:
     """Give a left thigh the mesh of the right ones."""
     link = rng.choice(named(tree, "link", "(FL|RL)_thigh$"))
     mesh = link.find("visual/geometry/mesh")
@@ -631,16 +631,16 @@ def mirrored_thigh_on_left(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("copy_paste", "h1.xml quadruped.xml biped.xml", "the inertia of the left part is pasted")
-def center_of_mass_not_mirrored(tree: Element, rng: Random) -> Mutant:
+def center_of_mass_not_mirror_image(tree: Element, rng: Random) -> Mutant:
     """Give a right thigh or knee the center of mass of the left one."""
     body = rng.choice(named(tree, "body", "(FR_thigh|RR_thigh|right_hip_pitch_link)$"))
     inertial = body.find("inertial")
     x, y, z = numbers(inertial.get("pos"))
-    inertial.set("pos", spell((x, -y, z)))
+    inertial.set("pos", format_numbers((x, -y, z)))
     return of(body)
 
 
-def _rods(tree: Element) -> None:
+def _mimic_joints(tree: Element) -> None:
     """Give each front knee a rod that follows it."""
     for leg in ("FL", "FR"):
         link = add(tree, "link", name=f"{leg}_rod")
@@ -661,7 +661,12 @@ def _rods(tree: Element) -> None:
         add(joint, "mimic", joint=f"{leg}_calf_joint", multiplier="1", offset="0")
 
 
-@DEFECTS("copy_paste", "a1 go2 quadruped", "the mimic is not renamed after copying", prepare=_rods)
+@DEFECTS(
+    "copy_paste",
+    "a1 go2 quadruped",
+    "the mimic is not renamed after copying",
+    prepare=_mimic_joints,
+)
 def mimic_of_other_leg(tree: Element, rng: Random) -> Mutant:
     """Let the right rod follow the left knee."""
     joint = named(tree, "joint", "FR_rod_joint")[0]
@@ -673,7 +678,7 @@ def mimic_of_other_leg(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("inertia", "go2 g1 biped", "SolidWorks takes products of inertia with the other sign")
-def products_negated(tree: Element, rng: Random) -> Mutant:
+def products_negative(tree: Element, rng: Random) -> Mutant:
     """Negate the products of inertia of one link."""
     link = rng.choice(named(tree, "link", "(thigh|hip_pitch_link|hip_yaw_link)$"))
     multiply(link.find("inertial/inertia"), -1, "ixy", "ixz", "iyz")
@@ -681,7 +686,7 @@ def products_negated(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("inertia", "a1 go2 h1", "the axes of the CAD part are other than those of the link")
-def moments_exchanged(tree: Element, rng: Random) -> Mutant:
+def moments_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange ixx and izz of a long link."""
     link = rng.choice(named(tree, "link", "(thigh|calf|knee_link)$"))
     inertia = link.find("inertial/inertia")
@@ -704,7 +709,7 @@ def inertia_about_joint(tree: Element, rng: Random) -> Mutant:
         "ixy": -x * y, "ixz": -x * z, "iyz": -y * z,
     }  # fmt: skip
     for name, square in offsets.items():
-        inertia.set(name, spell([float(inertia.get(name)) + mass * square]))
+        inertia.set(name, format_numbers([float(inertia.get(name)) + mass * square]))
     return of(link)
 
 
@@ -714,12 +719,12 @@ def full_inertia_in_urdf_order(tree: Element, rng: Random) -> Mutant:
     body = rng.choice(named(tree, "body", "(thigh|hip_pitch_link|hip_yaw_link)$"))
     inertial = body.find("inertial")
     xx, yy, zz, xy, xz, yz = numbers(inertial.get("fullinertia"))
-    inertial.set("fullinertia", spell((xx, xy, xz, yy, yz, zz)))
+    inertial.set("fullinertia", format_numbers((xx, xy, xz, yy, yz, zz)))
     return of(body)
 
 
 @DEFECTS("inertia", "go2.xml h1.xml g1.xml", "the quat of <inertial> is lost with diaginertia kept")
-def inertial_rotation_lost(tree: Element, rng: Random) -> Mutant:
+def inertial_rotation_missing(tree: Element, rng: Random) -> Mutant:
     """Drop the rotation of the principal axes of a body."""
     body = rng.choice(named(tree, "body", "(base_link|ankle_link|ankle_roll_link)$"))
     body.find("inertial").attrib.pop("quat")

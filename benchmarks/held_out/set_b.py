@@ -12,13 +12,13 @@ from benchmarks.held_out.defect import (
     Mutant,
     add,
     feet,
+    format_numbers,
     is_solid,
     multiply,
     named,
     numbers,
     of,
     option,
-    spell,
 )
 
 DEFECTS = DefectSet()
@@ -66,7 +66,7 @@ def velocity_in_degrees(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("dynamics", "g1 h1 biped", "rows of a table of motors are exchanged")
-def efforts_of_knee_and_ankle_exchanged(tree: Element, rng: Random) -> Mutant:
+def efforts_of_knee_and_ankle_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange the efforts of the knees and the ankles."""
     broken = []
     for side in ("left", "right"):
@@ -128,7 +128,7 @@ def safety_controller_of_zeros(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("mjcf_joint", "quadruped.xml biped.xml go2.xml", "unitree_ros#130: G1's file has none")
-def armature_lost(tree: Element, rng: Random) -> Mutant:
+def armature_missing(tree: Element, rng: Random) -> Mutant:
     """Drop every armature."""
     for joint in tree.iter("joint"):
         joint.attrib.pop("armature", None)
@@ -448,7 +448,9 @@ def keyframe_in_degrees(tree: Element, rng: Random) -> Mutant:
     for attribute, first in (("qpos", 7), ("ctrl", 0)):
         if key.get(attribute):
             values = numbers(key.get(attribute))
-            key.set(attribute, spell(values[:first] + [x * DEGREES for x in values[first:]]))
+            key.set(
+                attribute, format_numbers(values[:first] + [x * DEGREES for x in values[first:]])
+            )
     return Mutant(names=("home",), about="keyframe")
 
 
@@ -473,12 +475,12 @@ def turned_about_wrong_axis(tree: Element, rng: Random) -> Mutant:
     ]
     origin = rng.choice(origins)
     roll, pitch, yaw = numbers(origin.get("rpy"))
-    origin.set("rpy", spell((pitch, roll, yaw)))
+    origin.set("rpy", format_numbers((pitch, roll, yaw)))
     return of(origin.getparent().getparent())
 
 
 @DEFECTS("collision", "quadruped.xml biped.xml go2.xml", "URDF's order is length, then radius")
-def radius_and_length_exchanged(tree: Element, rng: Random) -> Mutant:
+def radius_and_length_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange radius and half length of a shank's or thigh's cylinder."""
     geoms = [
         geom
@@ -487,12 +489,12 @@ def radius_and_length_exchanged(tree: Element, rng: Random) -> Mutant:
         if is_solid(geom) and geom.get("type") == "cylinder"
     ]
     geom = rng.choice(geoms)
-    geom.set("size", spell(reversed(numbers(geom.get("size")))))
+    geom.set("size", format_numbers(reversed(numbers(geom.get("size")))))
     return of(geom)
 
 
 @DEFECTS("collision", "a1 go2 quadruped", "a block is pasted into the wrong link")
-def trunk_shape_in_calf(tree: Element, rng: Random) -> Mutant:
+def base_shape_in_calf(tree: Element, rng: Random) -> Mutant:
     """Give a calf the collision box of the trunk too."""
     link = rng.choice(named(tree, "link", "calf$"))
     trunk = named(tree, "link", "^(base|trunk)$")[-1]
@@ -504,7 +506,7 @@ def trunk_shape_in_calf(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("collision", "h1 g1", "only one of two meshes is mirrored for the right side")
-def collision_mesh_mirrored(tree: Element, rng: Random) -> Mutant:
+def collision_mesh_mirror_image(tree: Element, rng: Random) -> Mutant:
     """Mirror the collision mesh of one link, but not its visual."""
     link = rng.choice(named(tree, "link", "hip_pitch_link$"))
     link.find("collision/geometry/mesh").set("scale", "1 -1 1")
@@ -512,7 +514,7 @@ def collision_mesh_mirrored(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("collision", "a1 go2 quadruped", "the placeholder of a template is left")
-def trunk_shape_is_placeholder(tree: Element, rng: Random) -> Mutant:
+def base_shape_is_placeholder(tree: Element, rng: Random) -> Mutant:
     """Leave the trunk a box of a millimeter."""
     trunk = named(tree, "link", "^(base|trunk)$")[-1]
     trunk.find("collision/geometry/box").set("size", "0.001 0.001 0.001")
@@ -530,7 +532,7 @@ def geom_above_joint(tree: Element, rng: Random) -> Mutant:
     ]
     geom = rng.choice(geoms)
     x, y, z = numbers(geom.get("pos"))
-    geom.set("pos", spell((x, y, -z)))
+    geom.set("pos", format_numbers((x, y, -z)))
     return of(geom)
 
 
@@ -543,7 +545,7 @@ def collision_mesh_inflated(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("collision", "h1 g1", "a converter turns the collision mesh from y up to z up")
-def collision_mesh_turned(tree: Element, rng: Random) -> Mutant:
+def collision_mesh_not_aligned(tree: Element, rng: Random) -> Mutant:
     """Turn the collision mesh of one link, but not its visual."""
     link = rng.choice(named(tree, "link", "(hip_pitch|knee|torso)_link$"))
     link.find("collision/origin").set("rpy", "1.5707963 0 0")
@@ -702,7 +704,7 @@ def plugin_body_missing(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("references", "quadruped.xml biped.xml", "sides are exchanged in copying")
-def touch_sensors_exchanged(tree: Element, rng: Random) -> Mutant:
+def touch_sensors_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange the sites of the left and the right foot's touch sensors."""
     left, right = list(tree.find("sensor").iter("touch"))[:2]
     a, b = left.get("site"), right.get("site")
@@ -788,7 +790,7 @@ def rear_leg_in_front(tree: Element, rng: Random) -> Mutant:
                       or named(tree, "joint", "^(RL|RR)_hip_joint$"))  # fmt: skip
     origin, key = (part, "pos") if part.tag == "body" else (part.find("origin"), "xyz")
     x, y, z = numbers(origin.get(key))
-    origin.set(key, spell((-x, y, z)))
+    origin.set(key, format_numbers((-x, y, z)))
     return of(part)
 
 
@@ -800,7 +802,7 @@ def class_of_other_joint(tree: Element, rng: Random) -> Mutant:
     return of(joint)
 
 
-def _rods(tree: Element) -> None:
+def _mimic_joints(tree: Element) -> None:
     """Give each front knee a rod that follows it."""
     for leg in ("FL", "FR"):
         link = add(tree, "link", name=f"{leg}_rod")
@@ -821,7 +823,9 @@ def _rods(tree: Element) -> None:
         add(joint, "mimic", joint=f"{leg}_calf_joint", multiplier="1", offset="0")
 
 
-@DEFECTS("copy_paste", "a1 quadruped", "a sign is changed for the mirrored side", prepare=_rods)
+@DEFECTS(
+    "copy_paste", "a1 quadruped", "a sign is changed for the mirrored side", prepare=_mimic_joints
+)
 def mimic_with_other_sign(tree: Element, rng: Random) -> Mutant:
     """Let one rod turn against its knee."""
     joint = named(tree, "joint", "FR_rod_joint")[0]
@@ -838,7 +842,7 @@ def effort_of_one_leg(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("copy_paste", "h1.xml g1.xml", "left and right are seen from the front")
-def meshes_of_sides_exchanged(tree: Element, rng: Random) -> Mutant:
+def meshes_of_sides_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange the meshes of the left and the right hip."""
     part = "hip_pitch_link"
     for geom in list(tree.iter("geom")):
@@ -849,7 +853,7 @@ def meshes_of_sides_exchanged(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("copy_paste", "g1 g1.xml", "the rotation of the left shoulder is pasted on the right")
-def shoulder_not_mirrored(tree: Element, rng: Random) -> Mutant:
+def shoulder_not_mirror_image(tree: Element, rng: Random) -> Mutant:
     """Give the right shoulder the rotation of the left one."""
     if tree.tag == "mujoco":
         left, right = named(tree, "body", "(left|right)_shoulder_pitch_link$")
@@ -887,7 +891,7 @@ def inertia_is_placeholder(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("inertia", "go2 quadruped a1", "x is across the robot in the CAD program")
-def trunk_axes_exchanged(tree: Element, rng: Random) -> Mutant:
+def base_axes_swapped(tree: Element, rng: Random) -> Mutant:
     """Exchange ixx and iyy of the trunk."""
     trunk = named(tree, "link", "^(base|trunk)$")[-1]
     inertia = trunk.find("inertial/inertia")
@@ -898,7 +902,7 @@ def trunk_axes_exchanged(tree: Element, rng: Random) -> Mutant:
 
 
 @DEFECTS("inertia", "a1 go2 h1", "onshape-to-robot#85: the tensor is turned already")
-def inertia_turned_twice(tree: Element, rng: Random) -> Mutant:
+def inertia_rotation_repeated(tree: Element, rng: Random) -> Mutant:
     """Turn the inertia of a long link by 90 degrees."""
     link = rng.choice(named(tree, "link", SHANK))
     link.find("inertial/origin").set("rpy", "1.5707963 0 0")
@@ -915,22 +919,22 @@ def center_of_mass_above_joint(tree: Element, rng: Random) -> Mutant:
         part = rng.choice(named(tree, "link", SHANK))
         origin, key = part.find("inertial/origin"), "xyz"
     x, y, z = numbers(origin.get(key))
-    origin.set(key, spell((x, y, -z)))
+    origin.set(key, format_numbers((x, y, -z)))
     return of(part)
 
 
 @DEFECTS("inertia", "quadruped.xml biped.xml", "the inertia of the left part is pasted")
-def full_inertia_not_mirrored(tree: Element, rng: Random) -> Mutant:
+def full_inertia_not_mirror_image(tree: Element, rng: Random) -> Mutant:
     """Give a right thigh the products of inertia of the left one."""
     body = rng.choice(named(tree, "body", "((FR|RR)_thigh|right_hip_yaw_link)$"))
     inertial = body.find("inertial")
     xx, yy, zz, xy, xz, yz = numbers(inertial.get("fullinertia"))
-    inertial.set("fullinertia", spell((xx, yy, zz, -xy, xz, -yz)))
+    inertial.set("fullinertia", format_numbers((xx, yy, zz, -xy, xz, -yz)))
     return of(body)
 
 
 @DEFECTS("inertia", "go2 g1", "SolidWorks' products have the other sign, in all parts")
-def all_products_negated(tree: Element, rng: Random) -> Mutant:
+def all_products_negative(tree: Element, rng: Random) -> Mutant:
     """Negate the products of inertia of all links."""
     for inertia in tree.iter("inertia"):
         multiply(inertia, -1, "ixy", "ixz", "iyz")
@@ -943,5 +947,5 @@ def diagonal_inertia_in_other_order(tree: Element, rng: Random) -> Mutant:
     body = rng.choice(named(tree, "body", "(knee|ankle_roll|ankle)_link$"))
     inertial = body.find("inertial")
     a, b, c = numbers(inertial.get("diaginertia"))
-    inertial.set("diaginertia", spell((c, a, b)))
+    inertial.set("diaginertia", format_numbers((c, a, b)))
     return of(body)
