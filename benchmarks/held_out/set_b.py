@@ -823,9 +823,7 @@ def _mimic_joints(tree: Element) -> None:
         add(joint, "mimic", joint=f"{leg}_calf_joint", multiplier="1", offset="0")
 
 
-@DEFECTS(
-    "copy_paste", "a1 quadruped", "a sign is changed for the mirrored side", prepare=_mimic_joints
-)
+@DEFECTS("copy_paste", "a1 quadruped", "a sign is changed for the right", prepare=_mimic_joints)
 def mimic_with_other_sign(tree: Element, rng: Random) -> Mutant:
     """Let one rod turn against its knee."""
     joint = named(tree, "joint", "FR_rod_joint")[0]
