@@ -243,8 +243,8 @@ def convert_parameter(owner: str, name: str, value: object, parameter: Parameter
     """
     if parameter.is_plain(value):
         return value  # type: ignore[return-value]
-    converted: Value = convert(f"{owner}.{name}", value, _hint(parameter))
-    return converted
+    result: Value = convert(f"{owner}.{name}", value, _hint(parameter))
+    return result
 
 
 def convert_range(

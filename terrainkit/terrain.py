@@ -50,11 +50,11 @@ class Terrain(Parameterized, ABC):
 
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
-            given: Any = getattr(self, name)
-            value = parameter.hard if given is parameter.default else given
+            raw: Any = getattr(self, name)
+            value = parameter.hard if raw is parameter.default else raw
             if not parameter.is_plain(value):
                 value = convert_parameter(self.kind(), name, value, parameter)
-            if value is not given:
+            if value is not raw:
                 object.__setattr__(self, name, value)
 
     @classmethod
@@ -77,8 +77,8 @@ class Terrain(Parameterized, ABC):
         if values:
             check_names(cls.kind(), values, known)
         for name, value in values.items():
-            converted: Any = convert_range(cls.kind(), name, value, known[name])
-            fixed[name] = known[name].value_at(converted, difficulty)
+            result: Any = convert_range(cls.kind(), name, value, known[name])
+            fixed[name] = known[name].value_at(result, difficulty)
         return cls(**fixed)
 
     def build(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:

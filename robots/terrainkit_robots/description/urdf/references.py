@@ -35,12 +35,12 @@ _MAX_COMPARED = 20_000
 """Maximum number of names to search for a suggestion."""
 
 
-def invalid_references(document: XmlDocument) -> Iterator[Problem]:
+def invalid_references(doc: XmlDocument) -> Iterator[Problem]:
     """Yield a problem for each unknown name in <gazebo>, <transmission>, <sensor>, <ros2_control>.
 
     Two transmissions of one joint and a mechanicalReduction of zero are problems as well.
     """
-    root = document.root
+    root = doc.root
     assert root is not None
     links, joints = link_names(root), joint_names(root)
     known = {"link": links, "joint": joints, "link or joint": links | joints}
@@ -57,11 +57,11 @@ def invalid_references(document: XmlDocument) -> Iterator[Problem]:
         found[name] = Problem(
             code="TRE010",
             message=f"{place}: got {truncate(name)}{suggestion}; expected a {kind} of the robot",
-            source=document.source(element),
+            source=doc.source(element),
             subject=name,
         )
     yield from found.values()
-    yield from _repeated_transmissions(document, joints)
+    yield from _repeated_transmissions(doc, joints)
     for reduction in root.iterfind("transmission//mechanicalReduction"):
         text = (reduction.text or "").strip()
         ratio = parse_numbers(text, 1)
@@ -71,7 +71,7 @@ def invalid_references(document: XmlDocument) -> Iterator[Problem]:
                 code="JNT024",
                 message=f"mechanicalReduction of transmission {owner.get('name', '')}: got "
                 f"{truncate(text, 40)!r}; expected a ratio other than 0",
-                source=document.source(reduction),
+                source=doc.source(reduction),
                 subject=_driven_joint(owner) or owner.get("name", ""),
             )
 
@@ -109,11 +109,11 @@ def _driven_joint(transmission: "etree._Element") -> str:
     return "" if joint is None else joint.get("name", "")
 
 
-def _repeated_transmissions(document: XmlDocument, joints: set[str]) -> Iterator[Problem]:
+def _repeated_transmissions(doc: XmlDocument, joints: set[str]) -> Iterator[Problem]:
     """Yield a problem for each joint that two simple transmissions drive."""
-    assert document.root is not None
+    assert doc.root is not None
     seen: set[str] = set()
-    for element in document.root.iterchildren("transmission"):
+    for element in doc.root.iterchildren("transmission"):
         if "SimpleTransmission" not in (element.get("type") or element.findtext("type") or ""):
             continue
         name = _driven_joint(element)
@@ -122,7 +122,7 @@ def _repeated_transmissions(document: XmlDocument, joints: set[str]) -> Iterator
                 code="TRE010",
                 message=f"joint of a <transmission>: got {truncate(name)}, which another "
                 "transmission drives; expected one transmission for each joint",
-                source=document.source(element),
+                source=doc.source(element),
                 subject=name,
             )
         elif name in joints:

@@ -29,14 +29,14 @@ _FREE_JOINT = "root_joint"
 """Name of the joint that Pinocchio adds above the root link of a floating robot."""
 
 
-def invalid_srdf(document: XmlDocument) -> Iterator[Problem]:
+def invalid_srdf(doc: XmlDocument) -> Iterator[Problem]:
     """Yield a problem if the SRDF of a URDF has names that the robot lacks.
 
     The SRDF has the name of the URDF file, or that of the robot if no other URDF has it, and is in
     the same folder, or in srdf/ or config/ of the package.
     """
-    assert document.root is not None
-    path = _find_srdf(document.file, document.root.get("name", "").strip())
+    assert doc.root is not None
+    path = _find_srdf(doc.file, doc.root.get("name", "").strip())
     if path is None:
         return
     try:
@@ -49,15 +49,15 @@ def invalid_srdf(document: XmlDocument) -> Iterator[Problem]:
         yield Problem(code="TRE010", message=problem.message, source=problem.source)
         return
     known = {
-        "link": link_names(document.root),
-        "joint": {*joint_names(document.root), _FREE_JOINT, *_names_of(root, "virtual_joint")},
+        "link": link_names(doc.root),
+        "joint": {*joint_names(doc.root), _FREE_JOINT, *_names_of(root, "virtual_joint")},
         "group": _names_of(root, "group"),
     }
     references = [each for each in _references(root) if each[-1]]
     missing = [each for each in references if each[-1] not in known[each[2]]]
     unknown = list(dict.fromkeys(name for _, _, _, name in missing))
     total = len({name for _, _, _, name in references})
-    is_own = document.file.name.startswith(f"{path.stem}.")
+    is_own = doc.file.name.startswith(f"{path.stem}.")
     if missing and (is_own or total - len(unknown) >= _MIN_KNOWN_SHARE * total):
         element, place, kind, name = missing[0]
         yield Problem(
