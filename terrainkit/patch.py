@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,9 @@ from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized, Value, parameters_of
 from terrainkit.patch_geometry import PatchGeometry, uniform_friction
 from terrainkit.solids import Solids
+from terrainkit.spawn import Disk, find_spawn, sample_spawns
 from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
-
-if TYPE_CHECKING:
-    from terrainkit.spawn import Disc
 
 EDGE_TOLERANCE = 1e-3
 """Distance by which a solid may extend beyond its patch [m]."""
@@ -107,14 +105,15 @@ def build_patch(
     _check_slopes(terrain, config)
     grid, name = config.patch_grid(row, col), sub_terrain.name
     child_rng = partial(_child_rng, config, terrain, row, col)
-    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
+    rng: Any = patch_rng(config, terrain, row, col) if terrain.has_random_heights else None
+    heights = terrain.build(grid, rng)
     geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, heights, grid, child_rng)
     spawn_offset = 0.0
     if overlays:
         geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
-    heights, preferred = geometry.heights, geometry.spawn
+    heights, position = geometry.heights, geometry.spawn
     solids, goals = _finish(config, name, geometry, (row, col))
-    spawns = place_spawns(config, name, grid, heights, solids, preferred, partial(child_rng, 1))
+    spawns = place_spawns(config, name, grid, heights, solids, position, partial(child_rng, 1))
     x, y, _ = spawns[0].tolist()
     requested, realized = terrain.requested(), terrain.realized(grid)
     for k, overlay in enumerate(overlays):
@@ -130,7 +129,7 @@ def build_patch(
         solids=solids,
         goals=goals,
         spawns=with_headings(spawns, goals, geometry.heading),
-        spawn_offset=spawn_offset + max(abs(x - preferred[0]), abs(y - preferred[1])),
+        spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
     )
 
 
@@ -188,8 +187,8 @@ def _apply_overlays(
 
     The overlays keep the ground level at the spawn origin of the terrain without overlays.
     """
-    grid, preferred = geometry.grid, geometry.spawn
-    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, preferred)
+    grid, position = geometry.grid, geometry.spawn
+    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, position)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
     for k, overlay in enumerate(overlays):
         geometry = overlay.apply(geometry, child_rng(2 + k))
@@ -200,7 +199,7 @@ def _apply_overlays(
                 f"{grid.shape} with finite values"
             )
         geometry = dataclasses.replace(geometry, heights=heights)
-    return geometry, max(abs(x - preferred[0]), abs(y - preferred[1]))
+    return geometry, max(abs(x - position[0]), abs(y - position[1]))
 
 
 def place_spawns(
@@ -209,7 +208,7 @@ def place_spawns(
     grid: Grid,
     heights: NDArray[np.float32],
     solids: Solids,
-    preferred: tuple[float, float],
+    position: tuple[float, float],
     rng: Callable[[], np.random.Generator],
 ) -> NDArray[np.float64]:
     """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.spawn`.
@@ -220,19 +219,17 @@ def place_spawns(
         grid: Grid of the patch.
         heights: Heights of the patch [m], shape `grid.shape`.
         solids: Solids on the patch.
-        preferred: Preferred position of the first, x and y [m].
+        position: Preferred position of the first, x and y [m].
         rng: Returns the random number generator of the others; slow, so called only if needed.
 
     Raises:
         ConfigError: if the patch has no place to spawn.
     """
-    from terrainkit.spawn import sample_spawns
-
-    origin = _find_origin(config, name, grid, heights, solids, preferred)
+    origin = _find_origin(config, name, grid, heights, solids, position)
     if config.spawns_per_patch == 1:
         return np.array([origin])
-    disc, number = spawn_disc(config), config.spawns_per_patch
-    return sample_spawns(heights, grid, origin, disc, number, solids=solids, rng=rng())
+    disk, number = spawn_disk(config), config.spawns_per_patch
+    return sample_spawns(heights, grid, origin, disk, number, solids=solids, rng=rng())
 
 
 def _find_origin(
@@ -241,18 +238,16 @@ def _find_origin(
     grid: Grid,
     heights: NDArray[np.float32],
     solids: Solids,
-    preferred: tuple[float, float],
+    position: tuple[float, float],
 ) -> tuple[float, float, float]:
     """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
-    from terrainkit.spawn import find_spawn
-
-    disc = spawn_disc(config)
+    disk = spawn_disk(config)
     origin = find_spawn(
-        heights, grid, preferred, disc, solids=solids, threshold=config.wall_threshold
+        heights, grid, position, disk, solids=solids, threshold=config.wall_threshold
     )
     if origin is None:
         raise ConfigError(
-            f"{name}: no disc of radius {config.spawn_radius:g} m is flat within "
+            f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
             f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
@@ -260,11 +255,9 @@ def _find_origin(
     return origin
 
 
-def spawn_disc(config: MapConfig) -> "Disc":
+def spawn_disk(config: MapConfig) -> Disk:
     """Return the free place that a robot needs on a map."""
-    from terrainkit.spawn import Disc
-
-    return Disc(
+    return Disk(
         radius=config.spawn_radius,
         tolerance=config.spawn_tolerance,
         headroom=config.spawn_headroom,
@@ -309,8 +302,8 @@ def with_headings(
     positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
 ) -> NDArray[np.float32]:
     """Return spawn positions with headings, shape (k, 4): toward the first goal, else `default`."""
-    spawns = np.full((len(positions), 4), default, dtype=np.float32)
-    spawns[:, :3] = positions
+    spawns = np.empty((len(positions), 4), dtype=np.float32)
+    spawns[:, :3], spawns[:, 3] = positions, default
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T
         spawns[:, 3] = np.arctan2(dy, dx)

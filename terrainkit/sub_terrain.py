@@ -21,7 +21,7 @@ class SubTerrain(Config):
     """A terrain type of a map.
 
     In Python, `terrain` may be a subclass of :class:`~terrainkit.terrain.Terrain`, which is
-    registered and replaced by its name.
+    registered and replaced by its name. The classes of `overlays` are registered, too.
 
     Raises:
         ConfigError: if there is no such terrain, or a parameter is unknown or invalid.
@@ -44,7 +44,7 @@ class SubTerrain(Config):
     )
     """Friction coefficient of the patches; none for `static_friction` of the map."""
 
-    parameters: Mapping[str, Annotated[Any, Meta(description="a value or a range")]] = field(
+    parameters: Mapping[str, Annotated[Any, Meta(description="a finite value or a range")]] = field(
         default_factory=dict
     )
     """Parameters that replace the defaults: a value, or a range (easy, hard). In TOML they are keys
@@ -58,7 +58,10 @@ class SubTerrain(Config):
         try:
             super().__post_init__()
         except ConfigError as error:
-            raise ConfigError(f"{self.terrain}.{error}") from None
+            message = str(error).removeprefix("parameters.")  # they are keys of the table itself
+            raise ConfigError(f"{self.terrain}.{message}") from None
+        for overlay in self.overlays:
+            registry.register_overlay(type(overlay))
         if self.friction is not None:
             friction = convert_range(self.terrain, "friction", self.friction, _FRICTION)
             object.__setattr__(self, "friction", friction)
@@ -93,8 +96,8 @@ class SubTerrain(Config):
             "friction": self.friction,
             "overlays": self.overlays,
         }
-        given = {key: value for key, value in optional.items() if value not in ("", None, ())}
-        return {"terrain": self.terrain, "proportion": self.proportion, **given, **self.parameters}
+        raw = {key: value for key, value in optional.items() if value not in ("", None, ())}
+        return {"terrain": self.terrain, "proportion": self.proportion, **raw, **self.parameters}
 
     @cached_property
     def terrain_class(self) -> type[Terrain]:
@@ -107,8 +110,10 @@ class SubTerrain(Config):
 
     def friction_at(self, difficulty: float) -> float | None:
         """Return the friction of the patches at `difficulty`, 0 to 1; None for the map's."""
-        given: Any = self.friction
-        return _FRICTION.value_at(given, difficulty)  # type: ignore[return-value]
+        if self.friction is None:
+            return None
+        friction: float = _FRICTION.value_at(self.friction, difficulty)  # type: ignore[assignment]
+        return friction
 
     @cached_property
     def declarations(self) -> dict[str, Parameter]:

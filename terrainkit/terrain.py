@@ -44,13 +44,18 @@ class Terrain(Parameterized, ABC):
     than the one before.
     """
 
+    has_random_heights: ClassVar[bool] = True
+    """Whether :meth:`heights` takes random numbers. Where it does not, maps save the time of
+    creating a generator, which is that of a small patch, and pass None."""
+
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
-            given: Any = getattr(self, name)
-            if given is parameter.default:
-                given = parameter.hard
-            value = convert_parameter(self.kind(), name, given, parameter)
-            object.__setattr__(self, name, value)
+            raw: Any = getattr(self, name)
+            value = parameter.hard if raw is parameter.default else raw
+            if not parameter.is_plain(value):
+                value = convert_parameter(self.kind(), name, value, parameter)
+            if value is not raw:
+                object.__setattr__(self, name, value)
 
     @classmethod
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
@@ -68,11 +73,12 @@ class Terrain(Parameterized, ABC):
                 f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
             )
         known, values = parameters_of(cls), values or {}
-        check_names(cls.kind(), values, known)
         fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
+        if values:
+            check_names(cls.kind(), values, known)
         for name, value in values.items():
-            converted: Any = convert_range(cls.kind(), name, value, known[name])
-            fixed[name] = known[name].value_at(converted, difficulty)
+            result: Any = convert_range(cls.kind(), name, value, known[name])
+            fixed[name] = known[name].value_at(result, difficulty)
         return cls(**fixed)
 
     def build(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
@@ -124,7 +130,7 @@ class Terrain(Parameterized, ABC):
         """Return the heights on `grid` [m], shape `grid.shape`.
 
         Take random numbers only from `rng`. Sample first and scale afterward, so that the pattern
-        stays the same at every difficulty. Leave a flat disc where a robot can be spawned; see
+        stays the same at every difficulty. Leave a flat disk where a robot can be spawned; see
         :mod:`terrainkit.spawn`.
         """
 

@@ -1,6 +1,6 @@
-"""Validate a map: spawn discs, mesh, recorded parameters and difficulty.
+"""Validate a map: spawn disks, mesh, recorded parameters and difficulty.
 
-Everything is recomputed from the map alone. Spawn discs are sampled on the surface, the mesh is
+Everything is recomputed from the map alone. Spawn disks are sampled on the surface, the mesh is
 checked edge by edge and face by face, and each patch is compared with a second build of it.
 Imported and edited maps (mode custom) are not compared with their config.
 """
@@ -31,7 +31,7 @@ class Issue:
     """One violated guarantee of a map."""
 
     check: str
-    """Check that found it: finite, difficulty, patches, realized, solids, spawn or mesh."""
+    """Check that found it: finite, difficulty, patches, realized, solids, goals, spawn or mesh."""
 
     message: str
     """What is wrong, where, and by how much."""
@@ -65,7 +65,10 @@ def _config_issues(terrain_map: TerrainMap) -> list[Issue]:
 
 def _custom_issues(terrain_map: TerrainMap) -> list[Issue]:
     """Return the issues of a map that was not generated."""
-    return _issues("solids", _check_solids(terrain_map))
+    return [
+        *_issues("solids", _check_solids(terrain_map)),
+        *_issues("goals", _check_goals(terrain_map)),
+    ]
 
 
 def _issues(check: str, messages: Iterator[str]) -> list[Issue]:
@@ -146,7 +149,7 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         yield f"{location}: the spawn origin is {moved:.3f} m from that of its config"
     if expected.spawn_offset > expected.grid.cell:
         yield (
-            f"{location}: no flat disc at the spawn position of {expected.terrain}: the origin is "
+            f"{location}: no flat disk at the spawn position of {expected.terrain}: the origin is "
             f"{expected.spawn_offset:.3f} m away, where a robot may be beyond the obstacle"
         )
     error = float(np.abs(patch.heights - expected.heights).max())
@@ -205,16 +208,37 @@ def _check_solids(terrain_map: TerrainMap) -> Iterator[str]:
         yield f"solid {index} extends {beyond[index]:.3f} m beyond the map"
 
 
+def _check_goals(terrain_map: TerrainMap) -> Iterator[str]:
+    for row, col in np.ndindex(terrain_map.difficulty.shape):
+        grid, goals = terrain_map.config.patch_grid(row, col), terrain_map.goals[row, col]
+        last = np.flatnonzero(~np.isnan(goals).all(axis=1)).max(initial=-1)
+        for k, goal in enumerate(goals[: last + 1].astype(np.float64)):
+            subject = f"patch ({row}, {col}): goal {k}"
+            if not np.isfinite(goal).all():
+                yield f"{subject} is not finite"
+                continue
+            xy, z = goal[:2], float(goal[2])
+            if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
+                yield f"{subject} is outside the patch"
+                continue
+            below = float(terrain_map.height(xy)) - z
+            floor, ceiling = terrain_map.intervals(xy).T
+            if below > TOLERANCE:
+                yield f"{subject} is {below:.3f} m below the ground"
+            elif not ((floor - TOLERANCE <= z) & (z <= ceiling + TOLERANCE)).any():
+                yield f"{subject} is inside a solid"
+
+
 def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
     config = terrain_map.config
     if 2 * config.spawn_radius > min(config.patch_size):
         x, y = config.patch_size
-        yield f"no disc of radius {config.spawn_radius:g} m fits in a patch of {x:g} m x {y:g} m"
+        yield f"no disk of radius {config.spawn_radius:g} m fits in a patch of {x:g} m x {y:g} m"
         return
     radius = config.spawn_radius * np.linspace(0, 1, max(3, round(config.spawn_radius / 0.05)))
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    disc = (radius[:, None, None] * circle).reshape(-1, 2)
+    disk = (radius[:, None, None] * circle).reshape(-1, 2)
     for row, col in np.ndindex(terrain_map.difficulty.shape):
         spawns = terrain_map.patch(row, col).spawns.astype(np.float64)
         for number, (*xy, z, _) in enumerate(spawns):
@@ -223,8 +247,8 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
             grid = config.patch_grid(row, col)
             if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
                 yield f"{subject} is outside the patch"
-            ground = terrain_map.height(xy + disc)
-            free = terrain_map.clearance(xy + disc).min()
+            ground = terrain_map.height(xy + disk)
+            free = terrain_map.clearance(xy + disk).min()
             if free < config.spawn_headroom - TOLERANCE:
                 headroom = config.spawn_headroom
                 yield f"{subject} has {free:.3f} m of headroom; expected {headroom:g} m"

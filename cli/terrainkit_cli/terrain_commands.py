@@ -39,7 +39,8 @@ class Generate(ConfigCommand):
 
     output: Output
     """File to write. The suffix selects the format: .npz for a complete map, which the other
-    commands read; .xml (MuJoCo), .stl, .ply, .obj, .glb or .png for other programs."""
+    commands read; .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png for other
+    programs."""
 
     config: Annotated[str, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = ""
     """Map config (.toml), or a map (.npz) whose config is used; options override it."""
@@ -175,13 +176,16 @@ class List(Command):
 
         if not self.terrain:
             render.table(list(terrain_summaries().items()))
-            if names := registry.registered_terrains():
+            if names := (*registry.registered_terrains(), *registry.registered_overlays()):
                 render.result(f"\nregistered: {', '.join(names)}")
             if others := registry.plugin_terrains():
                 render.result("\nfrom other packages:")
                 render.table([(f"  {name}", point.value) for name, point in others.items()])
             render.result("\noverlays, which change any terrain:")
             render.table([(f"  {name}", text) for name, text in overlay_summaries().items()])
+            if others := registry.plugin_overlays():
+                render.result("\noverlays from other packages:")
+                render.table([(f"  {name}", point.value) for name, point in others.items()])
             mixes = (
                 (name, ", ".join(c.name for c in presets.get_preset(name)))
                 for name in presets.preset_names()
@@ -190,7 +194,7 @@ class List(Command):
             render.table([(f"  {name}", mix) for name, mix in mixes])
             render.result("\nterrainkit list NAME shows the parameters of a terrain or overlay.")
             return 0
-        is_overlay = self.terrain in registry.overlay_names()
+        is_overlay = self.terrain in (*registry.overlay_names(), *registry.plugin_overlays())
         about = (overlay_doc if is_overlay else terrain_doc)(self.terrain)
         render.result(f"{about.name}: {about.text}\n")
         rows = [("parameter", "easy", "hard", "")]
@@ -254,18 +258,19 @@ def _print_map(terrain_map: TerrainMap) -> None:
     }
     render.table(list(facts.items()))
     render.result("")
-    rows = [("column", "terrain", "difficulty", "measured difficulty")]
+    rows = [("column", "terrain", "difficulty", "measured difficulty of the ground")]
     for col in range(config.cols):
         patches = [terrain_map.patch(row, col) for row in range(config.rows)]
         hard = [measured_difficulty(t.heights, config.cell, float(t.origin[2])) for t in patches]
         names = ", ".join(dict.fromkeys(patch.terrain for patch in patches))
         levels = [patch.difficulty for patch in patches]
+        hint = ", without its solids" if any(len(patch.solids) for patch in patches) else ""
         rows.append(
             (
                 str(col),
                 names,
                 f"{min(levels):.2f} to {max(levels):.2f}",
-                f"{min(hard):.3f} to {max(hard):.3f} m",
+                f"{min(hard):.3f} to {max(hard):.3f} m{hint}",
             )
         )
     render.table(rows)

@@ -1,4 +1,4 @@
-"""Scatter objects at random positions with a minimum distance, as in Poisson-disc sampling."""
+"""Scatter objects at random positions with a minimum distance, as in Poisson-disk sampling."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +21,19 @@ def scatter(
     gap: float = 0.0,
     platform: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return random positions and radii of discs that keep their distance.
+    """Return random positions and radii of disks that keep their distance.
 
-    The discs are far apart where there is space. With a smaller gap, more discs come after the
-    same first ones, so that the pattern is the same at every difficulty. Any two discs are at
-    least `gap` apart, and a disc is at least half of it from the edge of the patch, so that a robot
+    The disks are far apart where there is space. With a smaller gap, more disks come after the
+    same first ones, so that the pattern is the same at every difficulty. Any two disks are at
+    least `gap` apart, and a disk is at least half of it from the edge of the patch, so that a robot
     that is narrower than `gap` reaches every free place.
 
     Args:
         grid: Grid of the patch.
         rng: Generator of the random numbers.
         radius: Minimum and maximum radius [m].
-        number: Maximum number of discs.
-        gap: Minimum distance between two discs, up to 10 [m].
+        number: Maximum number of disks.
+        gap: Minimum distance between two disks, up to 10 [m].
         platform: Side of the square at the center that stays free [m].
 
     Returns:
@@ -47,12 +47,12 @@ def scatter(
     beyond = np.maximum(np.abs(xy - grid.center) - platform / 2, 0.0)
     is_allowed = (to_edge >= 0) & ((beyond**2).sum(axis=1) > r**2)
     free = np.where(is_allowed, 2 * to_edge, -np.inf)
-    chosen: list[int] = []
+    selected: list[int] = []
     for level in _LEVELS[gap <= _LEVELS]:
-        while len(chosen) < number and (free >= level).any():
+        while len(selected) < number and (free >= level).any():
             k = int(np.argmax(free >= level))
             distance = np.sqrt(((xy - xy[k]) ** 2).sum(axis=1)) - r - r[k]
             free = np.minimum(free, distance)
             free[k] = -np.inf
-            chosen.append(k)
-    return xy[chosen], r[chosen]
+            selected.append(k)
+    return xy[selected], r[selected]

@@ -47,11 +47,11 @@ class ImportReport:
     """Part of that area where the map has no overhang [m2]: its ground is the top of the mesh, or
     the sky is open."""
 
-    largest_error: float = 0.0
+    max_error: float = 0.0
     """Largest difference in height between the map and the mesh where something hangs over the
     ground [m]: of the ground, or of the lower or upper side of a solid."""
 
-    largest_error_at: tuple[float, float] | None = None
+    max_error_at: tuple[float, float] | None = None
     """Where that is in the map, x and y [m]; None without overhangs."""
 
 
@@ -135,9 +135,10 @@ def _make_config(
     counts, sizes = [], []
     for k, count in enumerate((options.rows, options.cols)):
         axis, extent = "xy"[k], source.upper[k] - float(origin[k])
-        if origin[k] < source.lower[k] - cell / 2:
+        if origin[k] < source.lower[k] - cell / 2 or extent < cell / 2:
             raise ConfigError(
-                f"origin: got {axis} = {origin[k]:g} m; the file begins at {source.lower[k]:g} m"
+                f"origin: got {axis} = {origin[k]:g} m; the file extends from "
+                f"{source.lower[k]:g} m to {source.upper[k]:g} m"
             )
         if options.patch_size:
             size = options.patch_size[k]
@@ -148,7 +149,7 @@ def _make_config(
         if count < 1 or size < cell or count * size > extent + cell / 2:
             raise ConfigError(
                 f"patches along {axis}: got {max(count, 1)} of {size or cell:g} m; {path} has "
-                f"{max(extent, 0):g} m from the origin on"
+                f"{extent:g} m from the origin on"
             )
         counts.append(count)
         sizes.append(size)
@@ -245,6 +246,6 @@ def _report(terrain_map: TerrainMap, columns: Columns, num_missing: int) -> Impo
         num_missing=num_missing,
         overhang_area=len(i) * grid.cell**2,
         lost_area=int((~is_kept).sum()) * grid.cell**2,
-        largest_error=float(error[worst]),
-        largest_error_at=(float(xy[worst, 0]), float(xy[worst, 1])),
+        max_error=float(error[worst]),
+        max_error_at=(float(xy[worst, 0]), float(xy[worst, 1])),
     )

@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.features.lane import lane_goals, lane_positions, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals, lane_positions
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids, make_boxes
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Crawl(Terrain):
+class Crawl(Lane):
     """Bars across a lane along x, under which the robot crawls.
 
     The ground is flat, and the robot is spawned at low x. There is a goal behind each bar.
@@ -35,20 +34,13 @@ class Crawl(Terrain):
     spacing: float = parameter.size(1.0)
     """Distance between two bars [m]; more behind a bar shorter than `max_depth`."""
 
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
-
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""
         return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the bars, which span the whole width of the patch."""
-        x, depth = self._layout(grid, rng)
+        x, depth = self._bars(grid, rng)
         center = np.column_stack(
             [x + depth / 2, x * 0 + grid.center[1], x * 0 + self.clearance + self.thickness / 2]
         )
@@ -59,11 +51,11 @@ class Crawl(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each gap behind a bar."""
-        x, depth = self._layout(grid, rng)
+        x, depth = self._bars(grid, rng)
         behind = x + self.max_depth + self.spacing
         return lane_goals(grid, (x + depth + behind) / 2)
 
-    def _layout(
+    def _bars(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the first edge and the depth of each bar along x [m]."""

@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_blocks, number_that_fits
-from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenStairs(Terrain):
+class OpenStairs(Lane):
     """Stairs of separate treads up and down along x, between flat strips at both ends.
 
     There are no risers: a foot can slip between two treads. The robot is spawned at low x. The
@@ -35,17 +34,13 @@ class OpenStairs(Terrain):
     start: float = parameter.length(2.0)
     """Length of the flat strip at each end along x [m]."""
 
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
-
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""
         return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the treads."""
-        first, last, number = self._layout(grid)
+        first, last, number = self._stairs(grid)
         below = np.arange(number)
         # A tread up, its counterpart down, and the top.
         x0 = np.concatenate([first + below * self.tread, last - (below + 1) * self.tread])
@@ -60,12 +55,12 @@ class OpenStairs(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal on the top, and one behind the stairs."""
-        first, last, number = self._layout(grid)
+        first, last, number = self._stairs(grid)
         goals = lane_goals(grid, [(first + last) / 2, (last + grid.upper[0]) / 2])
         goals[:, 2] = self.riser * (number + 1), 0.0
         return goals
 
-    def _layout(self, grid: Grid) -> tuple[float, float, int]:
+    def _stairs(self, grid: Grid) -> tuple[float, float, int]:
         """Return the first and the last x of the stairs [m], and the treads below the top."""
         start = grid.length(grid.cells(self.start))
         length = grid.size[0] - 2 * start

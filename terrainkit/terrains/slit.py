@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import lane_goals, lane_slots, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals, lane_slots
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slit(Terrain):
+class Slit(Lane):
     """Walls across a lane along x, each with a narrow opening at a random position.
 
     The robot is spawned at low x, and there is a goal behind each opening. The walls are solids, so
@@ -25,7 +24,7 @@ class Slit(Terrain):
 
     has_column_seed: ClassVar[bool] = True
 
-    opening: float = parameter.scalar(1.3, 0.85, allows_zero=False)
+    opening: float = parameter.scalar(1.3, 0.85, allow_zero=False)
     """Width of an opening, in body widths."""
 
     body_width: float = parameter.size(0.35)
@@ -43,20 +42,13 @@ class Slit(Terrain):
     spacing: float = parameter.size(1.5)
     """Distance between two walls, center to center [m]."""
 
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
-
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""
         return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return two boxes for each wall, on both sides of the opening."""
-        edges, y = self._layout(grid, rng)
+        edges, y = self._slots(grid, rng)
         x = (edges[:-1] + edges[1:]) / 2
         width = self.opening * self.body_width
         low = np.concatenate([0 * y + grid.lower[1], y + width / 2])
@@ -69,12 +61,12 @@ class Slit(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal behind each opening."""
-        edges, y = self._layout(grid, rng)
+        edges, y = self._slots(grid, rng)
         goals = lane_goals(grid, edges[1:])
         goals[:, 1] = y
         return goals
 
-    def _layout(
+    def _slots(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the edges of the slots along x, and the y of each opening [m]."""

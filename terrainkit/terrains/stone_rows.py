@@ -8,15 +8,14 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
-from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between, pit_bounds
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class StoneRows(Terrain):
+class StoneRows(Lane):
     """Two rows of square stones across a pit, one for the left feet and one for the right.
 
     The robot is spawned at low x and walks along x. There is a goal at each pair of stones and one
@@ -41,10 +40,6 @@ class StoneRows(Terrain):
     start: float = parameter.length(2.0)
     """Length of the flat strip at each end along x [m]."""
 
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
-
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the pit between the flat strips."""
         low, high = pit_bounds(grid, self.start)
@@ -52,7 +47,7 @@ class StoneRows(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the stones, and the block behind the last pair."""
-        x = self._layout(grid)
+        x = self._rows(grid)
         low, high = pit_bounds(grid, self.start)
         y = grid.center[1] + np.array([-self.row_gap / 2 - self.stone, self.row_gap / 2])
         top = np.maximum(self.variation * (2 * rng.random((len(x), 2)) - 1), SINK - self.depth)
@@ -69,11 +64,11 @@ class StoneRows(Terrain):
     ) -> NDArray[np.floating]:
         """Return a goal at each pair of stones, and one behind the pit."""
         behind = grid.upper[0] - grid.length(grid.cells(self.start)) / 2
-        goals = lane_goals(grid, [*(self._layout(grid) + self.stone / 2), behind])
+        goals = lane_goals(grid, [*(self._rows(grid) + self.stone / 2), behind])
         goals[:, 2] = 0.0
         return goals
 
-    def _layout(self, grid: Grid) -> NDArray[np.float64]:
+    def _rows(self, grid: Grid) -> NDArray[np.float64]:
         """Return the first edge of each pair of stones along x [m]."""
         low, high = pit_bounds(grid, self.start)
         pitch, (length, width) = self.stone + self.gap, high - low

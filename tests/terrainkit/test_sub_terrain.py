@@ -28,7 +28,9 @@ def test_parameters_replace_the_default_ranges():
 
 
 def test_unknown_terrain_lists_known_ones():
-    with pytest.raises(ConfigError, match=r"no terrain 'lava' is built in, .*flat, .*gap, "):
+    with pytest.raises(
+        ConfigError, match=r"no terrain 'lava' is built in, .*; terrainkit list prints all"
+    ):
         SubTerrain(terrain="lava")
 
 
@@ -151,3 +153,9 @@ def test_parameters_are_copied():
 def test_sub_terrain_is_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError):
         SubTerrain(terrain="gap").proportion = 2.0
+
+
+@pytest.mark.parametrize("value", [float("nan"), {}])
+def test_sub_terrain_parameter_error_names_the_key(value):
+    with pytest.raises(ConfigError, match=r"^crawl\.clearance: got .*; expected a finite value or"):
+        SubTerrain(terrain="crawl", parameters={"clearance": value})

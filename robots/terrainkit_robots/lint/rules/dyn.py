@@ -15,7 +15,7 @@ from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.standing import StandResult, contact_areas, stand_test
 from terrainkit_robots.simulation.time_step import (
-    joint_inertias,
+    joint_inertia,
     max_stable_stiffness,
     max_stable_time_step,
 )
@@ -119,8 +119,8 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
     An episode starts with zero actions, that is, PD control with the suggested gains at the
     standing pose. A robot that falls within two seconds is reset before it learns anything. A robot
     that leans, stands on its shanks, lifts a foot or saturates a motor learns to do so. A tilt of 3
-    to 9 degrees is only a note. Robots with one or two legs need not balance: their joints are
-    locked, so that only the feet and the pose count.
+    to 9 degrees is only a note, and so are robots with more than six legs. Robots with one or two
+    legs need not balance: their joints are locked, so that only the feet and the pose count.
 
     Fix:
         The message names the cause. Otherwise check the pose, the feet and the effort limits.
@@ -138,7 +138,9 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
         not locked and assess(_stand(robot, locked=locked, self_collision=False)).stands
     )
     level = assessment.degree
-    if locked or len(robot.legs) > _MAX_SINGLE_LEGS:
+    if len(robot.legs) > _MAX_SINGLE_LEGS:
+        level = 0
+    elif locked:
         level = min(level, 1)
     elif stands_without and _has_mesh_collision(robot):
         level = max(level - 1, 0)
@@ -300,7 +302,7 @@ def low_joint_inertia(robot: Facts) -> Iterator[Violation]:
     """
     model, gains = make_sim_model(robot), suggest_gains(robot)
     declared = {name: float(model.model.joint(name).armature[0]) for name in gains}
-    inertias = joint_inertias(model)
+    inertias = joint_inertia(model)
     shares = {
         name: max_stable_stiffness(inertias[name].free) / gain.stiffness
         for name, gain in gains.items()
