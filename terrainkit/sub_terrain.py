@@ -44,7 +44,7 @@ class SubTerrain(Config):
     )
     """Friction coefficient of the patches; none for `static_friction` of the map."""
 
-    parameters: Mapping[str, Annotated[Any, Meta(description="a value or a range")]] = field(
+    parameters: Mapping[str, Annotated[Any, Meta(description="a finite value or a range")]] = field(
         default_factory=dict
     )
     """Parameters that replace the defaults: a value, or a range (easy, hard). In TOML they are keys
@@ -58,7 +58,8 @@ class SubTerrain(Config):
         try:
             super().__post_init__()
         except ConfigError as error:
-            raise ConfigError(f"{self.terrain}.{error}") from None
+            message = str(error).removeprefix("parameters.")  # they are keys of the table itself
+            raise ConfigError(f"{self.terrain}.{message}") from None
         for overlay in self.overlays:
             registry.register_overlay(type(overlay))
         if self.friction is not None:
