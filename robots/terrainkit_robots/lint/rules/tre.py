@@ -406,13 +406,15 @@ def parent_of_another_leg(robot: Facts) -> Iterator[Violation]:
         Attach the joint to the link of its own side.
 
     Source:
-        Sides are words such as FL, RR, left and r in the names of the links.
+        Sides are words such as FL, RR, left and r in the names of the links. Fixed joints are not
+        checked.
     """
     tree = robot.tree
     for joint in tree.parent_joint.values():
         own, other = side_words(joint.child), side_words(joint.parent)
-        if len(own) != 1 or len(other) != 1 or own[0].lower() == other[0].lower():
-            continue
+        is_paired = len(own) == len(other) == 1 and own[0].lower() != other[0].lower()
+        if not is_paired or not joint.moves:
+            continue  # a stereo camera has a left and a right frame
         expected = re.sub(rf"(?<![A-Za-z]){other[0]}(?![a-z])", own[0], joint.parent, count=1)
         lacks_child = expected in tree.links and len(tree.child_joints.get(expected, ())) < len(
             tree.child_joints[joint.parent]
