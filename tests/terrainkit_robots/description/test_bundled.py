@@ -12,6 +12,7 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.robot_files import make_robot_files
+from terrainkit_robots.spec.per_joint import by_joint
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 every_robot = pytest.mark.parametrize("name", bundled.robot_names())
@@ -363,9 +364,10 @@ def test_spec_names_exist_in_model(name):
     named = {spec.base, *spec.feet, *spec.shanks, *spec.thighs}
     named |= {*spec.termination_contacts, *spec.penalized_contacts}
     assert named <= set(bodies(model))
-    for joint, (lower, upper) in spec.soft_limits.items():
-        low, high = model.joint(joint).range
-        assert low < lower < spec.default_pose[joint] < upper < high
+    soft_limits = by_joint(spec.soft_limits, spec.joint_order)
+    for joint, position in spec.per_joint("default_pose").items():
+        (low, high), (lower, upper) = model.joint(joint).range, soft_limits[joint]
+        assert low < lower < position < upper < high
     for joint, effort in spec.per_joint("effort").items():
         assert model.actuator(joint.removesuffix("_joint")).ctrlrange[1] == effort
 
