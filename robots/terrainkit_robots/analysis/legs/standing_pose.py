@@ -267,7 +267,7 @@ def _solve_leg(
     cost = objective.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
     # The knee may bend both ways, and only the refined minima tell which way is better.
     starts = np.array([(axes[0, i], axes[1, j]) for i, j in _local_minima(cost)[:_MAX_STARTS]])
-    hip, knee = _round(objective, *_minimize(objective, starts, limits))
+    hip, knee = _round(objective, _minimize(objective, starts, limits))
     return {name: float(q) for name, q in objective.positions(hip, knee).items()}
 
 
@@ -293,21 +293,20 @@ def _minimize(objective: _LegObjective, starts: Matrix, limits: Matrix) -> Matri
     return np.asarray(best[cost.min(axis=1).argmin()])
 
 
-def _round(objective: _LegObjective, hip: float, knee: float) -> tuple[float, float]:
+def _round(objective: _LegObjective, best: Matrix) -> Matrix:
     """Return hip and knee as multiples of the first step that does not move the foot much."""
-    max_cost = float(objective.cost(np.float64(hip), np.float64(knee))) + _MAX_ROUNDING_COST
+    max_cost = float(objective.cost(*best)) + _MAX_ROUNDING_COST
     for step in _STEPS:
         axes = [
-            [q for q in step * (round(best / step) + np.arange(-1, 2)) if low <= q <= high]
-            for joint, best in ((objective.hip, hip), (objective.knee, knee))
+            [near for near in step * (round(q / step) + np.arange(-1, 2)) if low <= near <= high]
+            for joint, q in zip((objective.hip, objective.knee), best, strict=True)
             for low, high in [joint_range(joint)]
         ]
         grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
         cost = objective.cost(*grid.T)
         if len(grid) and cost.min() <= max_cost:
-            hip, knee = (round(float(q), 2) for q in grid[cost.argmin()])
-            break
-    return hip, knee
+            return np.asarray(grid[cost.argmin()]).round(2)
+    return best
 
 
 def _search_range(joint: Joint) -> tuple[float, float]:
