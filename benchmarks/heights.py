@@ -73,6 +73,6 @@ def run() -> Iterator[tuple[str, float]]:
     )
     yield "peak_memory_100x100_over_result (at most 2.5)", _peak(_PEAK)
     with tempfile.TemporaryDirectory() as folder:
-        for suffix in ("npz", "stl", "ply", "xml"):
+        for suffix in ("npz", "stl", "ply", "obj", "glb", "xml"):
             peak = _peak(_EXPORT_PEAK, str(Path(folder) / f"map.{suffix}"))
             yield f"peak_memory_with_{suffix}_over_result (at most 2.5)", peak

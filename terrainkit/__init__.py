@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
     from terrainkit.generation import generate
     from terrainkit.patch import Patch, make_patch
-    from terrainkit.registry import register_terrain
+    from terrainkit.registry import register_overlay, register_terrain
     from terrainkit.sub_terrain import SubTerrain
     from terrainkit.terrain_map import TerrainMap
 
@@ -27,6 +27,7 @@ __all__ = [
     "TerrainkitWarning",
     "generate",
     "make_patch",
+    "register_overlay",
     "register_terrain",
     "update_levels",
 ]
@@ -41,6 +42,7 @@ _MODULES = {
     "TerrainkitWarning": "errors",
     "generate": "generation",
     "make_patch": "patch",
+    "register_overlay": "registry",
     "register_terrain": "registry",
     "update_levels": "curriculum",
 }

@@ -86,13 +86,13 @@ class MapConfig(Config):
     around the origin is too small. They are at least two spawn radii apart."""
 
     spawn_radius: Size = 0.5
-    """Radius of the flat disc without obstacles around each spawn position [m]."""
+    """Radius of the flat disk without obstacles around each spawn position [m]."""
 
     spawn_tolerance: NonNegative = 0.01
-    """Largest height difference within that disc [m]."""
+    """Largest height difference within that disk [m]."""
 
     spawn_headroom: NonNegative = 1.0
-    """Height above that disc that is free of solids [m]."""
+    """Height above that disk that is free of solids [m]."""
 
     static_friction: NonNegative = 1.0
     """Static friction coefficient of the ground."""

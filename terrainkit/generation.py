@@ -174,8 +174,8 @@ def _warn(config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str
     if moved_spawns:
         names = listing(f"{name} on {count} patches" for name, count in moved_spawns.items())
         warnings.warn(
-            f"no flat disc of radius {config.spawn_radius:g} m at the preferred spawn position: "
-            f"{names}; the nearest flat disc is used; increase the platform or reduce spawn_radius",
+            f"no flat disk of radius {config.spawn_radius:g} m at the preferred spawn position: "
+            f"{names}; the nearest flat disk is used; increase the platform or reduce spawn_radius",
             TerrainkitWarning,
             stacklevel=3,
         )

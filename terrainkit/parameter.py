@@ -45,7 +45,7 @@ class Parameter:
     snap: Snap = "none"
     """How the value is rounded to cells: not at all, to whole cells, or to a centered square."""
 
-    allows_zero: bool = True
+    allow_zero: bool = True
     """Whether 0 is allowed. Negative values never are."""
 
     is_grade: bool = False
@@ -55,7 +55,7 @@ class Parameter:
     """Whether the ground beyond a flat part may slope. The slope starts at the center of the
     outermost cell, so the flat part is half a cell shorter on each sloping side."""
 
-    allows_range: bool = True
+    allow_range: bool = True
     """Whether the value may be a range (easy, hard)."""
 
     tolerance: float = 0.0
@@ -82,14 +82,14 @@ class Parameter:
 
     def value_at(self, value: Value | Range, difficulty: float) -> Value:
         """Return a value, or a range interpolated at `difficulty`, 0 to 1."""
-        return at_difficulty(value, difficulty) if self.allows_range else value
+        return at_difficulty(value, difficulty) if self.allow_range else value
 
     def realized(self, value: Value, grid: Grid) -> Realized:
         """Return `value` snapped to the cells of `grid`; a pair (x, y) where the axes differ."""
         if isinstance(value, str | tuple):
             return value
         if self.snap == "cells":
-            count = grid.cells(value, minimum=0 if self.allows_zero else 1)
+            count = grid.cells(value, minimum=0 if self.allow_zero else 1)
             return grid.length(count - self.slopes_away / 2)
         if self.snap == "centered":
             x, y = (grid.length(count - self.slopes_away) for count in grid.centered(value))
@@ -138,26 +138,26 @@ def length(
     easy: float,
     hard: float | None = None,
     *,
-    allows_zero: bool = False,
+    allow_zero: bool = False,
     slopes_away: bool = False,
 ) -> Any:
     """Declare a horizontal length [m], which snaps to whole cells, at least one by default."""
-    return _field(easy, hard, snap="cells", allows_zero=allows_zero, slopes_away=slopes_away)
+    return _field(easy, hard, snap="cells", allow_zero=allow_zero, slopes_away=slopes_away)
 
 
 def size(easy: float, hard: float | None = None) -> Any:
     """Declare a length of a solid [m], above 0, which does not snap to cells."""
-    return _field(easy, hard, allows_zero=False)
+    return _field(easy, hard, allow_zero=False)
 
 
 def platform(side: float, *, slopes_away: bool = False) -> Any:
     """Declare the side of a square at the center of the patch [m], which stays centered."""
-    return _field(side, snap="centered", allows_zero=False, slopes_away=slopes_away)
+    return _field(side, snap="centered", allow_zero=False, slopes_away=slopes_away)
 
 
-def scalar(easy: float, hard: float | None = None, *, allows_zero: bool = True) -> Any:
+def scalar(easy: float, hard: float | None = None, *, allow_zero: bool = True) -> Any:
     """Declare a number that does not snap to cells."""
-    return _field(easy, hard, allows_zero=allows_zero)
+    return _field(easy, hard, allow_zero=allow_zero)
 
 
 def grade(easy: float, hard: float) -> Any:
@@ -167,22 +167,22 @@ def grade(easy: float, hard: float) -> Any:
 
 def count(easy: int, hard: int | None = None) -> Any:
     """Declare a positive integer; only with two values may it depend on the difficulty."""
-    return _field(easy, hard, allows_zero=False, allows_range=hard is not None)
+    return _field(easy, hard, allow_zero=False, allow_range=hard is not None)
 
 
 def switch(*, default: bool = False) -> Any:
     """Declare a boolean that does not depend on the difficulty."""
-    return _field(default, allows_range=False)
+    return _field(default, allow_range=False)
 
 
 def text(default: str = "") -> Any:
     """Declare a text of at most 200 characters that does not depend on the difficulty."""
-    return _field(default, allows_range=False)
+    return _field(default, allow_range=False)
 
 
 def choice(default: str | int, *others: str | int) -> Any:
     """Declare one of a list of names or integers that does not depend on the difficulty."""
-    return _field(default, allows_range=False, choices=(default, *others))
+    return _field(default, allow_range=False, choices=(default, *others))
 
 
 def vector(default: tuple[float, ...]) -> Any:
@@ -190,7 +190,7 @@ def vector(default: tuple[float, ...]) -> Any:
 
     Unlike other numbers, they may be negative.
     """
-    return _field(tuple(float(each) for each in default), allows_range=False)
+    return _field(tuple(float(each) for each in default), allow_range=False)
 
 
 def _field(easy: Value, hard: Value | None = None, **options: Any) -> Any:
@@ -243,8 +243,8 @@ def convert_range(
         value = tuple(value)
     if not isinstance(value, tuple) or parameter.is_vector:
         return convert_parameter(owner, name, value, parameter)
-    if not parameter.allows_range or len(value) != 2:
-        expected = "one value" + (" or a pair (easy, hard)" if parameter.allows_range else "")
+    if not parameter.allow_range or len(value) != 2:
+        expected = "one value" + (" or a pair (easy, hard)" if parameter.allow_range else "")
         raise ConfigError(f"{owner}.{name}: got {show(value)}; expected {expected}")
     easy, hard = (convert_parameter(owner, name, end, parameter) for end in value)
     return easy, hard
@@ -275,7 +275,7 @@ def _is_plain(value: Any, parameter: Parameter) -> bool:
     if parameter.choices or isinstance(value, str | tuple):
         return False
     limit = MAX_VALUE if isinstance(value, float) else MAX_COUNT
-    return 0 < value <= limit or (value == 0 and parameter.allows_zero)
+    return 0 < value <= limit or (value == 0 and parameter.allow_zero)
 
 
 def _hint(parameter: Parameter) -> Any:
@@ -292,5 +292,5 @@ def _hint(parameter: Parameter) -> Any:
     if kind is bool:
         return bool
     limit = MAX_VALUE if kind is float else MAX_COUNT
-    bounds = Meta(ge=0, le=limit) if parameter.allows_zero else Meta(gt=0, le=limit)
+    bounds = Meta(ge=0, le=limit) if parameter.allow_zero else Meta(gt=0, le=limit)
     return Annotated[kind, bounds]

@@ -21,7 +21,7 @@ from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
 
 if TYPE_CHECKING:
-    from terrainkit.spawn import Disc
+    from terrainkit.spawn import Disk
 
 EDGE_TOLERANCE = 1e-3
 """Distance by which a solid may extend beyond its patch [m]."""
@@ -231,8 +231,8 @@ def place_spawns(
     origin = _find_origin(config, name, grid, heights, solids, preferred)
     if config.spawns_per_patch == 1:
         return np.array([origin])
-    disc, number = spawn_disc(config), config.spawns_per_patch
-    return sample_spawns(heights, grid, origin, disc, number, solids=solids, rng=rng())
+    disk, number = spawn_disk(config), config.spawns_per_patch
+    return sample_spawns(heights, grid, origin, disk, number, solids=solids, rng=rng())
 
 
 def _find_origin(
@@ -246,13 +246,13 @@ def _find_origin(
     """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
     from terrainkit.spawn import find_spawn
 
-    disc = spawn_disc(config)
+    disk = spawn_disk(config)
     origin = find_spawn(
-        heights, grid, preferred, disc, solids=solids, threshold=config.wall_threshold
+        heights, grid, preferred, disk, solids=solids, threshold=config.wall_threshold
     )
     if origin is None:
         raise ConfigError(
-            f"{name}: no disc of radius {config.spawn_radius:g} m is flat within "
+            f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
             f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
             f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
@@ -260,11 +260,11 @@ def _find_origin(
     return origin
 
 
-def spawn_disc(config: MapConfig) -> "Disc":
+def spawn_disk(config: MapConfig) -> "Disk":
     """Return the free place that a robot needs on a map."""
-    from terrainkit.spawn import Disc
+    from terrainkit.spawn import Disk
 
-    return Disc(
+    return Disk(
         radius=config.spawn_radius,
         tolerance=config.spawn_tolerance,
         headroom=config.spawn_headroom,

@@ -1,15 +1,15 @@
 """The registry of terrains and overlays.
 
 Each module in `terrainkit/terrains` is one terrain, named after its file, and each module in
-`terrainkit/overlays` one overlay. Other packages add
-terrains as entry points of the group `terrainkit.terrains`, and a program or notebook registers its
-own classes.
+`terrainkit/overlays` one overlay. Other packages add their own as entry points of the groups
+`terrainkit.terrains` and `terrainkit.overlays`, and a program or notebook registers its classes.
 """
 
 import importlib
 import inspect
 import pkgutil
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -19,41 +19,91 @@ from terrainkit.errors import ConfigError
 from terrainkit.overlay import Overlay
 from terrainkit.parameter import check_names, parameters_of
 from terrainkit.terrain import Terrain
-from terrainkit.text import expected_names
+from terrainkit.text import closest_names
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-ENTRY_POINTS = "terrainkit.terrains"
-
 INVERTED = "_inverted"
 """Suffix of the name of an inverted terrain in presets and maps."""
 
-_T = TypeVar("_T", bound=type[Terrain])
+_Terrain = TypeVar("_Terrain", bound=type[Terrain])
+_Overlay = TypeVar("_Overlay", bound=type[Overlay])
 
-_registered: dict[str, type[Terrain]] = {}
-"""The classes that this process has registered, by name."""
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Group:
+    """The classes of one parent."""
+
+    noun: str
+    """What they are called in errors, and in the names of the functions below."""
+
+    parent: Any
+    """Their parent class."""
+
+    package: ModuleType
+    """The package of the built-in ones."""
+
+    @property
+    def entry_points(self) -> str:
+        """Group of the entry points of other packages."""
+        return self.package.__name__
+
+
+_TERRAINS = _Group(noun="terrain", parent=Terrain, package=terrains)
+_OVERLAYS = _Group(noun="overlay", parent=Overlay, package=overlays)
+
+_registered: dict[tuple[str, str], type[Any]] = {}
+"""The classes that this process has registered, by noun and name."""
 
 
 @cache
 def terrain_names() -> tuple[str, ...]:
     """Return the names of the built-in terrains in alphabetical order, without importing them."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(terrains.__path__)))
+    return _module_names(_TERRAINS)
+
+
+@cache
+def overlay_names() -> tuple[str, ...]:
+    """Return the names of the built-in overlays in alphabetical order, without importing them."""
+    return _module_names(_OVERLAYS)
+
+
+def _module_names(group: _Group) -> tuple[str, ...]:
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(group.package.__path__)))
 
 
 def plugin_terrains() -> dict[str, "EntryPoint"]:
     """Return the entry points of terrains from other installed packages, by name."""
+    return _plugins(_TERRAINS)
+
+
+def plugin_overlays() -> dict[str, "EntryPoint"]:
+    """Return the entry points of overlays from other installed packages, by name."""
+    return _plugins(_OVERLAYS)
+
+
+def _plugins(group: _Group) -> dict[str, "EntryPoint"]:
     from importlib.metadata import entry_points
 
-    return {point.name: point for point in entry_points(group=ENTRY_POINTS)}
+    return {point.name: point for point in entry_points(group=group.entry_points)}
 
 
 def registered_terrains() -> tuple[str, ...]:
     """Return the names of the terrains that this process has registered."""
-    return tuple(_registered)
+    return _registered_names(_TERRAINS)
 
 
-def register_terrain(terrain: _T) -> _T:
+def registered_overlays() -> tuple[str, ...]:
+    """Return the names of the overlays that this process has registered."""
+    return _registered_names(_OVERLAYS)
+
+
+def _registered_names(group: _Group) -> tuple[str, ...]:
+    return tuple(name for noun, name in _registered if noun == group.noun)
+
+
+def register_terrain(terrain: _Terrain) -> _Terrain:
     """Register a terrain class, so that its name can be used in TOML and in maps.
 
     The name is that of the class in snake_case, `my_terrain` for `MyTerrain`. A class that is
@@ -69,82 +119,107 @@ def register_terrain(terrain: _T) -> _T:
     Raises:
         ConfigError: if it is not a terrain, or another terrain has the name.
     """
-    if not (isinstance(terrain, type) and issubclass(terrain, Terrain)):
-        raise ConfigError(f"terrain: got {terrain!r}; expected a subclass of Terrain")
-    name = terrain.kind()
-    if inspect.isabstract(terrain):
-        missing = ", ".join(sorted(terrain.__abstractmethods__))
-        raise ConfigError(f"{terrain.__name__}: got no method {missing}; expected one")
-    if "__dataclass_fields__" not in vars(terrain):
-        raise ConfigError(f"{terrain.__name__} lacks @dataclass(frozen=True, kw_only=True)")
-    parameters_of(terrain)
-    existing = _registered.get(name)
-    if existing is None and (name in terrain_names() or name in plugin_terrains()):
-        existing = get_terrain(name)
-    if existing is None or _path(existing) == _path(terrain):
-        if existing is not terrain:
-            _registered[name] = terrain
-            get_terrain.cache_clear()
-    elif existing is not terrain:
-        raise ConfigError(
-            f"the name {name!r} of {_path(terrain)} is that of {_path(existing)}; expected another "
-            "class name"
-        )
+    _register(_TERRAINS, terrain)
     return terrain
 
 
-def _path(terrain: type[Terrain]) -> str:
-    return f"{terrain.__module__}.{terrain.__qualname__}"
+def register_overlay(overlay: _Overlay) -> _Overlay:
+    """Register an overlay class, as :func:`register_terrain` does a terrain.
+
+    Raises:
+        ConfigError: if it is not an overlay, or another overlay has the name.
+    """
+    _register(_OVERLAYS, overlay)
+    return overlay
 
 
-@cache
+def _register(group: _Group, given: Any) -> None:
+    if not _is_subclass(given, group):
+        raise ConfigError(
+            f"{group.noun}: got {given!r}; expected a subclass of {group.parent.__name__}"
+        )
+    name = given.kind()
+    if inspect.isabstract(given):
+        missing = ", ".join(sorted(given.__abstractmethods__))
+        raise ConfigError(f"{given.__name__}: got no method {missing}; expected one")
+    if "__dataclass_fields__" not in vars(given):
+        raise ConfigError(f"{given.__name__} lacks @dataclass(frozen=True, kw_only=True)")
+    parameters_of(given)
+    existing: Any = _registered.get((group.noun, name))
+    if existing is None and (name in _module_names(group) or name in _plugins(group)):
+        existing = _get(group, name)
+    if existing is None or _path(existing) == _path(given):
+        if existing is not given:
+            _registered[group.noun, name] = given
+            _get.cache_clear()
+    elif existing is not given:
+        raise ConfigError(
+            f"the name {name!r} of {_path(given)} is that of {_path(existing)}; expected another "
+            "class name"
+        )
+
+
+def _is_subclass(given: object, group: _Group) -> bool:
+    return isinstance(given, type) and issubclass(given, group.parent)
+
+
+def _path(given: type[Any]) -> str:
+    return f"{given.__module__}.{given.__qualname__}"
+
+
 def get_terrain(name: str) -> type[Terrain]:
     """Return the terrain class `name`: a built-in or registered one, or that of a plugin.
 
     Raises:
         ConfigError: if there is no such terrain, or a plugin cannot be loaded.
     """
-    if name in terrain_names():
-        return _load_class(terrains, name, Terrain)  # type: ignore[no-any-return]
-    if name in _registered:
-        return _registered[name]
-    plugins = plugin_terrains()
-    if name not in plugins:
-        base = name.removesuffix(INVERTED)
-        if base in terrain_names() and "inverted" in parameters_of(get_terrain(base)):
-            raise ConfigError(f"no terrain {name!r}; use {base} with inverted = true")
-        expected = expected_names(name, [*terrain_names(), *plugins, *_registered])
-        raise ConfigError(
-            f"no terrain {name!r} is built in, installed, or registered with "
-            f"terrainkit.register_terrain; {expected}"
-        )
-    try:
-        terrain = plugins[name].load()
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{name} ({plugins[name].value}) cannot be loaded: {error}") from error
-    if not (isinstance(terrain, type) and issubclass(terrain, Terrain)):
-        raise ConfigError(
-            f"{name} ({plugins[name].value}): got {terrain!r}; expected a subclass of Terrain"
-        )
-    return terrain
+    return _get(_TERRAINS, name)  # type: ignore[no-any-return]
 
 
-@cache
-def overlay_names() -> tuple[str, ...]:
-    """Return the names of the overlays in alphabetical order, without importing them."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(overlays.__path__)))
-
-
-@cache
 def get_overlay(name: str) -> type[Overlay]:
-    """Return the overlay class `name`.
+    """Return the overlay class `name`: a built-in or registered one, or that of a plugin.
 
     Raises:
-        ConfigError: if there is no such overlay.
+        ConfigError: if there is no such overlay, or a plugin cannot be loaded.
     """
-    if name not in overlay_names():
-        raise ConfigError(f"no overlay {name!r}; {expected_names(name, overlay_names())}")
-    return _load_class(overlays, name, Overlay)  # type: ignore[no-any-return]
+    return _get(_OVERLAYS, name)  # type: ignore[no-any-return]
+
+
+@cache
+def _get(group: _Group, name: str) -> Any:
+    if name in _module_names(group):
+        return _load_class(group, name)
+    if (group.noun, name) in _registered:
+        return _registered[group.noun, name]
+    plugins = _plugins(group)
+    if name not in plugins:
+        raise _unknown_name(group, name, plugins)
+    try:
+        found = plugins[name].load()
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(f"{name} ({plugins[name].value}) cannot be loaded: {error}") from error
+    if not _is_subclass(found, group):
+        raise ConfigError(
+            f"{name} ({plugins[name].value}): got {found!r}; expected a subclass of "
+            f"{group.parent.__name__}"
+        )
+    return found
+
+
+def _unknown_name(group: _Group, name: str, plugins: Mapping[str, Any]) -> ConfigError:
+    base = name.removesuffix(INVERTED)
+    if (
+        base != name
+        and base in _module_names(group)
+        and "inverted" in parameters_of(_get(group, base))
+    ):
+        return ConfigError(f"no {group.noun} {name!r}; use {base} with inverted = true")
+    near = closest_names(name, [*_module_names(group), *plugins, *_registered_names(group)])
+    hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
+    return ConfigError(
+        f"no {group.noun} {name!r} is built in, installed, or registered with "
+        f"terrainkit.register_{group.noun}; {hint}terrainkit list prints all"
+    )
 
 
 def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
@@ -158,14 +233,14 @@ def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
     return overlay(**parameters)
 
 
-def _load_class(package: ModuleType, name: str, parent: type[Any]) -> Any:
-    """Return the subclass of `parent` in module `name` of a package."""
-    module = importlib.import_module(f"{package.__name__}.{name}")
+def _load_class(group: _Group, name: str) -> type[Any]:
+    """Return the class in module `name` of the package of a group."""
+    module = importlib.import_module(f"{group.package.__name__}.{name}")
     found: list[Any] = [value for value in vars(module).values() if inspect.isclass(value)]
-    classes = [each for each in found if issubclass(each, parent) and each.kind() == name]
+    classes = [each for each in found if issubclass(each, group.parent) and each.kind() == name]
     if len(classes) != 1:
         raise ConfigError(
-            f"{module.__file__}: got {len(classes)} subclasses of {parent.__name__} named like the "
-            "file; expected one"
+            f"{module.__file__}: got {len(classes)} subclasses of {group.parent.__name__} named "
+            "like the file; expected one"
         )
-    return classes[0]
+    return classes[0]  # type: ignore[no-any-return]

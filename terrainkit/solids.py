@@ -153,7 +153,7 @@ class Solids:
             axis = rotation_matrices(self.cylinders[:, 6:])[..., 2]
             radius, length = self.cylinders[:, 3:4], self.cylinders[:, 5:6]
             centers.append(self.cylinders[:, :3])
-            # The extent of a disc with unit normal a along x is radius sqrt(a_y^2 + a_z^2).
+            # The extent of a disk with unit normal a along x is radius sqrt(a_y^2 + a_z^2).
             across = np.hypot(np.roll(axis, 1, axis=1), np.roll(axis, 2, axis=1))
             half.append(radius * across + length * np.abs(axis))
         center, size = np.concatenate(centers).astype(float), np.concatenate(half)

@@ -21,7 +21,7 @@ class SubTerrain(Config):
     """A terrain type of a map.
 
     In Python, `terrain` may be a subclass of :class:`~terrainkit.terrain.Terrain`, which is
-    registered and replaced by its name.
+    registered and replaced by its name. The classes of `overlays` are registered, too.
 
     Raises:
         ConfigError: if there is no such terrain, or a parameter is unknown or invalid.
@@ -59,6 +59,8 @@ class SubTerrain(Config):
             super().__post_init__()
         except ConfigError as error:
             raise ConfigError(f"{self.terrain}.{error}") from None
+        for overlay in self.overlays:
+            registry.register_overlay(type(overlay))
         if self.friction is not None:
             friction = convert_range(self.terrain, "friction", self.friction, _FRICTION)
             object.__setattr__(self, "friction", friction)

@@ -124,7 +124,7 @@ class Terrain(Parameterized, ABC):
         """Return the heights on `grid` [m], shape `grid.shape`.
 
         Take random numbers only from `rng`. Sample first and scale afterward, so that the pattern
-        stays the same at every difficulty. Leave a flat disc where a robot can be spawned; see
+        stays the same at every difficulty. Leave a flat disk where a robot can be spawned; see
         :mod:`terrainkit.spawn`.
         """
 

@@ -214,19 +214,7 @@ class TerrainMap:
             ExportError: if the map has solids, or a height does not fit in 16 bits at this scale.
         """
         self.require_no_solids("a heightfield")
-        if not 0 < vertical_scale < np.inf:
-            raise ConfigError(f"vertical_scale: got {vertical_scale:g}; expected a number > 0")
-        units = np.rint(self.heights.T / vertical_scale)
-        limit = np.iinfo(np.int16)
-        low, high = float(units.min()), float(units.max())
-        if not (limit.min <= low and high <= limit.max):
-            # 1 % more, so that the rounded value in the message is sufficient.
-            minimum = max(high / limit.max, low / limit.min) * vertical_scale * 1.01
-            raise ExportError(
-                f"heights from {self.heights.min():g} to {self.heights.max():g} m do not fit in "
-                f"int16 at vertical_scale {vertical_scale:g}; expected at least {minimum:.3g}"
-            )
-        return np.ascontiguousarray(units, dtype=np.int16)
+        return np.ascontiguousarray(int16_heights(self.heights.T, vertical_scale))
 
     @property
     def patch_names(self) -> NDArray[np.str_]:
@@ -255,6 +243,14 @@ class TerrainMap:
             raise ExportError(
                 f"got a map with {len(self.solids)} solids, which {what} cannot represent; "
                 "expected a mesh (.stl, .ply, .obj, .glb) or MuJoCo model (.xml)"
+            )
+
+    def require_one_friction(self, what: str) -> None:
+        """Raise ExportError if the map has several friction coefficients; `what` has one."""
+        if not self.has_one_friction:
+            raise ExportError(
+                f"got a map with several friction coefficients, which {what} cannot represent; "
+                "expected no friction of sub-terrains, friction patches or solids"
             )
 
     def warn_about_friction(self, what: str) -> None:
@@ -408,3 +404,26 @@ def _points(name: str, values: ArrayLike, size: int) -> tuple[NDArray[np.float64
             f"{name}: got shape {points.shape}; expected finite values of shape (..., {size})"
         )
     return points.reshape(-1, size), points.shape[:-1]
+
+
+def int16_heights(heights: NDArray[np.floating], vertical_scale: float) -> NDArray[np.int16]:
+    """Return `heights` in units of `vertical_scale` [m].
+
+    Raises:
+        ConfigError: if `vertical_scale` is not above 0.
+        ExportError: if a height does not fit in 16 bits.
+    """
+    if not 0 < vertical_scale < np.inf:
+        raise ConfigError(f"vertical_scale: got {vertical_scale:g}; expected a number > 0")
+    units = np.rint(heights / vertical_scale)
+    limit = np.iinfo(np.int16)
+    low, high = float(units.min()), float(units.max())
+    if not (limit.min <= low and high <= limit.max):
+        # 1 % more, so that the rounded value in the message is sufficient.
+        minimum = max(high / limit.max, low / limit.min) * vertical_scale * 1.01
+        raise ExportError(
+            f"heights from {heights.min():g} to {heights.max():g} m do not fit in "
+            f"int16 at vertical_scale {vertical_scale:g}; expected at least {minimum:.3g}"
+        )
+    result: NDArray[np.int16] = units.astype(np.int16)
+    return result

@@ -56,6 +56,18 @@ def _similar(lower: str, names: Sequence[str], min_ratio: float) -> str:
     return best
 
 
+def closest_names(word: str, names: Iterable[str], number: int = 3) -> list[str]:
+    """Return up to `number` names similar to `word`, the most similar first."""
+    from difflib import get_close_matches
+
+    if len(word) > MAX_LENGTH:
+        return []
+    names = list(names)
+    first = closest(word, names)
+    similar = get_close_matches(word.lower(), names, number)
+    return list(dict.fromkeys([first, *similar] if first else similar))[:number]
+
+
 def expected_names(
     name: str, names: Iterable[str], prefix: str = "there are", closest_name: str = ""
 ) -> str:

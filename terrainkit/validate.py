@@ -1,6 +1,6 @@
-"""Validate a map: spawn discs, mesh, recorded parameters and difficulty.
+"""Validate a map: spawn disks, mesh, recorded parameters and difficulty.
 
-Everything is recomputed from the map alone. Spawn discs are sampled on the surface, the mesh is
+Everything is recomputed from the map alone. Spawn disks are sampled on the surface, the mesh is
 checked edge by edge and face by face, and each patch is compared with a second build of it.
 Imported and edited maps (mode custom) are not compared with their config.
 """
@@ -146,7 +146,7 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         yield f"{location}: the spawn origin is {moved:.3f} m from that of its config"
     if expected.spawn_offset > expected.grid.cell:
         yield (
-            f"{location}: no flat disc at the spawn position of {expected.terrain}: the origin is "
+            f"{location}: no flat disk at the spawn position of {expected.terrain}: the origin is "
             f"{expected.spawn_offset:.3f} m away, where a robot may be beyond the obstacle"
         )
     error = float(np.abs(patch.heights - expected.heights).max())
@@ -209,12 +209,12 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
     config = terrain_map.config
     if 2 * config.spawn_radius > min(config.patch_size):
         x, y = config.patch_size
-        yield f"no disc of radius {config.spawn_radius:g} m fits in a patch of {x:g} m x {y:g} m"
+        yield f"no disk of radius {config.spawn_radius:g} m fits in a patch of {x:g} m x {y:g} m"
         return
     radius = config.spawn_radius * np.linspace(0, 1, max(3, round(config.spawn_radius / 0.05)))
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    disc = (radius[:, None, None] * circle).reshape(-1, 2)
+    disk = (radius[:, None, None] * circle).reshape(-1, 2)
     for row, col in np.ndindex(terrain_map.difficulty.shape):
         spawns = terrain_map.patch(row, col).spawns.astype(np.float64)
         for number, (*xy, z, _) in enumerate(spawns):
@@ -223,8 +223,8 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
             grid = config.patch_grid(row, col)
             if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
                 yield f"{subject} is outside the patch"
-            ground = terrain_map.height(xy + disc)
-            free = terrain_map.clearance(xy + disc).min()
+            ground = terrain_map.height(xy + disk)
+            free = terrain_map.clearance(xy + disk).min()
             if free < config.spawn_headroom - TOLERANCE:
                 headroom = config.spawn_headroom
                 yield f"{subject} has {free:.3f} m of headroom; expected {headroom:g} m"

@@ -82,7 +82,7 @@ class PolicyCommand(Command):
 
         return open_run(self.policy, optional_number(self.checkpoint))
 
-    def evaluation_config(self, seconds: float) -> "EvaluationConfig":
+    def eval_config(self, seconds: float) -> "EvaluationConfig":
         """Return the settings of the rollout.
 
         Raises:
@@ -103,12 +103,13 @@ class PolicyCommand(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(PolicyCommand):
-    """Measure the velocity errors, falls and success of a policy.
+    """Measure the velocity errors, gait, falls and success of a policy.
 
     On a plane, the commands of the robots form a grid over the command ranges of the task. On a
-    map, robots walk forward from the spawn origin of every patch until they have crossed half of
-    it. The rollout has no noise, pushes or domain randomization. The first 2 s after a command are
-    not measured, and nothing is measured after a fall. The same seed gives the same result.
+    map, robots walk forward, backward, left and right from the spawn origin of every patch until
+    they have crossed half of it. The rollout has no noise, pushes or domain randomization. The
+    first 2 s after a command are not measured, and nothing is measured after a fall. The same seed
+    gives the same result.
     """
 
     seconds: float = 20.0
@@ -120,35 +121,44 @@ class Evaluate(PolicyCommand):
     output: Output = ""
     """Write the result to this file, as JSON."""
 
+    diagram: Annotated[str, text_option("PNG")] = ""
+    """Draw the contacts of the feet over 2 s in this picture."""
+
     overwrite: Flag = False
-    """Replace an existing file."""
+    """Replace existing files."""
 
     def run(self) -> int:
         """Evaluate the policy, and print or write the result."""
         from terrainkit.atomic_write import atomic_write, check_target
 
-        output = Path(self.output) if self.output else None
-        if output is not None:
-            check_target(output, overwrite=self.overwrite)  # before the rollout
+        output, diagram = (Path(each) if each else None for each in (self.output, self.diagram))
+        for target in filter(None, (output, diagram)):
+            check_target(target, overwrite=self.overwrite)  # before the rollout
         run = self.load_run()
         from terrainkit_robots.policy.evaluate import evaluate
 
         with render.steps() as steps:
             result = evaluate(
                 run,
-                self.evaluation_config(self.seconds),
+                self.eval_config(self.seconds),
                 lambda fraction: steps.update(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
         if self.format == "json":
             render.report(result.as_json())
         else:
-            render.result(summary_line(result))
+            render.result("\n".join([summary_line(result), *gait_lines(result)]))
             render.table(result_rows(result))
         if output is not None:
             with atomic_write(output, overwrite=self.overwrite) as path:
                 path.write_text(result.as_json(), encoding="utf-8")
+        if diagram is not None:
+            from terrainkit_robots.policy.gait import draw_contacts
+
+            with atomic_write(diagram, overwrite=self.overwrite) as path:
+                path.write_bytes(draw_contacts(result.contacts, result.dt))
+        for target in filter(None, (output, diagram)):
             if self.format == "table":
-                render.result(f"wrote {output}")
+                render.result(f"wrote {target}")
         return 0
 
 
@@ -174,39 +184,66 @@ def format_errors(metrics: "RolloutMetrics") -> tuple[str, str]:
     return f"{lin} m/s ({lin_1s} averaged over 1 s)", f"{ang} rad/s ({ang_1s} averaged over 1 s)"
 
 
+def gait_lines(result: "EvaluationResult") -> list[str]:
+    """Return the gait of the robots that are commanded to move, and a contact diagram, as lines."""
+    metrics, feet = result.metrics, list(result.contacts)
+    lines = [] if metrics.followed is None else [f"commands followed: {metrics.followed:.0%}"]
+    if metrics.swing_height is None or metrics.duty_factor is None:
+        return lines
+    heights = (_number(each, 100, 1) for each in metrics.swing_height)
+    values = (
+        f"{_number(metrics.step_frequency, 1, 1)} steps/s per foot",
+        f"feet slip at {_number(metrics.foot_slip, 1, 2)} m/s",
+        f"left and right differ by {_percent(metrics.asymmetry)}",
+        f"nose down {_number(metrics.base_pitch, 180 / math.pi, 1)} deg",
+        f"cost of transport {_number(metrics.cost_of_transport, 1, 2)}",
+    )
+    swings = ", ".join(f"{foot} {height}" for foot, height in zip(feet, heights, strict=True))
+    lines += [f"gait: {', '.join(values)}", f"swing height [cm]: {swings}"]
+    width = max(map(len, feet))
+    for (foot, contacts), duty in zip(result.contacts.items(), metrics.duty_factor, strict=True):
+        blocks = contacts.translate({ord("1"): "#", ord("0"): "."})
+        lines.append(f"{foot:{width}}  {blocks}  {_percent(duty)} in contact")
+    return lines
+
+
 def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
     """Return the groups of a result as rows of a table: by command, or by terrain and level."""
     groups = result.groups
     if "by_command" in groups:
-        rows: list[tuple[str, ...]] = [("forward", "left", "yaw", "fell", "m/s", "rad/s")]
+        head = "forward", "left", "yaw", "fell", "m/s", "rad/s", "followed", "swing [cm]"
+        rows: list[tuple[str, ...]] = [head]
         for group in groups["by_command"]:
             command = (f"{value:g}" for value in group.command or ())
             fell = str(group.falls) if group.robots == 1 else f"{group.falls}/{group.robots}"
             errors = _number(group.lin_vel_error), _number(group.ang_vel_error)
-            rows.append((*command, fell, *errors))
+            swing = [each for each in group.swing_height or () if each is not None]
+            lowest = _number(min(swing, default=None), 100, 1)
+            rows.append((*command, fell, *errors, _percent(group.followed), lowest))
         return rows
     if "by_terrain" not in groups:
         return []
     levels = [group.level for group in groups["by_level"]]
-    success = {(each.terrain, each.level): each.success for each in groups["by_terrain_and_level"]}
-    head = "terrain", "robots", "fell", "m/s", "rad/s", "success"
-    rows = [(*head, *(f"level {level}" if level == levels[0] else str(level) for level in levels))]
-    for group in groups["by_terrain"]:
+    by_level = *groups["by_terrain_and_level"], *groups.get("by_direction_and_level", ())
+    success = {(each.terrain or each.direction, each.level): each.success for each in by_level}
+    names = "terrain", "robots", "fell", "m/s", "rad/s", "success"
+    rows = [(*names, *(f"level {level}" if level == levels[0] else str(level) for level in levels))]
+    for group in (*groups["by_terrain"], *groups.get("by_direction", ())):
         cells = (
-            str(group.terrain),
+            str(group.terrain or group.direction),
             str(group.robots),
             str(group.falls),
             _number(group.lin_vel_error),
             _number(group.ang_vel_error),
             _percent(group.success),
         )
-        by_level = (_percent(success.get((group.terrain, level))) for level in levels)
-        rows.append((*cells, *by_level))
+        key = group.terrain or group.direction
+        rows.append((*cells, *(_percent(success.get((key, level))) for level in levels)))
     return rows
 
 
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
+def _number(value: float | None, factor: float = 1, digits: int = 3) -> str:
+    return "-" if value is None else f"{factor * value:.{digits}f}"
 
 
 def _percent(value: float | None) -> str:

@@ -68,11 +68,11 @@ def _report_lines(report: "ImportReport", *, has_solids: bool) -> list[str]:
     lines = []
     if report.num_missing:
         lines.append(f"filled {report.num_missing} missing heights")
-    if report.largest_error_at:
-        x, y = report.largest_error_at
+    if report.max_error_at:
+        x, y = report.max_error_at
         lines.append(
             f"overhangs over {report.overhang_area:.2f} m2, of which {report.lost_area:.2f} m2 are "
-            f"lost; largest error {report.largest_error:.3f} m at ({x:.2f}, {y:.2f})"
+            f"lost; largest error {report.max_error:.3f} m at ({x:.2f}, {y:.2f})"
             + ("" if has_solids else "; --solids keeps those of closed bodies")
         )
     return lines

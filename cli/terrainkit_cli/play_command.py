@@ -8,7 +8,7 @@ import tyro
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
-from terrainkit_cli.evaluate_command import PolicyCommand, result_rows, summary_line
+from terrainkit_cli.evaluate_command import PolicyCommand, gait_lines, result_rows, summary_line
 from terrainkit_cli.robot_options import Flag, Output
 from terrainkit_cli.training_extra import require_training
 
@@ -56,7 +56,7 @@ class Play(PolicyCommand):
             require_training("imageio_ffmpeg")  # before the rollout
         run = self.load_run()
         target = Path(self.output or f"{run.folder.resolve().name}.mp4")
-        config = self.evaluation_config(self.seconds)
+        config = self.eval_config(self.seconds)
         from terrainkit_robots.policy.play import play, view
         from terrainkit_robots.rendering.video import check_video_path, check_video_size
 
@@ -77,7 +77,7 @@ class Play(PolicyCommand):
                     f"rollout: {fraction:.0%} of {self.seconds:g} s"
                 ),
             )
-        render.result(summary_line(result.evaluation))
+        render.result("\n".join([summary_line(result.evaluation), *gait_lines(result.evaluation)]))
         render.table(result_rows(result.evaluation))
         if result.video is not None:
             self._write(result.video, target)

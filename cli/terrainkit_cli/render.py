@@ -209,12 +209,20 @@ def _training_line(progress: "TrainingProgress") -> None:
         lines.append([f"{name} {value}" for name, value in _training_metrics(progress)])
     if iteration % TERMS_INTERVAL == 0 or iteration == last:
         terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
-        lines.append(
-            terms + [f"{name} {value:+.3f} /s" for name, value in progress.rewards.items()]
-        )
+        rewards = [f"{name} {value}" for name, value in _training_rewards(progress)]
+        lines.append(terms + rewards)
     with suppress(OSError):  # such as that of a closed terminal
         for line in filter(None, lines):
             print(f"iteration {iteration}/{last}: {', '.join(line)}", file=sys.stderr, flush=True)
+
+
+def _training_rewards(progress: "TrainingProgress") -> list[tuple[str, str]]:
+    """Return each reward per second, and as a share of the most that it can be.
+
+    The share of a penalty is relative to the sum of the most that all rewards can be.
+    """
+    shares = progress.shares
+    return [(k, f"{v:+.3f} /s ({shares[k]:.0%})") for k, v in progress.rewards.items()]
 
 
 def _training_metrics(progress: "TrainingProgress") -> list[tuple[str, str]]:
@@ -227,6 +235,9 @@ def _training_metrics(progress: "TrainingProgress") -> list[tuple[str, str]]:
     if progress.reward is not None and progress.episode_length is not None:
         metrics.insert(2, ("reward", f"{progress.reward:.2f}"))
         metrics.insert(3, ("episode", f"{progress.episode_length:.1f} s"))
+    if progress.falls is not None and progress.speed is not None:
+        metrics.insert(4, ("falls", f"{progress.falls:.0%}"))
+        metrics.insert(5, ("speed", f"{progress.speed:.2f} m/s"))
     return metrics + [(f"level {name}", f"{level:.1f}") for name, level in progress.levels.items()]
 
 
@@ -244,8 +255,8 @@ def _training_table(progress: "TrainingProgress") -> "Table":
         table.add_row(name, value + reached)
     table.add_row("time learning", f"{progress.learning_fraction:.0%}")
     table.add_section()
-    for name, reward in progress.rewards.items():
-        table.add_row(name, f"{reward:+.3f} /s")
+    for row in _training_rewards(progress):
+        table.add_row(*row)
     return table
 
 

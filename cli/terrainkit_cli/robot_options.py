@@ -97,13 +97,13 @@ def parse_settings(
     )
 
 
-def parse_pairs(option: str, texts: Sequence[str], separator: str, expected: str) -> dict[str, str]:
+def parse_pairs(option: str, texts: Sequence[str], sep: str, expected: str) -> dict[str, str]:
     """Return the values of an option that assigns values to names.
 
     Args:
         option: Name of the option.
         texts: Its values.
-        separator: Text between a name and a value.
+        sep: Text between a name and a value.
         expected: The expected format, for error messages.
 
     Raises:
@@ -111,8 +111,8 @@ def parse_pairs(option: str, texts: Sequence[str], separator: str, expected: str
     """
     pairs: dict[str, str] = {}
     for text in texts:
-        name, found, value = (part.strip() for part in text.partition(separator))
-        if not name or not found or not (value or separator == ":="):
+        name, found, value = (part.strip() for part in text.partition(sep))
+        if not name or not found or not (value or sep == ":="):
             raise ConfigError(f"{option}: got {text!r}; expected {expected}")
         if name in pairs:
             raise ConfigError(f"{option}: got {name} twice; expected each name once")

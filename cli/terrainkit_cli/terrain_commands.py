@@ -175,13 +175,16 @@ class List(Command):
 
         if not self.terrain:
             render.table(list(terrain_summaries().items()))
-            if names := registry.registered_terrains():
+            if names := (*registry.registered_terrains(), *registry.registered_overlays()):
                 render.result(f"\nregistered: {', '.join(names)}")
             if others := registry.plugin_terrains():
                 render.result("\nfrom other packages:")
                 render.table([(f"  {name}", point.value) for name, point in others.items()])
             render.result("\noverlays, which change any terrain:")
             render.table([(f"  {name}", text) for name, text in overlay_summaries().items()])
+            if others := registry.plugin_overlays():
+                render.result("\noverlays from other packages:")
+                render.table([(f"  {name}", point.value) for name, point in others.items()])
             mixes = (
                 (name, ", ".join(c.name for c in presets.get_preset(name)))
                 for name in presets.preset_names()
@@ -190,7 +193,7 @@ class List(Command):
             render.table([(f"  {name}", mix) for name, mix in mixes])
             render.result("\nterrainkit list NAME shows the parameters of a terrain or overlay.")
             return 0
-        is_overlay = self.terrain in registry.overlay_names()
+        is_overlay = self.terrain in (*registry.overlay_names(), *registry.plugin_overlays())
         about = (overlay_doc if is_overlay else terrain_doc)(self.terrain)
         render.result(f"{about.name}: {about.text}\n")
         rows = [("parameter", "easy", "hard", "")]

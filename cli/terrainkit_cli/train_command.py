@@ -82,6 +82,7 @@ class Train(TaskCommand):
                 folder=Path(self.log_dir) if self.log_dir else None,
                 resume=run,
                 device=self.device,
+                start_callback=lambda runner: _print_start(runner, terrain),
                 progress_callback=show_progress,
                 should_stop=stop_signal,
             )
@@ -109,6 +110,16 @@ class Train(TaskCommand):
 
     def _terrain(self, run: "Run | None") -> str:
         return self.terrain or ("plane" if run is None else run.terrain)
+
+
+def _print_start(runner: "LeggedRunner", terrain: str) -> None:
+    """Print at once what is trained, where, and with how many threads."""
+    from terrainkit_robots.text import count, display_path
+
+    env = runner.env.cfg.env
+    where = f"{runner.env.robot.spec.name} on {display_path(terrain)}"
+    parallel = f"{count(env.num_envs, 'robot')}, {count(env.num_threads, 'thread')}"
+    render.note(f"training {where}: {parallel}, in {runner.folder}")
 
 
 def _print_result(runner: "LeggedRunner", task: "Task") -> None:

@@ -7,11 +7,11 @@ from pathlib import Path
 from terrainkit.text import truncate
 
 
-def names(words: Iterable[str], max_count: int = 6, separator: str = ", ") -> str:
+def names(items: Iterable[str], max_count: int = 6, sep: str = ", ") -> str:
     """Return words as `a, b, c`, with `...` in place of all after the first `max_count`."""
-    words = list(words)
-    shown = [truncate(word) for word in words[:max_count]]
-    return separator.join(shown + ["..."] * (len(words) > max_count))
+    items = list(items)
+    shown = [truncate(word) for word in items[:max_count]]
+    return sep.join(shown + ["..."] * (len(items) > max_count))
 
 
 def count(number: int, word: str) -> str:
@@ -41,10 +41,10 @@ def one_line(text: str) -> str:
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
-def free_name(name: str, taken: Container[str]) -> str:
+def free_name(name: str, used_names: Container[str]) -> str:
     """Return `name`, or the first of name_2, name_3, ... that is not taken."""
     free, number = name, 2
-    while free in taken:
+    while free in used_names:
         free, number = f"{name}_{number}", number + 1
     return free
 

@@ -1,10 +1,17 @@
-"""Write the trimesh. Binary STL and PLY need no other library; OBJ and GLB need trimesh."""
+"""Write the trimesh.
 
+Blocks of vertices and faces are written one after the other, so that no second copy of the mesh is
+needed.
+"""
+
+import json
+import struct
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
+from terrainkit.errors import ExportError
 from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.tri_mesh import TriMesh
 
@@ -15,7 +22,10 @@ SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 BYTES_PER_SAMPLE = BYTES_PER_NODE
 
 _FACES_PER_BLOCK = 1 << 15
-"""Faces that are written at a time, so that no copy of the whole mesh is needed."""
+"""Faces or vertices that are written at a time."""
+
+_MAX_GLB_BYTES = (1 << 32) - 1
+"""Largest file that the header of a .glb can describe."""
 
 _STL_FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _PLY_FACE = np.dtype([("count", "u1"), ("vertices", "<i4", 3)])
@@ -41,43 +51,38 @@ def export(
     terrain_map.warn_about_friction("a mesh file")
     mesh = terrain_map.mesh(merged=not full, closed=closed)
     if y_up:
-        vertices = mesh.vertices[:, [0, 2, 1]] * np.array([1, 1, -1], dtype=np.float32)
-        mesh = TriMesh(vertices=vertices, triangles=mesh.triangles)
+        y, z = mesh.vertices[:, 1].copy(), mesh.vertices[:, 2].copy()
+        mesh.vertices[:, 1], mesh.vertices[:, 2] = z, -y
     suffix = path.suffix.lower()
-    if suffix == ".stl":
-        _write_stl(mesh, path)
-    elif suffix == ".ply":
-        _write_ply(mesh, path)
-    else:
-        import trimesh
-
-        trimesh.Trimesh(
-            vertices=mesh.vertices,
-            faces=mesh.triangles,
-            process=False,
-            metadata=terrain_map.config.contact,
-        ).export(path)
+    with path.open("wb") as file:
+        if suffix == ".stl":
+            _write_stl(mesh, file)
+        elif suffix == ".ply":
+            _write_ply(mesh, file)
+        elif suffix == ".obj":
+            _write_obj(mesh, file)
+        else:
+            _write_glb(mesh, file, terrain_map.config.contact)
 
 
-def _write_stl(mesh: TriMesh, path: Path) -> None:
+def _write_stl(mesh: TriMesh, file: BinaryIO) -> None:
     """Write a binary STL file, in which each face has its normal and the positions of its corners.
 
     A header that starts with `solid` would mark a text file.
     """
-    with path.open("wb") as file:
-        file.write(b"terrain, in meters".ljust(80))
-        file.write(np.array(len(mesh.triangles), dtype="<u4").tobytes())
-        for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
-            corners = mesh.vertices[mesh.triangles[start : start + _FACES_PER_BLOCK]]
-            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-            faces = np.zeros(len(corners), dtype=_STL_FACE)
-            faces["normal"] = normals / np.where(lengths > 0, lengths, 1)
-            faces["corners"] = corners
-            file.write(faces.tobytes())
+    file.write(b"terrain, in meters".ljust(80))
+    file.write(np.array(len(mesh.triangles), dtype="<u4").tobytes())
+    for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
+        corners = mesh.vertices[mesh.triangles[start : start + _FACES_PER_BLOCK]]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        faces = np.zeros(len(corners), dtype=_STL_FACE)
+        faces["normal"] = normals / np.where(lengths > 0, lengths, 1)
+        faces["corners"] = corners
+        file.write(faces.tobytes())
 
 
-def _write_ply(mesh: TriMesh, path: Path) -> None:
+def _write_ply(mesh: TriMesh, file: BinaryIO) -> None:
     """Write a binary PLY file."""
     header = f"""ply
 format binary_little_endian 1.0
@@ -89,11 +94,83 @@ element face {len(mesh.triangles)}
 property list uchar int vertex_indices
 end_header
 """
-    with path.open("wb") as file:
-        file.write(header.encode())
-        file.write(np.ascontiguousarray(mesh.vertices, dtype="<f4").data)
-        for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
-            triangles = mesh.triangles[start : start + _FACES_PER_BLOCK]
-            faces = np.empty(len(triangles), dtype=_PLY_FACE)
-            faces["count"], faces["vertices"] = 3, triangles
-            file.write(faces.tobytes())
+    file.write(header.encode())
+    file.write(np.ascontiguousarray(mesh.vertices, dtype="<f4").data)
+    for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
+        triangles = mesh.triangles[start : start + _FACES_PER_BLOCK]
+        faces = np.empty(len(triangles), dtype=_PLY_FACE)
+        faces["count"], faces["vertices"] = 3, triangles
+        file.write(faces.tobytes())
+
+
+def _write_obj(mesh: TriMesh, file: BinaryIO) -> None:
+    """Write an OBJ file: text with a vertex or face per line, in which vertices count from 1."""
+    for line, values, first in (
+        ("v %.6f %.6f %.6f\n", mesh.vertices, 0),
+        ("f %d %d %d\n", mesh.triangles, 1),
+    ):
+        for start in range(0, len(values), _FACES_PER_BLOCK):
+            block = values[start : start + _FACES_PER_BLOCK] + first
+            file.write((line * len(block) % tuple(block.ravel().tolist())).encode())
+
+
+def _write_glb(mesh: TriMesh, file: BinaryIO, extras: dict[str, float]) -> None:
+    """Write a binary glTF 2.0 file: a header, a chunk of JSON, and a chunk with the arrays.
+
+    Raises:
+        ExportError: if the file would exceed the size that its header can describe.
+    """
+    # The indices are unsigned, and int32 has the same bytes.
+    arrays = [
+        np.ascontiguousarray(mesh.vertices, "<f4"),
+        np.ascontiguousarray(mesh.triangles, "<i4"),
+    ]
+    (num_vertices, _), (num_faces, _) = mesh.vertices.shape, mesh.triangles.shape
+    num_bytes = sum(array.nbytes for array in arrays)
+    scene = {
+        "asset": {"version": "2.0", "generator": "terrainkit"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "terrain", "mesh": 0}],
+        "meshes": [
+            {"extras": extras, "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}
+        ],
+        "accessors": [
+            {
+                "bufferView": 0,
+                "componentType": 5126,  # float
+                "count": num_vertices,
+                "type": "VEC3",
+                "min": arrays[0].min(axis=0).tolist(),
+                "max": arrays[0].max(axis=0).tolist(),
+            },
+            {
+                "bufferView": 1,
+                "componentType": 5125,  # unsigned int
+                "count": 3 * num_faces,
+                "type": "SCALAR",
+            },
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": arrays[0].nbytes, "target": 34962},
+            {
+                "buffer": 0,
+                "byteOffset": arrays[0].nbytes,
+                "byteLength": arrays[1].nbytes,
+                "target": 34963,
+            },
+        ],
+        "buffers": [{"byteLength": num_bytes}],
+    }
+    text = json.dumps(scene, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)  # chunks begin at multiples of 4 bytes
+    total = 12 + 8 + len(text) + 8 + num_bytes
+    if total > _MAX_GLB_BYTES:
+        raise ExportError(
+            f"a .glb file: got {total} bytes; expected at most {_MAX_GLB_BYTES}; use .ply"
+        )
+    file.write(struct.pack("<4sII", b"glTF", 2, total))
+    file.write(struct.pack("<I4s", len(text), b"JSON") + text)
+    file.write(struct.pack("<I4s", num_bytes, b"BIN\0"))
+    for array in arrays:
+        file.write(array.data)

@@ -6,8 +6,11 @@ geoms of any other body. All geoms have one class that sets every attribute, sin
 defaults would apply otherwise.
 """
 
+import itertools
+import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -22,6 +25,7 @@ from terrainkit.box_decomposition import (
 )
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.solid_raster import SolidRaster
 from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
@@ -44,13 +48,17 @@ _RINGS = 2
 """Samples around the patches that belong to the heightfield. The ground of the border's first cell
 slopes toward the patch, so the heightfield has to extend beyond that cell."""
 
+_HFIELD_LENGTH = 16.0
+"""Length at which heightfields beside boxes are divided [m]; a long one enlarges many nodes of
+MuJoCo's bounding volume hierarchy."""
+
 _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
 
 MAX_BOXES = 100
 """Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
-step of the bundled quadruped takes about 1.75 times that on a plane. Four runs of
-benchmarks/collision.py gave 50 to 130."""
+step of the bundled quadruped takes about 1.8 times that on a plane. Two runs of
+benchmarks/collision.py gave 91."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -69,6 +77,12 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         ConfigError: if `collision` is invalid.
         MemoryLimitError: if the map would not fit in memory.
     """
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        write_model(terrain_map, file, collision)
+
+
+def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -> None:
+    """Write the map as MJCF to an open file; see :func:`export`."""
     collision = convert("collision", collision, Collision)
     samples = terrain_map.heights.size
     check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
@@ -89,15 +103,20 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         boxes = zip(cover.centers, cover.half_sizes, cover.friction, strict=True)
         for center, half_size, friction in boxes:
             _set_friction(_add_box(world, center, half_size), friction, static)
-    # Padding provides the samples beyond the map where there is no border.
-    heights = np.pad(heights, _RINGS, mode="edge")
     split = [each for part in parts for each in _split_by_friction(terrain_map, part)]
     for k, (part, friction) in enumerate(split):
         name = "terrain" if cover is None and len(split) == 1 else f"terrain_{k}"
-        _set_friction(_add_hfield(asset, world, name, terrain_map, heights, part), friction, static)
+        geom = _add_hfield(asset, world, name, terrain_map, heights, (part, k))
+        _set_friction(geom, friction, static)
     _add_solids(asset, world, terrain_map.solids, static)
     ET.indent(root)
-    ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    # The elevation data are the larger part of the file. They are written row by row.
+    texts = re.split('(?<=elevation=")([0-9]+)(?=")', ET.tostring(root, encoding="unicode"))
+    file.write('<?xml version="1.0" encoding="utf-8"?>\n')
+    for text, number in zip(texts[::2], [*texts[1::2], ""], strict=True):
+        file.write(text)
+        if number:
+            file.writelines(_elevation_rows(heights, split[int(number)][0]))
 
 
 def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
@@ -106,7 +125,8 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
         return None
     if collision == "auto":
         threshold = terrain_map.config.wall_threshold
-        if not flat_cells(terrain_map.heights, terrain_map.grid, threshold).all():
+        grid = NodeGrid.from_heights(terrain_map.heights, terrain_map.grid, threshold)
+        if not flat_cells(grid).all():
             return None
         cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
         num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
@@ -166,13 +186,35 @@ def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list
     row, col = np.nonzero(patches)
     merged = merge_boxes(np.column_stack([0.0 * row, row, row + 1, col, col + 1]))
     # The surface at the edge of a patch depends on the next sample, too.
-    return [
+    parts = [
         (
             slice(edges_x[r0] - (r0 > 0), edges_x[r1] + (r1 < len(edges_x) - 1)),
             slice(edges_y[c0] - (c0 > 0), edges_y[c1] + (c1 < len(edges_y) - 1)),
         )
         for _, r0, r1, c0, c1 in merged.astype(int).tolist()
     ]
+    max_length = max(_HFIELD_LENGTH / terrain_map.config.cell, 1.0)
+    return [each for part in parts for each in _divide(part, max_length)]
+
+
+def _divide(part: _Part, max_length: float) -> list[_Part]:
+    """Divide a part into equal parts of about `max_length`, which share samples where they meet."""
+    spans = []
+    for each in part:
+        cells = each.stop - each.start - 1
+        lines = np.linspace(each.start, each.stop - 1, max(1, round(cells / max_length)) + 1)
+        spans.append([slice(a, b + 1) for a, b in itertools.pairwise(lines.astype(int).tolist())])
+    x, y = spans
+    return [(i, j) for i in x for j in y]
+
+
+def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:
+    """Return the samples of a part that are on the map, counted on the map."""
+    x, y = (
+        slice(max(each.start - _RINGS, 0), min(each.stop - _RINGS, size))
+        for each, size in zip(part, shape, strict=True)
+    )
+    return x, y
 
 
 def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Part, float]]:
@@ -180,10 +222,14 @@ def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Pa
 
     The friction changes at a sample, half a cell beyond the edge of the cells that have it.
     """
-    friction = np.pad(terrain_map.friction, _RINGS, mode="edge")[part]
+    friction = terrain_map.friction[_on_map(part, terrain_map.friction.shape)]
     x, y = changes(friction), changes(friction.T)
     i, j = (each.ravel() for each in np.indices((len(x) - 1, len(y) - 1)))
     values = friction[x[i], y[j]]
+    for edges, samples in zip((x, y), part, strict=True):
+        # The samples beyond the map have the friction of its edge.
+        edges[1:-1] += max(_RINGS - samples.start, 0)
+        edges[-1] = samples.stop - samples.start
     merged = merge_boxes(np.column_stack([values, x[i], x[i + 1], y[j], y[j + 1]]))
     first, last = ([each.start for each in part], [each.stop for each in part])
     result = []
@@ -211,29 +257,45 @@ def _add_hfield(
     name: str,
     terrain_map: "TerrainMap",
     heights: NDArray[np.float32],
-    part: _Part,
+    numbered_part: tuple[_Part, int],
 ) -> ET.Element:
-    """Add a part of the padded heights as a heightfield."""
-    cell = terrain_map.config.cell
-    samples = heights[part]
+    """Add a part of the heights as a heightfield; its elevation data is the number of the part."""
+    (part, number), cell = numbered_part, terrain_map.config.cell
+    samples = heights[_on_map(part, heights.shape)]
     low = float(samples.min())
-    levels = np.rint((samples - low) / _QUANTUM).astype(np.int32)
-    span = max(int(levels.max()), 1) * _QUANTUM  # MuJoCo requires a range above 0
-    half = [(n - 1) * cell / 2 for n in samples.shape]
+    span = max(int(_levels(samples.max(), low)), 1) * _QUANTUM  # MuJoCo requires a range above 0
+    nx, ny = (each.stop - each.start for each in part)
+    half = [(n - 1) * cell / 2 for n in (nx, ny)]
     middle = [((s.start + s.stop) / 2 - _RINGS) * cell for s in part]
     ET.SubElement(
         asset,
         "hfield",
         name=name,
-        nrow=str(samples.shape[1]),  # MuJoCo's rows are along y, its columns along x
-        ncol=str(samples.shape[0]),
+        nrow=str(ny),  # MuJoCo's rows are along y, its columns along x
+        ncol=str(nx),
         size=_numbers(*half, span, THICKNESS),
-        # Inline elevation starts with the row of the largest y.
-        elevation="\n".join(" ".join(map(str, row.tolist())) for row in levels.T[::-1]),
+        elevation=str(number),
     )
     position = _numbers(*np.add(terrain_map.grid.lower, middle), low)
     about = {"class": "terrain", "type": "hfield", "hfield": name, "pos": position}
     return ET.SubElement(world, "geom", about)
+
+
+def _levels(heights: Any, low: float) -> NDArray[np.int32]:
+    """Return the heights above `low` in units of `_QUANTUM`."""
+    return np.asarray(np.rint((heights - low) / _QUANTUM), dtype=np.int32)
+
+
+def _elevation_rows(heights: NDArray[np.float32], part: _Part) -> Iterator[str]:
+    """Yield the elevation data of a part; inline data starts with the row of the largest y."""
+    low = float(heights[_on_map(part, heights.shape)].min())
+    # Samples beyond the map, where there is no border, have the height of its edge.
+    x, y = (
+        np.clip(np.arange(each.start, each.stop) - _RINGS, 0, size - 1)
+        for each, size in zip(part, heights.shape, strict=True)
+    )
+    for j in y[::-1].tolist():
+        yield " ".join(map(str, _levels(heights[x, j], low).tolist())) + "\n"
 
 
 def _border_boxes(

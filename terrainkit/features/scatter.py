@@ -1,4 +1,4 @@
-"""Scatter objects at random positions with a minimum distance, as in Poisson-disc sampling."""
+"""Scatter objects at random positions with a minimum distance, as in Poisson-disk sampling."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +21,19 @@ def scatter(
     gap: float = 0.0,
     platform: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return random positions and radii of discs that keep their distance.
+    """Return random positions and radii of disks that keep their distance.
 
-    The discs are far apart where there is space. With a smaller gap, more discs come after the
-    same first ones, so that the pattern is the same at every difficulty. Any two discs are at
-    least `gap` apart, and a disc is at least half of it from the edge of the patch, so that a robot
+    The disks are far apart where there is space. With a smaller gap, more disks come after the
+    same first ones, so that the pattern is the same at every difficulty. Any two disks are at
+    least `gap` apart, and a disk is at least half of it from the edge of the patch, so that a robot
     that is narrower than `gap` reaches every free place.
 
     Args:
         grid: Grid of the patch.
         rng: Generator of the random numbers.
         radius: Minimum and maximum radius [m].
-        number: Maximum number of discs.
-        gap: Minimum distance between two discs, up to 10 [m].
+        number: Maximum number of disks.
+        gap: Minimum distance between two disks, up to 10 [m].
         platform: Side of the square at the center that stays free [m].
 
     Returns:

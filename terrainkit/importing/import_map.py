@@ -47,11 +47,11 @@ class ImportReport:
     """Part of that area where the map has no overhang [m2]: its ground is the top of the mesh, or
     the sky is open."""
 
-    largest_error: float = 0.0
+    max_error: float = 0.0
     """Largest difference in height between the map and the mesh where something hangs over the
     ground [m]: of the ground, or of the lower or upper side of a solid."""
 
-    largest_error_at: tuple[float, float] | None = None
+    max_error_at: tuple[float, float] | None = None
     """Where that is in the map, x and y [m]; None without overhangs."""
 
 
@@ -245,6 +245,6 @@ def _report(terrain_map: TerrainMap, columns: Columns, num_missing: int) -> Impo
         num_missing=num_missing,
         overhang_area=len(i) * grid.cell**2,
         lost_area=int((~is_kept).sum()) * grid.cell**2,
-        largest_error=float(error[worst]),
-        largest_error_at=(float(xy[worst, 0]), float(xy[worst, 1])),
+        max_error=float(error[worst]),
+        max_error_at=(float(xy[worst, 0]), float(xy[worst, 1])),
     )

@@ -84,10 +84,10 @@ class ImportOptions(ReadOptions):
     """Largest number of spawn positions of a patch."""
 
     spawn_radius: Size = 0.5
-    """Radius of the flat disc without obstacles around each spawn position [m]."""
+    """Radius of the flat disk without obstacles around each spawn position [m]."""
 
     spawn_tolerance: NonNegative = 0.01
-    """Largest height difference within that disc [m]; natural ground needs 0.1 or more."""
+    """Largest height difference within that disk [m]; natural ground needs 0.1 or more."""
 
     spawn_headroom: NonNegative = 1.0
-    """Height above that disc that is free of solids [m]."""
+    """Height above that disk that is free of solids [m]."""

@@ -29,11 +29,11 @@ class Noise(Overlay):
     pattern: str = parameter.choice("uniform", "perlin")
     """Independent heights at equidistant points like those of `rough`, or hills like `perlin`."""
 
-    spacing: float = parameter.scalar(0.2, allows_zero=False)
+    spacing: float = parameter.scalar(0.2, allow_zero=False)
     """Distance between two random heights or gradients [m]; about the diameter of a hill."""
 
     platform: float = parameter.scalar(2.0)
-    """Side of the unchanged square around the spawn position [m]; at least the spawn disc."""
+    """Side of the unchanged square around the spawn position [m]; at least the spawn disk."""
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the realized parameters: whole intervals across the patch."""

@@ -61,7 +61,7 @@ class Beams(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a box for each beam, down to the floor of the pit."""
-        first, last = self._layout(grid, rng)
+        first, last = self._beams(grid, rng)
         center = np.column_stack([(first + last) / 2, np.full(len(first), grid.center[1])])
         size = np.column_stack([last - first, np.full(len(first), self.width)])
         yaw = self.yaw * (2 * rng.random(len(first)) - 1)
@@ -71,11 +71,11 @@ class Beams(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each beam, and one behind the pit."""
-        first, last = self._layout(grid, rng)
+        first, last = self._beams(grid, rng)
         x = np.append((first + last) / 2, (last[-1] + self.gap + grid.upper[0]) / 2)
         return np.column_stack([x, 0 * x + grid.center[1], 0 * x, 0 * x])
 
-    def _layout(
+    def _beams(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the x of both ends of each beam [m]."""

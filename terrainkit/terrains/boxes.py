@@ -49,7 +49,7 @@ class Boxes(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the boxes; those of a pyramid are inside each other."""
-        xy, r = self._layout(grid, rng)
+        xy, r = self._boxes(grid, rng)
         layers = 1 + (rng.random(len(xy)) * self.layers).astype(np.int64)
         box = np.repeat(np.arange(len(xy)), layers)
         layer = np.concatenate([np.arange(n) for n in layers])
@@ -65,13 +65,13 @@ class Boxes(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal on top of each box and pyramid, counterclockwise around the platform."""
-        offset = self._layout(grid, rng)[0] - grid.center
+        offset = self._boxes(grid, rng)[0] - grid.center
         angle = np.arctan2(offset[:, 1], offset[:, 0])
         order = np.argsort(angle, kind="stable")
         x, y = (grid.center + offset[order]).T
         return np.column_stack([x, y, np.full(len(x), self.height), 0 * x])
 
-    def _layout(
+    def _boxes(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the centers and the radii of the boxes [m]."""

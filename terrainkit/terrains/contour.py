@@ -24,7 +24,7 @@ class Contour(Terrain):
     number: int = parameter.count(4)
     """Number of steps up to the highest terrace or down to the lowest, whichever are more."""
 
-    wavelength: float = parameter.scalar(2.5, allows_zero=False)
+    wavelength: float = parameter.scalar(2.5, allow_zero=False)
     """Wavelength of the noise [m]; about the diameter of the hills."""
 
     platform: float = parameter.platform(2.0)

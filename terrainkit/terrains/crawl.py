@@ -48,7 +48,7 @@ class Crawl(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the bars, which span the whole width of the patch."""
-        x, depth = self._layout(grid, rng)
+        x, depth = self._bars(grid, rng)
         center = np.column_stack(
             [x + depth / 2, x * 0 + grid.center[1], x * 0 + self.clearance + self.thickness / 2]
         )
@@ -59,11 +59,11 @@ class Crawl(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each gap behind a bar."""
-        x, depth = self._layout(grid, rng)
+        x, depth = self._bars(grid, rng)
         behind = x + self.max_depth + self.spacing
         return lane_goals(grid, (x + depth + behind) / 2)
 
-    def _layout(
+    def _bars(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the first edge and the depth of each bar along x [m]."""

@@ -23,7 +23,7 @@ class Eroded(Terrain):
     amplitude: float = parameter.height(0.05, 0.6)
     """Height of the highest hill or depth of the deepest hollow, whichever is larger [m]."""
 
-    wavelength: float = parameter.scalar(2.5, allows_zero=False)
+    wavelength: float = parameter.scalar(2.5, allow_zero=False)
     """Wavelength of the first octave of the noise [m]; about the diameter of the largest hills."""
 
     iterations: int = parameter.count(30)

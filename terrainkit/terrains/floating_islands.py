@@ -53,7 +53,7 @@ class FloatingIslands(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the islands and the walkways, level with the platform."""
-        xy, parent, _ = self._layout(grid, rng)
+        xy, parent, _ = self._centers(grid, rng)
         z = np.full((len(xy), 1), -self.thickness / 2)
         islands = make_cylinders(np.hstack([xy, z])[1:], self.radius, self.thickness)
         # A walkway overlaps both of its ends, so that its corners are not over the pit.
@@ -78,7 +78,7 @@ class FloatingIslands(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal on each island from the platform to the farthest one."""
-        xy, parent, distance = self._layout(grid, rng)
+        xy, parent, distance = self._centers(grid, rng)
         path = [int(np.argmax(distance))]
         while path[-1] != 0:
             path.append(int(parent[path[-1]]))
@@ -86,7 +86,7 @@ class FloatingIslands(Terrain):
         heading = np.arctan2(steps[:, 1], steps[:, 0])
         return np.column_stack([xy[path[-2::-1]], 0 * heading, heading])
 
-    def _layout(
+    def _centers(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
         """Return the centers of the platform and the islands, and the walkways between them.

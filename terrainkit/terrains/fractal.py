@@ -21,7 +21,7 @@ class Fractal(Terrain):
     amplitude: float = parameter.height(0.05, 0.4)
     """Height of the highest hill or depth of the deepest hollow, whichever is larger [m]."""
 
-    wavelength: float = parameter.scalar(3.0, allows_zero=False)
+    wavelength: float = parameter.scalar(3.0, allow_zero=False)
     """Wavelength of the first octave [m]; about the diameter of the largest hills."""
 
     octaves: int = parameter.count(5)

@@ -15,7 +15,7 @@ from terrainkit.terrain import Terrain
 class Gap(Terrain):
     """A gap of constant width around a central platform, with flat ground beyond it."""
 
-    width: float = parameter.length(0.0, 1.0, allows_zero=True)
+    width: float = parameter.length(0.0, 1.0, allow_zero=True)
     """Width of the gap [m]; it ends at the edge of the patch."""
 
     depth: float = parameter.height(5.0)

@@ -22,7 +22,7 @@ class Gutter(Terrain):
     the gutter. The slopes are solids; the ground is flat.
     """
 
-    roll: float = parameter.scalar(0.175, 0.524, allows_zero=False)
+    roll: float = parameter.scalar(0.175, 0.524, allow_zero=False)
     """Angle between a slope and the ground [rad]."""
 
     bottom: float = parameter.scalar(0.2)

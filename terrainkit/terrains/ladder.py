@@ -26,7 +26,7 @@ class Ladder(Terrain):
     The deck spans the width of the patch. The ladders are solids with round rungs.
     """
 
-    angle: float = parameter.scalar(1.222, 1.57, allows_zero=False)
+    angle: float = parameter.scalar(1.222, 1.57, allow_zero=False)
     """Angle between a ladder and the ground [rad]."""
 
     rung_spacing: float = parameter.size(0.25, 0.35)

@@ -45,7 +45,7 @@ class OpenStairs(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the treads."""
-        first, last, number = self._layout(grid)
+        first, last, number = self._stairs(grid)
         below = np.arange(number)
         # A tread up, its counterpart down, and the top.
         x0 = np.concatenate([first + below * self.tread, last - (below + 1) * self.tread])
@@ -60,12 +60,12 @@ class OpenStairs(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal on the top, and one behind the stairs."""
-        first, last, number = self._layout(grid)
+        first, last, number = self._stairs(grid)
         goals = lane_goals(grid, [(first + last) / 2, (last + grid.upper[0]) / 2])
         goals[:, 2] = self.riser * (number + 1), 0.0
         return goals
 
-    def _layout(self, grid: Grid) -> tuple[float, float, int]:
+    def _stairs(self, grid: Grid) -> tuple[float, float, int]:
         """Return the first and the last x of the stairs [m], and the treads below the top."""
         start = grid.length(grid.cells(self.start))
         length = grid.size[0] - 2 * start

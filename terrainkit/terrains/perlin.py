@@ -21,7 +21,7 @@ class Perlin(Terrain):
     amplitude: float = parameter.height(0.05, 0.3)
     """Height of the highest hill or depth of the deepest hollow, whichever is larger [m]."""
 
-    wavelength: float = parameter.scalar(1.5, allows_zero=False)
+    wavelength: float = parameter.scalar(1.5, allow_zero=False)
     """Distance between two random gradients [m]; about the diameter of a hill."""
 
     platform: float = parameter.platform(2.0, slopes_away=True)

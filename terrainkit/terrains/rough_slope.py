@@ -29,7 +29,7 @@ class RoughSlope(Terrain):
     step: float = parameter.height(STEP)
     """Step of the random heights [m]."""
 
-    spacing: float = parameter.scalar(0.2, allows_zero=False)
+    spacing: float = parameter.scalar(0.2, allow_zero=False)
     """Distance between two random heights [m]; heights in between are interpolated."""
 
     platform: float = parameter.platform(3.0, slopes_away=True)

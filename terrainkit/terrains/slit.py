@@ -25,7 +25,7 @@ class Slit(Terrain):
 
     has_column_seed: ClassVar[bool] = True
 
-    opening: float = parameter.scalar(1.3, 0.85, allows_zero=False)
+    opening: float = parameter.scalar(1.3, 0.85, allow_zero=False)
     """Width of an opening, in body widths."""
 
     body_width: float = parameter.size(0.35)
@@ -56,7 +56,7 @@ class Slit(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return two boxes for each wall, on both sides of the opening."""
-        edges, y = self._layout(grid, rng)
+        edges, y = self._slots(grid, rng)
         x = (edges[:-1] + edges[1:]) / 2
         width = self.opening * self.body_width
         low = np.concatenate([0 * y + grid.lower[1], y + width / 2])
@@ -69,12 +69,12 @@ class Slit(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal behind each opening."""
-        edges, y = self._layout(grid, rng)
+        edges, y = self._slots(grid, rng)
         goals = lane_goals(grid, edges[1:])
         goals[:, 1] = y
         return goals
 
-    def _layout(
+    def _slots(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the edges of the slots along x, and the y of each opening [m]."""

@@ -57,7 +57,7 @@ class SpiralStairs(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the treads and the column."""
-        (x, y), angle = self._layout(grid)
+        (x, y), angle = self._stairs(grid)
         top = self.riser * np.arange(1, self.number + 1)
         arc = angle[:, None] + np.linspace(0.0, angle[1] - angle[0], _ARC_POINTS)
         # The inner corners are inside the column.
@@ -76,13 +76,13 @@ class SpiralStairs(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal on every fourth tread and on the last, in the middle of the tread."""
-        (x, y), angle = self._layout(grid)
+        (x, y), angle = self._stairs(grid)
         treads = np.unique([*range(3, self.number, 4), self.number - 1])
         theta, r = (angle[treads] + angle[treads + 1]) / 2, (self.column + self.radius) / 2
         z = self.riser * (treads + 1)
         return np.column_stack([x + r * np.cos(theta), y + r * np.sin(theta), z, theta + np.pi / 2])
 
-    def _layout(self, grid: Grid) -> tuple[tuple[float, float], NDArray[np.float64]]:
+    def _stairs(self, grid: Grid) -> tuple[tuple[float, float], NDArray[np.float64]]:
         """Return the center of the spiral [m], and the angles at which treads start and end [rad].
 
         The first tread starts at -90 degrees, so that a robot on it walks along x.

@@ -52,7 +52,7 @@ class StoneRows(Terrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the stones, and the block behind the last pair."""
-        x = self._layout(grid)
+        x = self._rows(grid)
         low, high = pit_bounds(grid, self.start)
         y = grid.center[1] + np.array([-self.row_gap / 2 - self.stone, self.row_gap / 2])
         top = np.maximum(self.variation * (2 * rng.random((len(x), 2)) - 1), SINK - self.depth)
@@ -69,11 +69,11 @@ class StoneRows(Terrain):
     ) -> NDArray[np.floating]:
         """Return a goal at each pair of stones, and one behind the pit."""
         behind = grid.upper[0] - grid.length(grid.cells(self.start)) / 2
-        goals = lane_goals(grid, [*(self._layout(grid) + self.stone / 2), behind])
+        goals = lane_goals(grid, [*(self._rows(grid) + self.stone / 2), behind])
         goals[:, 2] = 0.0
         return goals
 
-    def _layout(self, grid: Grid) -> NDArray[np.float64]:
+    def _rows(self, grid: Grid) -> NDArray[np.float64]:
         """Return the first edge of each pair of stones along x [m]."""
         low, high = pit_bounds(grid, self.start)
         pitch, (length, width) = self.stone + self.gap, high - low

@@ -51,7 +51,7 @@ def test_edited_map_survives_a_file(flat, tmp_path):
 
 def test_edited_moves_only_invalid_spawns(flat):
     edited = flat.edited(heights=with_bump(flat, 1, 2, 0.4))
-    # The origin (6, 7.5) is on the bump of 1 m, whose disc of 0.5 m touches the edge.
+    # The origin (6, 7.5) is on the bump of 1 m, whose disk of 0.5 m touches the edge.
     assert np.hypot(*(edited.env_origins[1, 2, :2] - [6.0, 7.5])) > 0.9
     same = np.ones((2, 3), bool)
     same[1, 2] = False
@@ -90,7 +90,7 @@ def test_edited_without_flat_disc_is_an_error(flat):
     i, j = flat.config.patch_start(1, 1)
     heights[i : i + 40 : 4, j : j + 30] = 0.2
     with pytest.raises(
-        tk.TerrainkitError, match=r"^patch \(1, 1\): no disc of radius 0\.5 m is flat"
+        tk.TerrainkitError, match=r"^patch \(1, 1\): no disk of radius 0\.5 m is flat"
     ):
         flat.edited(heights=heights)
 

@@ -92,7 +92,7 @@ def test_generate_spawns_begin_with_the_origin():
 
 def test_generate_pads_spawns_with_nan():
     flat = SubTerrain(terrain="flat")
-    # The platform of 1.5 m has room for one disc with a radius of 0.5 m only.
+    # The platform of 1.5 m has room for one disk with a radius of 0.5 m only.
     small = SubTerrain(terrain="pyramid_stairs", parameters={"platform": 1.5})
     config = replace(SMALL, cols=2, spawns_per_patch=6, terrains=(flat, small))
     number = np.isfinite(generate(config).spawns).sum(axis=2)

@@ -55,6 +55,7 @@ def test_own_overlay_is_applied_to_every_row():
 
 
 def test_overlay_solid_beyond_the_patch_is_rejected():
+    @dataclass(frozen=True, kw_only=True)
     class Boom(Lift):
         def apply(self, patch, rng):  # noqa: ARG002
             boom = make_boxes((patch.grid.upper[0], patch.grid.center[1], 3), (1, 1, 1))

@@ -16,10 +16,10 @@ from terrainkit.terrains.flat import Flat
 class Hurdle(Flat):
     rise: float = parameter.height(0.1, 0.4)
     width: float = parameter.length(0.2)
-    gap: float = parameter.length(0.0, 1.0, allows_zero=True)
+    gap: float = parameter.length(0.0, 1.0, allow_zero=True)
     landing: float = parameter.platform(3.0)
     grade: float = parameter.scalar(0.4)
-    spacing: float = parameter.scalar(0.2, allows_zero=False)
+    spacing: float = parameter.scalar(0.2, allow_zero=False)
     number: int = parameter.count(4)
     inverted: bool = parameter.switch()
 

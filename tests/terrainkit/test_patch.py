@@ -85,7 +85,7 @@ def test_make_patch_without_spawn_is_rejected():
     choice = SubTerrain(terrain="rough", name="rubble", parameters={"platform": 0.4})
     with pytest.raises(
         ConfigError,
-        match=r"rubble: no disc of radius 0\.5 m is flat within 0\.01 m and free of",
+        match=r"rubble: no disk of radius 0\.5 m is flat within 0\.01 m and free of",
     ):
         make_patch(MapConfig(terrains=(choice,)), 9, 0)
 

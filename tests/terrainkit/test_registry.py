@@ -34,7 +34,7 @@ def moon(tmp_path, monkeypatch):
     registry.terrain_names.cache_clear()
     yield
     registry.terrain_names.cache_clear()
-    registry.get_terrain.cache_clear()
+    registry._get.cache_clear()
     sys.modules.pop("terrainkit.terrains.moon", None)
 
 
@@ -52,9 +52,19 @@ def test_get_terrain_ignores_imported_terrains():
     assert registry.get_terrain("rough_slope").__name__ == "RoughSlope"
 
 
-def test_get_terrain_unknown_name_lists_terrains():
-    with pytest.raises(ConfigError, match=r"did you mean 'stairs'\? There are: .*flat, .*wave$"):
-        registry.get_terrain("stair")
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("stair", "did you mean 'stairs' or 'star' or 'open_stairs'? "),
+        ("Obstacle", "did you mean 'obstacles'? "),
+        ("moon", ""),
+        ("x" * 1000, ""),
+    ],
+)
+def test_get_terrain_unknown_name_suggests_terrains(name, near):
+    with pytest.raises(ConfigError) as error:
+        registry.get_terrain(name)
+    assert str(error.value).endswith(f"register_terrain; {near}terrainkit list prints all")
 
 
 def test_get_terrain_suggests_inverted_option():
@@ -66,7 +76,7 @@ def test_get_terrain_suggests_inverted_option():
 def test_get_terrain_without_inverted_is_unknown(name):
     with pytest.raises(
         ConfigError,
-        match=rf"no terrain '{name}' is built in, .*there are: .*flat, .*wave$",
+        match=rf"no terrain '{name}' is built in, .*terrainkit list prints all$",
     ):
         registry.get_terrain(name)
 
@@ -109,14 +119,14 @@ def test_heights_of_wrong_shape_are_rejected():
 def plugin(monkeypatch):
     """Install an entry point called dunes, and forget what was found before and after."""
 
-    def install(value):
-        point = importlib.metadata.EntryPoint("dunes", value, registry.ENTRY_POINTS)
-        found = {registry.ENTRY_POINTS: (point,)}
-        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found[group])
+    def install(value, group="terrainkit.terrains"):
+        point = importlib.metadata.EntryPoint("dunes", value, group)
+        found = {group: (point,)}
+        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found.get(group, ()))
 
-    registry.get_terrain.cache_clear()
+    registry._get.cache_clear()
     yield install
-    registry.get_terrain.cache_clear()
+    registry._get.cache_clear()
 
 
 def test_get_terrain_loads_entry_point(plugin):
@@ -124,6 +134,13 @@ def test_get_terrain_loads_entry_point(plugin):
     assert registry.get_terrain("dunes") is registry.get_terrain("wave")
     dunes = SubTerrain(terrain="dunes", parameters={"amplitude": 0.1})
     assert generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(dunes,))).heights.max() > 0.09
+
+
+def test_get_overlay_loads_entry_point(plugin):
+    plugin("terrainkit.overlays.mirror:Mirror", "terrainkit.overlays")
+    assert registry.get_overlay("dunes") is registry.get_overlay("mirror")
+    assert set(registry.plugin_overlays()) == {"dunes"}
+    assert registry.make_overlay("dunes", {"axis": "x"}).axis == "x"
 
 
 def test_get_terrain_rejects_other_entry_point(plugin):
@@ -134,10 +151,10 @@ def test_get_terrain_rejects_other_entry_point(plugin):
         registry.get_terrain("dunes")
 
 
-def test_get_terrain_error_lists_plugins(plugin):
+def test_get_terrain_error_suggests_plugins(plugin):
     plugin("terrainkit.terrains.wave:Wave")
-    with pytest.raises(ConfigError, match=r"there are: .*flat, .*wave, dunes"):
-        registry.get_terrain("moon")
+    with pytest.raises(ConfigError, match=r"did you mean 'dunes' or 'tunnel'\? terrainkit list"):
+        registry.get_terrain("dune")
 
 
 @pytest.mark.parametrize("value", ["no_such_package:Dunes", "math:no_such_name"])
@@ -150,9 +167,9 @@ def test_get_terrain_reports_broken_entry_point(plugin, value):
 @pytest.fixture
 def registered(monkeypatch):
     monkeypatch.setattr(registry, "_registered", {})
-    registry.get_terrain.cache_clear()
+    registry._get.cache_clear()
     yield
-    registry.get_terrain.cache_clear()
+    registry._get.cache_clear()
 
 
 def make_ramp(module="__main__", **fields):
@@ -222,7 +239,7 @@ def test_map_of_registered_terrain_needs_registration(tmp_path):
     path = generate(config).save(tmp_path / "map.npz")
     assert TerrainMap.load(path).terrain_names == ("ramp_up",)
     registry._registered.clear()
-    registry.get_terrain.cache_clear()
+    registry._get.cache_clear()
     with pytest.raises(MapFileError, match="no terrain 'ramp_up' is built in, installed, or "):
         TerrainMap.load(path)
 
@@ -232,3 +249,80 @@ def test_map_of_registered_terrain_needs_registration(tmp_path):
 )
 def test_kind_is_class_name_in_snake_case(name, kind):
     assert type(name, (Terrain,), {}).kind() == kind
+
+
+LIFT = """
+import dataclasses
+from terrainkit import parameter
+from terrainkit.overlay import Overlay
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Lift(Overlay):
+    height: float = parameter.height(0.1, 0.5)
+
+    def apply(self, patch, rng):
+        return dataclasses.replace(patch, heights=patch.heights + self.height)
+"""
+
+
+def define_lift():
+    """Run a cell of a notebook that defines the overlay Lift."""
+    cell = {"__name__": "__main__"}
+    exec(LIFT, cell)
+    return cell["Lift"]
+
+
+@pytest.mark.usefixtures("registered")
+def test_register_overlay_uses_the_class_name():
+    lift = define_lift()
+    assert registry.register_overlay(lift) is lift
+    assert registry.get_overlay("lift") is lift
+    assert registry.registered_overlays() == ("lift",)
+    assert registry.registered_terrains() == ()
+    toml = '[[terrains]]\nterrain = "flat"\n[[terrains.overlays]]\noverlay = "lift"\nheight = 0.2'
+    assert MapConfig.from_toml(toml).sub_terrains[0].overlays == (lift(height=0.2),)
+
+
+@pytest.mark.usefixtures("registered")
+def test_register_overlay_replaces_class_defined_again():
+    first, again = define_lift(), define_lift()
+    registry.register_overlay(first)
+    registry.register_overlay(again)
+    assert registry.get_overlay("lift") is again
+    mirror = registry.get_overlay("mirror")
+    assert registry.register_overlay(mirror) is mirror
+    assert registry.registered_overlays() == ("lift",)
+
+
+@pytest.mark.usefixtures("registered")
+def test_map_of_own_overlay_needs_registration(tmp_path):
+    flat = SubTerrain(terrain="flat", overlays=(define_lift()(),))
+    config = MapConfig(rows=2, cols=1, border=0.0, terrains=(flat,))
+    path = generate(config).save(tmp_path / "map.npz")
+    loaded = TerrainMap.load(path)
+    assert loaded.config == config
+    assert loaded.env_origins[:, 0, 2].tolist() == pytest.approx([0.1, 0.5])
+    assert generate(loaded.config).heights.tobytes() == loaded.heights.tobytes()
+    registry._registered.clear()
+    registry._get.cache_clear()
+    with pytest.raises(MapFileError, match="no overlay 'lift' is built in, installed, or regist"):
+        TerrainMap.load(path)
+
+
+@pytest.mark.usefixtures("registered")
+@pytest.mark.parametrize(
+    ("overlay", "message"),
+    [
+        (registry.get_terrain("flat"), "overlay: got .*Flat'>; expected a subclass of Overlay"),
+        (type("Lift", (registry.get_overlay("mirror"),), {}), r"Lift lacks @dataclass\(frozen"),
+        (
+            dataclass(frozen=True, kw_only=True)(
+                type("Mirror", (registry.get_overlay("mirror"),), {"__module__": "a"})
+            ),
+            r"the name 'mirror' of a\.Mirror is that of terrainkit\.overlays\.mirror\.Mirror; ",
+        ),
+    ],
+)
+def test_register_overlay_rejects_other_class(overlay, message):
+    with pytest.raises(ConfigError, match=message):
+        registry.register_overlay(overlay)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids, make_boxes
-from terrainkit.spawn import Disc, find_spawn, sample_spawns
+from terrainkit.spawn import Disk, find_spawn, sample_spawns
 from terrainkit.surface import surface_at
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
@@ -29,12 +29,12 @@ def spawn(
     solids=None,
 ):
     solids = solids or Solids.empty()
-    needed = Disc(radius=radius, tolerance=tolerance, headroom=1.0)
+    needed = Disk(radius=radius, tolerance=tolerance, headroom=1.0)
     return find_spawn(heights, grid, wanted, needed, solids=solids, threshold=threshold)
 
 
-def disc(heights, origin, *, radius=0.5, threshold=WALL, grid=PLOT):
-    """Return the height of the ground all over the disc neighborhood `origin` [m]."""
+def disk(heights, origin, *, radius=0.5, threshold=WALL, grid=PLOT):
+    """Return the height of the ground all over the disk neighborhood `origin` [m]."""
     r, angle = np.meshgrid(np.linspace(0.0, radius, 26), np.linspace(0.0, 2 * math.pi, 121))
     points = np.stack([origin[0] + r * np.cos(angle), origin[1] + r * np.sin(angle)], axis=-1)
     place = (points.reshape(-1, 2) - grid.lower) / grid.cell - 0.5
@@ -51,7 +51,7 @@ def test_find_spawn_is_in_the_map_frame():
 
 
 @pytest.mark.parametrize("wanted", [(0.1, 2.0), (3.95, 2.0), (2.0, 0.3), (4.0, 4.0), (-1.0, 2.0)])
-def test_find_spawn_disc_is_inside_the_patch(wanted):
+def test_find_spawn_disk_is_inside_the_patch(wanted):
     x, y, _ = spawn(level(), wanted)
     assert min(x, y) >= 0.5
     assert max(x, y) <= 3.5
@@ -88,16 +88,16 @@ def test_find_spawn_avoids_one_high_sample():
 @pytest.mark.parametrize(
     ("sample", "height"), [((25, 22), 0.07), ((24, 24), -5.0), ((14, 17), -5.0)]
 )
-def test_find_spawn_disc_is_level_along_diagonals(sample, height):
+def test_find_spawn_disk_is_level_along_diagonals(sample, height):
     heights = level()
     heights[sample] = height
-    ground = disc(heights, spawn(heights, threshold=math.inf), threshold=math.inf)
+    ground = disk(heights, spawn(heights, threshold=math.inf), threshold=math.inf)
     assert np.ptp(ground) <= 0.01 + 1e-6
 
 
 @pytest.mark.parametrize("sample", [(25, 23), (26, 20), (13, 19), (24, 25)])
 def test_find_spawn_ignores_samples_without_influence(sample):
-    # The disc reaches 5 samples from (19.5, 19.5). The square of (25, 23), one sample to each
+    # The disk reaches 5 samples from (19.5, 19.5). The square of (25, 23), one sample to each
     # side, begins at offset (4.5, 2.5), and 4.5^2 + 2.5^2 is above 5^2.
     heights = level()
     heights[sample] = -5.0
@@ -121,7 +121,7 @@ def test_find_spawn_is_level_and_on_the_ground(samples, wanted, radius, threshol
     origin = spawn(heights, wanted, radius=radius, threshold=threshold)
     if origin is None:
         return
-    ground = disc(heights, origin, radius=radius, threshold=threshold)
+    ground = disk(heights, origin, radius=radius, threshold=threshold)
     assert ground[0] == pytest.approx(origin[2], abs=1e-6)
     assert np.ptp(ground) <= 0.01 + 1e-6
     assert radius <= min(origin[:2])
@@ -131,7 +131,7 @@ def test_find_spawn_is_level_and_on_the_ground(samples, wanted, radius, threshol
 def test_find_spawn_accepts_slope_within_tolerance():
     x = (np.arange(40, dtype=np.float32) + 0.5) * 0.1
     heights = np.broadcast_to(0.005 * x[:, None], PLOT.shape).astype(np.float32)
-    # Samples 14 to 25 have a say in the disc, 1.1 m apart: between them it rises by 5.5 mm.
+    # Samples 14 to 25 have a say in the disk, 1.1 m apart: between them it rises by 5.5 mm.
     assert spawn(heights, tolerance=0.0056) == pytest.approx((2.0, 2.0, 0.01), abs=1e-6)
     assert spawn(heights, tolerance=0.0054) is None
 
@@ -149,7 +149,7 @@ def test_find_spawn_returns_none_for_large_disc(radius):
 
 def test_find_spawn_fits_platform_of_disc_and_cell():
     heights = level(-5.0)
-    heights[14:26, 14:26] = 0.0  # 1.2 m for a disc of 1 m
+    heights[14:26, 14:26] = 0.0  # 1.2 m for a disk of 1 m
     assert spawn(heights) == (2.0, 2.0, 0.0)
 
 
@@ -158,7 +158,7 @@ def test_find_spawn_does_not_fit_smaller_platform():
     heights[16:24, 16:24] = 0.0
     x, y, z = spawn(heights)
     assert z == -5.0
-    assert disc(heights, (x, y)).tolist() == [-5.0] * (26 * 121)
+    assert disk(heights, (x, y)).tolist() == [-5.0] * (26 * 121)
 
 
 @pytest.mark.parametrize(("bottom", "expected"), [(0.9, False), (1.1, True)])
@@ -167,7 +167,7 @@ def test_find_spawn_avoids_solids_within_the_headroom(bottom, expected):
     x, y, _ = spawn(level(), solids=bar)
     assert ((x, y) == (2.0, 2.0)) == expected
     if not expected:
-        # The disc clears the bar, and moves no farther than a cell beyond.
+        # The disk clears the bar, and moves no farther than a cell beyond.
         distance = math.hypot(max(0, abs(x - 2.0) - 0.05), max(0, abs(y - 2.0) - 0.05))
         assert 0.5 <= distance <= 0.65
 
@@ -178,7 +178,7 @@ def test_find_spawn_returns_none_under_a_low_roof():
 
 
 def sampled(heights, number, *, origin=(2.0, 2.0, 0.0), radius=0.5, solids=None, seed=0):
-    needed = Disc(radius=radius, tolerance=0.01, headroom=1.0)
+    needed = Disk(radius=radius, tolerance=0.01, headroom=1.0)
     solids = solids or Solids.empty()
     rng = np.random.default_rng(seed)
     return sample_spawns(heights, PLOT, origin, needed, number, solids=solids, rng=rng)
@@ -203,7 +203,7 @@ def test_sample_spawns_fills_the_level_ground(radius):
     assert spacing(spawns) >= 2 * radius
     assert spawns[:, :2].min() >= radius
     assert spawns[:, :2].max() <= 4.0 - radius
-    # No further disc fits: every cell with a disc in the patch is near one of the positions.
+    # No further disk fits: every cell with a disk in the patch is near one of the positions.
     cells = PLOT.axis(0)
     cells = cells[(cells >= radius + 0.15) & (cells <= 4.0 - radius - 0.15)]
     x, y = np.meshgrid(cells, cells)
@@ -224,7 +224,7 @@ def test_sample_spawns_discs_are_level_and_on_the_ground():
     spawns = sampled(heights, 100, radius=0.3)
     assert len(spawns) > 5
     for x, y, z in spawns:
-        ground = disc(heights, (x, y), radius=0.3)
+        ground = disk(heights, (x, y), radius=0.3)
         assert np.ptp(ground) <= 0.01 + 1e-6
         assert z == 0.0
 
@@ -247,7 +247,7 @@ def test_sample_spawns_avoids_low_solids():
 
 
 def test_sample_spawns_without_flat_cell_is_the_origin():
-    # The level square of 12 cells has room for a disc at its center only, where no sample is. The
+    # The level square of 12 cells has room for a disk at its center only, where no sample is. The
     # ground around it is level too, but 5 m higher.
     heights = level(5.0)
     heights[14:26, 14:26] = 0.0

@@ -224,7 +224,7 @@ def test_assign_spreads_environments_over_spawns():
 
 
 def test_assign_warns_of_shared_spawns():
-    # On a patch of 6 m x 2 m, one disc of 0.8 m fits on each side of the origin.
+    # On a patch of 6 m x 2 m, one disk of 0.8 m fits on each side of the origin.
     terrain_map = flat_map(patch_size=(6.0, 2.0), spawns_per_patch=100, spawn_radius=0.8)
     message = "3 of 12 environments share a spawn position with another; increase spawns_per_patch"
     with pytest.warns(TerrainkitWarning, match=message):

@@ -50,7 +50,7 @@ def test_validate_generated_map_has_no_issues(config):
 @pytest.mark.parametrize("preset", presets.preset_names())
 def test_validate_presets_realize_their_parameters(preset):
     terrain_map = tk.generate(
-        tk.MapConfig(rows=4, cols=len(presets.get_preset(preset)) * 2, border=0.0, preset=preset)
+        tk.MapConfig(rows=4, cols=len(presets.get_preset(preset)), border=0.0, preset=preset)
     )
     assert found(terrain_map) == []
 
@@ -58,7 +58,7 @@ def test_validate_presets_realize_their_parameters(preset):
 def test_validate_large_disc_is_one_issue(sound):
     config = dataclasses.replace(sound.config, spawn_radius=1e6)
     messages = found(dataclasses.replace(sound, config=config))
-    assert ("spawn", "no disc of radius 1e+06 m fits in a patch of 8 m x 8 m") in messages
+    assert ("spawn", "no disk of radius 1e+06 m fits in a patch of 8 m x 8 m") in messages
     assert not any("border" in message for _, message in messages)
 
 
@@ -97,14 +97,14 @@ def test_validate_finds_moved_origin(sound):
 
 
 def test_validate_finds_origin_outside_pit():
-    # A disc of 1 m and the cells around it do not fit in a pit of 1 m.
+    # A disk of 1 m and the cells around it do not fit in a pit of 1 m.
     pit = tk.SubTerrain(terrain="pit", parameters={"side": 1.0})
     config = tk.MapConfig(rows=2, cols=1, border=1.0, terrains=(pit,))
     with pytest.warns(tk.TerrainkitWarning, match="at the preferred spawn position: pit on 1 "):
         terrain_map = tk.generate(config)
     ((check, message),) = found(terrain_map)
     assert check == "patches"
-    assert message.startswith("patch (1, 0): no flat disc at the spawn position of pit: the origin")
+    assert message.startswith("patch (1, 0): no flat disk at the spawn position of pit: the origin")
 
 
 def test_validate_finds_origin_outside_patch(sound):

@@ -40,8 +40,8 @@ def banked():
             return shoulder
 
     yield BankedTrack
-    registry._registered.pop("banked_track")
-    registry.get_terrain.cache_clear()
+    registry._registered.pop(("terrain", "banked_track"))
+    registry._get.cache_clear()
 
 
 @pytest.mark.usefixtures("banked")
@@ -103,7 +103,10 @@ def test_generate_adds_overlays_to_all_terrains(run_main, tmp_path):
 @pytest.mark.parametrize(
     ("overlay", "message"),
     [
-        ("nois", "no overlay 'nois'; did you mean 'noise'? There are: friction_patches, "),
+        (
+            "nois",
+            "registered with terrainkit.register_overlay; did you mean 'noise'? terrainkit list",
+        ),
         ("noise:amplitude", "--overlay: got 'amplitude'; expected name=value"),
         ("noise:pattern=pink", "noise.pattern: got 'pink'; expected one of: uniform, perlin"),
         ("noise:amplitudes=1", "noise has no parameter 'amplitudes'; did you mean 'amplitude'"),

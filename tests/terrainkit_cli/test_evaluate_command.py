@@ -29,9 +29,15 @@ def one_line(err):
 def test_evaluate_prints_a_table(here):
     code, out, err = here("walk", "--seconds", "2.1", "--num-envs", "2")
     assert (code, err) == (0, "")
-    first, head, *rows = out.splitlines()
+    first, followed, gait, swing, *contacts = out.splitlines()[:8]
+    head, *rows = out.splitlines()[8:]
     assert first.startswith("quadruped, model_7.pt, on plane: 2 robots, 0 fell; error 0.")
-    assert head.split() == ["forward", "left", "yaw", "fell", "m/s", "rad/s"]
+    assert followed.startswith("commands followed: ")
+    assert "steps/s" in gait
+    assert "FL_foot" in swing
+    assert [line.split()[0] for line in contacts] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
+    columns = "forward left yaw fell m/s rad/s followed swing [cm]"
+    assert head.split() == columns.split()
     assert len(rows) == 2
     assert all(row.split()[3] == "0" for row in rows)
 
@@ -60,11 +66,12 @@ def test_evaluate_with_one_command(here):
 
 
 def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
-    words = ("walk", *QUICK, "-o", "result.json")
+    words = ("walk", *QUICK, "-o", "result.json", "--diagram", "gait.png")
     code, out, err = here(*words)
     assert (code, err) == (0, "")
     assert out.startswith("quadruped, model_7.pt, on plane: 1 robot")
-    assert out.endswith("wrote result.json\n")
+    assert out.endswith("wrote result.json\nwrote gait.png\n")
+    assert (tmp_path / "gait.png").read_bytes().startswith(b"\x89PNG")
     before = (tmp_path / "result.json").read_text()
     assert json.loads(before)["seconds"] == 0.04
     with monkeypatch.context() as patch:
@@ -143,7 +150,13 @@ def make_metrics(**values):
 def make_result(metrics, **groups):
     config = EvaluationConfig(terrain="hill.npz")
     return EvaluationResult(
-        robot="hare", checkpoint="model_1.pt", config=config, metrics=metrics, groups=groups
+        robot="hare",
+        checkpoint="model_1.pt",
+        config=config,
+        metrics=metrics,
+        groups=groups,
+        contacts={},
+        dt=0.02,
     )
 
 

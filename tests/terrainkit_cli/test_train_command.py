@@ -68,7 +68,11 @@ def test_train_on_a_map(train, tmp_path, capsys):
     assert run.checkpoint.name == "model_2.pt"
     captured = capsys.readouterr()
     assert captured.out.startswith("trained 2 iterations: logs/quadruped/")
-    assert captured.err.startswith("iteration 2/2: env steps/s ")
+    start, progress = captured.err.splitlines()[:2]
+    assert start.startswith("terrainkit: training quadruped on map.npz: 4 robots, ")
+    assert "thread" in start
+    assert "in logs/quadruped/" in start
+    assert progress.startswith("iteration 2/2: env steps/s ")
     assert "level stairs" in captured.err
 
 
@@ -139,7 +143,7 @@ def test_train_full_disk_is_one_line(train, tmp_path, capsys):
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
     lines = capsys.readouterr().err.splitlines()
     assert code == 2
-    assert [line for line in lines if not line.startswith("iteration")] == [
+    assert [line for line in lines[1:] if not line.startswith("iteration")] == [
         "terrainkit: error: cannot write run/model_2.pt: File too large; there is no checkpoint"
     ]
     assert checkpoints(tmp_path / "run") == {}
@@ -234,8 +238,11 @@ PROGRESS = TrainingProgress(
     eta=3723.0,
     reward=-1.5,
     episode_length=4.25,
+    falls=0.125,
+    speed=0.5,
     noise_std=0.875,
     rewards={"tracking_lin_vel": 0.5, "torques": -0.0625},
+    shares={"tracking_lin_vel": 0.25, "torques": -0.03125},
     levels={"stairs": 3.5},
     success={"stairs": 0.75},
 )
@@ -254,7 +261,8 @@ def test_training_progress_lines_are_sparse(capsys):
         "iteration 23/23",
     ]
     assert err.splitlines()[0].endswith(
-        "env steps/s 1234, to go 1:02:03, reward -1.50, episode 4.2 s, noise std 0.88, "
+        "env steps/s 1234, to go 1:02:03, reward -1.50, episode 4.2 s, falls 12%, "
+        "speed 0.50 m/s, noise std 0.88, "
         "level stairs 3.5"
     )
 
@@ -264,7 +272,7 @@ def test_training_reward_lines_are_sparse(capsys):
         for iteration in range(1, 101):
             watch(PROGRESS._replace(iteration=iteration))
     terms = [line for line in capsys.readouterr().err.splitlines() if "env steps/s" not in line]
-    rewards = "success stairs 75%, tracking_lin_vel +0.500 /s, torques -0.062 /s"
+    rewards = "success stairs 75%, tracking_lin_vel +0.500 /s (25%), torques -0.062 /s (-3%)"
     assert terms == [f"iteration 50/400: {rewards}", f"iteration 100/400: {rewards}"]
 
 

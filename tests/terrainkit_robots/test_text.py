@@ -25,7 +25,7 @@ def test_names_lists_the_first_words():
     assert names("abcdef") == "a, b, c, d, e, f"
     assert names("abcdefg") == "a, b, c, d, e, f, ..."
     assert names((name for name in "abc"), 2) == "a, b, ..."
-    assert names("abc", separator=" > ") == "a > b > c"
+    assert names("abc", sep=" > ") == "a > b > c"
     assert names(["x" * 1000, "y"]) == "x" * 97 + "..., y"
 
 

@@ -34,34 +34,34 @@ def load_robot(
     """
     path, packages, contents = Path(path), packages or {}, contents or {}
     data = contents[path] if path in contents else read_bytes(path)
-    document = parse_xml(path, data)
-    if document.root is None:
-        return _empty_model(document)
-    tag = document.root.tag
+    doc = parse_xml(path, data)
+    if doc.root is None:
+        return _empty_model(doc)
+    tag = doc.root.tag
     if tag == "mujoco" or tag == "mujocoinclude":
         from terrainkit_robots.description.mjcf.reader import read_mjcf
 
-        return read_mjcf(document, contents=contents)
+        return read_mjcf(doc, contents=contents)
     if tag != "robot":
         message = f"root element: got <{tag}>; expected <robot> (URDF) or <mujoco> (MJCF)"
-        source = document.source(document.root)
-        return _empty_model(document, Problem(code="XML002", message=message, source=source))
+        source = doc.source(doc.root)
+        return _empty_model(doc, Problem(code="XML002", message=message, source=source))
     from terrainkit_robots.description.urdf.reader import read_urdf
 
     if path.suffix == f".{XACRO}":
         from terrainkit_robots.description.xacro.reader import read_xacro
 
-        return read_xacro(document, arguments=xacro_arguments or {}, packages=packages)
-    return read_urdf(document, packages=packages)
+        return read_xacro(doc, arguments=xacro_arguments or {}, packages=packages)
+    return read_urdf(doc, packages=packages)
 
 
-def _empty_model(document: XmlDocument, *problems: Problem) -> RobotModel:
-    suffix = document.file.suffix
+def _empty_model(doc: XmlDocument, *problems: Problem) -> RobotModel:
+    suffix = doc.file.suffix
     return RobotModel(
         name="",
         kind="mjcf" if suffix == ".xml" else "xacro" if suffix == f".{XACRO}" else "urdf",
-        file=document.file,
-        source=Source(file=document.file, line=0),
-        problems=(*document.problems, *problems),
-        sources=(document.file,),
+        file=doc.file,
+        source=Source(file=doc.file, line=0),
+        problems=(*doc.problems, *problems),
+        sources=(doc.file,),
     )

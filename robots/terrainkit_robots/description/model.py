@@ -408,7 +408,7 @@ class RobotModel:
     options: PhysicsOptions | None = None
     """Settings of the simulation; None for URDF."""
 
-    home: Mapping[str, float] = field(default_factory=dict)
+    keyframe: Mapping[str, float] = field(default_factory=dict)
     """Joint positions [rad] or [m] of the first keyframe by joint name; MJCF only."""
 
     imu: tuple[str, Matrix] | None = None

@@ -2,7 +2,7 @@
 
 Links are those of the main tree, each after its parent. Axes are unit vectors, positions count from
 the zero of the file, and masses are numbers. What cannot be represented is removed and listed in
-`notes`.
+`changes`.
 """
 
 import re
@@ -46,7 +46,7 @@ class CanonicalRobot:
     and URDF gets extra frames. Efforts are stored in the limits, each actuated joint has an
     actuator, and `floating` is set."""
 
-    notes: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
     """What was removed or changed, one sentence each."""
 
 
@@ -62,20 +62,20 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
     """
     if not facts.bodies:
         raise RobotFileError(f"{facts.model.file}: got no links; expected a robot")
-    notes: list[str] = []
+    changes: list[str] = []
     original, facts = facts, with_world_base(facts, floating=floating)
-    links = _links(facts, notes)
-    joints = _joints(facts, notes)
+    links = _links(facts, changes)
+    joints = _joints(facts, changes)
     floating = has_floating_base(facts) if floating is None else floating
     actuated = {joint.name for joint in facts.actuated}
     link_names = {link.name for link in links}
     if WORLD in link_names:
         new_name = free_name(f"{WORLD}_link", link_names)
         if WORLD in original.body_of:
-            notes.append(f"renamed link {WORLD} to {new_name}: MuJoCo reserves the name {WORLD}")
+            changes.append(f"renamed link {WORLD} to {new_name}: MuJoCo reserves the name {WORLD}")
         else:
             attached = names(joint.name for joint, _ in joints if joint.parent == WORLD)
-            notes.append(f"added the base link {new_name} for the world, with joints {attached}")
+            changes.append(f"added the base link {new_name} for the world, with joints {attached}")
         links = [replace(each, name=new_name) if each.name == WORLD else each for each in links]
         joints = [(_rename_world(joint, new_name), before) for joint, before in joints]
     imu = facts.model.imu
@@ -97,12 +97,12 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
             if joint.moves and name_before in actuated
         ),
         floating=floating,
-        home={name: q for name, q in facts.model.home.items() if name in facts.positions},
+        keyframe={name: q for name, q in facts.model.keyframe.items() if name in facts.positions},
         imu=imu if imu is not None and imu[0] in link_names else None,
         excluded=frozenset(pair for pair in facts.model.excluded if pair <= link_names),
         sources=facts.model.sources,
     )
-    return CanonicalRobot(model=model, notes=tuple(notes))
+    return CanonicalRobot(model=model, changes=tuple(changes))
 
 
 def _rename_world(joint: Joint, new_name: str) -> Joint:
@@ -149,19 +149,19 @@ def plain_name(model: RobotModel) -> str:
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip("._-") or "robot"
 
 
-def _links(facts: "Facts", notes: list[str]) -> list[Link]:
+def _links(facts: "Facts", changes: list[str]) -> list[Link]:
     index = {name: place for place, name in enumerate(facts.tree.order)}
     links = [link for body in facts.bodies for link in body.links]
     links.sort(key=lambda link: index[link.name])
     left = [name for name in facts.tree.links if name not in facts.body_of]
     if left:
-        notes.append(f"removed {names(left)}: not part of the kinematic tree")
+        changes.append(f"removed {names(left)}: not part of the kinematic tree")
     world_joints = [j.name for j in facts.model.joints if j.moves and j.parent not in facts.body_of]
     if world_joints:
-        notes.append(f"removed {names(world_joints)}: joints between the world and the robot")
+        changes.append(f"removed {names(world_joints)}: joints between the world and the robot")
     unknown = [link for link in links if has_unknown_inertia(link.inertial)]
     known = _with_mesh_inertia(facts, links) if unknown else links
-    return with_valid_inertia(facts.bodies, known, notes)
+    return with_valid_inertia(facts.bodies, known, changes)
 
 
 def has_unknown_inertia(inertial: Inertial | None) -> bool:
@@ -231,7 +231,7 @@ def _compile(facts: "Facts") -> Any:
         raise RobotFileError(f"{prefix}: MuJoCo rejects the file: {reason}") from None
 
 
-def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
+def _joints(facts: "Facts", changes: list[str]) -> list[tuple[Joint, str]]:
     """Return the joint of each link except the base, and its original name."""
     index = {name: place for place, name in enumerate(facts.tree.order)}
     base = facts.bodies[0].top.name
@@ -245,26 +245,30 @@ def _joints(facts: "Facts", notes: list[str]) -> list[tuple[Joint, str]]:
         name = joint.name or f"{joint.child}_joint"
         if name_counts[joint.name] > 1 and name in used_names:
             name = free_name(f"{joint.child}_joint", used_names)
-            notes.append(
+            changes.append(
                 f"renamed the joint of {joint.child} to {name}: duplicate name {joint.name}"
             )
         used_names.add(name)
         mimic = joint.mimic if joint.name in mimic_joint_names else None
         if joint.mimic is not None and mimic is None and joint.moves:
-            notes.append(f"removed the mimic of {joint.name}: {_mimic_problem(facts, joint.mimic)}")
-        moved = _canonical_joint(facts, replace(joint, mimic=mimic), bodies.get(joint.child), notes)
+            changes.append(
+                f"removed the mimic of {joint.name}: {_mimic_problem(facts, joint.mimic)}"
+            )
+        moved = _canonical_joint(
+            facts, replace(joint, mimic=mimic), bodies.get(joint.child), changes
+        )
         result.append((replace(moved, name=name), joint.name))
     return result
 
 
-def _canonical_joint(facts: "Facts", joint: Joint, body: Body | None, notes: list[str]) -> Joint:
+def _canonical_joint(facts: "Facts", joint: Joint, body: Body | None, changes: list[str]) -> Joint:
     if not joint.moves or body is None:
         if joint.kind != "fixed":
-            notes.append(f"fixed {joint.name}: joint type {joint.kind!r} is not supported")
+            changes.append(f"fixed {joint.name}: joint type {joint.kind!r} is not supported")
         return replace(joint, kind="fixed", limit=None, mimic=None, anchor=np.zeros(3))
     limits = joint.range
     if limits is None and joint.kind == "revolute":
-        notes.append(f"{joint.name} has no limits")
+        changes.append(f"{joint.name} has no limits")
     kind = "prismatic" if joint.kind == "prismatic" else "revolute" if limits else "continuous"
     lower, upper = limits or (None, None)
     return replace(

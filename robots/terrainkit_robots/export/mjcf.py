@@ -58,7 +58,7 @@ class Extras:
     excluded: Iterable[frozenset[str]] = ()
     """Pairs of bodies without contacts."""
 
-    home: Mapping[str, float] = field(default_factory=dict)
+    keyframe: Mapping[str, float] = field(default_factory=dict)
     """Joint positions of the keyframe [rad] or [m]; other joints are at 0."""
 
     height: float = 0.0
@@ -418,10 +418,10 @@ def _keyframe(root: Any, model: RobotModel, extras: Extras) -> None:
         return
     key = etree.SubElement(etree.SubElement(root, "keyframe"), "key", name="home")
     base = [0.0, 0.0, extras.height, 1.0, 0.0, 0.0, 0.0] if model.floating else []
-    key.set("qpos", number_text([*base, *(extras.home.get(name, 0.0) for name in order)]))
+    key.set("qpos", number_text([*base, *(extras.keyframe.get(name, 0.0) for name in order)]))
     if extras.actuators:
         targets = (
-            0.0 if actuator.is_velocity_control else extras.home.get(name, 0.0)
+            0.0 if actuator.is_velocity_control else extras.keyframe.get(name, 0.0)
             for name, actuator in extras.actuators.items()
         )
         key.set("ctrl", number_text(list(targets)))

@@ -61,14 +61,14 @@ def _ground_contacts(body: Body, pose: Matrix, facts: "Facts") -> list[BodyShape
 def imu_site(facts: "Facts") -> Site:
     """Return the site of the IMU: as defined in the file, or at a link of the base named imu.
 
-    Otherwise it is at the origin of the base, and `imu_notes` says so.
+    Otherwise it is at the origin of the base, and `imu_changes` says so.
     """
     body, pose = _imu(facts) or (_base(facts), np.eye(4))
     return Site(name="imu", body=body.top.name, pose=pose)
 
 
-def imu_notes(facts: "Facts") -> tuple[str, ...]:
-    """Return a note if a robot with a free base does not define its IMU."""
+def imu_changes(facts: "Facts") -> tuple[str, ...]:
+    """Return the change if a robot with a free base does not define its IMU."""
     if _imu(facts) is not None or facts.model.floating is False:
         return ()
     base = _base(facts).top.name

@@ -14,7 +14,7 @@ _CONTACT = ("friction", "condim", "priority", "solref", "solimp", "solmix", "mar
 
 
 def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
-    """Return a note for each kind of MJCF element that is not exported."""
+    """Return one line for each kind of MJCF element that is not exported."""
     if model.kind != "mjcf":
         return ()
     sections, stiffness_count, contact_count = Counter[str](), 0, 0
@@ -29,21 +29,21 @@ def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
             any(name in geom.attrib for name in _CONTACT) for geom in root.iter("geom")
         )
     sections["equality"] -= sum(joint.mimic is not None for joint in model.joints)
-    notes = [
+    changes = [
         f"ignored <{name}> ({count(sections[name], 'element')})"
         for name in _SECTIONS
         if sections[name] > 0
     ]
     if stiffness_count:
-        notes.append(f"ignored stiffness of joints ({count(stiffness_count, 'element')})")
+        changes.append(f"ignored stiffness of joints ({count(stiffness_count, 'element')})")
     if contact_count:
-        notes.append(
+        changes.append(
             f"ignored friction and contact parameters of geoms ({count(contact_count, 'element')})"
         )
     unused = [actuator.name for actuator in model.actuators if not actuator.joint]
     if unused:
-        notes.append(f"ignored {count(len(unused), 'actuator')} without a joint: {names(unused)}")
-    return tuple(notes)
+        changes.append(f"ignored {count(len(unused), 'actuator')} without a joint: {names(unused)}")
+    return tuple(changes)
 
 
 def _is_set(value: str | None) -> bool:

@@ -34,7 +34,7 @@ lose under rotation, and has no effect on the dynamics."""
 
 
 def with_valid_inertia(
-    bodies: Sequence["Body"], links: Sequence[Link], notes: list[str]
+    bodies: Sequence["Body"], links: Sequence[Link], changes: list[str]
 ) -> list[Link]:
     """Return links with valid inertia, and note the changes.
 
@@ -45,7 +45,7 @@ def with_valid_inertia(
     Args:
         bodies: Rigid bodies of the robot.
         links: Links of the robot in any order.
-        notes: List to which a sentence is appended for each body that is changed.
+        changes: List to which a sentence is appended for each body that is changed.
     """
     updated = {link.name: link for link in links}
     for body in bodies:
@@ -55,7 +55,7 @@ def with_valid_inertia(
             for name in poses
             if name in updated
         }
-        updated |= _merge_into_heaviest(body_links, poses, notes)
+        updated |= _merge_into_heaviest(body_links, poses, changes)
     return [updated[link.name] for link in links]
 
 
@@ -103,7 +103,7 @@ def _correct_rounding(link: Link) -> Link:
 
 
 def _merge_into_heaviest(
-    links: Mapping[str, Link], poses: Mapping[str, Matrix], notes: list[str]
+    links: Mapping[str, Link], poses: Mapping[str, Matrix], changes: list[str]
 ) -> Mapping[str, Link]:
     """Return the links of a body, with rejected masses moved to the heaviest link."""
     rejected = [name for name, link in links.items() if _is_rejected(link)]
@@ -123,7 +123,7 @@ def _merge_into_heaviest(
     )
     if total is None or total.inertia is None or not merged or not _is_valid(total.inertia):
         return links
-    notes.append(
+    changes.append(
         f"moved the mass of {names(merged)} to {heaviest}, to which they are fixed: MuJoCo "
         "rejects masses without inertia"
     )

@@ -105,11 +105,11 @@ def read_comments(file: Path, data: bytes | None = None) -> Iterator[Suppression
         return  # reported when the robot is read
     if not any(marker in data for marker in _MARKERS):
         return
-    document = parse_xml(file, data)
-    root = document.root
+    doc = parse_xml(file, data)
+    root = doc.root
     if root is None:
         return
-    lines = _Lines({element: source.line for element, source in document.sources.items()})
+    lines = _Lines({element: source.line for element, source in doc.sources.items()})
     outside = (*root.itersiblings(etree.Comment, preceding=True), *root.itersiblings(etree.Comment))
     matches = ((n, _COMMENT.fullmatch(n.text or "")) for n in (*outside, *root.iter(etree.Comment)))
     comments = ((node, match) for node, match in matches if match is not None)

@@ -19,7 +19,7 @@ from terrainkit_robots.onboarding.folder import (
 )
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
 from terrainkit_robots.onboarding.negligible_repairs import with_negligible_repairs
-from terrainkit_robots.onboarding.placeholder_effort import placeholder_efforts
+from terrainkit_robots.onboarding.placeholder_effort import placeholder_effort
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.robot_files import MJCF, SpecOverride, make_robot_files
@@ -139,7 +139,7 @@ def onboard(
         floating=options.floating,
         user_spec=user_spec,
         gain_set=options.gains,
-        unknown_efforts=placeholder_efforts(report.facts, report.findings),
+        unknown_effort=placeholder_effort(report.facts, report.findings),
         cache_dir=options.cache_dir,
         progress=options.progress,
     )

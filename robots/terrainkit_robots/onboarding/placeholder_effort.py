@@ -16,7 +16,7 @@ _RULE = "JNT011"
 """The rule that finds placeholder limits."""
 
 
-def placeholder_efforts(facts: "Facts", findings: "Iterable[Finding]") -> frozenset[str]:
+def placeholder_effort(facts: "Facts", findings: "Iterable[Finding]") -> frozenset[str]:
     """Return the joints of legs whose effort limit is a placeholder, such as 1000 N m."""
     legs = {joint.name for joint in facts.leg_joints if joint.kind != "prismatic"}
     return frozenset(
@@ -26,10 +26,10 @@ def placeholder_efforts(facts: "Facts", findings: "Iterable[Finding]") -> frozen
     )
 
 
-def without_efforts(
+def without_effort(
     model: "RobotModel", joints: frozenset[str]
 ) -> tuple["RobotModel", tuple[str, ...]]:
-    """Return a model in which the efforts of some joints are unknown, and a note on them."""
+    """Return a model in which the efforts of some joints are unknown, and the change."""
     if not joints:
         return model, ()
     efforts = sorted(
@@ -53,8 +53,8 @@ def without_efforts(
     )
     listed = names((joint.name for joint in model.joints if joint.name in joints), max_count=4)
     got = names(f"{effort:g}" for effort in efforts)
-    note = (
+    change = (
         f"the effort limit of {listed} is a placeholder ({got} N m); it was replaced by an "
         "estimate from the mass and the leg length, see [effort] in robot.toml"
     )
-    return changed, (note,)
+    return changed, (change,)

@@ -111,11 +111,11 @@ def _changes(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
     file = cell(display_path(result.report.facts.model.file))
     yield f"The source is {file}; it was not changed.\n"
     yield from titled_list("Fixed in the written files", [_fix(f) for f in result.fixed])
-    if robot.notes:
+    if robot.changes:
         yield "Omitted, changed or added:\n"
-        yield from (f"- {cell(note)}" for note in robot.notes)
+        yield from (f"- {cell(change)}" for change in robot.changes)
         yield ""
-    if not (result.fixed or robot.notes):
+    if not (result.fixed or robot.changes):
         yield "Nothing was fixed, omitted or changed.\n"
 
 

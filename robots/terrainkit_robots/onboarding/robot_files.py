@@ -17,9 +17,9 @@ from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
 from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
-from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
+from terrainkit_robots.export.sites import foot_sites, imu_changes, imu_site
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.onboarding.placeholder_effort import without_efforts
+from terrainkit_robots.onboarding.placeholder_effort import without_effort
 from terrainkit_robots.spec.column import rounded_length
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class RobotFiles:
     files: Mapping[str, bytes]
     """Content of each file, by its name in the folder."""
 
-    notes: tuple[str, ...]
+    changes: tuple[str, ...]
     """What was omitted, changed or added, one sentence each."""
 
 
@@ -73,7 +73,7 @@ def make_robot_files(
     floating: bool | None = None,
     user_spec: SpecOverride | None = None,
     gain_set: "GainSet" = "stand",
-    unknown_efforts: frozenset[str] = frozenset(),
+    unknown_effort: frozenset[str] = frozenset(),
     cache_dir: Path | None = None,
     progress: "Progress" = lambda items, _: items,
 ) -> RobotFiles:
@@ -86,7 +86,7 @@ def make_robot_files(
             or as the legs suggest.
         user_spec: Values that replace the derived ones.
         gain_set: The PD gains and action scales to suggest.
-        unknown_efforts: Joints whose effort limit in the file is a placeholder.
+        unknown_effort: Joints whose effort limit in the file is a placeholder.
         cache_dir: Folder that caches convex decompositions between runs.
         progress: Wraps an iterable of collision meshes to display a progress bar.
 
@@ -107,13 +107,13 @@ def make_robot_files(
     )
     exported = export_meshes(simplified.model, simplified.meshes)
     meshes = Meshes({Path(name): data for name, data in exported.files.items()})
-    model, effort_notes = without_efforts(exported.model, unknown_efforts)
-    spec_notes: tuple[str, ...] = ()
+    model, effort_changes = without_effort(exported.model, unknown_effort)
+    spec_changes: tuple[str, ...] = ()
     if user_spec is not None:
-        spec_notes = _check_user_spec(Facts(model, meshes, spec=user_spec.spec), user_spec)
+        spec_changes = _check_user_spec(Facts(model, meshes, spec=user_spec.spec), user_spec)
     spec = _make_spec(Facts(model, meshes), user_spec, gain_set)
     facts = Facts(_set_motor_limits(model, spec), meshes, spec=spec)
-    excluded, contact_notes = _excluded_contacts(facts)
+    excluded, contact_changes = _excluded_contacts(facts)
     texts = {
         URDF: urdf_text(facts.model, feet=spec.feet),
         MJCF: _mjcf_text(facts, spec, excluded),
@@ -126,16 +126,16 @@ def make_robot_files(
         facts=facts,
         spec=spec,
         files={name: text.encode() for name, text in texts.items()} | dict(exported.files),
-        notes=(
-            *spec_notes,
-            *canonical.notes,
+        changes=(
+            *spec_changes,
+            *canonical.changes,
             *unsupported_elements(source.model),
-            *simplified.notes,
-            *exported.notes,
-            *contact_notes,
-            *imu_notes(facts),
-            *(_keyframe_notes(facts) if user_spec is None else ()),
-            *(effort_notes if user_spec is None else ()),
+            *simplified.changes,
+            *exported.changes,
+            *contact_changes,
+            *imu_changes(facts),
+            *(_keyframe_changes(facts) if user_spec is None else ()),
+            *(effort_changes if user_spec is None else ()),
         ),
     )
 
@@ -228,15 +228,15 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         imu=imu,
         frames=tuple(frames),
         excluded=merged.model.excluded,
-        home=facts.positions,
+        keyframe=facts.positions,
         height=height,
         height_at_zero=max(height, rounded_length(_clearance(facts, {}))) if facts.stance else None,
     )
     return mjcf_text(merged.model, extras)
 
 
-def _keyframe_notes(facts: Facts) -> tuple[str, ...]:
-    """Return a note if the first keyframe is not the default pose."""
+def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
+    """Return one line if the first keyframe is not the default pose."""
     defect = keyframe_defect(facts.leg_model)
     if not defect:
         return ()
@@ -251,7 +251,7 @@ def _is_same_site(first: Site, second: Site) -> bool:
 
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:
-    """Return the pairs of links that must not collide, and a note on each derived pair."""
+    """Return the pairs of links that must not collide, and a line for each derived pair."""
     from_file = facts.model.excluded
     try:
         overlaps = facts.overlap_scene.detect(facts.positions)
@@ -262,12 +262,12 @@ def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[s
         for overlap in overlaps
         if overlap.depth > _MAX_PENETRATION
     }
-    notes = tuple(
+    changes = tuple(
         f"{' and '.join(sorted(pair))} do not collide in robot.xml: they penetrate each other by "
         f"{1000 * depth:.1f} mm at the default pose"
         for pair, depth in pairs.items()
     )
-    return from_file | frozenset(pairs), notes
+    return from_file | frozenset(pairs), changes
 
 
 def _base_height(facts: Facts) -> float:

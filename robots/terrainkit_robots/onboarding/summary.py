@@ -49,8 +49,8 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
             "missing",
             f"{num_missing} {missing} missing; set the folder of a package with --package NAME=DIR",
         )
-    if result.robot.notes:
-        yield "notes", f"{count(len(result.robot.notes), 'change')} listed in report.md"
+    if result.robot.changes:
+        yield "notes", f"{count(len(result.robot.changes), 'change')} listed in report.md"
 
 
 def _repairs(fixed: "Sequence[Finding]") -> Iterator[tuple[str, str]]:

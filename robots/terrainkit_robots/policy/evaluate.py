@@ -1,4 +1,4 @@
-"""Evaluate a policy without noise and randomization: velocity errors, falls and success."""
+"""Evaluate a policy without noise and randomization: velocity errors, gait, falls and success."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,12 +15,21 @@ from tensordict import TensorDict
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import PositiveInt
+from terrainkit_robots.policy.gait import (
+    asymmetry,
+    duty_factors,
+    foot_slip,
+    step_frequency,
+    swing_heights,
+)
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
+from terrainkit_robots.rl.state import CONTACT_FORCE
+from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.rl.terrain import load_terrain
 
 FloatArray = NDArray[np.float32]
@@ -34,6 +43,12 @@ SETTLING_TIME, AVERAGING_TIME = 2.0, 1.0
 
 MAX_MAP_ENVS, SINGLE_PATCH_ENVS = 512, 16
 """Default numbers of robots: at most on a map, and for one command on a single patch."""
+
+MAX_GAIT_STEPS, DIAGRAM_TIME = 1000, 2.0
+"""Steps after which the gait is no longer recorded, and time of the contact diagram [s]."""
+
+MIN_FOLLOWED = 0.5
+"""Share of a command's velocity from which the command is followed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,9 +88,17 @@ class RolloutMetrics:
     horizontal velocity error [m/s] and the absolute yaw velocity error [rad/s]. Those ending in
     `_1s` are of velocities averaged over 1 s, without the sway of a gait. They are None if no robot
     was measured, and `success`, the fraction of successful robots, is None on a plane.
+
+    The gait is that of robots that are commanded to move, None without any: swing height [m] and
+    duty factor of each foot (in the order of the robot's feet), swings of a foot per second, speed
+    of feet in contact [m/s], the largest relative difference of left and right in swing height or
+    duty factor, the pitch of the base (nose down is positive) [rad], the fraction of robots that
+    follow their command (at least half of its linear and of its yaw velocity), and the cost of
+    transport, mechanical power / (weight * speed).
     """
 
     command: tuple[float, ...] | None = None
+    direction: str | None = None
     terrain: str | None = None
     level: int | None = None
     robots: int
@@ -85,19 +108,28 @@ class RolloutMetrics:
     lin_vel_error_1s: float | None
     ang_vel_error: float | None
     ang_vel_error_1s: float | None
+    swing_height: tuple[float | None, ...] | None = None
+    duty_factor: tuple[float | None, ...] | None = None
+    step_frequency: float | None = None
+    foot_slip: float | None = None
+    asymmetry: float | None = None
+    base_pitch: float | None = None
+    followed: float | None = None
+    cost_of_transport: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the metrics as a dict, without the keys that do not define the group."""
-        empty = {k for k in ("command", "terrain", "level") if getattr(self, k) is None}
-        return {k: v for k, v in asdict(self).items() if k not in empty}
+        keys = "command", "direction", "terrain", "level"
+        return {k: v for k, v in asdict(self).items() if v is not None or k not in keys}
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationResult:
     """Result of an evaluation; `config` names the terrain of the training if none was given.
 
-    Groups are `by_command` on a plane, and `by_terrain`, `by_level` and `by_terrain_and_level` on a
-    map.
+    Groups are `by_command` on a plane, and `by_direction`, `by_terrain`, `by_level` and
+    `by_terrain_and_level` on a map. `contacts` has the last 2 s of the robot that is commanded to
+    walk ahead fastest: by foot, one character per step, 1 in contact.
     """
 
     robot: str
@@ -105,13 +137,16 @@ class EvaluationResult:
     config: EvaluationConfig
     metrics: RolloutMetrics
     groups: Mapping[str, Sequence[RolloutMetrics]]
+    contacts: Mapping[str, str]
+    dt: float
 
     def as_json(self) -> str:
         """Return the result as JSON; equal evaluations give equal bytes."""
         config, settling = self.config, {"settling_seconds": SETTLING_TIME}
         result: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
         result |= {"terrain": config.terrain, "seconds": config.seconds, **settling}
-        result |= {"seed": config.seed, "all": self.metrics.as_dict()}
+        result |= {"seed": config.seed, "feet": list(self.contacts)}
+        result |= {"contacts": {"dt": self.dt, **self.contacts}, "all": self.metrics.as_dict()}
         result |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
         return json.dumps(result, indent=2) + "\n"
 
@@ -127,14 +162,14 @@ def evaluate(
             read, or changed after the training; if the device does not exist.
     """
     config = config or EvaluationConfig()
-    env, commands = make_evaluation_env(run, config)
+    env, commands = make_eval_env(run, config)
     rollout = EvaluationRollout(env)
     rollout.run(load_policy(run, env), config.seconds, commands, progress)
     has_grid = env.terrain.is_flat and config.command is None
     return summarize(run, config, rollout, commands if has_grid else None)
 
 
-def make_evaluation_env(
+def make_eval_env(
     run: Run, config: EvaluationConfig, *, max_patch_envs: int = MAX_MAP_ENVS
 ) -> tuple[LeggedEnv, FloatArray | None]:
     """Return an environment to evaluate a policy in, and commands of shape (n, 3).
@@ -156,22 +191,26 @@ def make_evaluation_env(
     if config.command is not None:
         commands = np.array([config.command], np.float32)
     elif not config.random_commands:
-        forward = np.array([[0.75 * task.commands.lin_vel_x[1], 0, 0]], np.float32)
-        commands = command_grid(task.commands) if terrain.is_flat else forward
+        directions = direction_commands(task.commands).values()
+        commands = command_grid(task.commands) if terrain.is_flat else np.array([*directions])
     rows, cols = terrain.env_origins.shape[:2]
     n, patches = config.num_envs, rows * cols
-    if n is None and commands is not None and len(commands) > 1:
+    if n is None and terrain.is_flat and commands is not None and len(commands) > 1:
         n = len(commands)
     elif n is None:
         per_patch = max(1, min(max_patch_envs, MAX_MAP_ENVS // patches))
         n = SINGLE_PATCH_ENVS if patches == 1 else min(MAX_MAP_ENVS, patches * per_patch)
-    task = evaluation_task(task, n, seconds=config.seconds, seed=config.seed)
+    task = eval_task(task, n, seconds=config.seconds, seed=config.seed)
     task = replace(task, terrain=replace(task.terrain, collision=collision, measure_heights=scan))
     env = LeggedEnv(task, run.robot, terrain, device)
     levels_and_columns = np.divmod(_assign(patches, n, config.seed), cols)
     env.curriculum.levels[:], env.curriculum.columns[:] = levels_and_columns
     env.reset()
-    return env, None if commands is None else commands[_assign(len(commands), n, config.seed)]
+    if commands is None:
+        return env, None
+    if not terrain.is_flat:  # every direction on every patch
+        return env, commands[np.arange(n) // patches % len(commands)]
+    return env, commands[_assign(len(commands), n, config.seed)]
 
 
 def is_flat(run: Run, terrain: str | None = None) -> bool:
@@ -186,7 +225,7 @@ def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
     return np.arange(num_envs) % count
 
 
-def evaluation_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
+def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
     """Return a task without noise, randomization, pushes, curricula and timeouts in `seconds`."""
     off: dict[str, Any] = dict.fromkeys(["friction", "added_mass", "gains", "motor_strength"])
     off |= dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)
@@ -195,7 +234,6 @@ def evaluation_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: i
         env=replace(task.env, num_envs=num_envs, episode_length_s=2 * seconds + 1),
         terrain=replace(task.terrain, curriculum=False),
         init_state=replace(task.init_state, reset_range=(1.0, 1.0), lin_vel=0.0, ang_vel=0.0),
-        commands=replace(task.commands, curriculum=False),
         domain_rand=replace(task.domain_rand, **off),
         noise=replace(task.noise, noise_level=0.0),
         algorithm=replace(task.algorithm, num_mini_batches=1),  # a few robots allow no more
@@ -219,6 +257,18 @@ def command_grid(commands: Commands) -> FloatArray:
     grid[np.hypot(grid[:, 0], grid[:, 1]) < commands.min_norm, :2] = 0
     grid[np.abs(grid[:, 2]) < commands.min_norm, 2] = 0
     return np.unique(grid + np.float32(0), axis=0)  # + 0 turns -0 into 0
+
+
+def direction_commands(commands: Commands) -> dict[str, FloatArray]:
+    """Return a command for each direction of travel of a task, at 75 % of its limits."""
+    limits = (*commands.lin_vel_x[::-1], *commands.lin_vel_y[::-1])
+    axes = {"forward": (1, 0, 0), "backward": (1, 0, 0), "left": (0, 1, 0), "right": (0, 1, 0)}
+    signs = (1, -1, 1, -1)
+    return {
+        name: np.float32(0.75 * limit) * np.array(axis, np.float32)
+        for (name, axis), limit, sign in zip(axes.items(), limits, signs, strict=True)
+        if limit * sign > 0
+    }
 
 
 def rollout(
@@ -274,6 +324,12 @@ class EvaluationRollout:
         self._command_steps = np.zeros(n, np.int64)  # since the command changed
         self._measured_steps = np.zeros(n, np.int64)  # without interruption
         self._num_steps = 0
+        # Of each robot: sums of v . c, c^2, yaw rate times its command, yaw command^2, pitch,
+        # power and speed while it is commanded to travel, and of 1.
+        self.sums = np.zeros((8, n))
+        # Of each step: measured robots, and contact, height and speed of their feet.
+        self.gait: list[tuple[BoolArray, BoolArray, FloatArray, FloatArray]] = []
+        self.commands = np.zeros((n, 3), np.float32)  # of the last step
 
     def run(
         self,
@@ -302,14 +358,35 @@ class EvaluationRollout:
         active &= ~falls
         state = self.env.state
         velocity = np.column_stack([state.base_lin_vel[:, :2], state.base_ang_vel[:, 2]])
-        self._update_errors(commands, velocity - commands, active)
+        settled = self._update_errors(commands, velocity - commands, active)
+        self._update_gait(commands, velocity, settled)
         distance = np.linalg.norm(state.base_pos[:, :2] - self.start_pos, axis=1)
         commanded = np.linalg.norm(self.env.curriculum.commanded, axis=1)
         self.distance[active] = distance[active]
         self.commanded_distance[active] = commanded[active]
         self.crossed |= active & (distance > self.half_patch)
 
-    def _update_errors(self, commands: FloatArray, error: FloatArray, active: BoolArray) -> None:
+    def _update_gait(self, commands: FloatArray, velocity: FloatArray, settled: BoolArray) -> None:
+        state, self.commands = self.env.state, commands
+        squares, along = np.square(commands), velocity * commands
+        lin_sq, yaw_sq, lin, yaw = (
+            part for each in (squares, along) for part in (each[:, :2].sum(axis=1), each[:, 2])
+        )
+        gravity, moving = state.projected_gravity, settled & (commands != 0).any(axis=1)
+        pitch = np.arctan2(gravity[:, 0], -gravity[:, 2])
+        travels = lin_sq > 0
+        power = np.abs(state.torques * state.dof_vel).sum(axis=1) * travels
+        speed = np.hypot(velocity[:, 0], velocity[:, 1]) * travels
+        values = (lin, lin_sq, yaw, yaw_sq, pitch, power, speed, np.ones_like(pitch))
+        self.sums[:, moving] += np.array(values)[:, moving]
+        if len(self.gait) < MAX_GAIT_STEPS and settled.any():
+            contact = state.foot_force[..., 2] > CONTACT_FORCE
+            foot_speed = np.hypot(state.foot_vel[..., 0], state.foot_vel[..., 1])
+            self.gait.append((moving, contact, state.foot_height.copy(), foot_speed))
+
+    def _update_errors(
+        self, commands: FloatArray, error: FloatArray, active: BoolArray
+    ) -> BoolArray:
         # A heading command changes the yaw velocity at every step, which is no new command.
         command = self.env.velocity_command
         axes = 2 if command.heading_command and command.fixed is None else 3
@@ -326,6 +403,7 @@ class EvaluationRollout:
             self.error_sums[row, mask] += np.hypot(value[mask, 0], value[mask, 1])
             self.error_sums[row + 2, mask] += np.abs(value[mask, 2])
             self.error_counts[row::2, mask] += 1
+        return settled
 
     def metrics(self, mask: BoolArray, **key: Any) -> RolloutMetrics:
         """Return the metrics of the robots in a mask; each robot has the same weight."""
@@ -342,7 +420,48 @@ class EvaluationRollout:
             falls=int(self.falls[mask].sum()),
             success=None if self.env.terrain.is_flat else float(success[mask].mean()),
             **errors,
+            **self._gait_metrics(mask),
         )
+
+    def _gait_metrics(self, mask: BoolArray) -> dict[str, Any]:
+        """Return the gait of the robots in a mask, as fields of :class:`RolloutMetrics`."""
+        lin, lin_sq, yaw, yaw_sq, pitch, power, speed, count = self.sums[:, mask]
+        total, scene = float(count.sum()), self.env.scene
+        commanded = (self.commands[mask] != 0).any(axis=1) | (count > 0)
+        followed = (lin >= MIN_FOLLOWED * lin_sq) & (yaw >= MIN_FOLLOWED * yaw_sq) & (count > 0)
+        result: dict[str, Any] = {}
+        if commanded.any():
+            result["followed"] = float(followed[commanded].mean())
+        if not total or not self.gait:
+            return result
+        measured, contact, height, foot_speed = (
+            np.array([step[k][mask] for step in self.gait]) for k in range(4)
+        )
+        heights, duty = swing_heights(contact, height, measured), duty_factors(contact, measured)
+        mirror = mirror_feet(scene.foot_pos)
+        weight = float(scene.model.body_subtreemass[scene.base]) * 9.81
+        result |= {
+            "step_frequency": step_frequency(contact, measured, self.env.cfg.dt),
+            "foot_slip": foot_slip(contact, foot_speed, measured),
+            "asymmetry": max(asymmetry(each, mirror) for each in (heights, duty)),
+            "base_pitch": pitch.sum() / total,
+            "cost_of_transport": power.sum() / (weight * speed.sum()) if speed.any() else None,
+            "swing_height": tuple(None if np.isnan(each) else float(each) for each in heights),
+            "duty_factor": tuple(None if np.isnan(each) else float(each) for each in duty),
+        }
+        return {k: float(v) if isinstance(v, np.floating) else v for k, v in result.items()}
+
+    def contacts(self) -> dict[str, str]:
+        """Return the contacts of the robot that is commanded to walk ahead fastest.
+
+        By foot, one character per step, 1 in contact, for the last steps that were measured.
+        """
+        forward, left, yaw = self.commands.T
+        robot = int((forward - np.abs(left) - np.abs(yaw)).argmax())
+        steps = round(DIAGRAM_TIME / self.env.cfg.dt)
+        rows = [contact[robot] for moving, contact, *_ in self.gait if moving[robot]][-steps:]
+        feet = self.env.robot.spec.feet
+        return {foot: "".join(str(int(row[k])) for row in rows) for k, foot in enumerate(feet)}
 
 
 def summarize(
@@ -366,6 +485,12 @@ def summarize(
         add_group("by_command", np.array([k == key for k in keys]), command=key)
     if not env.terrain.is_flat:
         types, all_levels = dict.fromkeys(names.ravel().tolist()), np.unique(levels).tolist()
+        for name, command in direction_commands(env.cfg.commands).items():
+            mask = (rollout.commands == command).all(axis=1)
+            add_group("by_direction", mask, direction=name)
+            for level in all_levels:
+                mine = mask & (levels == level)
+                add_group("by_direction_and_level", mine, direction=name, level=level)
         for name in types:
             add_group("by_terrain", terrains == name, terrain=name)
         for level in all_levels:
@@ -379,4 +504,6 @@ def summarize(
         config=replace(config, terrain=str(config.terrain or run.terrain)),
         metrics=rollout.metrics(np.ones(env.num_envs, bool)),
         groups=groups,
+        contacts=rollout.contacts(),
+        dt=env.cfg.dt,
     )

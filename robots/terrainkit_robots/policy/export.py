@@ -17,7 +17,7 @@ from tensordict import TensorDict
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
-from terrainkit_robots.policy.evaluate import FloatArray, evaluation_task
+from terrainkit_robots.policy.evaluate import FloatArray, eval_task
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
@@ -65,7 +65,7 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
     files = folder / ONNX_FILE, folder / TORCHSCRIPT_FILE, folder / JSON_FILE
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
-    task = evaluation_task(run.task, num_envs=8)
+    task = eval_task(run.task, num_envs=8)
     env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
     iteration = read_checkpoint(last_checkpoint(run))["iteration"]

@@ -17,7 +17,7 @@ from terrainkit_robots.policy.evaluate import (
     Progress,
     command_schedule,
     is_flat,
-    make_evaluation_env,
+    make_eval_env,
     rollout,
     summarize,
 )
@@ -110,13 +110,13 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
 def _make_play_env(run: Run, config: EvaluationConfig) -> tuple[LeggedEnv, FloatArray | None]:
     """Return the environment, and the commands of its robots for :func:`command_schedule`."""
     if not is_flat(run, config.terrain):
-        return make_evaluation_env(run, config, max_patch_envs=1)
+        return make_eval_env(run, config, max_patch_envs=1)
     start = replace(run.task.init_state, position=0.0, yaw=0.0)  # the formation sets them
     run = replace(run, task=replace(run.task, init_state=start))
     config = replace(config, num_envs=config.num_envs or FORMATION_ENVS)
     if config.command is not None or config.random_commands:
-        return make_evaluation_env(run, config)
-    env, _ = make_evaluation_env(run, replace(config, command=(0.0, 0.0, 0.0)))
+        return make_eval_env(run, config)
+    env, _ = make_eval_env(run, replace(config, command=(0.0, 0.0, 0.0)))
     return env, np.repeat(demo_commands(run.task.commands)[:, None], env.num_envs, axis=1)
 
 

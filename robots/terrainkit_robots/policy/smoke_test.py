@@ -14,7 +14,7 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
-from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.load import single_torch_thread
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
@@ -96,7 +96,7 @@ def run_checks(robot: Robot, task: Task) -> SmokeTestResult:
     name, expected = "environment initializes", "no error"
     try:
         env = LeggedEnv(task, robot, Plane())
-        still_env = LeggedEnv(evaluation_task(task, NUM_ENVS), robot, Plane())
+        still_env = LeggedEnv(eval_task(task, NUM_ENVS), robot, Plane())
     except TerrainkitError as error:
         return SmokeTestResult(robot.spec.name, (Check(name, False, str(error), expected),))
     checks = (
@@ -115,7 +115,7 @@ def check_spawn_height(env: LeggedEnv) -> Check:
     """Check that the feet of the default pose are on the ground at the spawn height."""
     model, spec, scene = env.scene.model, env.robot.spec, env.scene
     data = mujoco.MjData(model)
-    data.qpos[:] = scene.home
+    data.qpos[:] = scene.default_qpos
     data.qpos[2] = spec.spawn_height or 0.0
     with quiet_mujoco():
         mujoco.mj_kinematics(model, data)

@@ -1,4 +1,4 @@
-"""Velocity commands: sampling, resampling, heading control, and the command curriculum."""
+"""Velocity commands: sampling, resampling and heading control."""
 
 import numpy as np
 
@@ -6,22 +6,15 @@ from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 
-MIN_TRACKING = 0.8
-"""Share of the largest tracking reward above which the range expands, as in legged_gym."""
-
-RANGE_STEP = 0.1
-"""Amount by which the range of the forward speed expands at a time [m/s]."""
-
 
 def sample_commands(
-    rng: np.random.Generator, count: int, cfg: Commands, lin_vel_x: tuple[float, float]
+    rng: np.random.Generator, count: int, cfg: Commands
 ) -> tuple[FloatArray, FloatArray]:
     """Sample commands, shape (count, 3), and headings [rad], shape (count,).
 
-    `lin_vel_x` is the current range of the forward speed [m/s]. The heading of a command to stand
-    is NaN.
+    The heading of a command to stand is NaN.
     """
-    low, high = np.array([lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_yaw], np.float32).T
+    low, high = np.array([cfg.lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_yaw], np.float32).T
     commands = low + (high - low) * rng.random((count, 3), dtype=np.float32)
     commands[np.hypot(commands[:, 0], commands[:, 1]) < cfg.min_norm, :2] = 0
     commands[np.abs(commands[:, 2]) < cfg.min_norm, 2] = 0
@@ -43,16 +36,13 @@ class VelocityCommand:
         self.heading = np.zeros(num_envs, np.float32)
         self.heading_command = heading_command
         self.fixed: FloatArray | None = None  # overrides the sampled commands, shape (n, 3)
-        self.lin_vel_x = cfg.lin_vel_x  # current range of the forward speed [m/s]
-        self.tracking = np.zeros(2)  # sum of `tracking_lin_vel` since the last check; seconds
         self._cfg = cfg
         self._interval = max(1, round(cfg.resampling_time / dt))
 
     def resample(self, rng: np.random.Generator, env_ids: Ids) -> None:
         """Sample new commands for some environments."""
-        self.commands[env_ids], self.heading[env_ids] = sample_commands(
-            rng, len(env_ids), self._cfg, self.lin_vel_x
-        )
+        sample = sample_commands(rng, len(env_ids), self._cfg)
+        self.commands[env_ids], self.heading[env_ids] = sample
 
     def resample_due(self, rng: np.random.Generator, steps: Ids) -> None:
         """Resample where the resampling time has passed; `steps` since reset, shape (n,)."""
@@ -67,24 +57,3 @@ class VelocityCommand:
         elif self.heading_command:
             rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
             self.commands[:, 2] = np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
-
-    def expand_range(
-        self, reward: float, seconds: float, *, scale: float, min_seconds: float
-    ) -> None:
-        """Expand the range of the forward speed once commands are tracked well.
-
-        `reward` is the sum of the `tracking_lin_vel` rewards of the episodes that ended, of a total
-        duration of `seconds`; it is averaged over `min_seconds`. Perfect tracking has the reward
-        `scale` per second.
-        """
-        self.tracking += reward, seconds
-        reward, seconds = self.tracking
-        if seconds < min_seconds:
-            return
-        self.tracking[:] = 0
-        if self._cfg.curriculum and reward / seconds / scale >= MIN_TRACKING:
-            (low, high), limit = self.lin_vel_x, self._cfg.max_curriculum
-            self.lin_vel_x = (
-                max(low - RANGE_STEP, min(low, -limit)),
-                min(high + RANGE_STEP, max(high, limit)),
-            )

@@ -129,18 +129,6 @@ class Commands(Config):
     """Norm below which linear and yaw velocity commands are set to zero [m/s, rad/s]."""
     standing: Fraction = 0.1
     """Fraction of the commands that are zero."""
-    curriculum: bool = False
-    """Whether the range of `lin_vel_x` grows once the robots track it well."""
-    max_curriculum: NonNegativeFloat = 1.0
-    """Largest range of `lin_vel_x` to either side [m/s]."""
-
-    def __post_init__(self) -> None:
-        """Validate the values, and that the curriculum can grow."""
-        super().__post_init__()
-        low, high = self.lin_vel_x
-        if self.curriculum and self.max_curriculum <= min(-low, high):
-            got = f"max_curriculum: got {self.max_curriculum:g}"
-            raise ConfigError(f"{got}; expected more than lin_vel_x, {low:g} to {high:g}")
 
 
 @dataclass(frozen=True, kw_only=True)

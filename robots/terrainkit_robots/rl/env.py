@@ -64,6 +64,7 @@ class LeggedEnv(VecEnv):
         self.episode_length_buf = torch.zeros(n, dtype=torch.int64)  # rsl-rl may replace it
         self.steps_since_reset = np.zeros(n, np.int64)
         self.start_pos = np.zeros((n, 2))  # base position at the last reset
+        self.path_length = np.zeros(n)  # since the last reset [m]
         self.actions = np.zeros((3, n, joints), np.float32)  # of the last three steps
         self.joint_offset = np.zeros((n, joints), np.float32)
         self.rewards = active_rewards(task.rewards)
@@ -108,6 +109,7 @@ class LeggedEnv(VecEnv):
         self.sensors.last_dof_vel[unstable] = 0  # MuJoCo reset the state: no acceleration
         self.state = state = self._compute_state(np.arange(self.num_envs), unstable)
         rewards = self._compute_rewards(state, unstable)
+        self.path_length += np.hypot(*state.base_lin_vel[:, :2].T) * self.cfg.dt
         time_out = (self.episode_length_buf.numpy() >= self.max_episode_length) & ~state.fallen
         done = state.fallen | time_out
         self.curriculum.accumulate_command(self.commands, quat_to_yaw(state.base_quat), self.cfg.dt)
@@ -221,15 +223,7 @@ class LeggedEnv(VecEnv):
             for name, total in self.episode_sums.items()
         }
         log["Episode/falls"] = float(fallen.mean())
-        if "tracking_lin_vel" in self.rewards:
-            self.velocity_command.expand_range(
-                float(self.episode_sums["tracking_lin_vel"][env_ids].sum()),
-                float(seconds.sum()),
-                scale=self.rewards["tracking_lin_vel"][1],
-                min_seconds=self.num_envs * self.cfg.env.episode_length_s,
-            )
-        if self.cfg.commands.curriculum:
-            log["Curriculum/lin_vel_x"] = self.velocity_command.lin_vel_x[1]
+        log["Episode/speed"] = float((self.path_length[env_ids] / seconds).mean())
         # rsl-rl cuts the first episodes to random lengths; those say nothing about the terrain.
         complete = (self.episode_length_buf.numpy() == self.steps_since_reset)[env_ids]
         base_pos = state.base_pos[env_ids]
@@ -259,6 +253,7 @@ class LeggedEnv(VecEnv):
         self.start_pos[env_ids] = qpos[:, :2]
         self.curriculum.reset(env_ids)
         self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
+        self.path_length[env_ids] = 0
         self.actions[:, env_ids] = 0
         self.pushes.reset(self.rng, env_ids)
         self.sensors.reset(env_ids)
@@ -273,7 +268,6 @@ class LeggedEnv(VecEnv):
         return {
             "arrays": {name: torch.tensor(array) for name, array in self._arrays().items()},
             "rng": self.rng.bit_generator.state,
-            "lin_vel_x": self.velocity_command.lin_vel_x,
             "curriculum": self.curriculum.state_dict(),
             "observations": dict(self._observations.clone().items()),
         }
@@ -281,7 +275,6 @@ class LeggedEnv(VecEnv):
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore a state; if the number of environments differs, restore only the curricula."""
         self.curriculum.load_state_dict(state["curriculum"])
-        self.velocity_command.lin_vel_x = tuple(state["lin_vel_x"])
         arrays, saved = self._arrays(), state["arrays"]
         if len(saved["episode_length"]) != self.num_envs:
             self.reset()
@@ -313,7 +306,7 @@ class LeggedEnv(VecEnv):
             "air_time": self.sensors.air_time,
             "steps_since_reset": self.steps_since_reset,
             "start_pos": self.start_pos,
-            "tracking": self.velocity_command.tracking,
+            "path_length": self.path_length,
         }
         sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
         # Computing the state again would advance the air time and draw noise.

@@ -129,7 +129,7 @@ def sample_reset_state(
     offset is halved, and then dropped.
     """
     count, limit = len(env_origins), cfg.position
-    qpos = np.tile(scene.home, (count, 1))
+    qpos = np.tile(scene.default_qpos, (count, 1))
     offset = rng.uniform(-limit, limit, (count, 2)).astype(np.float32)
     # Points that cover the area of the feet at any heading.
     radius = 0.5 * max(robot.spec.leg_length or 0.4, robot.spec.stance_width or 0.2)

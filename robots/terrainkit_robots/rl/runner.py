@@ -38,8 +38,11 @@ class TrainingProgress(NamedTuple):
     eta: float  # [s]
     reward: float | None  # sum of an episode; None before the first has ended
     episode_length: float | None  # [s]
+    falls: float | None  # fraction of the episodes
+    speed: float | None  # horizontal [m/s]
     noise_std: float
     rewards: Mapping[str, float]  # of each term [1/s]
+    shares: Mapping[str, float]  # of the most that the term can be; of a penalty: that all can be
     levels: Mapping[str, float]  # on each terrain; empty on a plane
     success: Mapping[str, float]  # on each terrain, 0 to 1
 
@@ -272,6 +275,9 @@ class LeggedRunner(OnPolicyRunner):
             {k.removeprefix(p): mean for k, mean in logger.means.items() if k.startswith(p)}
             for p in ("Episode/rew_", "Curriculum/level_", "Curriculum/success_")
         )
+        scales = {name: float(getattr(self.env.cfg.rewards, name)) for name in rewards}
+        most = sum(scale for scale in scales.values() if scale > 0) or 1.0
+        shares = {k: v / (scales[k] if scales[k] > 0 else most) for k, v in rewards.items()}
         return TrainingProgress(
             folder=self.folder,
             iteration=self._completed,
@@ -281,8 +287,11 @@ class LeggedRunner(OnPolicyRunner):
             eta=(self._last - self._completed) * pace,
             reward=statistics.mean(logger.rewbuffer) if lengths else None,
             episode_length=statistics.mean(lengths) if lengths else None,
+            falls=logger.means.get("Episode/falls"),
+            speed=logger.means.get("Episode/speed"),
             noise_std=self.alg.get_policy().output_std.detach().mean().item(),
             rewards=rewards,
+            shares=shares,
             levels=levels,
             success=success,
         )

@@ -43,12 +43,12 @@ class Scene:
     """Body id of the base."""
     geoms: Any
     """Ids of the robot's colliding geoms, shape (g,)."""
-    home: Any
+    default_qpos: Any
     """qpos of the default pose with the base at height 0, shape (nq,)."""
     foot_pos: Any
-    """Position of each foot's site at `home` [m], shape (f, 3)."""
+    """Position of each foot's site at `default_qpos` [m], shape (f, 3)."""
     sole_depth: Any
-    """Distance from each foot's site down to its lowest point at `home` [m], shape (f,)."""
+    """Distance from each foot's site down to its lowest point at `default_qpos` [m], shape (f,)."""
     sensors: dict[str, slice]
     """Range in sensordata of `foot_position`, `foot_velocity`, `foot_force`, `penalized_force` and
     `termination_force`, three numbers per body. Forces act on what the robot touches [N]."""
@@ -68,10 +68,10 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
         except ValueError as error:
             raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
     joints = [model.joint(name).id for name in robot.spec.joint_order]
-    home = model.qpos0.copy()
-    home[:7] = (0, 0, 0, 1, 0, 0, 0)
-    home[model.jnt_qposadr[joints]] = robot.default_pose
-    foot_pos, sole_depth = _measure_feet(robot, model, home)
+    default_qpos = model.qpos0.copy()
+    default_qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+    default_qpos[model.jnt_qposadr[joints]] = robot.default_pose
+    foot_pos, sole_depth = _measure_feet(robot, model, default_qpos)
     base_id = model.body(robot.spec.base).id
     of_robot = model.body_rootid[model.geom_bodyid] == model.body_rootid[base_id]
     return Scene(
@@ -80,7 +80,7 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
         joint_qvel=model.jnt_dofadr[joints],
         base=base_id,
         geoms=np.flatnonzero(collides(model) & of_robot),
-        home=home,
+        default_qpos=default_qpos,
         foot_pos=foot_pos,
         sole_depth=sole_depth,
         sensors=sensors,
@@ -202,10 +202,10 @@ def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     return ranges
 
 
-def _measure_feet(robot: Robot, model: Any, home: Any) -> tuple[FloatArray, FloatArray]:
+def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArray, FloatArray]:
     """Return the `foot_pos` and the `sole_depth` of a scene."""
     data = mujoco.MjData(model)
-    data.qpos[:] = home
+    data.qpos[:] = default_qpos
     mujoco.mj_kinematics(model, data)
     foot_pos, depths = np.array([data.site(SOLE + foot).xpos for foot in robot.spec.feet]), []
     for foot, height in zip(robot.spec.feet, foot_pos[:, 2], strict=True):

@@ -122,11 +122,14 @@ def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
             )
 
 
+def mirror_feet(position: FloatArray) -> NDArray[np.int64]:
+    """Return the foot nearest to the mirror image of each foot; positions [m], shape (f, 3)."""
+    return np.linalg.norm(position[:, None] - position * [1, -1, 1], axis=2).argmin(axis=1)
+
+
 def _foot_map(env: "LeggedEnv") -> SignedPermutation:
     """Return the map of one vector per foot: feet are paired by position in the default pose."""
-    feet, position = env.robot.spec.feet, env.scene.foot_pos
-    distance = np.linalg.norm(position[:, None] - position * [1, -1, 1], axis=2)
-    index = distance.argmin(axis=1)
+    feet, index = env.robot.spec.feet, mirror_feet(env.scene.foot_pos)
     for k in np.flatnonzero(index[index] != np.arange(len(feet))):
         got = f"the foot {feet[k]} is nearest to the mirror image of {feet[index[k]]}"
         raise ConfigError(f"symmetry: {got}, which is nearest to another; expected pairs of feet")

@@ -23,6 +23,7 @@ def train(
     folder: Path | None = None,
     resume: runs.Run | None = None,
     device: str = "cpu",
+    start_callback: "Callable[[LeggedRunner], object]" = lambda _: None,
     progress_callback: "ProgressCallback | None" = None,
     should_stop: Callable[[], object] = lambda: False,
 ) -> "LeggedRunner":
@@ -38,6 +39,7 @@ def train(
             networks, its optimizer state if the learning rate and its schedule are the same, and
             its terrain levels if the map is the same.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
+        start_callback: Called before the first iteration.
         progress_callback: Called after each iteration.
         should_stop: Called before each iteration; True stops training with a checkpoint.
 
@@ -79,6 +81,7 @@ def train(
             raise ConfigError(f"runner.max_iterations: got {total}; {expected}")
         if runner.is_main_process:
             runner.folder = runs.run_folder(folder, robot, terrain, task, continued)
+            start_callback(runner)
         # Resets of a new run would otherwise all time out in the same step.
         runner.learn(total - completed, init_at_random_ep_len=not env.steps_since_reset.any())
     except (TerrainkitError, OSError) as error:

@@ -23,7 +23,7 @@ from terrainkit_robots.simulation.stiffness import (
     leg_gain_target,
     other_gain_target,
 )
-from terrainkit_robots.simulation.time_step import JointInertia, joint_inertias
+from terrainkit_robots.simulation.time_step import JointInertia, joint_inertia
 from terrainkit_robots.simulation.units import REVOLUTE, JointUnits
 
 _MIN_STIFFNESS_RATIO = 20.0
@@ -69,12 +69,12 @@ def suggest_training_gains(facts: Facts) -> Mapping[str, Gain]:
 
 def _compute_gains(facts: Facts, gain_set: GainSet) -> Mapping[str, Gain]:
     sim = make_sim_model(facts)
-    inertias = joint_inertias(sim)
+    inertia = joint_inertia(sim)
     wheels = _wheels(facts, sim)
-    found = {name: _wheel_gain(facts, sim, inertias, name) for name in wheels}
+    found = {name: _wheel_gain(facts, sim, inertia, name) for name in wheels}
     legs, others = _group_joints(facts, [name for name in sim.actuated if name not in wheels])
     leg_targets = {
-        key: leg_gain_target(facts, sim, inertias, joints, gain_set) for key, joints in legs.items()
+        key: leg_gain_target(facts, sim, inertia, joints, gain_set) for key, joints in legs.items()
     }
     ratio = _MIN_STIFFNESS_RATIO if gain_set == "stand" else _TRAIN_STIFFNESS_RATIO
     for target in _merge_similar(leg_targets):
@@ -82,7 +82,7 @@ def _compute_gains(facts: Facts, gain_set: GainSet) -> Mapping[str, Gain]:
     # Other joints of the same stiffness get the same damping.
     similar: dict[tuple[float, float, JointUnits], list[GainTarget]] = defaultdict(list)
     for joints in others.values():
-        target = other_gain_target(sim, inertias, joints)
+        target = other_gain_target(sim, inertia, joints)
         similar[_round(target.stiffness), target.armature, target.units].append(target)
     for targets in similar.values():
         lightest = min(target.inertia for target in targets)
@@ -210,24 +210,24 @@ def _wheels(facts: Facts, sim: SimModel) -> frozenset[str]:
 
 
 def _wheel_gain(
-    facts: Facts, sim: SimModel, inertias: Mapping[str, JointInertia], name: str
+    facts: Facts, sim: SimModel, inertia: Mapping[str, JointInertia], name: str
 ) -> Gain:
     """Return the gains of a wheel, which control its velocity."""
     joint = facts.body_of_joint[name].joint
     assert joint is not None
     effort = sim.effort_limit(name)
     velocity = joint.limit.velocity if joint.limit else None
-    inertia = inertias[name].free
-    limit = _MAX_WHEEL_DAMPING * inertia / TIME_STEP
+    free = inertia[name].free
+    limit = _MAX_WHEEL_DAMPING * free / TIME_STEP
     if math.isfinite(effort) and velocity is not None and 0 < velocity < math.inf:
         damping = effort / velocity
         reason = f"its effort limit of {effort:.3g} N m at an error of its maximum velocity"
     else:
-        damping = inertia / _WHEEL_TIME_CONSTANT
+        damping = free / _WHEEL_TIME_CONSTANT
         reason = f"a time constant of {_WHEEL_TIME_CONSTANT:g} s"
     if damping > limit:
         damping = limit
-        reason = f"stability limit at a time step of {1000 * TIME_STEP:g} ms, {inertia:.2g} kg m2"
+        reason = f"stability limit at a time step of {1000 * TIME_STEP:g} ms, {free:.2g} kg m2"
     return Gain(
         stiffness=0.0,
         damping=_round(damping),

@@ -144,7 +144,7 @@ def make_sim_model(facts: Facts) -> SimModel:
     extras = Extras(
         actuators=actuators,
         excluded=model.excluded,
-        home=facts.positions,
+        keyframe=facts.positions,
         height=facts.stance.height if facts.stance else 1.0,
         time_step=TIME_STEP,
     )

@@ -92,7 +92,7 @@ class _RequiredStiffness:
 def leg_gain_target(
     facts: Facts,
     sim: SimModel,
-    inertias: Mapping[str, JointInertia],
+    inertia: Mapping[str, JointInertia],
     joints: Sequence[str],
     gain_set: GainSet = "stand",
 ) -> GainTarget:
@@ -111,7 +111,7 @@ def leg_gain_target(
         required = [
             _RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_LEG_ERROR)
         ]
-        return _make_target(sim, inertias, joints, required)
+        return _make_target(sim, inertia, joints, required)
     else:
         stiffness = _UPRIGHT_FACTOR * weight * length / count
         reason = f"{_UPRIGHT_FACTOR:g} x weight x leg length / {count} legs = {stiffness:.3g}"
@@ -120,7 +120,7 @@ def leg_gain_target(
         ]
     if facts.stance is not None and is_statically_stable(facts.legs):
         required.append(_stance_stiffness(facts.stance.torques, sim, units))
-    return _make_target(sim, inertias, joints, required)
+    return _make_target(sim, inertia, joints, required)
 
 
 def _stance_stiffness(
@@ -140,13 +140,13 @@ def _stance_stiffness(
 
 
 def other_gain_target(
-    sim: SimModel, inertias: Mapping[str, JointInertia], joints: Sequence[str]
+    sim: SimModel, inertia: Mapping[str, JointInertia], joints: Sequence[str]
 ) -> GainTarget:
     """Return the target of a joint that is not part of a leg, and of its mirror image."""
     units = sim.units(joints[0])
     sag = _MAX_SAG * _length_scale(units)
     load = max(_max_gravity_load(sim, name) for name in joints)
-    dynamic = _MIN_FREQUENCY**2 * max(inertias[name].locked for name in joints)
+    dynamic = _MIN_FREQUENCY**2 * max(inertia[name].locked for name in joints)
     required = [
         _RequiredStiffness(
             stiffness=load / sag,
@@ -160,7 +160,7 @@ def other_gain_target(
             min_error=_MIN_ERROR,
         ),
     ]
-    return _make_target(sim, inertias, joints, required)
+    return _make_target(sim, inertia, joints, required)
 
 
 def _length_scale(units: JointUnits) -> float:
@@ -170,7 +170,7 @@ def _length_scale(units: JointUnits) -> float:
 
 def _make_target(
     sim: SimModel,
-    inertias: Mapping[str, JointInertia],
+    inertia: Mapping[str, JointInertia],
     joints: Sequence[str],
     required: Sequence[_RequiredStiffness],
 ) -> GainTarget:
@@ -180,27 +180,26 @@ def _make_target(
     stiffness, reason = max(_limit_by_effort(each, effort, units) for each in required)
     if not math.isfinite(stiffness):
         raise CannotCheckError(f"the load of joint {joints[0]} is too large to compute its gains")
-    inertia = min(inertias[name].free for name in joints)
+    free = min(inertia[name].free for name in joints)
     armature = max(float(sim.model.joint(name).armature[0]) for name in joints)
-    stable = max_stable_stiffness(inertia)
+    stable = max_stable_stiffness(free)
     extra_armature = stable < _MIN_STIFFNESS_SHARE * stiffness
     if extra_armature:
-        required_armature = armature + min_stable_inertia(stiffness) - inertia
+        required_armature = armature + min_stable_inertia(stiffness) - free
         scale = 10.0 ** math.floor(math.log10(required_armature))
         rounded_up = (s * scale for s in (1, 2, 3, 5, 10) if s * scale >= 0.999 * required_armature)
         added = float(f"{next(rounded_up):.1g}") - armature
-        inertia, armature = inertia + added, armature + added
+        free, armature = free + added, armature + added
     elif stable < stiffness:
         stiffness = stable
         reason = (
-            f"stability limit at a time step of {1000 * TIME_STEP:g} ms, "
-            f"{inertia:.2g} {units.inertia}"
+            f"stability limit at a time step of {1000 * TIME_STEP:g} ms, {free:.2g} {units.inertia}"
         )
     return GainTarget(
         joints=tuple(joints),
         stiffness=stiffness,
         reason=reason,
-        inertia=inertia,
+        inertia=free,
         armature=armature,
         units=units,
         extra_armature=extra_armature,

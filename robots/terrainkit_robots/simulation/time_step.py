@@ -32,7 +32,7 @@ class JointInertia:
     """Inertia when nothing else moves."""
 
 
-def joint_inertias(sim: SimModel) -> Mapping[str, JointInertia]:
+def joint_inertia(sim: SimModel) -> Mapping[str, JointInertia]:
     """Return the inertia of each moving joint, by name."""
     mass, inverse = _mass_matrix(sim)
     return {

@@ -71,7 +71,7 @@ class JointMatches(Generic[T]):
             message = f"{table}.{truncate(key_text(key))} matches no joint{suggestion}"
             yield MatchError(name=key, message=message)
         for joint, keys in self.duplicate.items():
-            listed = names(map(key_text, keys), separator=" and ")
+            listed = names(map(key_text, keys), sep=" and ")
             message = (
                 f"joint {truncate(joint)} is matched by {listed} of {table}; expected one of them"
             )

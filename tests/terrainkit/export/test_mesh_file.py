@@ -3,12 +3,14 @@ import json
 import struct
 import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
 import trimesh
 
-from terrainkit.errors import TerrainkitWarning
+from terrainkit import TerrainMap
+from terrainkit.errors import ExportError, TerrainkitWarning
 from terrainkit.export.mesh_file import _FACES_PER_BLOCK
 from terrainkit.solids import Solids
 
@@ -20,6 +22,15 @@ every_suffix = pytest.mark.parametrize("suffix", SUFFIXES)
 
 def saved(terrain_map, folder, suffix, **options):
     return trimesh.load_mesh(terrain_map.save(folder / f"map{suffix}", **options))
+
+
+def peak_memory(function):
+    tracemalloc.start()
+    try:
+        function()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def points(terrain_map):
@@ -68,8 +79,9 @@ def test_mesh_file_y_up_rotates_about_x(ray_down, terrain_map, tmp_path, suffix)
     np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
 
 
-def test_mesh_file_ply_is_exact(terrain_map, tmp_path):
-    path = terrain_map.save(tmp_path / "map.ply")
+@pytest.mark.parametrize("suffix", [".ply", ".glb"])
+def test_mesh_file_is_exact(terrain_map, tmp_path, suffix):
+    path = terrain_map.save(tmp_path / f"map{suffix}")
     read, mesh = trimesh.load_mesh(path, process=False), terrain_map.mesh()
     assert read.vertices.astype(np.float32).tobytes() == mesh.vertices.tobytes()
     assert read.faces.astype(np.int32).tobytes() == mesh.triangles.tobytes()
@@ -85,7 +97,7 @@ def test_mesh_file_stl_is_exact(terrain_map, tmp_path):
     np.testing.assert_allclose(trimesh.triangles.normals(corners)[0], read.face_normals, atol=1e-5)
 
 
-@pytest.mark.parametrize("suffix", [".stl", ".ply"])
+@every_suffix
 def test_mesh_file_does_not_import_trimesh(tmp_path, suffix):
     script = (
         "import sys, terrainkit as t\n"
@@ -93,6 +105,30 @@ def test_mesh_file_does_not_import_trimesh(tmp_path, suffix):
         "assert 'trimesh' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", script, str(tmp_path / f"map{suffix}")], check=True)
+
+
+@every_suffix
+def test_mesh_file_is_written_in_blocks(terrain_map, tmp_path, suffix, monkeypatch):
+    mesh = terrain_map.mesh()
+    monkeypatch.setattr(TerrainMap, "mesh", lambda *_, **__: mesh)
+    monkeypatch.setattr("terrainkit.export.mesh_file._FACES_PER_BLOCK", 256)
+    # Besides the mesh, writing needs a small part of its memory.
+    views = mesh.vertices.nbytes + mesh.triangles.nbytes
+    assert peak_memory(lambda: terrain_map.save(tmp_path / f"map{suffix}")) < views / 2
+
+
+def test_mjcf_is_written_in_rows(terrain_map, tmp_path):
+    path = tmp_path / "map.xml"
+    peak = peak_memory(lambda: terrain_map.save(path))
+    assert peak < 2.5 * (terrain_map.heights.nbytes + path.stat().st_size)
+
+
+def test_mesh_file_glb_header_limits_size(terrain_map, tmp_path, monkeypatch):
+    monkeypatch.setattr("terrainkit.export.mesh_file._MAX_GLB_BYTES", 1000)
+    path = tmp_path / "map.glb"
+    with pytest.raises(ExportError, match=r"a \.glb file: got \d+ bytes; expected at most 1000;"):
+        terrain_map.save(path)
+    assert not path.exists()
 
 
 def test_mesh_file_glb_has_friction_extras(terrain_map, tmp_path):

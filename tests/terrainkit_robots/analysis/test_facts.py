@@ -139,7 +139,7 @@ def test_actuated_joints_of_mjcf(actuators, driven):
 def test_positions_equal_keyframe():
     path = bundled.urdf_path("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
-    assert robot.positions == {each.name: robot.model.home[each.name] for each in robot.joints}
+    assert robot.positions == {each.name: robot.model.keyframe[each.name] for each in robot.joints}
     assert robot.stance.positions == robot.positions
 
 

@@ -42,7 +42,7 @@ def test_cart_on_rail(tmp_path):
     done, spec = onboard_text(tmp_path, CART)
     assert [joint.name for joint in done.robot.facts.joints] == ["slider", "hinge"]
     assert (spec.joint_order, spec.floating, spec.base) == (("slider",), False, "cart")
-    assert done.robot.notes == (
+    assert done.robot.changes == (
         "removed table, ball: not part of the kinematic tree",
         "added the base link world_link for the world, with joints slider",
     )
@@ -61,7 +61,7 @@ def test_planar_walker(tmp_path, floating):
     assert moving == (["elbow"] if floating else ["z", "x", "turn", "elbow"])
     assert (spec.floating, spec.base) == (bool(floating), "torso")
     told = "removed z, x, turn: " if floating else "added the base link world_link "
-    assert any(note.startswith(told) for note in done.robot.notes)
+    assert any(change.startswith(told) for change in done.robot.changes)
 
 
 @pytest.mark.parametrize("joint", ["<freejoint/>", ""])

@@ -59,7 +59,7 @@ def check_same(source):
         np.testing.assert_allclose(pose, there[link], atol=1e-12)
     # Doing it again changes nothing: the form is one.
     again = to_canonical(made)
-    assert again.notes == ()
+    assert again.changes == ()
     assert [j.name for j in again.model.joints] == [j.name for j in form.model.joints]
 
 
@@ -86,7 +86,7 @@ def test_unsupported_joint_is_fixed(tmp_path):
     robot = facts(tmp_path, mjcf(f'<body name="ball">{MASS}<joint name="b" type="ball"/></body>'))
     form = to_canonical(robot)
     assert [joint.kind for joint in form.model.joints] == ["fixed"]
-    assert any("b" in note and "ball" in note for note in form.notes)
+    assert any("b" in change and "ball" in change for change in form.changes)
 
 
 def test_mjcf_effort_is_that_of_actuator(tmp_path):
@@ -109,7 +109,7 @@ def test_other_trees_are_removed(tmp_path):
     )
     form = to_canonical(facts(tmp_path, text))
     assert [link.name for link in form.model.links] == ["base", "leg"]
-    assert any("crate" in note for note in form.notes)
+    assert any("crate" in change for change in form.changes)
 
 
 @pytest.mark.parametrize(
@@ -198,7 +198,7 @@ def test_duplicate_joint_names(tmp_path):
       <joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint></robot>"""
     form = to_canonical(facts(tmp_path, text))
     assert [joint.name for joint in form.model.joints] == ["j", "c_joint"]
-    assert form.notes == ("renamed the joint of c to c_joint: duplicate name j",)
+    assert form.changes == ("renamed the joint of c to c_joint: duplicate name j",)
 
 
 @pytest.mark.parametrize(("name", "wanted"), [("my robot/../x", "my_robot_.._x"), ("..", "robot")])
@@ -215,7 +215,7 @@ def test_link_named_world_is_renamed(tmp_path):
     assert [link.name for link in form.model.links] == ["world_link_2", "world_link"]
     assert form.model.joints[0].parent == "world_link_2"
     assert form.model.floating is False
-    assert form.notes == ("renamed link world to world_link_2: MuJoCo reserves the name world",)
+    assert form.changes == ("renamed link world to world_link_2: MuJoCo reserves the name world",)
 
 
 DYNAMICS = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
@@ -229,23 +229,23 @@ def test_friction_and_damping(tmp_path, written, wanted):
 
 
 @pytest.mark.parametrize(
-    ("leads", "notes"),
+    ("leads", "changes"),
     [
         (("k", "j"), ("j", "k")),
         (("j", "j"), ("j",)),
         (("nobody", "j"), ("j",)),
     ],
 )
-def test_invalid_mimic_is_removed(tmp_path, leads, notes):
+def test_invalid_mimic_is_removed(tmp_path, leads, changes):
     joint = """<joint name="{}" type="continuous"><parent link="a"/><child link="{}"/>
       <mimic joint="{}"/></joint>"""
     joints = joint.format("j", "b", leads[0]) + joint.format("k", "c", leads[1])
     text = f'<robot name="r"><link name="a"/><link name="b"/><link name="c"/>{joints}</robot>'
     form = to_canonical(facts(tmp_path, text))
     free = [joint.name for joint in form.model.joints if joint.mimic is None]
-    assert free == list(notes)
+    assert free == list(changes)
     why = {"nobody": "there is no joint 'nobody'"}.get(leads[0], "it is part of a cycle")
-    assert form.notes == tuple(f"removed the mimic of {name}: {why}" for name in notes)
+    assert form.changes == tuple(f"removed the mimic of {name}: {why}" for name in changes)
 
 
 MESH = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'

@@ -81,7 +81,7 @@ def test_actuator_order(quadruped):
         name: ActuatorConfig(stiffness=20 + k, damping=0.5, effort=5.0 + k, armature=0.01)
         for k, name in enumerate(names)
     }
-    model = written(quadruped.model, actuators=drives, home=quadruped.positions, height=0.3)
+    model = written(quadruped.model, actuators=drives, keyframe=quadruped.positions, height=0.3)
     assert [model.actuator(k).name for k in range(model.nu)] == names
     for k, name in enumerate(names):
         motor, joint = model.actuator(k), model.joint(name)
@@ -113,7 +113,7 @@ def test_touch_sensors_of_feet(quadruped):
         actuators=drives,
         feet=foot_sites(quadruped),
         imu=imu_site(quadruped),
-        home=quadruped.positions,
+        keyframe=quadruped.positions,
         height=quadruped.stance.height,
     )
     text = mjcf_text(quadruped.model, extras)

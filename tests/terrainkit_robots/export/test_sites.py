@@ -5,7 +5,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.canonical import to_canonical
-from terrainkit_robots.export.sites import foot_sites, imu_notes, imu_site
+from terrainkit_robots.export.sites import foot_sites, imu_changes, imu_site
 
 
 def facts_of(name):
@@ -38,7 +38,7 @@ def test_imu_at_link(tmp_path):
     site = imu_site(facts)
     assert site.body == "trunk"
     np.testing.assert_allclose(site.pose[:3, 3], [0.1, 0.2, 0.3])
-    assert imu_notes(facts) == ()
+    assert imu_changes(facts) == ()
 
 
 def test_imu_default_is_base(tmp_path):
@@ -48,12 +48,12 @@ def test_imu_default_is_base(tmp_path):
     site = imu_site(facts)
     assert site.body == "trunk"
     np.testing.assert_allclose(site.pose, np.eye(4))
-    assert imu_notes(facts) == (
+    assert imu_changes(facts) == (
         "placed the IMU at the origin of trunk: no sensor, site or link defines it",
     )
     # An arm that is bolted down has none, and nobody misses it.
     arm = Facts(to_canonical(facts, floating=False).model)
-    assert imu_notes(arm) == ()
+    assert imu_changes(arm) == ()
 
 
 IMU = """<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
@@ -69,7 +69,7 @@ def test_imu_of_file_has_precedence(tmp_path):
     site = imu_site(facts)
     assert site.body == "trunk"  # of which the head is a part
     np.testing.assert_allclose(site.pose[:3, 3], [0.1, 0.2, 1.3])
-    assert imu_notes(facts) == ()
+    assert imu_changes(facts) == ()
 
 
 def test_imu_of_other_tree_is_ignored(tmp_path):
@@ -80,7 +80,7 @@ def test_imu_of_other_tree_is_ignored(tmp_path):
     path.write_text(text.replace('name="imu_link"', 'name="cover"'))
     model = to_canonical(Facts(load_robot(path))).model
     assert model.imu is None
-    assert imu_notes(Facts(model))[0].startswith("placed the IMU at the origin of trunk")
+    assert imu_changes(Facts(model))[0].startswith("placed the IMU at the origin of trunk")
 
 
 def test_imu_of_go2(robot_file):

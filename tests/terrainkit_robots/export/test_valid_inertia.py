@@ -45,7 +45,7 @@ def test_sensor_mass_moves_to_trunk(tmp_path):
     form = to_canonical(robot, floating=True)
     _, imu = form.model.links
     assert imu.inertial is None
-    assert form.notes == (
+    assert form.changes == (
         "moved the mass of imu to trunk, to which they are fixed: MuJoCo rejects masses without "
         "inertia",
     )
@@ -72,7 +72,7 @@ def test_rotated_and_rounded_plate(tmp_path):
     )
     robot = facts(tmp_path, {"plate": plate})
     form = to_canonical(robot, floating=True)
-    assert not form.notes
+    assert not form.changes
     before, after = robot.bodies[0].principal, Facts(form.model).bodies[0].principal
     assert after == pytest.approx(before, rel=1e-3)
     compiled(form)
@@ -82,7 +82,7 @@ def test_invalid_body_is_unchanged(tmp_path):
     wrong = '<mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="1" ixy="0" ixz="0" iyz="0"/>'
     robot = facts(tmp_path, {"a": wrong, "b": NOTHING.format(1)}, fixed("a", "b"))
     form = to_canonical(robot, floating=True)
-    assert not form.notes
+    assert not form.changes
     assert [link.inertial.mass for link in form.model.links] == [2, 1]
     assert form.model.links[0].inertial.inertia[2, 2] == 1
 
@@ -97,8 +97,8 @@ def test_missing_inertia_is_zero(tmp_path):
     ]
     for form in forms:
         assert form.model.links[1].inertial is None
-        assert form.notes == forms[0].notes
-        assert "moved the mass of imu to trunk" in form.notes[0]
+        assert form.changes == forms[0].changes
+        assert "moved the mass of imu to trunk" in form.changes[0]
     bodies = [Facts(form.model).bodies[0] for form in forms]
     np.testing.assert_array_equal(bodies[0].inertia, bodies[1].inertia)
     assert bodies[0].mass == pytest.approx(60.5)
@@ -110,7 +110,7 @@ def test_single_mass_without_inertia(tmp_path):
       <axis xyz="0 1 0"/></joint>"""
     robot = facts(tmp_path, {"base": NONE.format(5), "arm": TRUNK}, joint)
     form = to_canonical(robot, floating=False)
-    assert form.notes == ()
+    assert form.changes == ()
     np.testing.assert_array_equal(form.model.links[0].inertial.inertia, np.zeros((3, 3)))
     assert 'mass value="5"/>\n      <inertia ixx="0" ixy="0"' in urdf_text(form.model)
     for model in compiled(form):

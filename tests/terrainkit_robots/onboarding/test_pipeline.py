@@ -181,7 +181,7 @@ def test_onboard_notes_warnings_of_spec(onboarded, tmp_path):
     heights = ("base_height_target = 0.33", "base_height_target = 0.23")
     edited = edit_spec(onboarded(QUADRUPED), tmp_path, heights)
     result = onboard(QUADRUPED, tmp_path / "robot", options(spec=edited))
-    assert any("LEG009" in note for note in result.robot.notes)
+    assert any("LEG009" in change for change in result.robot.changes)
 
 
 def onboard_arm(tmp_path, *replacements, **changes):
@@ -266,7 +266,7 @@ def test_onboard_continues_after_other_errors(tmp_path):
     result = onboard_arm(tmp_path, ('lower="-1.5" upper="1.5" ', ""))
     assert result.folder is not None
     assert {f.code for f in result.report.findings if f.severity == "error"} == {"JNT006"}
-    assert any("shoulder has no limits" in note for note in result.robot.notes)
+    assert any("shoulder has no limits" in change for change in result.robot.changes)
 
 
 def test_onboard_reports_mujoco_error_in_one_line(tmp_path):
@@ -339,7 +339,7 @@ def test_onboard_replaces_crouching_keyframe(tmp_path):
     result = onboard(file, tmp_path / "robot", options())
     assert result.robot.spec.provenance["default_pose"].origin == "solved"
     assert result.verification.is_stable
-    assert any("keyframe is not the default pose" in note for note in result.robot.notes)
+    assert any("keyframe is not the default pose" in change for change in result.robot.changes)
 
 
 def test_onboard_training_gains(onboarded, tmp_path):
@@ -374,7 +374,7 @@ def test_onboard_replaces_placeholder_efforts(tmp_path):
     assert effort["FL_hip_joint"] == 33.0
     assert effort["FL_calf_joint"] == 45.43
     assert "x weight x leg length" in str(result.robot.spec.provenance)
-    assert any("is a placeholder (1000 N m)" in note for note in result.robot.notes)
+    assert any("is a placeholder (1000 N m)" in change for change in result.robot.changes)
     model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
     assert model.actuator_forcerange[0, 1] == 33.0
 

@@ -65,7 +65,7 @@ def make_result(facts, **changes):
         for joint in facts.actuated
     }
     spec = derive_spec(facts, gains=gains, floating=bool(facts.legs))
-    robot = RobotFiles(facts=facts, spec=spec, files={}, notes=())
+    robot = RobotFiles(facts=facts, spec=spec, files={}, changes=())
     fields = {"report": Report(facts=facts, findings=()), "folder": Path("out"), "robot": robot}
     return OnboardResult(**fields | changes)
 
@@ -95,8 +95,8 @@ def arm():
     return make_result(facts_of(ARM))
 
 
-def with_notes(result, *notes):
-    return replace(result, robot=replace(result.robot, notes=notes))
+def with_changes(result, *changes):
+    return replace(result, robot=replace(result.robot, changes=changes))
 
 
 def headings(text):
@@ -163,7 +163,7 @@ def test_report_shows_pictures_or_reason(quadruped):
 
 def test_report_lists_changes(quadruped):
     fix = Fix(safety="safe", description="make it 1 kg", edits=())
-    result = with_notes(replace(quadruped, fixed=(finding(fix=fix),)), "the wheel | was left out")
+    result = with_changes(replace(quadruped, fixed=(finding(fix=fix),)), "the wheel | was left out")
     text = section(report_markdown(result), "Changes")
     assert "- INR002: calf: make it 1 kg\n" in text
     assert "- the wheel \\| was left out\n" in text
@@ -287,7 +287,7 @@ def test_report_escapes_names(quadruped):
     )
     result = replace(
         quadruped,
-        robot=replace(robot, spec=spec, notes=(NASTY,)),
+        robot=replace(robot, spec=spec, changes=(NASTY,)),
         report=report,
         verification=verification,
         fixed=(finding(subject=NASTY, message=NASTY),),

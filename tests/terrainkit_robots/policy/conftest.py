@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
-from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.rl.config import Control, Env, Normalization, Policy, Runner, Sim, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, create_run, open_run
@@ -119,7 +119,7 @@ def make_sliding(quadruped: Robot) -> Callable[..., SlidingEnv]:
     ) -> SlidingEnv:
         # One physics step per policy step, since the physics does not matter.
         task = replace(SMALL, sim=Sim(dt=0.02), control=Control(decimation=1), **parts)
-        env = SlidingEnv(evaluation_task(task, len(velocities)), quadruped, terrain or Plane())
+        env = SlidingEnv(eval_task(task, len(velocities)), quadruped, terrain or Plane())
         env.velocities = np.array(velocities, np.float32)
         env.fall_times = np.zeros(len(velocities)) if fall_times is None else np.array(fall_times)
         return env

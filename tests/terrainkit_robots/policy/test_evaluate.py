@@ -11,9 +11,9 @@ from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
     EvaluationRollout,
     command_grid,
+    eval_task,
     evaluate,
-    evaluation_task,
-    make_evaluation_env,
+    make_eval_env,
     summarize,
 )
 from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
@@ -22,24 +22,24 @@ from terrainkit_robots.rl.run import open_run
 
 def run_still(run, config, seconds=0.1, **options):
     """Evaluate a policy without motion."""
-    env, commands = make_evaluation_env(run, config, **options)
+    env, commands = make_eval_env(run, config, **options)
     rollout = EvaluationRollout(env)
     rollout.run(lambda _: torch.zeros(env.num_envs, env.num_actions), seconds, commands)
     return rollout, commands
 
 
-def test_evaluation_task_keeps_custom_configs():
+def test_eval_task_keeps_custom_configs():
     @dataclass(frozen=True, kw_only=True)
     class Jumping(Commands):
         height: float = 0.3
 
     task = Task(commands=Jumping(height=0.4, lin_vel_x=(0, 2)))
-    assert evaluation_task(task, 1).commands == task.commands
+    assert eval_task(task, 1).commands == task.commands
 
 
 def test_evaluation_env_is_not_randomized(make_run):
     run = make_run(domain_rand=DomainRand(joint_offset=0.1))
-    env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=3, seconds=30, seed=5))
+    env, _ = make_eval_env(run, EvaluationConfig(num_envs=3, seconds=30, seed=5))
     assert env.cfg.env.episode_length_s > 30
     assert env.cfg.runner.seed == 5
     assert not env.params.added_mass.any()
@@ -70,7 +70,7 @@ def test_command_grid_respects_one_sided_ranges_and_min_norm():
 
 
 def test_plane_has_one_robot_per_command(make_run):
-    env, commands = make_evaluation_env(make_run(), EvaluationConfig())
+    env, commands = make_eval_env(make_run(), EvaluationConfig())
     assert env.num_envs == len(commands) == len(np.unique(commands, axis=0)) == 75
 
 
@@ -81,12 +81,13 @@ def test_map_patches_get_equal_numbers_of_robots(
     make_run, map_file, num_envs, max_patch_envs, per_patch
 ):
     config = EvaluationConfig(num_envs=num_envs)
-    env, commands = make_evaluation_env(make_run(map_file), config, max_patch_envs=max_patch_envs)
+    env, commands = make_eval_env(make_run(map_file), config, max_patch_envs=max_patch_envs)
     patches = zip(env.curriculum.levels.tolist(), env.curriculum.columns.tolist(), strict=True)
     counts = np.unique(list(patches), axis=0, return_counts=True)[1]
     assert (counts == per_patch).all()
     assert len(counts) == min(6, env.num_envs)
-    assert (commands == np.float32([0.75 * env.cfg.commands.lin_vel_x[1], 0, 0])).all()
+    directions = np.float32([[0.75, 0, 0], [-0.75, 0, 0], [0, 0.375, 0], [0, -0.375, 0]])
+    assert commands.tolist() == directions[np.arange(env.num_envs) // 6 % 4].tolist()
     origins = env.terrain.env_origins[env.curriculum.levels, env.curriculum.columns]
     distance = np.abs(env.state.base_pos - origins)[:, :2].max()
     assert distance <= env.cfg.init_state.position + 1e-5
@@ -100,7 +101,7 @@ def test_policy_keeps_its_observations_on_another_terrain(make_run, map_file):
         (make_run("plane", terrain=Terrain(measure_heights=True)), None, 45 + 187),
     ]
     for run, terrain, width in cases:
-        env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=1, terrain=terrain))
+        env, _ = make_eval_env(run, EvaluationConfig(num_envs=1, terrain=terrain))
         assert env.get_observations()["policy"].shape == (1, width)
         assert env.terrain.is_flat == (terrain in ("plane", None))
 
@@ -124,23 +125,23 @@ def test_evaluation_config_rejects_invalid_values(options, message):
 
 def test_evaluation_env_rejects_an_unknown_device(make_run):
     with pytest.raises(ConfigError, match="abacus"):
-        make_evaluation_env(make_run(), EvaluationConfig(device="abacus"))
+        make_eval_env(make_run(), EvaluationConfig(device="abacus"))
 
 
 def test_evaluation_env_rejects_a_changed_map(make_run, small_map, map_file):
     run = make_run(map_file)
     generate(replace(small_map.config, seed=9)).save(map_file, overwrite=True)
     with pytest.raises(ConfigError, match=r"map\.npz changed after .* expected --terrain"):
-        make_evaluation_env(run, EvaluationConfig(num_envs=1))
+        make_eval_env(run, EvaluationConfig(num_envs=1))
     for terrain in (map_file, run.folder / "map.toml"):
-        make_evaluation_env(run, EvaluationConfig(num_envs=1, terrain=str(terrain)))
+        make_eval_env(run, EvaluationConfig(num_envs=1, terrain=str(terrain)))
 
 
 def test_evaluation_env_ignores_the_map_of_a_flat_run(make_run, map_file):
     run = make_run(map_file, terrain=Terrain(collision="plane"))
     (run.folder / "map.toml").unlink()
     map_file.write_text("gone")
-    env, _ = make_evaluation_env(run, EvaluationConfig(num_envs=1))
+    env, _ = make_eval_env(run, EvaluationConfig(num_envs=1))
     assert env.terrain.is_flat
 
 
@@ -172,6 +173,8 @@ def test_summary_groups_by_command(make_run):
     assert document["all"]["lin_vel_error"] is None  # nothing is measured before settling
     assert len(document["by_command"]) == 75
     assert document["by_command"][0]["command"] == [-1.0, -0.5, -1.0]
+    assert document["all"]["followed"] == 0
+    assert document["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     assert "by_terrain" not in document
 
 
@@ -186,6 +189,8 @@ def test_summary_groups_by_terrain_and_level(make_run, map_file):
         for group in document["by_terrain_and_level"]
     ]
     assert groups == [(name, k, 2) for name in ("stairs", "rough_slope") for k in range(3)]
+    directions = [(group["direction"], group["robots"]) for group in document["by_direction"]]
+    assert directions == [("forward", 6), ("backward", 6)]
     assert "by_command" not in document
 
 
@@ -211,6 +216,10 @@ def test_bundled_quadruped_follows_commands():
     assert result.metrics.falls == 0
     assert result.metrics.lin_vel_error < 0.25
     assert result.metrics.ang_vel_error < 0.25
+    assert result.metrics.followed == 1
+    assert 1 < result.metrics.step_frequency < 6
+    assert all(0 < height < 0.15 for height in result.metrics.swing_height)
+    assert {len(each) for each in result.contacts.values()} == {100}
 
 
 def test_evaluate_uses_single_torch_thread():

@@ -13,7 +13,7 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy import export as module
-from terrainkit_robots.policy.evaluate import evaluation_task, rollout
+from terrainkit_robots.policy.evaluate import eval_task, rollout
 from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -150,7 +150,7 @@ def test_json_reproduces_the_torques(quadruped, wheels, control_type, drive):
         stiffness = robot.spec.per_joint("stiffness") | {robot.spec.joint_order[0]: 0.0}
         robot = Robot.from_spec(replace(robot.spec, stiffness=stiffness), robot.mjcf.parent)
     control = Control(control_type=control_type, damping=1.5)
-    env = LeggedEnv(evaluation_task(replace(SMALL, control=control), 1), robot, Plane())
+    env = LeggedEnv(eval_task(replace(SMALL, control=control), 1), robot, Plane())
     config = describe_policy(env)
     joints = {name: np.array(value) for name, value in config["joints"].items()}
     assert config["control_type"] == control_type

@@ -8,7 +8,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.policy import play as module
-from terrainkit_robots.policy.evaluate import EvaluationConfig, make_evaluation_env
+from terrainkit_robots.policy.evaluate import EvaluationConfig, make_eval_env
 from terrainkit_robots.policy.play import (
     PoseRecorder,
     demo_commands,
@@ -84,7 +84,7 @@ def test_play_on_a_map_follows_robots_on_each_terrain(make_run, map_file):
 
 
 def test_shot_ends_at_the_first_fall(make_run, map_file, monkeypatch):
-    env, _ = make_evaluation_env(make_run(map_file), EvaluationConfig(num_envs=2))
+    env, _ = make_eval_env(make_run(map_file), EvaluationConfig(num_envs=2))
     recorder = PoseRecorder(env)
     for step in range(20):
         env.step(torch.zeros(2, 12))
@@ -98,7 +98,7 @@ def test_shot_ends_at_the_first_fall(make_run, map_file, monkeypatch):
 
 
 def test_tracked_robots_cover_all_terrains_first(make_run, map_file):
-    env, _ = make_evaluation_env(make_run(map_file), EvaluationConfig(num_envs=12))
+    env, _ = make_eval_env(make_run(map_file), EvaluationConfig(num_envs=12))
     robots = select_tracked_robots(env, 3)
     assert env.curriculum.columns[robots].tolist() == [0, 1, 0]
     assert env.curriculum.levels[robots].tolist() == [1, 1, 1]

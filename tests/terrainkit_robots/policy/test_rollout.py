@@ -8,7 +8,7 @@ from terrainkit_robots.policy.evaluate import (
     SETTLING_TIME,
     EvaluationRollout,
     command_schedule,
-    evaluation_task,
+    eval_task,
     rollout,
 )
 from terrainkit_robots.rl.config import Commands, Env, Task
@@ -21,7 +21,7 @@ FORWARD = np.array([[1, 0, 0]], np.float32)
 @pytest.fixture
 def env(quadruped):
     task = Task(env=Env(num_envs=2, num_threads=1))
-    return LeggedEnv(evaluation_task(task, 2), quadruped, Plane())
+    return LeggedEnv(eval_task(task, 2), quadruped, Plane())
 
 
 def still(obs):
@@ -157,3 +157,21 @@ def test_rollout_stops_when_all_robots_have_fallen(make_sliding, stop_early, ste
     run(env, 0.4, 0 * FORWARD, progress=fractions.append, stop_early=stop_early)
     assert len(fractions) == steps
     assert fractions[-1] == pytest.approx(steps / 20)
+
+
+def test_commands_are_followed_from_half_of_their_velocity(make_sliding):
+    velocities = [[0.6, 0, 0], [0.4, 0, 0], [0.6, 0, 0], [0.6, 0, 0.3], [0, 0, 0]]
+    commands = np.array([[1, 0, 0]] * 2 + [[1, 0, 0.5]] * 2 + [[0, 0, 0]], np.float32)
+    measured = run(make_sliding(velocities), 2.2, commands)
+    followed = [measured.metrics(np.arange(5) == k).followed for k in range(5)]
+    assert followed == [1, 0, 0, 1, None]
+    assert measured.metrics(np.ones(5, bool)).followed == 0.5
+
+
+def test_gait_of_standing_robots(env):
+    metrics = run(env, 2.2, np.tile(FORWARD, (2, 1))).metrics(select(1, 1))
+    assert metrics.followed == 0
+    assert metrics.duty_factor == (1, 1, 1, 1)
+    assert metrics.swing_height == (None,) * 4
+    assert (metrics.step_frequency, metrics.asymmetry) == (0, 0)
+    assert metrics.base_pitch == pytest.approx(-0.0204, abs=2e-3)

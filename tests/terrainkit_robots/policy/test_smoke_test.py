@@ -8,7 +8,7 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.policy import smoke_test as module
-from terrainkit_robots.policy.evaluate import evaluation_task
+from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.smoke_test import (
     SmokeTestResult,
     check_memory,
@@ -40,7 +40,7 @@ def replace_spec(robot, **values):
 
 
 def still_env(robot, **parts):
-    return LeggedEnv(evaluation_task(replace(TASK, **parts), 4), robot, Plane())
+    return LeggedEnv(eval_task(replace(TASK, **parts), 4), robot, Plane())
 
 
 @pytest.fixture

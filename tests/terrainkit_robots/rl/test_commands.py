@@ -1,4 +1,4 @@
-"""Velocity commands: sampling, heading control, resampling and the command curriculum."""
+"""Velocity commands: sampling, heading control and resampling."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.commands import VelocityCommand, sample_commands
 from terrainkit_robots.rl.config import Commands, Control, DomainRand, Env, InitState, Rewards, Task
@@ -26,7 +25,7 @@ _ALL = Commands(min_norm=0.0, standing=0.0)
 
 
 def draw(settings: Commands, count: int = _MANY, seed: int = 0) -> tuple[Any, Any]:
-    return sample_commands(np.random.default_rng(seed), count, settings, settings.lin_vel_x)
+    return sample_commands(np.random.default_rng(seed), count, settings)
 
 
 class TestSampleCommands:
@@ -51,12 +50,6 @@ class TestSampleCommands:
             assert heading.shape == (count,)
             assert commands.dtype == heading.dtype == np.float32
 
-    def test_current_range_is_used(self) -> None:
-        rng = np.random.default_rng(0)
-        commands, _ = sample_commands(rng, _MANY, replace(_ALL, lin_vel_x=(-1, 1)), (2.0, 3.0))
-        assert commands[:, 0].min() >= 2
-        assert commands[:, 0].max() <= 3
-
     def test_zero_width_range_is_constant(self) -> None:
         settings = replace(_ALL, lin_vel_x=(0.5, 0.5), lin_vel_y=(0, 0), ang_vel_yaw=(0.3, 0.3))
         commands, _ = draw(settings, 3)
@@ -67,7 +60,7 @@ class TestSampleCommands:
         speed, turn = np.hypot(commands[:, 0], commands[:, 1]), np.abs(commands[:, 2])
         assert (speed[speed > 0] >= 0.4).all()
         assert (turn[turn > 0] >= 0.4).all()
-        # The area of a disc of radius 0.4 in a square of side 2, and 0.4 of the yaw range.
+        # The area of a disk of radius 0.4 in a square of side 2, and 0.4 of the yaw range.
         assert (speed == 0).mean() == pytest.approx(np.pi * 0.16 / 4, abs=0.01)
         assert (turn == 0).mean() == pytest.approx(0.4, abs=0.015)
         assert ((speed == 0) & (turn > 0)).any()
@@ -141,48 +134,6 @@ class TestHeadingCommand:
         before = env.commands[:, 2].copy()
         env.velocity_command.update_heading(quat_to_yaw(env.state.base_quat) + np.float32(0.5))
         assert (env.commands[:, 2] != before).any() == expected
-
-
-def expanded(
-    lin_vel_x: tuple[float, float], tracking: float, settings: Commands
-) -> tuple[float, float]:
-    """Return the range of the forward speed after 10 s of tracking, averaged over 10 s."""
-    command = VelocityCommand(settings, 4, 0.02, heading_command=False)
-    command.lin_vel_x = lin_vel_x
-    command.expand_range(1.5 * tracking * 10, 10, scale=1.5, min_seconds=10)
-    return command.lin_vel_x
-
-
-class TestExpandRange:
-    def test_by_hand(self) -> None:
-        settings = Commands(curriculum=True, max_curriculum=2.0)
-        assert expanded((-1.0, 1.0), 0.79, settings) == (-1.0, 1.0)
-        assert expanded((-1.0, 1.0), 0.81, settings) == pytest.approx((-1.1, 1.1))
-
-    def test_range_stops_at_max_curriculum(self) -> None:
-        settings, span = Commands(curriculum=True, max_curriculum=1.25), (-0.5, 0.75)
-        for _ in range(20):
-            before, span = span, expanded(span, 0.9, settings)
-            assert span[0] <= before[0]
-            assert span[1] >= before[1]
-        assert span == (-1.25, 1.25)
-
-    def test_range_never_shrinks(self) -> None:
-        settings = Commands(curriculum=True, max_curriculum=1.5)
-        assert expanded((-2.0, 3.0), 0.9, settings) == (-2.0, 3.0)
-
-    def test_curriculum_needs_a_larger_maximum(self) -> None:
-        with pytest.raises(
-            ConfigError, match="max_curriculum: got 1; expected more than lin_vel_x, -1 to 1"
-        ):
-            Commands(curriculum=True)
-        with pytest.raises(ConfigError, match=r"max_curriculum: got 0\.3; "):
-            Commands(curriculum=True, lin_vel_x=(-0.4, 0.8), max_curriculum=0.3)
-        Commands(curriculum=True, lin_vel_x=(-1.0, 0.5))
-        Commands(curriculum=True, lin_vel_x=(0.0, 1.5))
-
-    def test_range_is_fixed_without_curriculum(self) -> None:
-        assert expanded((-1.0, 1.0), 1.0, Commands(max_curriculum=5.0)) == (-1.0, 1.0)
 
 
 def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
@@ -292,31 +243,3 @@ class TestInEnvironment:
         env.set_commands(None)
         assert np.abs(env.state.commands).max() <= 1
         assert np.abs(run(env, 3)[-1]).max() <= 1
-
-    def test_range_expands_after_min_seconds(self) -> None:
-        """A single short episode must not expand the range for all robots."""
-        env = make_env(
-            num_envs=4,
-            env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),
-            commands=Commands(curriculum=True, max_curriculum=1.15),
-            rewards=Rewards(tracking_sigma=1e9),
-        )
-        env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
-        run(env, 1)
-        assert env.velocity_command.lin_vel_x == (-1.0, 1.0)
-        spans = []
-        for _ in range(5):
-            run(env, 10)
-            spans.append(env.velocity_command.lin_vel_x[1])
-        assert max(spans) == 1.15
-        assert spans == sorted(spans)
-        assert spans[0] <= 1.1 + 1e-6
-
-    def test_range_stays_when_tracking_is_poor(self) -> None:
-        env = make_env(
-            env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),
-            commands=Commands(curriculum=True, max_curriculum=2.0, standing=0, min_norm=0.9),
-            rewards=Rewards(tracking_sigma=0.01),
-        )
-        run(env, 30)
-        assert env.velocity_command.lin_vel_x == (-1.0, 1.0)

@@ -44,8 +44,8 @@ class RoverTask(Task):
     wheels: Wheels = field(default_factory=Wheels)
     """The wheels."""
 
-    commands: Commands = field(default_factory=lambda: Commands(max_curriculum=2.0))
-    """Commands that may grow."""
+    commands: Commands = field(default_factory=lambda: Commands(standing=0.5))
+    """Commands that often are zero."""
 
     laps: int = 3
     """A value that is in no section."""

@@ -57,7 +57,7 @@ def simulate(
         pos, yaw = np.zeros((n, 2)), rng.uniform(-np.pi, np.pi, n).astype(np.float32)
         for step in range(20):
             if step % 10 == 0:
-                command, heading = sample_commands(rng, n, commands, commands.lin_vel_x)
+                command, heading = sample_commands(rng, n, commands)
             if commands.heading_command:
                 steering.heading, steering.commands = heading, command
                 steering.update_heading(yaw)

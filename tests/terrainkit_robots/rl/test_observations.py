@@ -317,7 +317,7 @@ class TestInEnvironment:
         env = self.make(noise=Noise(noise_level=0.0))
         env.set_commands(np.tile(np.array([1, 0, 0.5], np.float32), (3, 1)))
         env.joint_offset[:] = 0
-        env.sim.qpos[:] = env.scene.home
+        env.sim.qpos[:] = env.scene.default_qpos
         env.sim.qpos[:, 2] = 0.4
         env.sim.qvel[:] = 0
         env.sim.qvel[:, 6 + 2] = 2.0

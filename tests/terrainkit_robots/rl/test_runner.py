@@ -76,7 +76,7 @@ def test_resuming_continues_exactly(make, tmp_path):
 def test_resuming_continues_exactly_on_a_map(make, task, tmp_path, map_ground):
     task = replace(
         task,
-        commands=replace(task.commands, heading_command=True, curriculum=True, max_curriculum=2.0),
+        commands=replace(task.commands, heading_command=True),
     )
     unbroken = make(task, map_ground, folder=tmp_path / "unbroken")
     unbroken.learn(4, init_at_random_ep_len=True)

@@ -78,8 +78,8 @@ class TestIndices:
     def test_home_is_the_default_pose(self, scene, cart):
         for name, position in zip(cart.spec.joint_order, cart.default_pose, strict=True):
             address = scene.model.joint(name).qposadr[0]
-            assert scene.home[address] == pytest.approx(position)
-        np.testing.assert_array_equal(scene.home[:7], [0, 0, 0, 1, 0, 0, 0])
+            assert scene.default_qpos[address] == pytest.approx(position)
+        np.testing.assert_array_equal(scene.default_qpos[:7], [0, 0, 0, 1, 0, 0, 0])
 
     def test_joint_qvel_matches_joint_order(self, scene, cart):
         for k, name in enumerate(cart.spec.joint_order):
@@ -112,7 +112,7 @@ class TestIndices:
 
 class TestCollisions:
     def folded(self, scene, height=3.0):
-        qpos = scene.home.copy()
+        qpos = scene.default_qpos.copy()
         qpos[2] = height
         for name in ("front_hinge", "rear_hinge"):
             turn = 1.9 if name == "front_hinge" else -1.9
@@ -132,7 +132,7 @@ class TestCollisions:
         scene = build_scene(
             cart, Plane(), nominal_task(asset=Asset(self_collisions=self_collisions))
         )
-        qpos = scene.home.copy()
+        qpos = scene.default_qpos.copy()
         qpos[2] = -0.5
         touching = {
             name
@@ -181,7 +181,7 @@ class TestForces:
     def test_trunk_carries_a_robot_on_its_back(self, cart, nominal_task):
         scene = build_scene(cart, Plane(), nominal_task(1))
         sim = Simulation(scene, 1, 1)
-        sim.qpos[0] = scene.home
+        sim.qpos[0] = scene.default_qpos
         sim.qpos[0, 2:7] = (0.06, 0, 1, 0, 0)
         for _ in range(100):
             sim.step(4)

@@ -21,7 +21,7 @@ from terrainkit_robots.rl.terrain import MapTerrain, Plane
 def sim(cart, nominal_task):
     scene = build_scene(cart, Plane(), nominal_task())
     sim = Simulation(scene, 3, 1)
-    start = np.tile(scene.home, (3, 1))
+    start = np.tile(scene.default_qpos, (3, 1))
     start[:, 2] = [0.3, 0.5, 0.7]
     sim.reset(np.arange(3), start, np.zeros((3, scene.model.nv)))
     return sim
@@ -66,7 +66,7 @@ class TestSimulation:
     def test_reset_of_some_simulations(self, sim):
         sim.step(10)
         untouched = sim.qpos[[0, 2]].copy()
-        start = sim.scene.home.copy()
+        start = sim.scene.default_qpos.copy()
         start[:3] = (1, 2, 3)
         sim.ctrl[:] = 0.3
         sim.reset(np.array([1]), start[None], np.full((1, sim.scene.model.nv), 0.1))
@@ -100,13 +100,13 @@ class TestUnstable:
             sim.qvel[1, 7] = np.nan
             assert sim.step(4).tolist() == [False, True, False]
             ids = np.array([1])
-            sim.reset(ids, sim.scene.home[None], np.zeros((1, sim.scene.model.nv)))
+            sim.reset(ids, sim.scene.default_qpos[None], np.zeros((1, sim.scene.model.nv)))
 
     def test_other_simulations_are_unaffected(self, cart, nominal_task):
         def run(bad):
             scene = build_scene(cart, Plane(), nominal_task())
             sim = Simulation(scene, 3, 1)
-            sim.qpos[:] = scene.home + 0.3
+            sim.qpos[:] = scene.default_qpos + 0.3
             if bad:
                 sim.qvel[1, 7] = np.nan
             sim.step(8)

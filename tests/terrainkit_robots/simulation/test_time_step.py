@@ -9,7 +9,7 @@ from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.time_step import (
-    joint_inertias,
+    joint_inertia,
     max_stable_stiffness,
     max_stable_time_step,
     min_stable_inertia,
@@ -35,19 +35,19 @@ def quadruped():
     return make_sim_model(facts), suggest_gains(facts)
 
 
-def test_joint_inertias_of_pendulum(pendulum):
-    found = joint_inertias(pendulum)["j"]
+def test_joint_inertia_of_pendulum(pendulum):
+    found = joint_inertia(pendulum)["j"]
     assert found.free == pytest.approx(INERTIA)
     assert found.locked == pytest.approx(INERTIA)
 
 
-def test_joint_inertias_free_are_smaller():
+def test_joint_inertia_free_is_smaller():
     sim, _ = quadruped()
-    for found in joint_inertias(sim).values():
+    for found in joint_inertia(sim).values():
         assert 0 < found.free < found.locked
 
 
-def test_joint_inertias_match_impulse_response():
+def test_joint_inertia_matches_impulse_response():
     sim, _ = quadruped()
     data = mujoco.MjData(sim.model)
     model = sim.model.__copy__()
@@ -60,7 +60,7 @@ def test_joint_inertias_match_impulse_response():
         data.qfrc_applied[:] = 0
         data.qfrc_applied[dof] = 1.0
         mujoco.mj_forward(model, data)
-        assert 1 / data.qacc[dof] == pytest.approx(joint_inertias(sim)[name].free, rel=1e-6)
+        assert 1 / data.qacc[dof] == pytest.approx(joint_inertia(sim)[name].free, rel=1e-6)
 
 
 def test_min_stable_inertia_inverts_max_stable_stiffness():

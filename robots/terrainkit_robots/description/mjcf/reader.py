@@ -66,24 +66,24 @@ _PAIRED = 1 << 30
 """Contype bit of geoms that collide only through a <pair>; no other geom uses it."""
 
 
-def read_mjcf(document: XmlDocument, *, contents: Mapping[Path, bytes] | None = None) -> RobotModel:
+def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None) -> RobotModel:
     """Return the robot of a document whose root is <mujoco>.
 
     Args:
-        document: The XML document.
+        doc: The XML document.
         contents: File contents by path, which are used instead of included files on disk.
     """
-    file = document.file
-    if document.root is None:
+    file = doc.file
+    if doc.root is None:
         return RobotModel(
             name="",
             kind="mjcf",
             file=file,
             source=Source(file=file, line=0),
-            problems=document.problems,
+            problems=doc.problems,
             sources=(file,),
         )
-    mjcf = read_tree(document, contents or {})
+    mjcf = read_tree(doc, contents or {})
     spec, lines = parse_mjcf(mjcf)
     robot = RobotModel(
         name=mjcf.root.written.get("model", "").strip(),
@@ -133,7 +133,7 @@ class _Reader:
             joints=joints,
             actuators=self._scaled_actuators(joints),
             options=self._options(),
-            home=self._home_positions(joints),
+            keyframe=self._keyframe_positions(joints),
             imu=self._imu(),
             excluded=frozenset(
                 frozenset((each.bodyname1, each.bodyname2))
@@ -455,7 +455,7 @@ class _Reader:
             )
         return (low, high) if written or joint.limited == limited.mjLIMITED_TRUE else None
 
-    def _home_positions(self, joints: Sequence[Joint]) -> dict[str, float]:
+    def _keyframe_positions(self, joints: Sequence[Joint]) -> dict[str, float]:
         """Return the joint positions of the first keyframe that has any."""
         sizes = {"floating": 7, "ball": 4, "fixed": 0}
         expected = sum(sizes.get(joint.kind, 1) for joint in joints)
@@ -511,17 +511,17 @@ def _first(node: Node, attributes: Sequence[str]) -> str:
 class _Names:
     """Set of used names."""
 
-    def __init__(self, taken: Iterable[str]) -> None:
-        self._taken = set(taken)
+    def __init__(self, used_names: Iterable[str]) -> None:
+        self._used_names = set(used_names)
         self._counts: dict[str, int] = {}
 
     def unused(self, name: str) -> str:
         """Return an unused name and add it to the set."""
         free = name
-        while free in self._taken:
+        while free in self._used_names:
             self._counts[name] = self._counts.get(name, 1) + 1
             free = f"{name}_{self._counts[name]}"
-        self._taken.add(free)
+        self._used_names.add(free)
         return free
 
 

@@ -137,16 +137,16 @@ class MjcfTree:
         return text, attached, lines
 
 
-def read_tree(document: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
+def read_tree(doc: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
     """Return a document with the files that it includes and attaches.
 
     Args:
-        document: The main file; it has a root element.
+        doc: The main file; it has a root element.
         contents: File contents by path, which are used instead of the files on disk.
     """
     reader = _Reader(contents)
-    reader.problems += document.problems
-    root = reader.tree(document)
+    reader.problems += doc.problems
+    root = reader.tree(doc)
     if root.tag != "mujoco":
         message = f"root element: got <{root.tag}>, a part of a model; expected <mujoco>"
         reader.problems.append(Problem(code="XML002", message=message, source=root.source))
@@ -196,10 +196,10 @@ class _Reader:
         top = Node(tag="", source=main.source(main.root), folder=folder)
         stack: list[tuple[etree._Element, XmlDocument, Node, int]] = [(main.root, main, top, 0)]
         while stack and self._count <= MAX_ELEMENTS:
-            element, document, parent, depth = stack.pop()
-            source = document.source(element)
+            element, doc, parent, depth = stack.pop()
+            source = doc.source(element)
             if element.tag == "include":
-                part = self._load_include(element, document, folder, included)
+                part = self._load_include(element, doc, folder, included)
                 if part is not None and part.root is not None:
                     inner = reversed(list(part.root.iterchildren(etree.Element)))
                     stack += [(child, part, parent, depth) for child in inner]
@@ -213,7 +213,7 @@ class _Reader:
             parent.children.append(node)
             self._count += 1
             children = reversed(list(element.iterchildren(etree.Element)))
-            stack += [(child, document, node, depth + 1) for child in children]
+            stack += [(child, doc, node, depth + 1) for child in children]
         root = top.children[0]
         root.parent = None
         return root
@@ -249,13 +249,13 @@ class _Reader:
     def _load_include(
         self,
         element: "etree._Element",
-        document: XmlDocument,
+        doc: XmlDocument,
         folder: Path,
         included: dict[Path, tuple[Path, ...]],
     ) -> XmlDocument | None:
         """Return the document of an <include>; None with a problem if it cannot be read."""
-        source, name = document.source(element), (element.get("file") or "").strip()
-        chain = (*included[_real_path(document.file)], _real_path(document.file))
+        source, name = doc.source(element), (element.get("file") or "").strip()
+        chain = (*included[_real_path(doc.file)], _real_path(doc.file))
         if not name:
             self._report(source, "<include> has no file", "")
             return None
@@ -264,7 +264,7 @@ class _Reader:
                 source, f"<include file={name!r}> has children; MuJoCo rejects the file", name
             )
         path = folder / name
-        sibling = document.file.parent / name
+        sibling = doc.file.parent / name
         if not self._exists(path) and self._exists(sibling):
             path = sibling
         if _real_path(path) in included:

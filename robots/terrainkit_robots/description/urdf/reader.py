@@ -27,7 +27,14 @@ from terrainkit_robots.description.model import (
     SafetyController,
 )
 from terrainkit_robots.description.package_resolver import PackageResolver
-from terrainkit_robots.description.urdf.colors import Color, color_of, named_colors
+from terrainkit_robots.description.urdf.colors import (
+    Color,
+    color_of,
+    named_colors,
+    undefined_materials,
+)
+from terrainkit_robots.description.urdf.references import invalid_references
+from terrainkit_robots.description.urdf.srdf import invalid_srdf
 from terrainkit_robots.description.urdf.tags import (
     has_variable,
     misspelled_names,
@@ -40,30 +47,30 @@ from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbe
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
 
 
-def read_urdf(document: XmlDocument, *, packages: Mapping[str, Path]) -> RobotModel:
+def read_urdf(doc: XmlDocument, *, packages: Mapping[str, Path]) -> RobotModel:
     """Return the robot of a document whose root is <robot>.
 
     Args:
-        document: The XML document.
+        doc: The XML document.
         packages: Folders of ROS packages by name.
     """
-    return _Reader(document, packages).robot()
+    return _Reader(doc, packages).robot()
 
 
 class _Reader:
     """Read one document and collect its problems."""
 
-    def __init__(self, document: XmlDocument, packages: Mapping[str, Path]) -> None:
-        self._document = document
-        self._packages = PackageResolver(document.file, packages)
-        self._problems = list(document.problems)
+    def __init__(self, doc: XmlDocument, packages: Mapping[str, Path]) -> None:
+        self._doc = doc
+        self._packages = PackageResolver(doc.file, packages)
+        self._problems = list(doc.problems)
         self._colors: Mapping[str, Color] = {}
 
     def robot(self) -> RobotModel:
         """Return the robot."""
-        root = self._document.root
+        root = self._doc.root
         assert root is not None
-        source = self._document.source(root)
+        source = self._doc.source(root)
         if not root.get("name", "").strip():
             self._report("XML003", root, "the robot has no name; expected <robot name=...>")
         self._check_names(root)
@@ -73,12 +80,12 @@ class _Reader:
         return RobotModel(
             name=root.get("name", "").strip(),
             kind="urdf",
-            file=self._document.file,
+            file=self._doc.file,
             source=source,
             links=links,
             joints=joints,
             problems=tuple(self._problems),
-            sources=(self._document.file,),
+            sources=(self._doc.file,),
         )
 
     def _report(
@@ -88,7 +95,7 @@ class _Reader:
             Problem(
                 code=code,
                 message=message,
-                source=self._document.source(element),
+                source=self._doc.source(element),
                 subject=subject or _owner(element),
                 details=details,
             )
@@ -107,6 +114,13 @@ class _Reader:
             owner = "" if parent is None else parent.tag
             message = f"second <{element.tag}> in a <{owner}>; expected one, and the first is read"
             self._report("XML015", element, message)
+        for element in undefined_materials(root):
+            name = truncate(element.get("name", ""))
+            message = f"material {name}: has no color or texture anywhere; expected a definition"
+            self._report("XML016", element, message)
+        if not any(problem.code in ("XML001", "XML004") for problem in self._problems):
+            self._problems += invalid_references(self._doc)
+            self._problems += invalid_srdf(self._doc)
 
     # Numbers
 
@@ -192,7 +206,7 @@ class _Reader:
     def _link(self, element: "etree._Element") -> Link:
         return Link(
             name=self._required(element, "name", element),
-            source=self._document.source(element),
+            source=self._doc.source(element),
             inertial=self._inertial(element.find("inertial")),
             collisions=tuple(self._geometries(element, "collision")),
             visuals=tuple(self._geometries(element, "visual")),
@@ -207,17 +221,25 @@ class _Reader:
             values = [self._parse_number(tensor, name) for name in _DIAGONAL]
             values += [
                 self._parse_number(tensor, name) if tensor.get(name) is not None else 0.0
-                for name in ("ixy", "ixz", "iyz")
+                for name in _PRODUCTS
             ]
             inertia = _symmetric(values)
+            self._check_products(tensor)
         return Inertial(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             mass=self._parse_number(element.find("mass"), "value"),
             origin=self._origin(element),
             inertia=inertia,
-            inertia_source=None if tensor is None else self._document.source(tensor),
+            inertia_source=None if tensor is None else self._doc.source(tensor),
             missing=tuple(n for n in _DIAGONAL if tensor is None or tensor.get(n) is None),
         )
+
+    def _check_products(self, tensor: "etree._Element") -> None:
+        """Report missing products of inertia; INR003 reports missing moments."""
+        missing = [name for name in _PRODUCTS if tensor.get(name) is None]
+        if missing and set(tensor.keys()) >= set(_DIAGONAL):
+            message = f"<inertia> has no {', '.join(missing)}; MuJoCo rejects the file"
+            self._report("XML013", tensor, message, attributes=" ".join(missing))
 
     def _geometries(self, link: "etree._Element", tag: str) -> Iterator[Geometry]:
         for element in link.iterchildren(tag):
@@ -228,14 +250,14 @@ class _Reader:
             yield geometry if color is None else replace(geometry, color=color)
 
     def _geometry(self, element: "etree._Element") -> Geometry:
-        source, name = self._document.source(element), element.get("name", "")
+        source, name = self._doc.source(element), element.get("name", "")
         origin = self._origin(element)
         geometry = element.find("geometry")
         shape = None if geometry is None else next(geometry.iterchildren(etree.Element), None)
         if shape is None:
             self._report("XML013", element, f"<{element.tag}> has no shape in a <geometry>")
             return Geometry(source=source, name=name, shape="unknown", origin=origin)
-        size_source = self._document.source(shape)
+        size_source = self._doc.source(shape)
         if shape.tag == "mesh":
             mesh = self._mesh(shape)
             return Geometry(source=source, name=name, shape="mesh", origin=origin, mesh=mesh)
@@ -271,7 +293,7 @@ class _Reader:
         scale = self._parse_numbers(element, "scale", 3)
         x, y, z = (1.0, 1.0, 1.0) if scale is None else map(float, scale)
         return MeshFile(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             filename=filename,
             path=path,
             found_by=found_by,
@@ -290,13 +312,13 @@ class _Reader:
             direction = np.zeros(3)  # an invalid axis, not a missing one
         return Joint(
             name=name,
-            source=self._document.source(element),
+            source=self._doc.source(element),
             kind=self._required(element, "type", element),
             parent=self._required(parent, "link", element),
             child=self._required(child, "link", element),
             origin=self._origin(element),
             axis=direction,
-            axis_source=None if axis is None else self._document.source(axis),
+            axis_source=None if axis is None else self._doc.source(axis),
             limit=self._limit(element.find("limit")),
             mimic=self._mimic(element.find("mimic")),
             dynamics=self._dynamics(element.find("dynamics")),
@@ -308,7 +330,7 @@ class _Reader:
         if element is None:
             return None
         return Dynamics(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             damping=self._parse_number(element, "damping"),
             friction=self._parse_number(element, "friction"),
         )
@@ -317,7 +339,7 @@ class _Reader:
         if element is None:
             return None
         return SafetyController(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             k_position=self._parse_number(element, "k_position"),
             k_velocity=self._parse_number(element, "k_velocity"),
             lower=self._parse_number(element, "soft_lower_limit"),
@@ -328,7 +350,7 @@ class _Reader:
         if element is None:
             return None
         return Limit(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             lower=self._parse_number(element, "lower"),
             upper=self._parse_number(element, "upper"),
             effort=self._parse_number(element, "effort"),
@@ -343,7 +365,7 @@ class _Reader:
             self._parse_number(element, "offset"),
         )
         return Mimic(
-            source=self._document.source(element),
+            source=self._doc.source(element),
             joint=element.get("joint", ""),
             multiplier=1.0 if multiplier is None else multiplier,
             offset=offset or 0.0,
@@ -351,6 +373,7 @@ class _Reader:
 
 
 _DIAGONAL = ("ixx", "iyy", "izz")
+_PRODUCTS = ("ixy", "ixz", "iyz")
 
 _SIZES = {
     "box": {"size"},

@@ -13,33 +13,33 @@ from terrainkit_robots.description.xml.document import XmlDocument, parse_xml
 
 
 def read_xacro(
-    document: XmlDocument, *, arguments: Mapping[str, str], packages: Mapping[str, Path]
+    doc: XmlDocument, *, arguments: Mapping[str, str], packages: Mapping[str, Path]
 ) -> RobotModel:
     """Return the robot of a xacro file.
 
     An error of the expansion is recorded as a problem of the model.
 
     Args:
-        document: The xacro file, parsed as XML.
+        doc: The xacro file, parsed as XML.
         arguments: Values of xacro arguments by name.
         packages: Folders of ROS packages by name.
     """
-    file_source = Source(file=document.file, line=0)
+    file_source = Source(file=doc.file, line=0)
     model = RobotModel(
-        name="", kind="xacro", file=document.file, source=file_source, sources=(document.file,)
+        name="", kind="xacro", file=doc.file, source=file_source, sources=(doc.file,)
     )
-    if document.problems:  # the expansion would only repeat them
-        return dataclasses.replace(model, problems=document.problems)
+    if doc.problems:  # the expansion would only repeat them
+        return dataclasses.replace(model, problems=doc.problems)
     try:
-        expansion = expand_xacro(document.file, arguments, packages)
+        expansion = expand_xacro(doc.file, arguments, packages)
     except XacroError as error:
         source = file_source
         if error.location is not None:
             file, line = error.location
-            source = Source(file=_as_given(file, document.file), line=line)
+            source = Source(file=_as_given(file, doc.file), line=line)
         problem = Problem(code="XML005", message=str(error), source=source)
         return dataclasses.replace(model, problems=(problem,))
-    expanded = parse_xml(document.file, expansion.data)
+    expanded = parse_xml(doc.file, expansion.data)
     if expanded.root is None:
         return dataclasses.replace(model, problems=expanded.problems)
     sources = {}
@@ -47,10 +47,10 @@ def read_xacro(
     for element in expanded.root.iter(etree.Element):
         origin = pop_origin(element, expansion.files)
         if origin is not None:  # otherwise, the location of the previous element
-            source = Source(file=_as_given(origin[0], document.file), line=origin[1])
+            source = Source(file=_as_given(origin[0], doc.file), line=origin[1])
         sources[element] = source
     model = read_urdf(dataclasses.replace(expanded, sources=sources), packages=packages)
-    files = tuple(_as_given(file, document.file) for file in expansion.files)
+    files = tuple(_as_given(file, doc.file) for file in expansion.files)
     return dataclasses.replace(model, kind="xacro", sources=files)
 
 

@@ -82,6 +82,9 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
         return _rejected(
             file, data, f"the file has more than {MAX_BYTES // 2**20} MiB; it is not parsed"
         )
+    encoding = _wide_encoding(file, data)
+    if encoding is not None:
+        problems.append(encoding)
     text = _skip_leading_bytes(file, data, problems)
     if not text.strip():
         return _rejected(file, data, "the file is empty; expected a <robot> or <mujoco> element")
@@ -157,12 +160,50 @@ def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> byt
     return data[leading.end() :]
 
 
+_WIDE_ENCODINGS = {
+    "UTF-32": (b"\xff\xfe\0\0", b"\0\0\xfe\xff", b"<\0\0\0", b"\0\0\0<"),
+    "UTF-16": (b"\xff\xfe", b"\xfe\xff", b"<\0", b"\0<"),
+}
+"""First bytes of a file in an encoding with several bytes for each character."""
+
+
+def _wide_encoding(file: Path, data: bytes) -> Problem | None:
+    """Return a problem if a file is UTF-16 or UTF-32."""
+    for encoding, starts in _WIDE_ENCODINGS.items():
+        start = next((start for start in starts if data.startswith(start)), None)
+        if start is None:
+            continue
+        has_bom = b"<" not in start
+        is_big = start in starts[1::2]
+        codec = encoding if has_bom else f"{encoding}-{'BE' if is_big else 'LE'}"
+        text = data.decode(codec, "replace")
+        return Problem(
+            code="XML009",
+            message=f"the file is encoded as {encoding}, which MuJoCo and urdfdom reject; expected "
+            "UTF-8",
+            source=Source(file=file, line=1),
+            subject=file.name,
+            details={
+                "bytes": str(len(data)),
+                "text": re.sub(
+                    r'(<\?xml[^>]*?encoding=)["\'][^"\']*["\']', r'\1"UTF-8"', text, count=1
+                ),
+            },
+        )
+    return None
+
+
 def leading_bytes_fix(problem: Problem) -> Fix:
-    """Return the fix that removes the bytes reported by `_skip_leading_bytes`."""
+    """Return the fix that removes the reported bytes, or that writes the file as UTF-8."""
+    text = problem.details.get("text", "")
     edit = ReplaceBytes(
-        source=problem.source, start=0, end=int(problem.details["bytes"]), replacement=b""
+        source=problem.source,
+        start=0,
+        end=int(problem.details["bytes"]),
+        replacement=text.encode(),
     )
-    return Fix(safety="safe", description="Remove the leading bytes.", edits=(edit,))
+    description = "Write the file as UTF-8." if text else "Remove the leading bytes."
+    return Fix(safety="safe", description=description, edits=(edit,))
 
 
 def _syntax_errors(file: Path, parser: etree.XMLParser) -> list[Problem]:

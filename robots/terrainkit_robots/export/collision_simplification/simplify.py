@@ -81,7 +81,7 @@ class SimplifiedRobot:
     errors: tuple[VolumeError, ...] = ()
     """Volume error of each mesh that was replaced."""
 
-    notes: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
     """What replaced each collision mesh, one sentence each."""
 
 
@@ -124,7 +124,7 @@ def simplify_collisions(
         contents=contents,
         meshes=meshes.with_contents(contents),
         errors=tuple(simplifier.errors),
-        notes=tuple(simplifier.notes),
+        changes=tuple(simplifier.changes),
     )
 
 
@@ -139,7 +139,7 @@ class _Simplifier:
         # a folder that does not exist, because the contents are in memory
         self.names = FileNames(f".terrainkit-{method}")
         self.errors: list[VolumeError] = []
-        self.notes: list[str] = []
+        self.changes: list[str] = []
 
     def simplify(self, mesh: MeshFile) -> None:
         """Create the replacement of a mesh."""
@@ -156,7 +156,7 @@ class _Simplifier:
         )
         self.errors.append(error)
         change = "unknown" if error.percent is None else f"{error.percent:+.1f} %"
-        self.notes.append(
+        self.changes.append(
             f"replaced collision mesh {mesh.filename} by {replacement} (volume {change})"
         )
 
@@ -181,7 +181,7 @@ class _Simplifier:
             try:
                 return self._parts(mesh)
             except MeshError as error:
-                self.notes.append(
+                self.changes.append(
                     f"collision mesh {mesh.filename} {error}; its convex hull is used"
                 )
         hull = self._hull(mesh, _MAX_HULL_VERTICES)

@@ -26,7 +26,7 @@ class MeshBytes:
     scale: tuple[float, float, float]
     """Scale that the robot file still has to apply, without negative factors."""
 
-    note: str = ""
+    change: str = ""
     """Visible change of the mesh, as a sentence without its subject; empty if there is none."""
 
 
@@ -45,19 +45,19 @@ def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
     surface = meshes.surface(mesh.path)
     header = meshes.header(mesh.path)
     mirrored = min(mesh.scale) < 0
-    note = ""
+    change = ""
     if len(surface.faces) > MAX_FACES:
         before = len(surface.faces)
         surface = decimate(surface, MAX_FACES)
-        note = f"was decimated from {before:,} to {len(surface.faces):,} faces"
+        change = f"was decimated from {before:,} to {len(surface.faces):,} faces"
     elif header.format == "stl" and not mirrored:
         data = meshes.data(mesh.path)
         if not data.startswith(b"solid"):  # some readers take it for an ASCII STL
             return MeshBytes(data=data, scale=mesh.scale)
     if mirrored:
         data = binary_stl(scaled(surface, mesh.scale))
-        return MeshBytes(data=data, scale=(1.0, 1.0, 1.0), note=note)
-    return MeshBytes(data=binary_stl(surface), scale=mesh.scale, note=note)
+        return MeshBytes(data=data, scale=(1.0, 1.0, 1.0), change=change)
+    return MeshBytes(data=binary_stl(surface), scale=mesh.scale, change=change)
 
 
 def has_no_volume(meshes: Meshes, mesh: MeshFile) -> bool:

@@ -1,7 +1,7 @@
 """Export the mesh files of a robot as binary STL, named relative to the robot file.
 
-Simulators stop at missing or flat meshes. Such visual meshes are removed with a note. An unreadable
-collision mesh is an error, and a flat one is replaced by a thin box.
+Simulators stop at missing or flat meshes. Such visual meshes are removed and listed in `changes`.
+An unreadable collision mesh is an error, and a flat one is replaced by a thin box.
 """
 
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ class RobotWithMeshes:
     files: Mapping[str, bytes]
     """Content of each mesh file, a binary STL, by its name with slashes."""
 
-    notes: tuple[str, ...] = ()
+    changes: tuple[str, ...] = ()
     """What was removed or changed, one sentence each."""
 
 
@@ -56,7 +56,7 @@ def export_meshes(model: RobotModel, meshes: Meshes, *, folder: str = "meshes") 
     return RobotWithMeshes(
         model=replace(model, links=links),
         files=exporter.names.files,
-        notes=tuple(exporter.notes),
+        changes=tuple(exporter.changes),
     )
 
 
@@ -68,7 +68,7 @@ class _MeshExporter:
         self._meshes = meshes
         self._converted: dict[tuple[Path, tuple[float, float, float]], MeshBytes | MeshError] = {}
         self.names = FileNames(folder)
-        self.notes: dict[str, None] = {}
+        self.changes: dict[str, None] = {}
 
     def link(self, link: Link) -> Link:
         """Return a link with the geometry that can be exported."""
@@ -89,19 +89,19 @@ class _MeshExporter:
             if exported is not None:
                 yield exported
 
-    def _add_note(self, note: str) -> None:
-        self.notes[note] = None  # unique, in order
+    def _add_change(self, change: str) -> None:
+        self.changes[change] = None  # unique, in order
 
     def _primitive(self, link: Link, shape: Geometry) -> Geometry | None:
         if not has_bounds(shape, self._meshes) or min(shape.size[:1]) <= 0:
             what = "geometry of unknown shape" if shape.shape == "unknown" else shape.shape
-            self._add_note(f"removed a {what} of {link.name}: it has no valid size")
+            self._add_change(f"removed a {what} of {link.name}: it has no valid size")
             return None
         if shape.shape == "capsule" and shape.size[1] == 0:
             return replace(shape, shape="sphere", size=shape.size[:1])
         if min(shape.size) <= 0:
             sizes = " ".join(f"{size:g}" for size in shape.size)
-            self._add_note(f"removed a {shape.shape} of {link.name}: its size is {sizes}")
+            self._add_change(f"removed a {shape.shape} of {link.name}: its size is {sizes}")
             return None
         if shape.shape != "ellipsoid":
             return replace(shape, mesh=None)
@@ -124,12 +124,12 @@ class _MeshExporter:
                 ) from None
             if is_collision:
                 return self._box_of_flat_mesh(link, shape, mesh, file)
-            self._add_note(f"removed the visual mesh {file} of {link.name}: it {error}")
+            self._add_change(f"removed the visual mesh {file} of {link.name}: it {error}")
             return None
-        if content.note:
-            self._add_note(f"mesh {file} {content.note}")
+        if content.change:
+            self._add_change(f"mesh {file} {content.change}")
         if shape.fit_to_mesh:
-            self._add_note(
+            self._add_change(
                 f"{link.name} collides with mesh {file} instead of MuJoCo's fitted primitive"
             )
         name = self.names.add(mesh.path.stem, ".stl", content.data)
@@ -156,9 +156,9 @@ class _MeshExporter:
         """Return a thin box in place of a flat mesh; None for a line or a point."""
         pose, half = oriented_box(self._meshes.vertices(mesh))
         if np.sort(half)[1] < _MIN_THICKNESS / 2:
-            self._add_note(f"removed the collision mesh {file} of {link.name}: it has no surface")
+            self._add_change(f"removed the collision mesh {file} of {link.name}: it has no surface")
             return None
-        self._add_note(
+        self._add_change(
             f"replaced the flat collision mesh {file} of {link.name} by a box of "
             f"{1000 * _MIN_THICKNESS:g} mm thickness"
         )

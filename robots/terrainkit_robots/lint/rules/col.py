@@ -229,7 +229,7 @@ def overlap(robot: Facts) -> Iterator[Violation]:
 def _is_arbitrary_pose(robot: Facts, pair: tuple[str, str], overlap: "Overlap") -> bool:
     """Return whether neither a leg nor a keyframe defines the pose in which two bodies overlap."""
     first, second = (robot.body_of[name].index for name in pair)
-    if robot.model.home or not robot.leg_bodies.isdisjoint((first, second)):
+    if robot.model.keyframe or not robot.leg_bodies.isdisjoint((first, second)):
         return False
     if overlap.has_mesh:
         return True

@@ -15,7 +15,7 @@ from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.standing import StandResult, contact_areas, stand_test
 from terrainkit_robots.simulation.time_step import (
-    joint_inertias,
+    joint_inertia,
     max_stable_stiffness,
     max_stable_time_step,
 )
@@ -300,7 +300,7 @@ def low_joint_inertia(robot: Facts) -> Iterator[Violation]:
     """
     model, gains = make_sim_model(robot), suggest_gains(robot)
     declared = {name: float(model.model.joint(name).armature[0]) for name in gains}
-    inertias = joint_inertias(model)
+    inertias = joint_inertia(model)
     shares = {
         name: max_stable_stiffness(inertias[name].free) / gain.stiffness
         for name, gain in gains.items()

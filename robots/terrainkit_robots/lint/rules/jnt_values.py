@@ -246,14 +246,26 @@ def excessive_armature(robot: Facts) -> Iterator[Violation]:
 def zero_gear(robot: Facts) -> Iterator[Violation]:
     """The gear of an actuator is zero.
 
-    The actuator then has no effect on the joint, and MuJoCo does not warn about it.
+    The actuator then has no effect on the joint, and MuJoCo does not warn about it. The
+    mechanicalReduction of a URDF <transmission> is a gear as well. Only ROS tools read it, so a
+    ratio of zero or one that is not a number is a warning there.
 
     Fix:
-        Set the gear to 1, or to the ratio of the transmission.
+        Set the gear to 1, or to the ratio of the transmission. A negative ratio inverts the
+        direction.
 
     Source:
-        MuJoCo's XML reference, actuator: gear scales the length and the force of the actuator.
+        MuJoCo's XML reference, actuator: gear scales the length and the force of the actuator;
+        wiki.ros.org/urdf/XML/Transmission.
     """
+    for problem in robot.model.problems:
+        if problem.code == "JNT024":
+            yield Violation(
+                subject=problem.subject,
+                source=problem.source,
+                severity="warning",
+                message=problem.message,
+            )
     for actuator in robot.model.actuators:
         if actuator.joint and actuator.gear == 0:
             yield Violation(

@@ -10,7 +10,6 @@ from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.link_source import inertia_source
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.asymmetry import find_misalignments
 from terrainkit_robots.analysis.symmetry.mirror import swap_sides
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Joint
@@ -146,8 +145,8 @@ def product_asymmetry(robot: Facts) -> Iterator[Violation]:
         both sides share without mirroring them are not checked.
     """
     # The frames of bodies behind a misaligned joint are turned; SYM006 reports the joint.
-    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for pair in robot.mirror_pairs:
+    _, displaced = robot.misalignments
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         if displaced & pair.indices:
             continue
@@ -200,8 +199,8 @@ def _is_copy(a: Body, b: Body) -> bool:
 def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
     """A joint and its mirror image do not follow mirrored joints in the same way.
 
-    Only one of them is coupled, or it follows a joint of the other side, or its multiplier has a
-    wrong sign: names and signs were not changed after copying one side.
+    Only one of them is coupled, or it follows a joint of the other side or of another leg, or its
+    multiplier has a wrong sign: names and signs were not changed after copying one side.
 
     Fix:
         Give both joints a <mimic> of their own side. The multipliers are equal, or opposite if the
@@ -219,10 +218,16 @@ def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
     for pair in robot.mirror_pairs:
         left, right = pair.left.joint, pair.right.joint
         a, b = left.mimic, right.mimic
-        if (a is None and b is None) or _is_gripper(left, right):
+        in_legs = pair.indices <= robot.leg_bodies
+        if (a is None and b is None) or (_is_gripper(left, right) and not in_legs):
             continue
         odd, problem = right, ""
-        if a is None or b is None:
+        crossed = next(
+            (joint for joint in (left, right) if in_legs and _crosses(robot, joint)), None
+        )
+        if crossed is not None and crossed.mimic is not None:
+            odd, problem = crossed, f"got {crossed.mimic.joint}; expected a joint of the same leg"
+        elif a is None or b is None:
             odd, other = (left, right) if b is None else (right, left)
             assert odd.mimic is not None
             problem = f"got {odd.mimic.joint}, and no mimic for its mirror image {other.name}"
@@ -247,15 +252,27 @@ def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
             )
 
 
-def _is_gripper(left: Joint, right: Joint) -> bool:
-    """Return whether two joints are fingers of one gripper.
+def _crosses(robot: Facts, joint: Joint) -> bool:
+    """Return whether a joint of a leg follows a joint of another leg."""
+    target = "" if joint.mimic is None else joint.mimic.joint
+    chains = [
+        {body.joint.name for i in leg.limb.chain if (body := robot.bodies[i]).joint is not None}
+        for leg in robot.legs
+    ]
+    own = [chain for chain in chains if joint.name in chain]
+    return any(target in chain for chain in chains) and not any(target in each for each in own)
 
-    One follows the other, or their names have two sides, such as l_gripper_r_finger_joint.
+
+def _is_gripper(left: Joint, right: Joint) -> bool:
+    """Return whether two joints are fingers of one gripper, or of two equal ones.
+
+    One follows the other, or a name has two sides, such as l_gripper_r_finger_joint.
     """
     targets = {joint.mimic.joint for joint in (left, right) if joint.mimic is not None}
-    words = [word.lower() for word in re.findall(r"[a-zA-Z][a-z]*", left.name)]
-    sides = [word for word in words if swap_sides(word) != word]
-    return not targets.isdisjoint({left.name, right.name}) or len(sides) > 1
+    return not targets.isdisjoint({left.name, right.name}) or any(
+        sum(swap_sides(word) != word for word in re.findall(r"[a-zA-Z][a-z]*", joint.name)) > 1
+        for joint in (left, right)
+    )
 
 
 @rule("SYM013", "collision-asymmetry", "warning", needs=("legs",))
@@ -272,8 +289,8 @@ def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
         Bounding boxes at position 0. Those of published robots agree to 30 % of their diagonal.
     """
     # Bodies behind a misaligned joint are elsewhere; SYM006 reports the joint.
-    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for pair in robot.mirror_pairs:
+    _, displaced = robot.misalignments
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         if displaced & pair.indices or not pair.indices <= robot.leg_bodies:
             continue

@@ -135,8 +135,8 @@ def _pose_provenance(facts: Facts) -> Provenance:
         return Provenance(
             origin="solved", reason="legs bent, feet below the center of mass, other joints near 0"
         )
-    home = facts.model.home
-    if home and all(joint.name in home for joint in facts.actuated):
+    keyframe = facts.model.keyframe
+    if keyframe and all(joint.name in keyframe for joint in facts.actuated):
         return declared
     return _provenance("suggested", "closest to 0 within the limits")
 

@@ -12,12 +12,12 @@ LEG = {"hip": 0.0, "thigh": 0.9, "calf": -1.8}
 def quadruped(bundled, **changes):
     """Return the quadruped with a keyframe that differs from its own, by FL_calf and so on."""
     facts = bundled("quadruped.xml")
-    home = {
+    keyframe = {
         f"{side}_{part}_joint": changes.get(f"{side}_{part}", changes.get(part, q))
         for side in ("FL", "FR", "RL", "RR")
         for part, q in LEG.items()
     }
-    return Facts(replace(facts.model, home=home), facts.meshes)
+    return Facts(replace(facts.model, keyframe=keyframe), facts.meshes)
 
 
 @pytest.mark.parametrize(
@@ -37,12 +37,12 @@ def test_keyframe_defect_names_cause(bundled, changes, defect):
 
 def test_keyframe_that_does_not_stand_is_replaced(bundled):
     crouching = quadruped(bundled, thigh=2.6, calf=-2.6)
-    without = Facts(replace(crouching.model, home={}), crouching.meshes)
+    without = Facts(replace(crouching.model, keyframe={}), crouching.meshes)
     assert solve_standing_pose(crouching.leg_model) == solve_standing_pose(without.leg_model)
 
 
 def test_keyframe_without_all_joints_has_no_defect(bundled):
     facts = bundled("quadruped.xml")
-    partial = Facts(replace(facts.model, home={"FL_calf_joint": -2.6}), facts.meshes)
+    partial = Facts(replace(facts.model, keyframe={"FL_calf_joint": -2.6}), facts.meshes)
     assert not keyframe_defect(partial.leg_model)
     assert not is_standing_keyframe(partial.leg_model)

@@ -264,9 +264,9 @@ def test_standing_pose_of_random_legs(thigh, ratio, lower, upper):
 def test_standing_pose_keeps_keyframe():
     path = bundled.urdf_path("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
-    assert robot.model.home
+    assert robot.model.keyframe
     assert solve_standing_pose(robot.leg_model) == {
-        j.name: robot.model.home[j.name] for j in robot.joints
+        j.name: robot.model.keyframe[j.name] for j in robot.joints
     }
 
 

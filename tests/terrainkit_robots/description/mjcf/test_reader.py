@@ -196,7 +196,7 @@ def test_published_robots_match_mujoco(name: str, robot_file: Callable[[str], Pa
 
 def test_go2_home_and_torque_limits(robot_file: Callable[[str], Path]) -> None:
     robot = read_file(robot_file("go2_mjcf/go2.xml"))
-    assert robot.home["RR_calf_joint"] == -1.8
+    assert robot.keyframe["RR_calf_joint"] == -1.8
     assert robot.imu is not None
     name, place = robot.imu
     assert name == "base_link"
@@ -323,7 +323,7 @@ def test_home_is_first_keyframe_with_positions() -> None:
         )
     )
     assert robot.problems == ()
-    assert robot.home == {"hip": 0.4, "slide": 0.5, "knee": 0.6}
+    assert robot.keyframe == {"hip": 0.4, "slide": 0.5, "knee": 0.6}
 
 
 def test_excluded_pairs() -> None:

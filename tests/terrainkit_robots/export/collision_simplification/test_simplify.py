@@ -88,7 +88,7 @@ class TestHull:
         assert error.original == pytest.approx(8)
         assert error.volume == pytest.approx(2 * ANGLE.convex_hull.volume)
         assert error.percent == pytest.approx(100 * (ANGLE.convex_hull.volume / 4 - 1))
-        assert done.notes == (
+        assert done.changes == (
             f"replaced collision mesh angle.stl by its convex hull (volume {error.percent:+.1f} %)",
         )
 
@@ -96,7 +96,7 @@ class TestHull:
         done = treated("hull", mesh("open.stl"))
         assert done.errors[0].original is None
         assert done.errors[0].percent is None
-        assert "(volume unknown)" in done.notes[0]
+        assert "(volume unknown)" in done.changes[0]
         assert volumes(done) == pytest.approx([0.006])
 
     def test_scale_is_applied_to_vertices(self):
@@ -152,7 +152,7 @@ class TestCoacd:
         done = treated("coacd", mesh("thin.stl"))
         assert done.errors[0].replacement == "its convex hull"
         expected = "collision mesh thin.stl makes CoACD fail: no reason; its convex hull is used"
-        assert done.notes[0] == expected
+        assert done.changes[0] == expected
 
 
 class TestPrimitives:

@@ -46,7 +46,7 @@ class TestFormats:
         packed = content(data, "a.STL", scale=(0.001, 0.002, 0.003))
         assert packed.data == data
         assert packed.scale == (0.001, 0.002, 0.003)
-        assert not packed.note
+        assert not packed.change
 
     def test_stl_that_looks_like_text(self):
         packed = content(b"solid".ljust(80) + STL[80:], "a.stl")
@@ -120,7 +120,7 @@ class TestTooManyFaces:
         packed = content(data, "a.stl", (1, 1, -1))
         surface = read(packed)
         assert len(surface.faces) <= 1000
-        assert packed.note == f"was decimated from 5,120 to {len(surface.faces)} faces"
+        assert packed.change == f"was decimated from 5,120 to {len(surface.faces)} faces"
         assert signed_volume(surface) == pytest.approx(ball.volume, rel=0.05)
 
 

@@ -51,7 +51,7 @@ class TestNames:
         assert visual.mesh.filename == "meshes/a.stl"
         assert visual.mesh.path == Path("meshes/a.stl")
         assert visual.mesh.scale == (2, 2, 2)
-        assert not done.notes
+        assert not done.changes
 
     def test_equal_content_is_stored_once(self):
         shapes = [mesh("a.stl"), mesh("b/c.stl"), mesh("a.stl", (1, 1, 2))]
@@ -74,17 +74,17 @@ class TestNames:
 class TestRemoved:
     def test_missing_visual_mesh(self):
         done = packed(visuals=[mesh("a.stl"), shape("sphere", 0.1)])
-        assert done.notes == ("removed the visual mesh a.stl of leg: it does not exist",)
+        assert done.changes == ("removed the visual mesh a.stl of leg: it does not exist",)
         assert [each.shape for each in done.model.links[0].visuals] == ["sphere"]
 
     def test_flat_visual_mesh(self):
         done = packed(visuals=[mesh("a.stl", (1, 0, 1))] * 2, a__stl=BOX)
-        assert done.notes == ("removed the visual mesh a.stl of leg: it is flat",)
+        assert done.changes == ("removed the visual mesh a.stl of leg: it is flat",)
         assert not done.model.links[0].visuals
         assert not done.files
 
     @pytest.mark.parametrize(
-        ("given", "note"),
+        ("given", "change"),
         [
             (shape("plane"), "removed a plane of leg: it has no valid size"),
             (
@@ -102,9 +102,9 @@ class TestRemoved:
             ),
         ],
     )
-    def test_geometry_without_size(self, given, note):
+    def test_geometry_without_size(self, given, change):
         done = packed(collisions=[given, shape("sphere", 0.1)])
-        assert done.notes == (note,)
+        assert done.changes == (change,)
         assert [each.shape for each in done.model.links[0].collisions] == ["sphere"]
 
 
@@ -129,17 +129,17 @@ class TestCollisionMeshes:
         assert sorted(box.size) == pytest.approx([0.0005, 0.05, 0.1])
         assert box.origin[:3, 3] == pytest.approx([1, 2, 3])
         assert box.mesh is None
-        assert "by a box of 1 mm thickness" in done.notes[0]
+        assert "by a box of 1 mm thickness" in done.changes[0]
 
     def test_mesh_without_surface_is_removed(self):
         done = packed(collisions=[mesh("a.stl", (1, 0, 0))], a__stl=BOX)
         assert not done.model.links[0].collisions
-        assert "it has no surface" in done.notes[0]
+        assert "it has no surface" in done.changes[0]
 
     def test_fitted_mesh_is_exported(self):
         done = packed(collisions=[mesh("a.stl", fit_to_mesh=True)], a__stl=BOX)
         assert not done.model.links[0].collisions[0].fit_to_mesh
-        assert "instead of MuJoCo's fitted primitive" in done.notes[0]
+        assert "instead of MuJoCo's fitted primitive" in done.changes[0]
 
 
 class TestPrimitives:
