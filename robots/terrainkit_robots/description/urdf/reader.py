@@ -113,7 +113,9 @@ class _Reader:
             parent = element.getparent()
             owner = "" if parent is None else parent.tag
             message = f"second <{element.tag}> in a <{owner}>; expected one, and the first is read"
-            self._report("XML015", element, message)
+            first = None if parent is None else parent.find(element.tag)
+            is_copy = first is not None and _same_content(first, element)
+            self._report("XML015", element, message, copy="1" if is_copy else "")
         for element in undefined_materials(root):
             name = truncate(element.get("name", ""))
             message = f"material {name}: has no color or texture anywhere; expected a definition"
@@ -405,3 +407,10 @@ def _owner(element: "etree._Element") -> str:
             return str(at.get("name"))
         at = at.getparent()
     return ""
+
+
+def _same_content(first: "etree._Element", second: "etree._Element") -> bool:
+    """Return whether two elements have the same attributes and children."""
+    if first.attrib != second.attrib or len(first) != len(second):
+        return False
+    return all(a.tag == b.tag and _same_content(a, b) for a, b in zip(first, second, strict=True))

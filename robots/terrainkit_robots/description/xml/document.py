@@ -99,6 +99,7 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
                 subject=file.name,
             )
         )
+    text = _with_version(file, data, text, problems)
     parser = etree.XMLParser(
         recover=True, resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
     )
@@ -137,6 +138,39 @@ def _rejected(
 
 def _unparsed(file: Path, data: bytes, problems: Sequence[Problem]) -> XmlDocument:
     return XmlDocument(file=file, data=data, root=None, sources={}, problems=tuple(problems))
+
+
+_VERSION = re.compile(rb"<\?xml\s+version\s*=\s*[\"'](?!1\.\d+[\"'])([^\"']{3})[\"']")
+"""XML declaration with a version that does not exist."""
+
+
+def _with_version(file: Path, data: bytes, text: bytes, problems: list[Problem]) -> bytes:
+    """Return `text` with version 1.0 in its XML declaration, and report another version."""
+    match = _VERSION.match(text)
+    if match is None:
+        return text
+    start = len(data) - len(text) + match.start(1)
+    version = match[1].decode("ascii", "replace")
+    problems.append(
+        Problem(
+            code="XML001",
+            message=f"version in <?xml?>: got {version!r}; expected 1.0, or strict readers reject "
+            "the file",
+            source=Source(file=file, line=1),
+            subject=file.name,
+            details={"start": str(start), "end": str(start + 3)},
+        )
+    )
+    return text[: match.start(1)] + b"1.0" + text[match.end(1) :]
+
+
+def version_fix(problem: Problem) -> Fix | None:
+    """Return the fix of a wrong version in the XML declaration; None for other problems."""
+    if "end" not in problem.details:
+        return None
+    start, end = int(problem.details["start"]), int(problem.details["end"])
+    edit = ReplaceBytes(source=problem.source, start=start, end=end, replacement=b"1.0")
+    return Fix(safety="safe", description="Set the version of the XML to 1.0.", edits=(edit,))
 
 
 def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> bytes:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix, RemoveAttribute, RemoveElement, SetAttribute
 from terrainkit_robots.description.model import Problem
-from terrainkit_robots.description.xml.document import leading_bytes_fix
+from terrainkit_robots.description.xml.document import leading_bytes_fix, version_fix
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 
 
@@ -25,22 +25,25 @@ def _violation(
     )
 
 
-@rule("XML001", "malformed-xml", "error")
+@rule("XML001", "malformed-xml", "error", fixes="safe")
 def malformed_xml(robot: Facts) -> Iterator[Violation]:
     """The file is not well-formed XML.
 
     Readers handle malformed XML differently: some stop, others silently drop every element after
     the error. Elements that can be recovered are still checked, so that one missing bracket does
-    not hide other problems.
+    not hide other problems. A version other than 1.0 in <?xml?> is a warning, since MuJoCo and
+    urdfdom do not read it.
 
     Fix:
-        Correct the XML at the reported line. An editor with XML support highlights it.
+        Correct the XML at the reported line. An editor with XML support highlights it. The safe fix
+        sets the version.
 
     Source:
         XML 1.0, section 2.1. The message is from libxml2.
     """
     for problem in _problems(robot, "XML001"):
-        yield _violation(robot, problem)
+        fix = version_fix(problem)
+        yield _violation(robot, problem, fix, "warning" if fix is not None else None)
 
 
 @rule("XML002", "unknown-root", "error")
@@ -300,7 +303,7 @@ def unsupported_quaternion(robot: Facts) -> Iterator[Violation]:
         yield _violation(robot, problem, fix)
 
 
-@rule("XML015", "repeated-element", "error")
+@rule("XML015", "repeated-element", "error", fixes="safe")
 def repeated_element(robot: Facts) -> Iterator[Violation]:
     """An element that may occur once occurs twice.
 
@@ -308,13 +311,17 @@ def repeated_element(robot: Facts) -> Iterator[Violation]:
     was merged. MuJoCo rejects most of them; other readers silently take the first or the last.
 
     Fix:
-        Remove the one that is wrong.
+        Remove the one that is wrong. The safe fix removes an exact copy.
 
     Source:
         wiki.ros.org/urdf/XML; MuJoCo 4.0: "repeated element".
     """
     for problem in _problems(robot, "XML015"):
-        yield _violation(robot, problem)
+        fix = None
+        if problem.details.get("copy") and problem.source.element is not None:
+            edit = RemoveElement(source=problem.source)
+            fix = Fix(safety="safe", description="Remove the copy.", edits=(edit,))
+        yield _violation(robot, problem, fix)
 
 
 @rule("XML016", "undefined-material", "warning")
