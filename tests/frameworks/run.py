@@ -15,6 +15,8 @@ FOLDER = Path(__file__).parent
 PACKAGES = {
     "mjlab": [["mjlab==1.6.0"]],
     "pybullet": [["pybullet==3.2.7"]],
+    "warp": [["newton==1.8.0", "mujoco-warp==4.0.0"]],
+    "mjx": [["mujoco-mjx==3.17.0"]],
     "isaaclab": [["torch"], ["--no-deps", "isaaclab==2.3.2.post1"]],
 }
 """Arguments of `pip install` for each check."""
