@@ -93,10 +93,13 @@ def patch_rng(config: MapConfig, terrain: Terrain, row: int, col: int) -> "np.ra
     It depends on the seed and the patch only. In mode curriculum, all rows of a column share it for
     terrains with :attr:`~terrainkit.terrain.Terrain.has_column_seed`.
     """
+    # A list of integers takes twice as long to convert, but may have seeds of 64 bits.
+    is_small = config.seed < 2**32
     if config.mode == "curriculum" and terrain.has_column_seed:
         seed = np.random.SeedSequence([config.seed, col], spawn_key=_COLUMN_STREAM)
     else:
-        seed = np.random.SeedSequence([config.seed, row, col])
+        words = [config.seed, row, col]
+        seed = np.random.SeedSequence(np.array(words, np.uint32) if is_small else words)
     return np.random.default_rng(seed)
 
 
