@@ -139,7 +139,7 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
 
 
 def _is_flat(terrain_map: "TerrainMap") -> bool:
-    """Return whether all cells are flat, band by band: one with a slope is often among the first."""
+    """Return whether all cells are flat, band by band: most maps have a slope in an early one."""
     heights, grid = terrain_map.heights, terrain_map.grid
     for start in range(0, len(heights), _ROWS_PER_BAND):
         band = heights[start : start + _ROWS_PER_BAND + 1]  # the next one repeats the last row
