@@ -177,17 +177,23 @@ class TerrainMap:
             closed: Return one watertight solid: the ground with sides and a bottom, united with
                 the solids.
         """
-        from terrainkit.mesh import closed_mesh, full_mesh, merged_mesh
+        from terrainkit.mesh import closed_mesh
         from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes, united
 
-        threshold = self.config.wall_threshold
-        ground = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
+        ground = self.ground_mesh(merged=merged)
         if closed:
             ground = closed_mesh(ground)
         if not self.solids.collides.any():
             return ground
         meshes = [ground, *solid_meshes(self.solids.select(self.solids.collides))]
         return united(meshes) if closed else concatenate_meshes(meshes)
+
+    def ground_mesh(self, *, merged: bool = True) -> "TriMesh":
+        """Return the ground as a triangle mesh, without the solids; see :meth:`mesh`."""
+        from terrainkit.mesh import full_mesh, merged_mesh
+
+        make_mesh = merged_mesh if merged else full_mesh
+        return make_mesh(self.heights, self.grid, self.config.wall_threshold)
 
     def boxes(self) -> "BoxDecomposition":
         """Return the level ground as boxes; see :mod:`terrainkit.box_decomposition`."""
@@ -243,6 +249,14 @@ class TerrainMap:
             raise ExportError(
                 f"got a map with {len(self.solids)} solids, which {what} cannot represent; "
                 "expected a mesh (.stl, .ply, .obj, .glb) or MuJoCo model (.xml)"
+            )
+
+    def require_one_ground_friction(self, what: str) -> None:
+        """Raise ExportError if the ground has several friction coefficients; `what` has one."""
+        if not (self.friction == np.float32(self.config.static_friction)).all():
+            raise ExportError(
+                f"got ground with several friction coefficients, which {what} cannot represent; "
+                "expected no friction of sub-terrains or friction patches"
             )
 
     def require_one_friction(self, what: str) -> None:

@@ -12,7 +12,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.simulator_conventions.armature import (
     GENESIS_ARMATURE,
-    inertias_without_armature,
+    inertia_without_armature,
 )
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     KEEP_LINK_OPTIONS,
@@ -109,8 +109,8 @@ def _format_order(order: SimulatorOrder, file: Sequence[str]) -> str:
     return f"{order.simulator}{unverified}: {indices}"
 
 
-def _join(words: Sequence[str]) -> str:
-    *first, last = words
+def _join(items: Sequence[str]) -> str:
+    *first, last = items
     return f"{', '.join(first)} and {last}" if first else last
 
 
@@ -165,7 +165,7 @@ def genesis_armature(robot: Facts) -> Iterator[Violation]:
         `default_armature` in genesis-world 1.4.5 is 0.1 unless MuJoCo compatibility is enabled. It
         is compared with the inertia about the joint axis of all links below, at joint positions 0.
     """
-    moved = inertias_without_armature(robot.bodies, robot.actuated)
+    moved = inertia_without_armature(robot.bodies, robot.actuated)
     slowed = [each for each in moved if each.inertia < GENESIS_ARMATURE]
     if not slowed:
         return

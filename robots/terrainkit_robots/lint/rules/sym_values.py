@@ -12,7 +12,7 @@ from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import swap_sides
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
-from terrainkit_robots.description.model import Joint
+from terrainkit_robots.description.model import Geometry, Joint
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.transforms import Matrix
 
@@ -31,6 +31,9 @@ _MAX_PRODUCT_ERROR = 0.1
 
 _MAX_MOMENT_ERROR = 0.05
 """Difference of principal moments above which SYM003 reports the pair, as the same share."""
+
+_MAX_SIZE_RATIO = 1.5
+"""Allowed ratio of the sizes of two mirrored primitives."""
 
 _MAX_SHAPE_ERROR, _SHAPE_MARGIN = 0.3, 0.01
 """Allowed distance between two mirrored bounding boxes: a share of the diagonal plus a constant
@@ -275,12 +278,13 @@ def _is_gripper(left: Joint, right: Joint) -> bool:
     )
 
 
-@rule("SYM013", "collision-asymmetry", "warning", needs=("legs",))
+@rule("SYM013", "collision-asymmetry", "warning")
 def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
-    """The collision shapes of a leg are not where those of its mirror image are.
+    """The collision shapes of a body are not where those of its mirror image are, or as large.
 
     A shape is turned, shifted or scaled on one side only, or has the mesh of another part. The legs
-    collide at different positions, and one foot may reach deeper than the other.
+    collide at different positions, and one foot may reach deeper than the other. The sizes of
+    primitives are compared on all pairs, arms included.
 
     Fix:
         Mirror the <origin> and the size of the collision shapes.
@@ -292,6 +296,10 @@ def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
     _, displaced = robot.misalignments
     for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
+        resized = _resized(robot, pair)
+        if resized is not None:
+            yield resized
+            continue
         if displaced & pair.indices or not pair.indices <= robot.leg_bodies:
             continue
         a, b = _box(robot, left), _box(robot, right)
@@ -321,6 +329,46 @@ def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
             f"most {1000 * limit:.3g} mm",
             measured={"difference": error, "mirror_image": other.body.name},
         )
+
+
+def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
+    """Return the violation of a pair whose primitives have different sizes, or None."""
+    shapes = _primitives(pair.left.body), _primitives(pair.right.body)
+    if [each.shape for each in shapes[0]] != [each.shape for each in shapes[1]]:
+        return None
+    for left, right in zip(*shapes, strict=True):
+        sizes = np.array(left.size), np.array(right.size)
+        ratio = float(max((sizes[0] / sizes[1]).max(), (sizes[1] / sizes[0]).max()))
+        if ratio <= _MAX_SIZE_RATIO:
+            continue
+
+        def size(body: Body, index: int = shapes[0].index(left)) -> Matrix | None:
+            siblings = _primitives(body)
+            return np.array(siblings[index].size) if len(siblings) == len(shapes[0]) else None
+
+        odd, other = robot.outlier_first(pair.left, pair.right, size)
+        own, mirrored = (left, right) if odd is pair.left else (right, left)
+        return Violation(
+            subject=odd.body.name,
+            source=own.size_source or own.source,
+            certainty="likely",
+            message=f"size of the collision {own.shape} of {odd.body.name}: got "
+            f"{_format_size(own)} m, and {_format_size(mirrored)} m for its mirror image "
+            f"{other.body.name} (radii and half lengths); expected at most a factor of "
+            f"{_MAX_SIZE_RATIO:g}",
+            measured={"ratio": ratio, "mirror_image": other.body.name},
+        )
+    return None
+
+
+def _primitives(body: Body) -> list[Geometry]:
+    """Return the collision primitives of a body, by shape and size."""
+    found = [s.geometry for s in body.collisions if s.geometry.size and min(s.geometry.size) > 0]
+    return sorted(found, key=lambda each: (each.shape, each.size))
+
+
+def _format_size(geometry: Geometry) -> str:
+    return " ".join(f"{value:g}" for value in geometry.size)
 
 
 def _box(robot: Facts, side: MirrorSide) -> Matrix | None:
