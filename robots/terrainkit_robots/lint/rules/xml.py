@@ -187,8 +187,8 @@ def byte_order_mark(robot: Facts) -> Iterator[Violation]:
     """There are invisible characters before the XML, or the file is UTF-16.
 
     Some editors write a byte order mark or a blank line before <?xml ...?>. Strict readers reject
-    the file, with an error message that points at nothing visible. MuJoCo and urdfdom skip them, but
-    cannot read UTF-16 and UTF-32 at all, which is an error.
+    the file, with an error message that points at nothing visible. MuJoCo and urdfdom skip them,
+    but cannot read UTF-16 and UTF-32 at all, which is an error.
 
     Fix:
         Save the file as UTF-8 without a byte order mark, starting with <?xml ...?> or <robot>.
