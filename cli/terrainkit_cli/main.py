@@ -17,6 +17,7 @@ COMMAND_GROUPS = {
         "list": "terrain_commands",
         "info": "terrain_commands",
         "preview": "terrain_commands",
+        "view": "view_command",
         "check-map": "terrain_commands",
         "diff": "terrain_commands",
         "export": "export_command",
