@@ -7,6 +7,7 @@ defaults would apply otherwise.
 """
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 from xml.etree import ElementTree as ET
@@ -42,6 +43,9 @@ _QUANTUM = 1e-4
 
 BYTES_PER_SAMPLE = 100
 """Peak memory per sample [bytes]: its elevation as a number and as text."""
+
+_ROWS_PER_BAND = 256
+"""Samples along x that are searched for slopes at a time."""
 
 _RINGS = 2
 """Samples around the patches that belong to the heightfield. The ground of the border's first cell
@@ -125,15 +129,26 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
     if collision == "hfield":
         return None
     if collision == "auto":
-        threshold = terrain_map.config.wall_threshold
-        grid = NodeGrid.from_heights(terrain_map.heights, terrain_map.grid, threshold)
-        if not flat_cells(grid).all():
+        if not _is_flat(terrain_map):
             return None
         cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
         num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
         # Of two geoms of either kind, a box was measured to be faster than a heightfield.
         return cover if len(cover.centers) <= max(MAX_BOXES, 2 * num_hfields) else None
     return terrain_map.boxes()
+
+
+def _is_flat(terrain_map: "TerrainMap") -> bool:
+    """Return whether all cells are flat, band by band: most maps have a slope in an early one."""
+    heights, grid = terrain_map.heights, terrain_map.grid
+    for start in range(0, len(heights), _ROWS_PER_BAND):
+        band = heights[start : start + _ROWS_PER_BAND + 1]  # the next one repeats the last row
+        nodes = NodeGrid.from_heights(
+            band, replace(grid, shape=band.shape), terrain_map.config.wall_threshold
+        )
+        if not flat_cells(nodes).all():
+            return False
+    return True
 
 
 def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
