@@ -1,5 +1,6 @@
 """The command that shows a map in the browser."""
 
+import socket
 import time
 from contextlib import redirect_stdout
 from dataclasses import dataclass
@@ -41,6 +42,14 @@ class View(Command):
 
         if not 0 < self.port < 1 << 16:
             raise ConfigError(f"--port: got {self.port}; expected 1 to 65535")
+        try:  # viser would wait forever for a server that cannot listen
+            with socket.socket() as trial:
+                trial.bind((self.host, 0))
+        except OSError as error:
+            raise ConfigError(
+                f"--host: got {self.host}, which is not an address of this machine "
+                f"({error.strerror}); expected localhost or 0.0.0.0"
+            ) from None
         terrain_map = TerrainMap.load(self.map)
         with redirect_stdout(StringIO()):  # viser prints a banner
             server = viser.ViserServer(host=self.host, port=self.port, verbose=False)
