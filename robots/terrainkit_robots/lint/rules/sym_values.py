@@ -185,9 +185,11 @@ def product_asymmetry(robot: Facts) -> Iterator[Violation]:
 def _turned_trunk(robot: Facts) -> Iterator[Violation]:
     """Yield a violation if the trunk has large products of inertia with the mirrored axis."""
     trunk, normal = robot.bodies[0], robot.mirror.normal
-    inertia = _inertia(trunk)
-    if inertia is None:
+    inertia, inertial = _inertia(trunk), trunk.main_link.inertial
+    if inertia is None or inertial is None or inertial.inertia is None:
         return
+    if not inertial.inertia.any():
+        return  # reported by INR003
     row = inertia @ normal
     share = float(np.linalg.norm(row - (row @ normal) * normal) / trunk.principal[2])
     if share > _MAX_PRODUCT_ERROR:
