@@ -26,8 +26,8 @@ class Export(Command):
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt
     (TorchScript) and policy.json, which describes the observations and their scales, the default
-    pose, gains, limits, and the order of the joints. The exported policies are verified against
-    the checkpoint.
+    pose, gains, limits, and the order of the joints, and robot.xml (MJCF) with its meshes. The
+    exported policies are verified against the checkpoint.
     """
 
     source: Annotated[
