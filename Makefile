@@ -1,4 +1,4 @@
-.PHONY: test check format bench docs wheel
+.PHONY: test check format bench docs wheel integrations
 
 test:          ## all tests
 	python -m pytest
@@ -18,3 +18,6 @@ docs:          ## rewrite the generated docs and pictures
 
 wheel:         ## the wheel that pip installs
 	python -m pip wheel --no-deps --wheel-dir dist .
+
+integrations:  ## run the integrations in their real frameworks, each in its own environment
+	python tests/frameworks/run.py

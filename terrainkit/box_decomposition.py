@@ -11,19 +11,22 @@ from numpy.typing import ArrayLike, NDArray
 from terrainkit.grid import Grid
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.mesh.node_grid import NodeGrid
-from terrainkit.rectangle_cover import rectangle_cover
-from terrainkit.walls import flat_corners, wall_edges
+from terrainkit.rectangle_cover import Span, rectangle_cover
+from terrainkit.walls import flat_corners
 
 MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
 height, since the time would grow with its square. Below it, a box may extend under higher ground to
 the edge of the block, where it can merge with one in the next block."""
 
-MAX_LENGTH = 24.0
-"""Distance at which a row of merged boxes is divided [m]. Long boxes enlarge many nodes of MuJoCo's
-bounding volume hierarchy, all of which are tested for a robot near such a box."""
+MAX_LENGTHS = (16.0, 32.0)
+"""Distances along x and y at which a row of merged boxes is divided [m]. Long boxes enlarge many
+nodes of MuJoCo's bounding volume hierarchy, all of which are tested for a robot near such a box.
+Heights differ along x, with the difficulty, so that mostly level ground merges along it; along y,
+boxes of all heights merge, and fewer of them save more time."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
+_Covers = dict[tuple[tuple[int, ...], bytes, bytes], list[tuple[int, Span]]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +65,7 @@ def decompose_boxes(
 
     A cell is flat if its whole square is flat. Within a patch, the boxes of each height are found
     by :func:`~terrainkit.rectangle_cover.rectangle_cover`, and may extend under higher ground.
-    Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTH`
+    Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTHS`
     unless that doubles their number. They are sorted by their centers, since MuJoCo's bounding
     volume hierarchy divides boxes with equal centers along an axis in this order.
 
@@ -79,73 +82,79 @@ def decompose_boxes(
 
     friction = np.broadcast_to(np.asarray(friction, dtype=np.float32), heights.shape)
 
-    flat = flat_cells(heights, grid, threshold)
+    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    flat = flat_cells(node_grid)
     # A lower bound of the ground in each cell.
-    low = np.where(flat, heights, cv2.erode(heights, np.ones((3, 3), dtype=np.uint8)))
-    _drop_patches_without_walls(flat, _cells_at_walls(heights, threshold), patch_edges)
+    low = cv2.erode(heights, np.ones((3, 3), dtype=np.uint8))
+    np.copyto(low, heights, where=flat)
+    _drop_patches_without_walls(flat, node_grid, patch_edges)
     edges = [
         np.union1d(lines, changes(each)).tolist()
         for lines, each in zip(patch_edges, (friction, friction.T), strict=True)
     ]
-    boxes = [
-        (height, i0 + a, i0 + b, j0 + c, j0 + d, friction[i0, j0])
-        for i0, i1 in itertools.pairwise(edges[0])
-        for j0, j1 in itertools.pairwise(edges[1])
-        for height, (a, b, c, d) in _cover_block(flat[i0:i1, j0:j1], low[i0:i1, j0:j1])
-    ]
+    differ_x = (flat[1:] != flat[:-1]) | (low[1:] != low[:-1])
+    differ_y = (flat[:, 1:] != flat[:, :-1]) | (low[:, 1:] != low[:, :-1])
+    covers: _Covers = {}
+    boxes = []
+    for i0, i1 in itertools.pairwise(edges[0]):
+        for j0, j1 in itertools.pairwise(edges[1]):
+            if not flat[i0:i1, j0:j1].any():
+                continue
+            x = _first_cells(i0, i1, differ_x[i0 : i1 - 1, j0:j1].any(axis=1))
+            y = _first_cells(j0, j1, differ_y[i0:i1, j0 : j1 - 1].any(axis=0))
+            cells = np.ix_(x[:-1], y[:-1])
+            for top, span in _cover_block(flat[cells], low[cells], covers):
+                a, b, c, d = span
+                boxes.append((top, x[a], x[b], y[c], y[d], friction[i0, j0]))
     table = np.array(boxes, dtype=np.float64).reshape(-1, 6)
     # Only boxes of the same top and friction are merged; their number stands for both.
     pairs, number = np.unique(table[:, [0, 5]], axis=0, return_inverse=True)
     table = np.column_stack([number.reshape(-1), table[:, 1:5]])
-    short, long = merge_boxes(table, MAX_LENGTH // grid.cell), merge_boxes(table)
+    max_length = MAX_LENGTHS[0] // grid.cell, MAX_LENGTHS[1] // grid.cell
+    short, long = merge_boxes(table, max_length), merge_boxes(table)
     merged = long if 2 * len(long) <= len(short) else short
     number, i0, i1, j0, j1 = merged.T
     merged = merged[np.lexsort([i0, number, j0 + j1, i0 + i1])]
     return _make_boxes(merged, pairs, grid, float(heights.min()) - THICKNESS, flat)
 
 
-def flat_cells(heights: NDArray[np.float32], grid: Grid, threshold: float) -> NDArray[np.bool_]:
-    """Return which cells are flat, shape of `heights`.
+def flat_cells(node_grid: NodeGrid) -> NDArray[np.bool_]:
+    """Return which cells of a heightfield are flat, shape (nx - 2, ny - 2).
 
     A cell consists of a quarter of each of the four quads around its sample. It is flat if, in
     each quad, its corner is connected without a wall only to corners of the same height.
     """
-    node_grid = NodeGrid.from_heights(heights, grid, threshold)
-    numbers = np.flatnonzero(node_grid.has_wall)
-    i, j = np.divmod(numbers, node_grid.has_wall.shape[1])
-    corners = node_grid.z.ravel()[node_grid.corners(i, j)]
-    at_walls = flat_corners(corners.T, node_grid.walls(i, j).T)
-    corner = node_grid.flat_x & node_grid.flat_y
+    z = node_grid.z
+    differ_x, differ_y = z[1:] != z[:-1], z[:, 1:] != z[:, :-1]
+    corner = ~(differ_x[:, :-1] | differ_x[:, 1:] | differ_y[:-1] | differ_y[1:])
+    x = differ_x.astype(np.uint8) + node_grid.walls_x
+    y = differ_y.astype(np.uint8) + node_grid.walls_y
+    quads = np.flatnonzero(node_grid.has_wall)
+    i, j = np.divmod(quads, corner.shape[1])
+    at_walls = flat_corners(np.stack([x[i, j], y[i + 1, j], x[i, j + 1], y[i, j]]))
 
-    flat = np.ones(node_grid.z.shape, dtype=bool)
-    quads = (slice(None, -1), slice(1, None))
+    flat = np.ones(z.shape, dtype=bool)
+    halves = (slice(None, -1), slice(1, None))
     for k, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))):
-        corner[i, j] = at_walls[:, k]
-        flat[quads[a], quads[b]] &= corner
+        corner.ravel()[quads] = at_walls[k]
+        flat[halves[a], halves[b]] &= corner
     return flat[1:-1, 1:-1]
-
-
-def _cells_at_walls(heights: NDArray[np.float32], threshold: float) -> NDArray[np.bool_]:
-    """Return which cells have a wall on one of their four sides, shape of `heights`."""
-    result = np.zeros(heights.shape, dtype=bool)
-    along_x, along_y = wall_edges(heights, threshold)
-    for side in (slice(None, -1), slice(1, None)):
-        result[side] |= along_x
-        result[:, side] |= along_y
-    return result
 
 
 def _drop_patches_without_walls(
     flat: NDArray[np.bool_],
-    has_wall: NDArray[np.bool_],
+    node_grid: NodeGrid,
     patch_edges: tuple[NDArray[np.int64], NDArray[np.int64]],
 ) -> None:
     """Set `flat` to False in each patch that has slopes and no walls."""
+    # The nodes begin one before the samples, so wall k is before sample k.
+    walls_x, walls_y = node_grid.walls_x[:, 1:-1], node_grid.walls_y[1:-1]
     x, y = patch_edges
     for i0, i1 in itertools.pairwise(x.tolist()):
         for j0, j1 in itertools.pairwise(y.tolist()):
             patch = (slice(i0, i1), slice(j0, j1))
-            if not (flat[patch].all() or has_wall[patch].any()):
+            has_wall = walls_x[i0 : i1 + 1, j0:j1].any() or walls_y[i0:i1, j0 : j1 + 1].any()
+            if not (flat[patch].all() or has_wall):
                 flat[patch] = False
 
 
@@ -157,24 +166,44 @@ def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
 
 
 def _cover_block(
-    flat: NDArray[np.bool_], low: NDArray[np.float32]
-) -> Iterator[tuple[float, tuple[int, int, int, int]]]:
-    """Yield the top and the span of each box of a block of cells, in the order of their tops."""
-    x, y = (np.union1d(*map(changes, pair)) for pair in ((flat, low), (flat.T, low.T)))
-    flat, low = flat[x[:-1]][:, y[:-1]], low[x[:-1]][:, y[:-1]]
-    tops = np.unique(low[flat])
+    flat: NDArray[np.bool_], low: NDArray[np.float32], covers: _Covers
+) -> Iterator[tuple[float, Span]]:
+    """Yield the top and the span of each box of a block of cells, in the order of their tops.
+
+    The boxes depend only on the order of the heights. The rows of a curriculum often differ only
+    in the height of their steps, so `covers` has the boxes of the blocks so far.
+    """
+    heights, ranks = np.unique(low, return_inverse=True)
+    ranks = ranks.reshape(low.shape)
+    key = (low.shape, flat.tobytes(), ranks.tobytes())
+    if key not in covers:
+        covers[key] = list(_cover_ranks(flat, ranks))
+    for rank, span in covers[key]:
+        yield float(heights[rank]), span
+
+
+def _cover_ranks(flat: NDArray[np.bool_], ranks: NDArray[np.int64]) -> Iterator[tuple[int, Span]]:
+    """Yield the rank of the top and the span of each box, in the order of their tops."""
+    tops = np.unique(ranks[flat]).tolist()
     part = (slice(0, flat.shape[0]), slice(0, flat.shape[1]))
     for top in tops:
-        required = flat & (low == top)
+        required = flat & (ranks == top)
         if len(tops) > MAX_HEIGHTS_PER_BLOCK:
             part = _bounds(required.any(axis=1)), _bounds(required.any(axis=0))
-        i, j = x[part[0].start :].tolist(), y[part[1].start :].tolist()
-        for a, b, c, d in rectangle_cover(required[part], low[part] >= top):
-            yield float(top), (i[a], i[b], j[c], j[d])
+        i, j = part[0].start, part[1].start
+        for a, b, c, d in rectangle_cover(required[part], ranks[part] >= top):
+            yield top, (i + a, i + b, j + c, j + d)
+
+
+def _first_cells(start: int, stop: int, differ: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the cells from `start` that differ from the one before, and `stop`."""
+    return np.concatenate([[start], np.flatnonzero(differ) + start + 1, [stop]])
 
 
 def changes(values: NDArray[Any]) -> NDArray[np.int64]:
     """Return the rows that differ from the previous one, including both ends."""
+    if values.strides[0] == 0:  # a view that repeats one row
+        return np.array([0, len(values)])
     differ = (values[1:] != values[:-1]).any(axis=1)
     return np.concatenate([[0], np.flatnonzero(differ) + 1, [len(values)]])
 
@@ -185,18 +214,20 @@ def _bounds(mask: NDArray[np.bool_]) -> slice:
     return slice(index[0], index[-1] + 1)
 
 
-def merge_boxes(boxes: NDArray[np.float64], max_length: float = np.inf) -> NDArray[np.float64]:
+def merge_boxes(
+    boxes: NDArray[np.float64], max_length: tuple[float, float] = (np.inf, np.inf)
+) -> NDArray[np.float64]:
     """Merge boxes of the same top that share a whole side until none do.
 
     Args:
         boxes: Top or another key, and cells i0 to i1 and j0 to j1 of each box, shape (n, 5).
-        max_length: Cells after which a row of merged boxes is divided.
+        max_length: Cells along x and y after which a row of merged boxes is divided.
     """
     before = -1
     while len(boxes) != before:
         before = len(boxes)
-        for _ in "xy":
-            boxes = _merge_along_x(boxes, max_length)[:, [0, 3, 4, 1, 2]]
+        for each in max_length:
+            boxes = _merge_along_x(boxes, each)[:, [0, 3, 4, 1, 2]]
     return boxes
 
 

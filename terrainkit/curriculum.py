@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.type_hint import PositiveInt, convert, show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,14 +52,12 @@ def assign_levels(
         Levels and columns, each of shape (num_envs,).
 
     Raises:
-        ConfigError: if `num_envs` is negative or there is no row `max_init_level`.
+        ConfigError: if `num_envs` or `seed` is negative, or there is no row `max_init_level`.
     """
-    highest = rows - 1 if max_init_level is None else max_init_level
-    if num_envs < 0:
-        raise ConfigError(f"num_envs: got {num_envs}; expected 0 or more")
-    if not 0 <= highest < rows:
-        raise ConfigError(f"max_init_level: got {highest}; expected 0 to {rows - 1}")
-    levels = np.random.default_rng(seed).integers(0, highest + 1, size=num_envs)
+    num_envs = convert("num_envs", num_envs, Annotated[int, Meta(ge=0)])
+    row = Annotated[int, Meta(ge=0, le=rows - 1)]
+    highest = convert("max_init_level", rows - 1 if max_init_level is None else max_init_level, row)
+    levels = _make_rng(seed).integers(0, highest + 1, size=num_envs)
     columns = np.arange(num_envs) * cols // max(num_envs, 1)
     return levels, columns
 
@@ -108,17 +109,12 @@ def resample_columns(
         Columns, shape (n,): each variant with the same probability, the current one included.
 
     Raises:
-        ConfigError: if an environment is not on the map.
+        ConfigError: if an environment is not on the map, or `seed` is negative.
     """
-    rows, before = np.asarray(levels, dtype=np.int64), np.asarray(columns, dtype=np.int64)
-    for name, values, size in zip(
-        ("levels", "columns"), (rows, before), terrain_types.shape, strict=True
-    ):
-        if values.size and not (values.min() >= 0 and values.max() < size):
-            got = f"{values.min()} to {values.max()}"
-            raise ConfigError(f"{name}: got {got}; expected 0 to {size - 1}")
+    rows = _indices("levels", levels, terrain_types.shape[0])
+    before = _indices("columns", columns, terrain_types.shape[1], number=len(rows))
     is_variant = terrain_types[rows] == terrain_types[rows, before][:, None]
-    rank = np.random.default_rng(seed).integers(is_variant.sum(axis=1))
+    rank = _make_rng(seed).integers(is_variant.sum(axis=1))
     after: NDArray[np.int64] = np.argmax(np.cumsum(is_variant, axis=1) > rank[:, None], axis=1)
     return after
 
@@ -153,17 +149,61 @@ def update_levels(
         Levels after, shape (n,).
 
     Raises:
-        ConfigError: if `top_levels` is below 1, or a level is not on the map.
+        ConfigError: if `top_levels` is below 1, a level is not on the map, the distances are
+            not numbers, or `seed` is negative.
     """
-    before = np.asarray(levels, dtype=np.int64)
-    walked = np.asarray(distance, dtype=np.float64)
-    if top_levels < 1:
-        raise ConfigError(f"top_levels: got {top_levels}; expected 1 or more")
-    if before.size and not (before.min() >= 0 and before.max() < rows):
-        raise ConfigError(f"levels: got {before.min()} to {before.max()}; expected 0 to {rows - 1}")
+    before = _indices("levels", levels, rows)
+    top_levels = convert("top_levels", top_levels, PositiveInt)
+    walked = _distances("distance", distance, len(before))
     up = walked > patch_length / 2
-    down = ~up & (walked < np.asarray(command_distance, dtype=np.float64) / 2)
+    down = ~up & (walked < _distances("command_distance", command_distance, len(before)) / 2)
     after = np.maximum(before + up - down, 0)
     lowest = max(0, rows - top_levels)
-    solved = np.random.default_rng(seed).integers(lowest, rows, size=before.shape)
+    solved = _make_rng(seed).integers(lowest, rows, size=before.shape)
     return np.where(after >= rows, solved, after)
+
+
+def _make_rng(seed: int | Sequence[int]) -> np.random.Generator:
+    """Return the generator of a seed; numpy would accept None, and warn of nothing."""
+    try:
+        values = np.asarray(seed)
+        is_valid = (
+            values.dtype.kind in "iu" and values.ndim < 2 and values.size and values.min() >= 0
+        )
+    except ValueError:  # lists of different lengths
+        is_valid = False
+    if not is_valid:
+        raise ConfigError(f"seed: got {show(seed)}; expected integers >= 0")
+    return np.random.default_rng(seed)
+
+
+def _indices(
+    name: str, values: ArrayLike, size: int, number: int | None = None
+) -> NDArray[np.int64]:
+    """Return rows or columns of a map with `size` of them, one for each environment."""
+    given = _to_array(name, values)
+    if given.ndim != 1 or len(given) != (len(given) if number is None else number):
+        expected = "(n,)" if number is None else f"({number},)"
+        raise ConfigError(f"{name}: got shape {given.shape}; expected {expected}")
+    if given.size and given.dtype.kind not in "iu":
+        raise ConfigError(f"{name}: got values of {given.dtype}; expected integers")
+    if given.size and not (given.min() >= 0 and given.max() < size):
+        raise ConfigError(f"{name}: got {given.min()} to {given.max()}; expected 0 to {size - 1}")
+    return given.astype(np.int64)
+
+
+def _distances(name: str, values: ArrayLike, number: int) -> NDArray[np.float64]:
+    """Return the distances of the environments [m], or the one of all of them."""
+    given = _to_array(name, values)
+    if given.dtype.kind not in "fiu":
+        raise ConfigError(f"{name}: got values of {given.dtype}; expected numbers")
+    if given.shape not in ((), (number,)):
+        raise ConfigError(f"{name}: got shape {given.shape}; expected ({number},)")
+    return given.astype(np.float64)
+
+
+def _to_array(name: str, values: ArrayLike) -> NDArray[Any]:
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise ConfigError(f"{name}: got lists of different lengths; expected one list") from None

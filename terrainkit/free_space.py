@@ -13,7 +13,7 @@ CONTACT = 1e-4
 
 def first_surface(
     heights: NDArray[np.float64],
-    spans: NDArray[np.float64],
+    bounds: NDArray[np.float64],
     z: NDArray[np.float64],
     direction: Direction,
 ) -> NDArray[np.float64]:
@@ -23,11 +23,11 @@ def first_surface(
 
     Args:
         heights: Height of the ground under each start [m], shape (n,).
-        spans: Bottom and top of the solids on each line [m], shape (n, k, 2), padded with NaN.
+        bounds: Bottom and top of the solids on each line [m], shape (n, k, 2), padded with NaN.
         z: Height of each start [m], shape (n,).
         direction: Direction of the rays.
     """
-    surfaces = np.concatenate([heights[:, None], spans.reshape(len(spans), -1)], axis=1)
+    surfaces = np.concatenate([heights[:, None], bounds.reshape(len(bounds), -1)], axis=1)
     if direction == "down":
         found = np.max(surfaces, axis=1, where=surfaces <= z[:, None], initial=-np.inf)
     else:
@@ -35,19 +35,21 @@ def first_surface(
     return np.where(np.isfinite(found), found, np.nan)
 
 
-def free_intervals(heights: NDArray[np.float64], spans: NDArray[np.float64]) -> NDArray[np.float64]:
+def free_intervals(
+    heights: NDArray[np.float64], bounds: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Return the free intervals above the ground on each vertical line.
 
     Args:
         heights: Height of the ground on each line [m], shape (n,).
-        spans: Bottom and top of the solids on each line [m], shape (n, k, 2), in the order of the
+        bounds: Bottom and top of the solids on each line [m], shape (n, k, 2), in the order of the
             bottoms, padded with NaN.
 
     Returns:
         Floor and ceiling of each interval [m], shape (n, m, 2), upward, padded with NaN. The
         ceiling of the last one is inf. Gaps of less than `CONTACT` are closed.
     """
-    bottom, top = spans[..., 0], spans[..., 1]
+    bottom, top = bounds[..., 0], bounds[..., 1]
     tops = np.column_stack([heights, np.where(np.isnan(top), -np.inf, top)])
     floor = np.maximum.accumulate(tops, axis=1)
     bottoms = np.where(np.isnan(bottom), np.inf, bottom)
@@ -62,13 +64,13 @@ def free_intervals(heights: NDArray[np.float64], spans: NDArray[np.float64]) -> 
     return np.where(np.take_along_axis(free, order, axis=1)[..., None], chosen, np.nan)
 
 
-def clearance(heights: NDArray[np.float64], spans: NDArray[np.float64]) -> NDArray[np.float64]:
+def clearance(heights: NDArray[np.float64], bounds: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the free height above the ground on each vertical line [m], shape (n,).
 
     It is inf under the open sky, and 0 where a solid covers the ground. The arguments are those of
     :func:`free_intervals`.
     """
-    bottom, top = spans[..., 0], spans[..., 1]
+    bottom, top = bounds[..., 0], bounds[..., 1]
     above = top > heights[:, None] + CONTACT  # solids within the ground do not count; NaN is False
     gap = np.where(above, bottom - heights[:, None], np.inf).min(axis=1, initial=np.inf)
     return np.where(gap < CONTACT, 0.0, gap)

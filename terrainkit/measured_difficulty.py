@@ -1,4 +1,4 @@
-"""Measure the difficulty of a patch from its heights."""
+"""Measure the difficulty of the ground of a patch from its heights."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ MAX_STEP_HEIGHT = 0.5
 
 
 def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float) -> float:
-    r"""Return the difficulty of a patch [m]: 0 for flat ground.
+    r"""Return the difficulty of the ground of a patch [m]: 0 for flat ground.
 
     .. math:: H = \operatorname{mean}_{p, \delta} \min(|h(p + \delta) - h(p)|, L)
                 + \operatorname{mean}_p \min(|h(p) - h_0|, L)
@@ -19,6 +19,9 @@ def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float)
     over all samples p and steps :math:`\delta` along x and y of up to `STEP_LENGTH`, with
     L = `MAX_STEP_HEIGHT`. The first term measures slopes, risers and edges within one step. The
     second measures the height to climb and the depth of holes. The measure is our own.
+
+    Solids do not count. Heights alone do not tell whether a robot goes over or under a solid: a bar
+    is harder the lower it is, and a tread the higher it is.
 
     Args:
         heights: Heights of a patch [m], shape (nx, ny).

@@ -225,8 +225,8 @@ def convert_parameter(owner: str, name: str, value: object, parameter: Parameter
     """
     if type(value) is type(parameter.easy) and _is_plain(value, parameter):
         return value
-    converted: Value = convert(f"{owner}.{name}", value, _hint(parameter))
-    return converted
+    result: Value = convert(f"{owner}.{name}", value, _hint(parameter))
+    return result
 
 
 def convert_range(

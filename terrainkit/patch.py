@@ -112,9 +112,9 @@ def build_patch(
     spawn_offset = 0.0
     if overlays:
         geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
-    heights, preferred = geometry.heights, geometry.spawn
+    heights, position = geometry.heights, geometry.spawn
     solids, goals = _finish(config, name, geometry, (row, col))
-    spawns = place_spawns(config, name, grid, heights, solids, preferred, partial(child_rng, 1))
+    spawns = place_spawns(config, name, grid, heights, solids, position, partial(child_rng, 1))
     x, y, _ = spawns[0].tolist()
     requested, realized = terrain.requested(), terrain.realized(grid)
     for k, overlay in enumerate(overlays):
@@ -130,7 +130,7 @@ def build_patch(
         solids=solids,
         goals=goals,
         spawns=with_headings(spawns, goals, geometry.heading),
-        spawn_offset=spawn_offset + max(abs(x - preferred[0]), abs(y - preferred[1])),
+        spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
     )
 
 
@@ -188,8 +188,8 @@ def _apply_overlays(
 
     The overlays keep the ground level at the spawn origin of the terrain without overlays.
     """
-    grid, preferred = geometry.grid, geometry.spawn
-    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, preferred)
+    grid, position = geometry.grid, geometry.spawn
+    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, position)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
     for k, overlay in enumerate(overlays):
         geometry = overlay.apply(geometry, child_rng(2 + k))
@@ -200,7 +200,7 @@ def _apply_overlays(
                 f"{grid.shape} with finite values"
             )
         geometry = dataclasses.replace(geometry, heights=heights)
-    return geometry, max(abs(x - preferred[0]), abs(y - preferred[1]))
+    return geometry, max(abs(x - position[0]), abs(y - position[1]))
 
 
 def place_spawns(
@@ -209,7 +209,7 @@ def place_spawns(
     grid: Grid,
     heights: NDArray[np.float32],
     solids: Solids,
-    preferred: tuple[float, float],
+    position: tuple[float, float],
     rng: Callable[[], np.random.Generator],
 ) -> NDArray[np.float64]:
     """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.spawn`.
@@ -220,7 +220,7 @@ def place_spawns(
         grid: Grid of the patch.
         heights: Heights of the patch [m], shape `grid.shape`.
         solids: Solids on the patch.
-        preferred: Preferred position of the first, x and y [m].
+        position: Preferred position of the first, x and y [m].
         rng: Returns the random number generator of the others; slow, so called only if needed.
 
     Raises:
@@ -228,7 +228,7 @@ def place_spawns(
     """
     from terrainkit.spawn import sample_spawns
 
-    origin = _find_origin(config, name, grid, heights, solids, preferred)
+    origin = _find_origin(config, name, grid, heights, solids, position)
     if config.spawns_per_patch == 1:
         return np.array([origin])
     disk, number = spawn_disk(config), config.spawns_per_patch
@@ -241,14 +241,14 @@ def _find_origin(
     grid: Grid,
     heights: NDArray[np.float32],
     solids: Solids,
-    preferred: tuple[float, float],
+    position: tuple[float, float],
 ) -> tuple[float, float, float]:
     """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
     from terrainkit.spawn import find_spawn
 
     disk = spawn_disk(config)
     origin = find_spawn(
-        heights, grid, preferred, disk, solids=solids, threshold=config.wall_threshold
+        heights, grid, position, disk, solids=solids, threshold=config.wall_threshold
     )
     if origin is None:
         raise ConfigError(

@@ -100,7 +100,10 @@ def render_preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
     height, span = ground.shape[:2]
     image = np.full((height + above + below, span + left + right, 3), _BACKGROUND, dtype=np.uint8)
     image[above : above + height, left : left + span] = ground
-    _draw_color_bar(image[above : above + height, left + span :], heights)
+    tops = terrain_map.solids.bounds()[1][:, 2]  # the color of a solid is that of its top
+    low = min(float(heights.min()), tops.min(initial=np.inf))
+    high = max(float(heights.max()), tops.max(initial=-np.inf))
+    _draw_color_bar(image[above : above + height, left + span :], low, high)
     zero = (left - crop[0] * scale, above + height + crop[1] * scale)
     _draw_solids(image, terrain_map, scale, zero)
     _draw_labels(image, terrain_map, scale, zero)
@@ -165,9 +168,9 @@ def color_levels(low: float, high: float) -> NDArray[np.float64]:
     return np.unique([low, *inner, high])
 
 
-def _draw_color_bar(image: Picture, heights: NDArray[np.float32]) -> None:
-    """Draw the color bar of `heights` and its ticks into the margin `image`."""
-    levels = color_levels(float(heights.min()), float(heights.max()))
+def _draw_color_bar(image: Picture, low: float, high: float) -> None:
+    """Draw the color bar of heights from `low` to `high` [m] into the margin `image`."""
+    levels = color_levels(low, high)
     height = min(len(image) - 1, _MAX_BAR_HEIGHT)
     ticks = np.linspace(height, 0, len(levels))
     rows = np.interp(np.arange(height + 1), ticks[::-1], levels[::-1])

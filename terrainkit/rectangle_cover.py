@@ -105,7 +105,7 @@ def _select_greedily(candidates: list[_Rectangle], missing: int) -> list[tuple[_
     """Return rectangles in greedy order, each with the cells that it was the first to cover."""
     queue = [(-each.cells.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
     heapq.heapify(queue)
-    chosen = []
+    selected = []
     while missing:
         # The number of missing cells only falls, so an unchanged first entry is the largest.
         number, area, k = queue[0]
@@ -114,17 +114,17 @@ def _select_greedily(candidates: list[_Rectangle], missing: int) -> list[tuple[_
         current = -first.bit_count()
         if current == number:
             heapq.heappop(queue)
-            chosen.append((rectangle, first))
+            selected.append((rectangle, first))
             missing ^= first << rectangle.shift
         else:
             heapq.heapreplace(queue, (current, area, k))
-    return chosen
+    return selected
 
 
-def _drop_redundant(chosen: list[tuple[_Rectangle, int]]) -> list[_Rectangle]:
+def _drop_redundant(selected: list[tuple[_Rectangle, int]]) -> list[_Rectangle]:
     """Return the chosen rectangles without those whose cells others cover, last ones first."""
     kept, covered = [], 0
-    for rectangle, first in reversed(chosen):
+    for rectangle, first in reversed(selected):
         # Earlier rectangles do not cover the cells that this one was the first to cover.
         if first & ~(covered >> rectangle.shift):
             kept.append(rectangle)

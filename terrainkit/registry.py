@@ -133,38 +133,38 @@ def register_overlay(overlay: _Overlay) -> _Overlay:
     return overlay
 
 
-def _register(group: _Group, given: Any) -> None:
-    if not _is_subclass(given, group):
+def _register(group: _Group, item: Any) -> None:
+    if not _is_subclass(item, group):
         raise ConfigError(
-            f"{group.noun}: got {given!r}; expected a subclass of {group.parent.__name__}"
+            f"{group.noun}: got {item!r}; expected a subclass of {group.parent.__name__}"
         )
-    name = given.kind()
-    if inspect.isabstract(given):
-        missing = ", ".join(sorted(given.__abstractmethods__))
-        raise ConfigError(f"{given.__name__}: got no method {missing}; expected one")
-    if "__dataclass_fields__" not in vars(given):
-        raise ConfigError(f"{given.__name__} lacks @dataclass(frozen=True, kw_only=True)")
-    parameters_of(given)
+    name = item.kind()
+    if inspect.isabstract(item):
+        missing = ", ".join(sorted(item.__abstractmethods__))
+        raise ConfigError(f"{item.__name__}: got no method {missing}; expected one")
+    if "__dataclass_fields__" not in vars(item):
+        raise ConfigError(f"{item.__name__} lacks @dataclass(frozen=True, kw_only=True)")
+    parameters_of(item)
     existing: Any = _registered.get((group.noun, name))
     if existing is None and (name in _module_names(group) or name in _plugins(group)):
         existing = _get(group, name)
-    if existing is None or _path(existing) == _path(given):
-        if existing is not given:
-            _registered[group.noun, name] = given
+    if existing is None or _path(existing) == _path(item):
+        if existing is not item:
+            _registered[group.noun, name] = item
             _get.cache_clear()
-    elif existing is not given:
+    elif existing is not item:
         raise ConfigError(
-            f"the name {name!r} of {_path(given)} is that of {_path(existing)}; expected another "
+            f"the name {name!r} of {_path(item)} is that of {_path(existing)}; expected another "
             "class name"
         )
 
 
-def _is_subclass(given: object, group: _Group) -> bool:
-    return isinstance(given, type) and issubclass(given, group.parent)
+def _is_subclass(item: object, group: _Group) -> bool:
+    return isinstance(item, type) and issubclass(item, group.parent)
 
 
-def _path(given: type[Any]) -> str:
-    return f"{given.__module__}.{given.__qualname__}"
+def _path(item: type[Any]) -> str:
+    return f"{item.__module__}.{item.__qualname__}"
 
 
 def get_terrain(name: str) -> type[Terrain]:

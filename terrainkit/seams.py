@@ -48,7 +48,7 @@ class Seams:
         patch, are therefore no cliffs; the side of a flight of stairs is one.
         """
         candidates = list(self._above(MIN_CLIFF_HEIGHT))
-        steps = {p: self._largest_step(p) for p in {p for seam in candidates for p in seam.patches}}
+        steps = {p: self._max_step(p) for p in {p for seam in candidates for p in seam.patches}}
         cliffs = [seam for seam in candidates if seam.height > sum(steps[p] for p in seam.patches)]
         return sorted(cliffs, key=lambda seam: -seam.height)
 
@@ -79,7 +79,7 @@ class Seams:
         inside = 0 <= row < self.config.rows and 0 <= col < self.config.cols
         return (row, col) if inside else None
 
-    def _largest_step(self, patch: Index | None) -> float:
+    def _max_step(self, patch: Index | None) -> float:
         if patch is None:
             return 0.0
         (i, j), (nx, ny) = self.config.patch_start(*patch), self.config.patch_shape

@@ -176,9 +176,11 @@ def _half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]
     middle, half = np.einsum("nkj,nj->nk", normals, shapes[:, :3]), shapes[:, 3:6]
     sides = [np.dstack([normals, middle + half]), np.dstack([-normals, half - middle])]
     planes, counts = [np.concatenate(sides, axis=1).reshape(-1, 4)], [np.full(len(shapes), 6)]
-    for vertices in solids.hulls():
+    equations = [convex_hull(vertices).equations.round(9) for vertices in solids.hulls()]
+    if equations:
+        hull = np.repeat(np.arange(len(equations)), [len(each) for each in equations])
         # Coplanar facets of a hull repeat their plane.
-        equations = np.unique(convex_hull(vertices).equations.round(9), axis=0)
-        planes.append(equations * [1, 1, 1, -1])
-        counts.append(np.array([len(equations)]))
+        unique = np.unique(np.column_stack([hull, np.concatenate(equations)]), axis=0)
+        planes.append(unique[:, 1:] * [1, 1, 1, -1])
+        counts.append(np.bincount(unique[:, 0].astype(np.int64)))
     return np.concatenate(planes), np.concatenate(counts)

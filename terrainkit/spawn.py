@@ -30,13 +30,13 @@ class Disk:
 def find_spawn(
     heights: NDArray[np.float32],
     grid: Grid,
-    preferred: tuple[float, float],
+    position: tuple[float, float],
     disk: Disk,
     *,
     solids: Solids,
     threshold: float,
 ) -> tuple[float, float, float] | None:
-    """Return the spawn origin nearest to `preferred`.
+    """Return the spawn origin nearest to `position`.
 
     All samples that influence the surface within the disk around the origin differ by at most its
     tolerance, and no solid is above the disk within its headroom. The disk is therefore flat, and
@@ -45,7 +45,7 @@ def find_spawn(
     Args:
         heights: Heights on `grid` [m], shape `grid.shape`.
         grid: Grid of the patch; the disk stays inside it.
-        preferred: Preferred spawn position, x and y [m].
+        position: Preferred spawn position, x and y [m].
         disk: The disk.
         solids: Solids of the patch.
         threshold: Difference between neighboring samples above which there is a wall [m].
@@ -53,9 +53,9 @@ def find_spawn(
     Returns:
         Origin (x, y, z) [m]; None if there is no such disk in the patch.
     """
-    (x, y), (x0, y0) = preferred, grid.lower
+    (x, y), (x0, y0) = position, grid.lower
     index = (x - x0) / grid.cell - 0.5, (y - y0) / grid.cell - 0.5
-    if _is_inside(preferred, grid, disk.radius):
+    if _is_inside(position, grid, disk.radius):
         low, z = _height_range(heights, index, disk.radius / grid.cell)
         if z - low <= disk.tolerance:
             if low != z:

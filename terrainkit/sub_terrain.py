@@ -44,7 +44,7 @@ class SubTerrain(Config):
     )
     """Friction coefficient of the patches; none for `static_friction` of the map."""
 
-    parameters: Mapping[str, Annotated[Any, Meta(description="a value or a range")]] = field(
+    parameters: Mapping[str, Annotated[Any, Meta(description="a finite value or a range")]] = field(
         default_factory=dict
     )
     """Parameters that replace the defaults: a value, or a range (easy, hard). In TOML they are keys
@@ -58,7 +58,8 @@ class SubTerrain(Config):
         try:
             super().__post_init__()
         except ConfigError as error:
-            raise ConfigError(f"{self.terrain}.{error}") from None
+            message = str(error).removeprefix("parameters.")  # they are keys of the table itself
+            raise ConfigError(f"{self.terrain}.{message}") from None
         for overlay in self.overlays:
             registry.register_overlay(type(overlay))
         if self.friction is not None:
@@ -95,8 +96,8 @@ class SubTerrain(Config):
             "friction": self.friction,
             "overlays": self.overlays,
         }
-        given = {key: value for key, value in optional.items() if value not in ("", None, ())}
-        return {"terrain": self.terrain, "proportion": self.proportion, **given, **self.parameters}
+        raw = {key: value for key, value in optional.items() if value not in ("", None, ())}
+        return {"terrain": self.terrain, "proportion": self.proportion, **raw, **self.parameters}
 
     @cached_property
     def terrain_class(self) -> type[Terrain]:
@@ -109,8 +110,8 @@ class SubTerrain(Config):
 
     def friction_at(self, difficulty: float) -> float | None:
         """Return the friction of the patches at `difficulty`, 0 to 1; None for the map's."""
-        given: Any = self.friction
-        return _FRICTION.value_at(given, difficulty)  # type: ignore[return-value]
+        raw: Any = self.friction
+        return _FRICTION.value_at(raw, difficulty)  # type: ignore[return-value]
 
     @cached_property
     def declarations(self) -> dict[str, Parameter]:

@@ -46,10 +46,10 @@ class Terrain(Parameterized, ABC):
 
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
-            given: Any = getattr(self, name)
-            if given is parameter.default:
-                given = parameter.hard
-            value = convert_parameter(self.kind(), name, given, parameter)
+            raw: Any = getattr(self, name)
+            if raw is parameter.default:
+                raw = parameter.hard
+            value = convert_parameter(self.kind(), name, raw, parameter)
             object.__setattr__(self, name, value)
 
     @classmethod
@@ -71,8 +71,8 @@ class Terrain(Parameterized, ABC):
         check_names(cls.kind(), values, known)
         fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
         for name, value in values.items():
-            converted: Any = convert_range(cls.kind(), name, value, known[name])
-            fixed[name] = known[name].value_at(converted, difficulty)
+            result: Any = convert_range(cls.kind(), name, value, known[name])
+            fixed[name] = known[name].value_at(result, difficulty)
         return cls(**fixed)
 
     def build(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:

@@ -177,17 +177,23 @@ class TerrainMap:
             closed: Return one watertight solid: the ground with sides and a bottom, united with
                 the solids.
         """
-        from terrainkit.mesh import closed_mesh, full_mesh, merged_mesh
+        from terrainkit.mesh import closed_mesh
         from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes, united
 
-        threshold = self.config.wall_threshold
-        ground = (merged_mesh if merged else full_mesh)(self.heights, self.grid, threshold)
+        ground = self.ground_mesh(merged=merged)
         if closed:
             ground = closed_mesh(ground)
         if not self.solids.collides.any():
             return ground
         meshes = [ground, *solid_meshes(self.solids.select(self.solids.collides))]
         return united(meshes) if closed else concatenate_meshes(meshes)
+
+    def ground_mesh(self, *, merged: bool = True) -> "TriMesh":
+        """Return the ground as a triangle mesh, without the solids; see :meth:`mesh`."""
+        from terrainkit.mesh import full_mesh, merged_mesh
+
+        make_mesh = merged_mesh if merged else full_mesh
+        return make_mesh(self.heights, self.grid, self.config.wall_threshold)
 
     def boxes(self) -> "BoxDecomposition":
         """Return the level ground as boxes; see :mod:`terrainkit.box_decomposition`."""
@@ -214,19 +220,7 @@ class TerrainMap:
             ExportError: if the map has solids, or a height does not fit in 16 bits at this scale.
         """
         self.require_no_solids("a heightfield")
-        if not 0 < vertical_scale < np.inf:
-            raise ConfigError(f"vertical_scale: got {vertical_scale:g}; expected a number > 0")
-        units = np.rint(self.heights.T / vertical_scale)
-        limit = np.iinfo(np.int16)
-        low, high = float(units.min()), float(units.max())
-        if not (limit.min <= low and high <= limit.max):
-            # 1 % more, so that the rounded value in the message is sufficient.
-            minimum = max(high / limit.max, low / limit.min) * vertical_scale * 1.01
-            raise ExportError(
-                f"heights from {self.heights.min():g} to {self.heights.max():g} m do not fit in "
-                f"int16 at vertical_scale {vertical_scale:g}; expected at least {minimum:.3g}"
-            )
-        return np.ascontiguousarray(units, dtype=np.int16)
+        return np.ascontiguousarray(int16_heights(self.heights.T, vertical_scale))
 
     @property
     def patch_names(self) -> NDArray[np.str_]:
@@ -255,6 +249,22 @@ class TerrainMap:
             raise ExportError(
                 f"got a map with {len(self.solids)} solids, which {what} cannot represent; "
                 "expected a mesh (.stl, .ply, .obj, .glb) or MuJoCo model (.xml)"
+            )
+
+    def require_one_ground_friction(self, what: str) -> None:
+        """Raise ExportError if the ground has several friction coefficients; `what` has one."""
+        if not (self.friction == np.float32(self.config.static_friction)).all():
+            raise ExportError(
+                f"got ground with several friction coefficients, which {what} cannot represent; "
+                "expected no friction of sub-terrains or friction patches"
+            )
+
+    def require_one_friction(self, what: str) -> None:
+        """Raise ExportError if the map has several friction coefficients; `what` has one."""
+        if not self.has_one_friction:
+            raise ExportError(
+                f"got a map with several friction coefficients, which {what} cannot represent; "
+                "expected no friction of sub-terrains, friction patches or solids"
             )
 
     def warn_about_friction(self, what: str) -> None:
@@ -408,3 +418,26 @@ def _points(name: str, values: ArrayLike, size: int) -> tuple[NDArray[np.float64
             f"{name}: got shape {points.shape}; expected finite values of shape (..., {size})"
         )
     return points.reshape(-1, size), points.shape[:-1]
+
+
+def int16_heights(heights: NDArray[np.floating], vertical_scale: float) -> NDArray[np.int16]:
+    """Return `heights` in units of `vertical_scale` [m].
+
+    Raises:
+        ConfigError: if `vertical_scale` is not above 0.
+        ExportError: if a height does not fit in 16 bits.
+    """
+    if not 0 < vertical_scale < np.inf:
+        raise ConfigError(f"vertical_scale: got {vertical_scale:g}; expected a number > 0")
+    units = np.rint(heights / vertical_scale)
+    limit = np.iinfo(np.int16)
+    low, high = float(units.min()), float(units.max())
+    if not (limit.min <= low and high <= limit.max):
+        # 1 % more, so that the rounded value in the message is sufficient.
+        minimum = max(high / limit.max, low / limit.min) * vertical_scale * 1.01
+        raise ExportError(
+            f"heights from {heights.min():g} to {heights.max():g} m do not fit in "
+            f"int16 at vertical_scale {vertical_scale:g}; expected at least {minimum:.3g}"
+        )
+    result: NDArray[np.int16] = units.astype(np.int16)
+    return result

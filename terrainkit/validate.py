@@ -31,7 +31,7 @@ class Issue:
     """One violated guarantee of a map."""
 
     check: str
-    """Check that found it: finite, difficulty, patches, realized, solids, spawn or mesh."""
+    """Check that found it: finite, difficulty, patches, realized, solids, goals, spawn or mesh."""
 
     message: str
     """What is wrong, where, and by how much."""
@@ -65,7 +65,10 @@ def _config_issues(terrain_map: TerrainMap) -> list[Issue]:
 
 def _custom_issues(terrain_map: TerrainMap) -> list[Issue]:
     """Return the issues of a map that was not generated."""
-    return _issues("solids", _check_solids(terrain_map))
+    return [
+        *_issues("solids", _check_solids(terrain_map)),
+        *_issues("goals", _check_goals(terrain_map)),
+    ]
 
 
 def _issues(check: str, messages: Iterator[str]) -> list[Issue]:
@@ -203,6 +206,27 @@ def _check_solids(terrain_map: TerrainMap) -> Iterator[str]:
     beyond = np.maximum(grid.lower - lower, upper - grid.upper).max(axis=1, initial=0.0)
     for index in np.flatnonzero(beyond > TOLERANCE).tolist():
         yield f"solid {index} extends {beyond[index]:.3f} m beyond the map"
+
+
+def _check_goals(terrain_map: TerrainMap) -> Iterator[str]:
+    for row, col in np.ndindex(terrain_map.difficulty.shape):
+        grid, goals = terrain_map.config.patch_grid(row, col), terrain_map.goals[row, col]
+        last = np.flatnonzero(~np.isnan(goals).all(axis=1)).max(initial=-1)
+        for k, goal in enumerate(goals[: last + 1].astype(np.float64)):
+            subject = f"patch ({row}, {col}): goal {k}"
+            if not np.isfinite(goal).all():
+                yield f"{subject} is not finite"
+                continue
+            xy, z = goal[:2], float(goal[2])
+            if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
+                yield f"{subject} is outside the patch"
+                continue
+            below = float(terrain_map.height(xy)) - z
+            floor, ceiling = terrain_map.intervals(xy).T
+            if below > TOLERANCE:
+                yield f"{subject} is {below:.3f} m below the ground"
+            elif not ((floor - TOLERANCE <= z) & (z <= ceiling + TOLERANCE)).any():
+                yield f"{subject} is inside a solid"
 
 
 def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:

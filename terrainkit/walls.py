@@ -48,17 +48,16 @@ def wall_edges(
     return x, y
 
 
-def flat_corners(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return whether each corner of a quad is connected only to corners of its height, (n, 4).
+def flat_corners(edges: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return whether each corner of a quad is connected only to corners of its height, (4, n).
 
     Corners are connected by edges without a wall.
 
     Args:
-        corners: Heights of the corners [m], shape (n, 4).
-        walls: Whether each edge is a wall, shape (n, 4).
+        edges: Each edge of each quad: 0 level, 1 sloped, 2 a wall, shape (4, n).
     """
-    slopes = (corners != np.roll(corners, -1, axis=1)) & ~walls
-    flat: NDArray[np.bool_] = _flat_cases()[walls @ _CASE, slopes @ _CASE]
+    a, b, c, d = edges
+    flat: NDArray[np.bool_] = np.take(_flat_cases(), a | b << 2 | c << 4 | d << 6, axis=1)
     return flat
 
 
@@ -109,10 +108,11 @@ def _connected_cases() -> NDArray[np.bool_]:
 
 @cache
 def _flat_cases() -> NDArray[np.bool_]:
-    """Return whether each corner is flat, by the walls and by the edges that slope, (16, 16, 4)."""
-    slopes = (np.arange(16)[:, None] & _CASE) > 0
+    """Return whether each corner is flat, by the states of the edges, two bits each, (4, 256)."""
+    edges = np.arange(256)[:, None] >> np.array([0, 2, 4, 6]) & 3
+    connected = _connected_cases()[(edges == 2) @ _CASE]
     # An edge that slopes tilts the corners that are connected to its first corner.
-    tilted = np.einsum("ak,wkc->wac", slopes, _connected_cases())
+    tilted = np.einsum("ak,akc->ca", edges == 1, connected)
     return np.asarray(~tilted, dtype=bool)
 
 

@@ -19,8 +19,8 @@ from terrainkit_cli.terrain_commands import written
 class Export(Command):
     """Export a map to other formats, or a policy to ONNX.
 
-    A map (.npz) is written as .xml (MuJoCo), .stl, .ply, .obj, .glb or .png: the suffix of
-    --output selects the format.
+    A map (.npz) is written as .xml (MuJoCo), .usd, .sdf, .stl, .ply, .obj, .glb or .png: the suffix
+    of --output selects the format.
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt

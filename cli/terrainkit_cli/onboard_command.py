@@ -156,11 +156,11 @@ class Onboard(Command):
 
 def _blocking_errors(result: "OnboardResult") -> str:
     """Return a report on the errors that prevent onboarding."""
-    from terrainkit_robots.lint.report import format_reports
+    from terrainkit_robots.lint.report import to_text
     from terrainkit_robots.onboarding.pipeline import is_blocking
 
     errors = tuple(filter(is_blocking, result.report.findings))
-    return format_reports([replace(result.report, findings=errors)], "text")
+    return to_text([replace(result.report, findings=errors)], "text")
 
 
 def _remaining_errors(result: "OnboardResult") -> list[str]:

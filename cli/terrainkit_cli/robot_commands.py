@@ -184,7 +184,7 @@ class CheckRobot(Command):
         return _Check(report=report, failed=report.verdict in failing, diff=diff)
 
     def _print(self, reports: "Sequence[Report]", diff: str, output: Path | None) -> None:
-        from terrainkit_robots.lint.report import format_reports
+        from terrainkit_robots.lint.report import to_text
         from terrainkit_robots.lint.report.summary import summarize_findings
 
         if self.diff:
@@ -196,13 +196,13 @@ class CheckRobot(Command):
 
             if output is None and render.has_colors():
                 lines = text_report.format_lines(
-                    reports, width=render.width(), notes=bool(self.flag("notes"))
+                    reports, width=render.width(), verbose=bool(self.flag("notes"))
                 )
                 render.styled(lines)
                 return
-            text = text_report.format_reports(reports, notes=bool(self.flag("notes")))
+            text = text_report.to_text(reports, verbose=bool(self.flag("notes")))
         else:
-            text = format_reports(reports, self.format)
+            text = to_text(reports, self.format)
         if output is None:
             render.report(text)
         elif reports:

@@ -39,7 +39,8 @@ class Generate(ConfigCommand):
 
     output: Output
     """File to write. The suffix selects the format: .npz for a complete map, which the other
-    commands read; .xml (MuJoCo), .stl, .ply, .obj, .glb or .png for other programs."""
+    commands read; .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png for other
+    programs."""
 
     config: Annotated[str, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = ""
     """Map config (.toml), or a map (.npz) whose config is used; options override it."""
@@ -257,18 +258,19 @@ def _print_map(terrain_map: TerrainMap) -> None:
     }
     render.table(list(facts.items()))
     render.result("")
-    rows = [("column", "terrain", "difficulty", "measured difficulty")]
+    rows = [("column", "terrain", "difficulty", "measured difficulty of the ground")]
     for col in range(config.cols):
         patches = [terrain_map.patch(row, col) for row in range(config.rows)]
         hard = [measured_difficulty(t.heights, config.cell, float(t.origin[2])) for t in patches]
         names = ", ".join(dict.fromkeys(patch.terrain for patch in patches))
         levels = [patch.difficulty for patch in patches]
+        hint = ", without its solids" if any(len(patch.solids) for patch in patches) else ""
         rows.append(
             (
                 str(col),
                 names,
                 f"{min(levels):.2f} to {max(levels):.2f}",
-                f"{min(hard):.3f} to {max(hard):.3f} m",
+                f"{min(hard):.3f} to {max(hard):.3f} m{hint}",
             )
         )
     render.table(rows)

@@ -54,10 +54,11 @@ def export(
         y, z = mesh.vertices[:, 1].copy(), mesh.vertices[:, 2].copy()
         mesh.vertices[:, 1], mesh.vertices[:, 2] = z, -y
     suffix = path.suffix.lower()
+    if suffix == ".stl":
+        write_stl(mesh, path)
+        return
     with path.open("wb") as file:
-        if suffix == ".stl":
-            _write_stl(mesh, file)
-        elif suffix == ".ply":
+        if suffix == ".ply":
             _write_ply(mesh, file)
         elif suffix == ".obj":
             _write_obj(mesh, file)
@@ -65,21 +66,22 @@ def export(
             _write_glb(mesh, file, terrain_map.config.contact)
 
 
-def _write_stl(mesh: TriMesh, file: BinaryIO) -> None:
+def write_stl(mesh: TriMesh, path: Path) -> None:
     """Write a binary STL file, in which each face has its normal and the positions of its corners.
 
     A header that starts with `solid` would mark a text file.
     """
-    file.write(b"terrain, in meters".ljust(80))
-    file.write(np.array(len(mesh.triangles), dtype="<u4").tobytes())
-    for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
-        corners = mesh.vertices[mesh.triangles[start : start + _FACES_PER_BLOCK]]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        faces = np.zeros(len(corners), dtype=_STL_FACE)
-        faces["normal"] = normals / np.where(lengths > 0, lengths, 1)
-        faces["corners"] = corners
-        file.write(faces.tobytes())
+    with path.open("wb") as file:
+        file.write(b"terrain, in meters".ljust(80))
+        file.write(np.array(len(mesh.triangles), dtype="<u4").tobytes())
+        for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
+            corners = mesh.vertices[mesh.triangles[start : start + _FACES_PER_BLOCK]]
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+            faces = np.zeros(len(corners), dtype=_STL_FACE)
+            faces["normal"] = normals / np.where(lengths > 0, lengths, 1)
+            faces["corners"] = corners
+            file.write(faces.tobytes())
 
 
 def _write_ply(mesh: TriMesh, file: BinaryIO) -> None:

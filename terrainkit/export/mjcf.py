@@ -6,10 +6,11 @@ geoms of any other body. All geoms have one class that sets every attribute, sin
 defaults would apply otherwise.
 """
 
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -24,6 +25,7 @@ from terrainkit.box_decomposition import (
 )
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.solid_raster import SolidRaster
 from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
@@ -46,13 +48,17 @@ _RINGS = 2
 """Samples around the patches that belong to the heightfield. The ground of the border's first cell
 slopes toward the patch, so the heightfield has to extend beyond that cell."""
 
+_HFIELD_LENGTH = 16.0
+"""Length at which heightfields beside boxes are divided [m]; a long one enlarges many nodes of
+MuJoCo's bounding volume hierarchy."""
+
 _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
 
 MAX_BOXES = 100
 """Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
-step of the bundled quadruped takes about 1.75 times that on a plane. Four runs of
-benchmarks/collision.py gave 50 to 130."""
+step of the bundled quadruped takes about 1.8 times that on a plane. Two runs of
+benchmarks/collision.py gave 91."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -71,6 +77,12 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
         ConfigError: if `collision` is invalid.
         MemoryLimitError: if the map would not fit in memory.
     """
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        write_model(terrain_map, file, collision)
+
+
+def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -> None:
+    """Write the map as MJCF to an open file; see :func:`export`."""
     collision = convert("collision", collision, Collision)
     samples = terrain_map.heights.size
     check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
@@ -100,12 +112,11 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     ET.indent(root)
     # The elevation data are the larger part of the file. They are written row by row.
     texts = re.split('(?<=elevation=")([0-9]+)(?=")', ET.tostring(root, encoding="unicode"))
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write('<?xml version="1.0" encoding="utf-8"?>\n')
-        for text, number in zip(texts[::2], [*texts[1::2], ""], strict=True):
-            file.write(text)
-            if number:
-                file.writelines(_elevation_rows(heights, split[int(number)][0]))
+    file.write('<?xml version="1.0" encoding="utf-8"?>\n')
+    for text, number in zip(texts[::2], [*texts[1::2], ""], strict=True):
+        file.write(text)
+        if number:
+            file.writelines(_elevation_rows(heights, split[int(number)][0]))
 
 
 def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
@@ -114,7 +125,8 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
         return None
     if collision == "auto":
         threshold = terrain_map.config.wall_threshold
-        if not flat_cells(terrain_map.heights, terrain_map.grid, threshold).all():
+        grid = NodeGrid.from_heights(terrain_map.heights, terrain_map.grid, threshold)
+        if not flat_cells(grid).all():
             return None
         cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
         num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
@@ -174,13 +186,26 @@ def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list
     row, col = np.nonzero(patches)
     merged = merge_boxes(np.column_stack([0.0 * row, row, row + 1, col, col + 1]))
     # The surface at the edge of a patch depends on the next sample, too.
-    return [
+    parts = [
         (
             slice(edges_x[r0] - (r0 > 0), edges_x[r1] + (r1 < len(edges_x) - 1)),
             slice(edges_y[c0] - (c0 > 0), edges_y[c1] + (c1 < len(edges_y) - 1)),
         )
         for _, r0, r1, c0, c1 in merged.astype(int).tolist()
     ]
+    max_length = max(_HFIELD_LENGTH / terrain_map.config.cell, 1.0)
+    return [each for part in parts for each in _divide(part, max_length)]
+
+
+def _divide(part: _Part, max_length: float) -> list[_Part]:
+    """Divide a part into equal parts of about `max_length`, which share samples where they meet."""
+    spans = []
+    for each in part:
+        cells = each.stop - each.start - 1
+        lines = np.linspace(each.start, each.stop - 1, max(1, round(cells / max_length)) + 1)
+        spans.append([slice(a, b + 1) for a, b in itertools.pairwise(lines.astype(int).tolist())])
+    x, y = spans
+    return [(i, j) for i in x for j in y]
 
 
 def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:

@@ -1,11 +1,27 @@
-"""Positions along a lane: a patch that a robot crosses along x from a flat start."""
+"""Lane: a patch that a robot crosses along x from a flat start, and positions along it."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import MAX_PER_AXIS, number_that_fits
 from terrainkit.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lane(Terrain):
+    """The parent class of terrains that a robot crosses along x."""
+
+    start: float = parameter.length(2.0)
+    """Length of the flat start along x [m]."""
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start."""
+        return lane_spawn(grid, self.start)
 
 
 def lane_spawn(grid: Grid, start: float) -> tuple[float, float]:

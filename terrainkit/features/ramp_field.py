@@ -1,11 +1,63 @@
 """Fields of equal rectangles along a lane."""
 
+from abc import abstractmethod
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import number_that_fits
+from terrainkit.features.blocks import make_ramps, number_that_fits
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.grid import Grid
+from terrainkit.solids import Solids
+
+
+@dataclass(frozen=True, kw_only=True)
+class RampField(Lane):
+    """The parent class of lanes with equal ramps as solids on flat ground, and a goal behind."""
+
+    grade: float = parameter.scalar(0.09, 0.268)
+    """Rise over run of a ramp; 0.268 is 15 degrees."""
+
+    end: float = parameter.length(1.0)
+    """Minimum length of the flat strip behind the ramps along x [m]."""
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return flat ground."""
+        return np.zeros(grid.shape)
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return the ramps, in as many whole rows as fit."""
+        lower, i, j = self._cells(grid)
+        rise = self.grade * self.ramp_size()[0] * self.raised_corners(i, j)
+        return make_ramps(lower, lower + np.array(self.ramp_size()), rise)
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal in the middle of the flat strip behind the ramps."""
+        lower, _, _ = self._cells(grid)
+        return lane_goals(grid, (lower[:, 0].max() + self.ramp_size()[0] + grid.upper[0]) / 2)
+
+    @abstractmethod
+    def ramp_size(self) -> tuple[float, float]:
+        """Return the sides of a ramp along x and y [m]."""
+
+    @abstractmethod
+    def raised_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
+        """Return the corners of each ramp that are raised, counterclockwise, 0 or 1.
+
+        Args:
+            i: Number of each ramp along x, shape (n,).
+            j: Number of each ramp along y, shape (n,).
+        """
+
+    def _cells(
+        self, grid: Grid
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+        return ramp_cells(self.kind(), grid, self.start, self.end, self.ramp_size())
 
 
 def ramp_cells(

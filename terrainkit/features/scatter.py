@@ -47,12 +47,12 @@ def scatter(
     beyond = np.maximum(np.abs(xy - grid.center) - platform / 2, 0.0)
     is_allowed = (to_edge >= 0) & ((beyond**2).sum(axis=1) > r**2)
     free = np.where(is_allowed, 2 * to_edge, -np.inf)
-    chosen: list[int] = []
+    selected: list[int] = []
     for level in _LEVELS[gap <= _LEVELS]:
-        while len(chosen) < number and (free >= level).any():
+        while len(selected) < number and (free >= level).any():
             k = int(np.argmax(free >= level))
             distance = np.sqrt(((xy - xy[k]) ** 2).sum(axis=1)) - r - r[k]
             free = np.minimum(free, distance)
             free[k] = -np.inf
-            chosen.append(k)
-    return xy[chosen], r[chosen]
+            selected.append(k)
+    return xy[selected], r[selected]

@@ -5,25 +5,42 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-from terrainkit.errors import HeightFileError, TerrainkitWarning
+from terrainkit.errors import ConfigError, HeightFileError, TerrainkitWarning
+from terrainkit.importing.geotiff import GeoTags, read_geo_tags
 from terrainkit.importing.isolated import run_isolated
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
 from terrainkit.toml_text import read_text
 
-SUFFIXES = (".png", ".tif", ".tiff")
+_TIFF_SUFFIXES = (".tif", ".tiff")
+SUFFIXES = (".png", *_TIFF_SUFFIXES)
 
 
 def read(path: Path, options: ReadOptions) -> Raster:
     """Return the heights of a gray image: column 0 has the lowest x, row 0 the highest y.
 
     A .json file of the same name may state `scale` and `offset` [m], `cell` [m] and `first_sample`
-    (x, y) [m], as written by the .png exporter.
+    (x, y) [m], as written by the .png exporter. The tags of a GeoTIFF state the cell, the position
+    and the value of missing heights.
+
+    Raises:
+        HeightFileError: if the file cannot be read.
+        ConfigError: if an option is missing, or the cells of a GeoTIFF are not squares in meters.
     """
     pixels = run_isolated("read_image", path)["pixels"]
+    tags = read_geo_tags(path) if path.suffix.lower() in _TIFF_SUFFIXES else GeoTags()
     stated = _sidecar(path.with_suffix(".json"))
     cell, (x, y) = stated.get("cell"), stated.get("first_sample", (0.0, 0.0))
     half = (options.file_cell or cell or 0.0) / 2 if "first_sample" in stated else 0.0
+    if tags.cell and not (options.file_cell or cell):
+        dx, dy = tags.cell
+        if not tags.is_in_meters or not dx > 0 or abs(dx - dy) > 1e-6 * dx:
+            unit = " m" if tags.is_in_meters else ", not in meters"
+            raise ConfigError(
+                f"file_cell: missing; {path} has cells of {dx:g} x {dy:g}{unit}; expected squares "
+                "in meters"
+            )
+        cell, (x, y) = dx, tags.lower
     raster = make_raster(
         path,
         pixels[::-1].T,
@@ -32,6 +49,7 @@ def read(path: Path, options: ReadOptions) -> Raster:
         lower=(x - half, y - half),
         scale=stated.get("scale"),
         offset=stated.get("offset", 0.0),
+        nodata=tags.nodata,
     )
     if pixels.dtype.itemsize == 1:
         step = (raster.values.max() - raster.values.min()) / max(1, int(pixels.max()))

@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.features.lane import lane_goals, lane_positions, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals, lane_positions
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids, make_boxes
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Crawl(Terrain):
+class Crawl(Lane):
     """Bars across a lane along x, under which the robot crawls.
 
     The ground is flat, and the robot is spawned at low x. There is a goal behind each bar.
@@ -34,13 +33,6 @@ class Crawl(Terrain):
 
     spacing: float = parameter.size(1.0)
     """Distance between two bars [m]; more behind a bar shorter than `max_depth`."""
-
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""

@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_ramps
-from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gutter(Terrain):
+class Gutter(Lane):
     """A gutter along x between two slopes, in the manner of NIST.
 
     The robot walks with its feet on both slopes. It is spawned at low x, and there is a goal behind
@@ -31,15 +30,8 @@ class Gutter(Terrain):
     width: float = parameter.size(2.4)
     """Width of the gutter with its slopes [m]."""
 
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
     end: float = parameter.size(1.0)
     """Length of the flat end along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""

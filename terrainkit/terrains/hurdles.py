@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import parameter
-from terrainkit.features.lane import lane_goals, lane_slots, lane_spawn, slot_centers
+from terrainkit.features.lane import Lane, lane_goals, lane_slots, slot_centers
 from terrainkit.grid import Grid
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hurdles(Terrain):
+class Hurdles(Lane):
     """Hurdles across a lane along x, at random distances and of random thickness.
 
     The robot is spawned at low x. The hurdles span the width of the patch, and there is a goal
@@ -36,13 +35,6 @@ class Hurdles(Terrain):
 
     max_spacing: float = parameter.size(2.2)
     """Maximum distance between two hurdles, center to center [m]."""
-
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `height` on the hurdles."""

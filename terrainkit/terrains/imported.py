@@ -1,10 +1,11 @@
 """Ground from a file."""
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from terrainkit.grid import Grid
 from terrainkit.importing.isolated import check_file
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, read_raster
-from terrainkit.parameter import Realized
+from terrainkit.parameter import Range, Realized, Value
 from terrainkit.terrain import Terrain
 
 _EXAMPLE = Path(__file__).parent.parent / "importing" / "example.npy"
@@ -29,8 +30,9 @@ class Imported(Terrain):
 
     Each column has another part of the file; where the file is smaller than a patch, it is
     continued by its mirror image. The heights fade to 0 at the platform and at the edges of the
-    patch. The map depends on the file, so it records the SHA-256 of the file. `terrainkit import`
-    makes a whole map of a file instead.
+    patch. The map depends on the file, so it records the SHA-256 of the file. Of a mesh, the ground
+    is the highest surface: solids cannot fade. `terrainkit import --solids` makes a whole map of a
+    file instead, with its overhangs.
     """
 
     has_column_seed: ClassVar[bool] = True
@@ -66,6 +68,16 @@ class Imported(Terrain):
 
     missing: str = parameter.choice("reject", "nearest", "lowest")
     """Missing heights: an error, the nearest height, or the lowest height of the file."""
+
+    @classmethod
+    def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
+        """Return the terrain at `difficulty`, 0 to 1; see :meth:`Terrain.at`."""
+        if values and "solids" in values:
+            raise ConfigError(
+                "imported.solids: the heights of a patch are scaled and fade to 0, which solids "
+                "cannot; terrainkit import --solids keeps the overhangs of a mesh in a whole map"
+            )
+        return super().at(difficulty, values)
 
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the parameters, with the SHA-256 of the file."""

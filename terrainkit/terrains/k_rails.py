@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.grid import Grid
 from terrainkit.parameter import MAX_COUNT
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class KRails(Terrain):
+class KRails(Lane):
     """A field of rails at 45 degrees to a lane along x, in the manner of NIST.
 
     Two square panels side by side have rails in opposite directions, and the second half of the
@@ -39,10 +38,6 @@ class KRails(Terrain):
 
     end: float = parameter.size(1.0)
     """Minimum length of the flat end along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slopes below the rails, which are constant along y."""

@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_blocks, number_that_fits
-from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenStairs(Terrain):
+class OpenStairs(Lane):
     """Stairs of separate treads up and down along x, between flat strips at both ends.
 
     There are no risers: a foot can slip between two treads. The robot is spawned at low x. The
@@ -34,10 +33,6 @@ class OpenStairs(Terrain):
 
     start: float = parameter.length(2.0)
     """Length of the flat strip at each end along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""

@@ -50,7 +50,7 @@ class Rooms(Terrain):
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the walls, two boxes beside each door."""
         parts = []
-        for axis, (line, first, door) in enumerate(self._layout(grid, rng)):
+        for axis, (line, first, door) in enumerate(self._lines(grid, rng)):
             last = first + self.side + 2 * self.thickness
             middle = (line + self.thickness / 2).ravel()
             for start, end in ((first, door), (door + self.door, last)):
@@ -70,7 +70,7 @@ class Rooms(Terrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in each door from the room of the spawn toward high x."""
-        (line, _, door), _ = self._layout(grid, rng)
+        (line, _, door), _ = self._lines(grid, rng)
         row = (door.shape[1] - 1) // 2
         x = line[(len(line) - 2) // 2 + 1 :, row] + self.thickness / 2
         y = door[(len(line) - 2) // 2 + 1 :, row] + self.door / 2
@@ -82,7 +82,7 @@ class Rooms(Terrain):
         x, y = (number_that_fits("rooms", pitch, n - self.thickness) for n in grid.size)
         return x, y
 
-    def _layout(
+    def _lines(
         self, grid: Grid, rng: np.random.Generator
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
         """Return the walls across x and those across y.

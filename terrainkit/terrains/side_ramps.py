@@ -8,15 +8,14 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_ramps
-from terrainkit.features.lane import lane_slots, lane_spawn
+from terrainkit.features.lane import Lane, lane_slots
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class SideRamps(Terrain):
+class SideRamps(Lane):
     """Ramps over a pit along x, tilted to the left and to the right in turn.
 
     Each ramp is beside the middle of the lane and leans toward it; its middle is at height 0. The
@@ -42,15 +41,8 @@ class SideRamps(Terrain):
     depth: float = parameter.height(0.6)
     """Depth of the pit [m]."""
 
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
     end: float = parameter.size(1.2)
     """Minimum length along x behind the last ramp, with its gap [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the pit."""

@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import lane_goals, lane_slots, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals, lane_slots
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slit(Terrain):
+class Slit(Lane):
     """Walls across a lane along x, each with a narrow opening at a random position.
 
     The robot is spawned at low x, and there is a goal behind each opening. The walls are solids, so
@@ -42,13 +41,6 @@ class Slit(Terrain):
 
     spacing: float = parameter.size(1.5)
     """Distance between two walls, center to center [m]."""
-
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""

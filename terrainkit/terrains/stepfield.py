@@ -7,16 +7,15 @@ from numpy.typing import NDArray
 
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.grid import Grid
-from terrainkit.terrain import Terrain
 
 _POSTS = 10
 """Posts along each side of a field."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stepfield(Terrain):
+class Stepfield(Lane):
     """Fields of 10 x 10 square posts, 1 to 4 units high, along a lane between flat strips.
 
     Flat fields, hills and diagonal hills alternate, as in the stepfields of response-robot tests.
@@ -30,15 +29,8 @@ class Stepfield(Terrain):
     post: float = parameter.length(0.1)
     """Side of a post [m]."""
 
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
     end: float = parameter.length(1.0)
     """Minimum length of the flat strip behind the fields along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the posts, in as many whole fields as fit along x and y."""
@@ -50,7 +42,7 @@ class Stepfield(Terrain):
         ridge = np.stack([0 * x, 1 - np.abs(2 * x - 1), 1 - np.abs(x - y)])
         hill = np.rint(2 * np.choose(kind, ridge))
         levels = 1 + hill + np.floor(rng.random(kind.shape) * np.where(kind == 0, 4, 2))
-        levels = np.minimum(levels, _lowest_neighbor(levels) + 2)
+        levels = np.minimum(levels, _min_neighbor(levels) + 2)
         ground = np.zeros(grid.shape)
         i, j = grid.cells(self.start), self._first_across(grid)
         block = np.kron(levels, np.ones((side, side)))
@@ -90,7 +82,7 @@ class Stepfield(Terrain):
         return nx, ny
 
 
-def _lowest_neighbor(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+def _min_neighbor(levels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the lowest of the eight neighbors of each post; the ground around is at level 0."""
     padded = np.pad(levels, 1)
     shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]

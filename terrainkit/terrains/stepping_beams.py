@@ -9,15 +9,14 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import lane_slots, lane_spawn
+from terrainkit.features.lane import Lane, lane_slots
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class SteppingBeams(Terrain):
+class SteppingBeams(Lane):
     """Narrow beams over a pit across a lane along x, on which the robot steps.
 
     The robot is spawned at low x, and there is a goal behind the pit. The beams are solids of
@@ -48,15 +47,8 @@ class SteppingBeams(Terrain):
     depth: float = parameter.height(1.0)
     """Depth of the pit [m]."""
 
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
     end: float = parameter.size(1.0)
     """Minimum length along x behind the last beam, with its gap [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the pit."""

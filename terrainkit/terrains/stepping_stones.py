@@ -1,6 +1,7 @@
 """Stepping stones over deep holes."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,12 @@ from terrainkit.terrain import Terrain
 class SteppingStones(Terrain):
     """Square stones in rows along y with random offsets, around a flat platform.
 
-    Stones are truncated at the edge of the patch.
+    Stones are truncated at the edge of the patch. The offsets are such that the holes have the same
+    share of the area as on an endless field of these stones, within half a stone, so that smaller
+    stones are never easier. In mode curriculum, the rows of a column have the same random numbers.
     """
+
+    has_column_seed: ClassVar[bool] = True
 
     stone: float = parameter.length(1.575, 0.075)
     """Side of a stone [m]."""
@@ -35,11 +40,60 @@ class SteppingStones(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the stones; rows are `stone` wide along x, with gaps of `distance`."""
         stone, distance = grid.cells(self.stone), grid.cells(self.distance)
-        pitch = stone + distance
-        shifts = (rng.random(grid.shape[0]) * pitch).astype(np.int64)
+        pitch, (nx, ny) = stone + distance, grid.shape
+        draws = rng.random(nx)
         tops = (2 * rng.random(grid.shape) - 1) * self.variation
-        row, x = np.divmod(np.arange(grid.shape[0])[:, None], pitch)
-        column, y = np.divmod(np.arange(grid.shape[1])[None, :] + shifts[row], pitch)
-        ground = np.where((x < stone) & (y < stone), tops[row, column % grid.shape[1]], -self.depth)
-        ground[grid.centered_slices(grid.centered(self.platform))] = 0.0
+        # Of each row of cells along x, the platform covers those in `across`.
+        along, across = grid.centered_slices(grid.centered(self.platform))
+        is_covered = np.zeros(nx, dtype=bool)
+        is_covered[along] = True
+        num_covered = across.stop - across.start
+        free = nx * ny - int(is_covered.sum()) * num_covered
+        gaps = _gaps(nx, stone, pitch)
+        area = gaps @ (ny - num_covered * is_covered)
+        start = int(np.argmin(np.abs(area - free * distance / pitch)))
+        row, x = np.divmod(np.arange(nx) + start, pitch)
+        # The area of the holes along y in each row of stones, for each offset of its stones.
+        counts = [
+            np.bincount(row, weights=mask, minlength=row[-1] + 1)
+            for mask in (x < stone, (x < stone) & is_covered)
+        ]
+        gaps = _gaps(ny, stone, pitch)
+        covered_gaps = gaps[:, across].sum(axis=1)
+        areas = np.outer(counts[0], gaps.sum(axis=1)) - np.outer(counts[1], covered_gaps)
+        sizes = counts[0] * ny - counts[1] * num_covered
+        missing = free * (1 - (stone / pitch) ** 2) - area[start]
+        shifts = _shifts(areas, missing * sizes / max(1, sizes.sum()), draws)
+        column, y = np.divmod(np.arange(ny)[None, :] + shifts[row, None], pitch)
+        top = tops[row[:, None] % nx, column % ny]
+        ground = np.where((x[:, None] < stone) & (y < stone), top, -self.depth)
+        ground[along, across] = 0.0
         return ground
+
+
+def _gaps(number: int, stone: int, pitch: int) -> NDArray[np.bool_]:
+    """Return whether each of `number` cells is in a gap, for each offset, (pitch, number)."""
+    return (np.arange(number) + np.arange(pitch)[:, None]) % pitch >= stone
+
+
+def _shifts(
+    areas: NDArray[np.float64], expected: NDArray[np.float64], draws: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """Return a random offset for each row of stones, such that the areas of their holes add up.
+
+    Otherwise, holes beyond the patch and below the platform would decide whether a patch with
+    smaller stones is harder.
+
+    Args:
+        areas: Area of the holes of each row for each offset [cells], shape (rows, pitch).
+        expected: Area of the holes of each row on an endless field [cells], shape (rows,).
+        draws: Random numbers from 0 to 1.
+    """
+    shifts, missing = np.zeros(len(areas), dtype=np.int64), 0.0
+    for k, area in enumerate(areas):
+        missing += expected[k]
+        error = np.abs(area - missing)
+        nearest = np.flatnonzero(error <= error.min() + 1e-9)
+        shifts[k] = nearest[int(draws[k % len(draws)] * len(nearest))]
+        missing -= area[shifts[k]]
+    return shifts

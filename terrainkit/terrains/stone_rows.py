@@ -8,15 +8,14 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
-from terrainkit.features.lane import lane_goals, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between, pit_bounds
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class StoneRows(Terrain):
+class StoneRows(Lane):
     """Two rows of square stones across a pit, one for the left feet and one for the right.
 
     The robot is spawned at low x and walks along x. There is a goal at each pair of stones and one
@@ -40,10 +39,6 @@ class StoneRows(Terrain):
 
     start: float = parameter.length(2.0)
     """Length of the flat strip at each end along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the pit between the flat strips."""

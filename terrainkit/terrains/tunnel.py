@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import lane_goals, lane_slots, lane_spawn
+from terrainkit.features.lane import Lane, lane_goals, lane_slots
 from terrainkit.grid import Grid
 from terrainkit.solids import Solids, make_boxes
-from terrainkit.terrain import Terrain
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tunnel(Terrain):
+class Tunnel(Lane):
     """Tunnels along a lane along x, with walls up to the sides of the patch.
 
     The robot is spawned at low x, and there is a goal behind each tunnel. The tunnels are solids;
@@ -36,13 +35,6 @@ class Tunnel(Terrain):
 
     spacing: float = parameter.size(3.0)
     """Distance between two tunnels, center to center [m]."""
-
-    start: float = parameter.length(2.0)
-    """Length of the flat start along x [m]."""
-
-    def spawn(self, grid: Grid) -> tuple[float, float]:
-        """Return the center of the flat start."""
-        return lane_spawn(grid, self.start)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return flat ground."""

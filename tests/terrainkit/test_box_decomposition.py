@@ -7,6 +7,7 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.box_decomposition import decompose_boxes, flat_cells
 from terrainkit.grid import Grid
+from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.surface import surface_at
 
 SMALL = arrays(
@@ -34,7 +35,8 @@ def cover_of(heights, threshold):
 
 
 def level_of(heights, threshold):
-    return flat_cells(heights, Grid(shape=heights.shape, cell=1.0), threshold)
+    grid = Grid(shape=heights.shape, cell=1.0)
+    return flat_cells(NodeGrid.from_heights(heights, grid, threshold))
 
 
 def patch(terrain, *, size=(6.0, 4.0), **parameters):
@@ -156,26 +158,28 @@ def test_boxes_of_a_patch_without_walls_are_none():
     assert not cover.covered.any()
 
 
-def stripes(counts, patch_cells):
-    """Return the boxes of patches along y, each with a wall of its own height across x."""
-    heights = np.zeros((20, sum(counts) * patch_cells), dtype=np.float32)
-    heights[10:] = np.repeat(np.arange(1, len(counts) + 1), np.array(counts) * patch_cells)
-    edges = (np.array([0, 20]), patch_cells * np.arange(sum(counts) + 1))
-    return decompose_boxes(heights, Grid(shape=heights.shape, cell=1.0), 0.5, edges)
+def stripes(counts, axis):
+    """Return the boxes of patches of 10 m along an axis, each with a wall of its own height."""
+    heights = np.zeros((20, sum(counts) * 10), dtype=np.float32)
+    heights[10:] = np.repeat(np.arange(1, len(counts) + 1), np.array(counts) * 10)
+    edges = (np.array([0, 20]), 10 * np.arange(sum(counts) + 1))
+    if axis == 0:
+        heights, edges = np.ascontiguousarray(heights.T), edges[::-1]
+    cover = decompose_boxes(heights, Grid(shape=heights.shape, cell=1.0), 0.5, edges)
+    sizes = 2 * cover.half_sizes[:, :2]
+    return sorted(map(tuple, (sizes[:, ::-1] if axis == 0 else sizes).tolist()))
 
 
 def test_boxes_are_merged_to_a_limited_length():
-    # Four patches of 10 m: at height 0, a new box begins in the patch at 30 m.
-    cover = stripes([2, 1, 1], 10)
-    sizes = sorted(map(tuple, (2 * cover.half_sizes[:, :2]).tolist()))
-    assert sizes == [(10.0, 10.0), (10.0, 10.0), (10.0, 20.0), (20.0, 10.0), (20.0, 30.0)]
+    # At height 0, a new box begins in the patch at 40 m along y, and in the one at 20 m along x.
+    high = [(10.0, 10.0), (10.0, 10.0), (10.0, 10.0), (10.0, 20.0)]
+    assert stripes([2, 1, 1, 1], axis=1) == [*high, (20.0, 10.0), (20.0, 40.0)]
+    assert stripes([2, 1, 1], axis=0) == [*high[1:], (20.0, 20.0), (20.0, 20.0)]
 
 
 def test_boxes_are_longer_where_that_halves_their_number():
-    # Without a limit 2 boxes, with it 4 and more.
-    cover = stripes([9], 10)
-    sizes = sorted(map(tuple, (2 * cover.half_sizes[:, :2]).tolist()))
-    assert sizes == [(10.0, 90.0), (20.0, 90.0)]
+    # Without a limit 2 boxes, with it 6.
+    assert stripes([9], axis=1) == [(10.0, 90.0), (20.0, 90.0)]
 
 
 def test_boxes_are_in_the_order_of_their_centers(level_map):

@@ -79,10 +79,10 @@ def test_budget_step_time_is_that_of_the_slower_geoms(flat_budget, terrain_map):
 
 @pytest.mark.parametrize(
     ("num_boxes", "time"),
-    [(0, 1.03), (1, 1.03), (97, 1.75), (271, 2.174), (3164, 4.2), (13207, 5.8)],
+    [(0, 1.03), (1, 1.03), (95, 1.75), (259, 2.074), (3172, 3.9), (14232, 5.4)],
 )
 def test_box_step_time_is_linear_in_the_logarithm(num_boxes, time):
-    # 271 is the geometric mean of 97 and 758; 13207 / 3164 is 3164 / 758.
+    # 259 is the geometric mean of 95 and 707; 14232 / 3172 is 3172 / 707.
     assert box_step_time(num_boxes) == pytest.approx(time, abs=1e-3)
 
 

@@ -54,15 +54,25 @@ def test_assign_levels_is_seeded():
     assert (one != other).any()
 
 
-def test_assign_levels_rejects_negative_number():
-    with pytest.raises(ConfigError, match="num_envs: got -1; expected 0 or more"):
-        assign_levels(-1, 10, 20, None, seed=0)
-
-
-@pytest.mark.parametrize("highest", [-1, 10])
-def test_assign_levels_rejects_unknown_level(highest):
-    with pytest.raises(ConfigError, match=f"max_init_level: got {highest}; expected 0 to 9"):
-        assign_levels(8, 10, 20, highest, seed=0)
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"num_envs": -1}, "num_envs: got -1; expected an integer >= 0"),
+        ({"num_envs": "a"}, "num_envs: got 'a'; expected an integer >= 0"),
+        ({"num_envs": 2.5}, "num_envs: got 2.5; expected an integer >= 0"),
+        ({"max_init_level": -1}, "max_init_level: got -1; expected an integer from 0 to 9"),
+        ({"max_init_level": 10}, "max_init_level: got 10; expected an integer from 0 to 9"),
+        ({"seed": -1}, "seed: got -1; expected integers >= 0"),
+        ({"seed": "a"}, "seed: got 'a'; expected integers >= 0"),
+        ({"seed": None}, "seed: got None; expected integers >= 0"),
+        ({"seed": (1, -1)}, r"seed: got \[1, -1\]; expected integers >= 0"),
+        ({"seed": 0.5}, "seed: got 0.5; expected integers >= 0"),
+    ],
+)
+def test_assign_levels_rejects_invalid_value(given, message):
+    valid = {"num_envs": 8, "rows": 10, "cols": 20, "max_init_level": None, "seed": 0}
+    with pytest.raises(ConfigError, match=f"^{message}$"):
+        assign_levels(**(valid | given))
 
 
 @pytest.mark.parametrize(
@@ -131,8 +141,25 @@ def test_update_levels_rejects_unknown_levels(levels, message):
 
 
 def test_update_levels_rejects_top_levels_below_one():
-    with pytest.raises(ConfigError, match="top_levels: got 0; expected 1 or more"):
+    with pytest.raises(ConfigError, match="top_levels: got 0; expected an integer >= 1"):
         update([0], [0.0], [0.0], top_levels=0)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"levels": [0.5, 1.0]}, "levels: got values of float64; expected integers"),
+        ({"levels": 3}, r"levels: got shape \(\); expected \(n,\)"),
+        ({"levels": [[1], [2, 3]]}, "levels: got lists of different lengths; expected one list"),
+        ({"distance": [1.0]}, r"distance: got shape \(1,\); expected \(2,\)"),
+        ({"command_distance": ["a", "b"]}, "command_distance: got values of <U1; expected numb"),
+        ({"seed": -1}, "seed: got -1; expected integers >= 0"),
+    ],
+)
+def test_update_levels_rejects_invalid_values(given, message):
+    valid = {"levels": [0, 1], "distance": [0.0, 1.0], "command_distance": [1.0, 1.0]}
+    with pytest.raises(ConfigError, match=message):
+        update(**(valid | given))
 
 
 def careers(can_walk, episodes=120, num_envs=200):
@@ -229,3 +256,20 @@ def test_resample_columns_without_variants_changes_nothing():
 def test_resample_columns_rejects_unknown_patches(level, column, message):
     with pytest.raises(ConfigError, match=message):
         resample_columns([level], [column], TYPES, seed=0)
+
+
+@pytest.mark.parametrize(
+    ("levels", "columns", "seed", "message"),
+    [
+        ([0], [0.5], 0, "columns: got values of float64; expected integers"),
+        ([0, 0], [0], 0, r"columns: got shape \(1,\); expected \(2,\)"),
+        ([0], [0], -1, "seed: got -1; expected integers >= 0"),
+    ],
+)
+def test_resample_columns_rejects_invalid_values(levels, columns, seed, message):
+    with pytest.raises(ConfigError, match=message):
+        resample_columns(levels, columns, TYPES, seed=seed)
+
+
+def test_resample_columns_of_no_environments():
+    assert resample_columns([], [], TYPES, seed=0).tolist() == []

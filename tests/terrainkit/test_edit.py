@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -113,3 +115,25 @@ def test_validate_finds_solid_beyond_custom_map(flat):
     # The map ends at y = 10.
     edited = flat.edited(solids=make_boxes([1.0, 9.9, 2.0], [0.5, 0.5, 0.1]))
     assert messages(edited) == [("solids", "solid 0 extends 0.150 m beyond the map")]
+
+
+@pytest.mark.parametrize(
+    ("goal", "message"),
+    [
+        ((1.0, 1.0, 0.0, 0.0), None),
+        ((3.5, 0.5, 1.0, 0.0), None),  # on the block
+        ((1.0, np.nan, 0.0, 0.0), "is not finite"),
+        ((np.nan, np.nan, np.nan, np.nan), "is not finite"),  # before the last goal
+        ((1.0, 1.0, 0.0, np.inf), "is not finite"),
+        ((5.0, 1.0, 0.0, 0.0), "is outside the patch"),
+        ((1.0, 1.0, -0.2, 0.0), "is 0.200 m below the ground"),
+        ((3.5, 0.5, 0.5, 0.0), "is inside a solid"),
+    ],
+)
+def test_validate_finds_invalid_goal_of_custom_map(flat, goal, message):
+    goals = np.full((2, 3, 4, 4), np.nan, dtype=np.float32)
+    goals[0, 0, :3] = [(1.0, 1.0, 0.0, 0.0), goal, (3.0, 2.0, 0.0, 0.0)]
+    block = make_boxes((3.5, 0.5, 0.5), (0.6, 0.6, 1.0))
+    terrain_map = dataclasses.replace(flat.edited(solids=block), goals=goals)
+    expected = [f"patch (0, 0): goal 1 {message}"] if message else []
+    assert [each.message for each in validate(terrain_map) if each.check == "goals"] == expected

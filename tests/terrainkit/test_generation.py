@@ -30,7 +30,7 @@ def test_generate_default_map_has_golden_bytes():
     terrain_map = generate(MapConfig())
     assert terrain_map.heights.shape == (1300, 1300)
     assert sha256(terrain_map) == (
-        "b15d85142bd7b58ba65b0fbfdb4ba15a967acbfe69d06f7b6c90547b190d9d6d"
+        "1454113576474cb6fc191cdb81c8c11159fb6d4c13560015f863ec9b0277be95"
     )
 
 

@@ -63,6 +63,19 @@ def test_color_levels_are_ends_and_color_stops():
     assert color_levels(0.0, 0.0).tolist() == [0.0]
 
 
+def test_preview_height_scale_includes_the_tops_of_solids(solid_map):
+    lifted = dataclasses.replace(
+        solid_map, solids=solid_map.solids.transformed(np.eye(3), np.array([0.0, 0.0, 3.0]))
+    )
+    bars = [
+        render_preview(each, 400)[70:-60, -130 + 25]
+        for each in (dataclasses.replace(solid_map, solids=Solids.empty()), solid_map, lifted)
+    ]
+    highest = [0.0, 0.7, 3.7]  # the top of the cylinder
+    for bar, top in zip(bars, highest, strict=True):
+        assert bar[2] == pytest.approx(height_colors(np.array(top)), abs=4)
+
+
 @pytest.mark.parametrize("inverted", [False, True])
 def test_preview_height_scale_has_the_colors_of_heights(inverted):
     slope = tk.SubTerrain(terrain="pyramid_slope", parameters={"inverted": inverted})

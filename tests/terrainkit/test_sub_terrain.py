@@ -153,3 +153,9 @@ def test_parameters_are_copied():
 def test_sub_terrain_is_frozen():
     with pytest.raises(dataclasses.FrozenInstanceError):
         SubTerrain(terrain="gap").proportion = 2.0
+
+
+@pytest.mark.parametrize("value", [float("nan"), {}])
+def test_sub_terrain_parameter_error_names_the_key(value):
+    with pytest.raises(ConfigError, match=r"^crawl\.clearance: got .*; expected a finite value or"):
+        SubTerrain(terrain="crawl", parameters={"clearance": value})

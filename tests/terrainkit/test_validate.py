@@ -50,7 +50,7 @@ def test_validate_generated_map_has_no_issues(config):
 @pytest.mark.parametrize("preset", presets.preset_names())
 def test_validate_presets_realize_their_parameters(preset):
     terrain_map = tk.generate(
-        tk.MapConfig(rows=4, cols=len(presets.get_preset(preset)) * 2, border=0.0, preset=preset)
+        tk.MapConfig(rows=4, cols=len(presets.get_preset(preset)), border=0.0, preset=preset)
     )
     assert found(terrain_map) == []
 

@@ -8,8 +8,8 @@ import pytest
 from terrainkit_cli.main import COMMANDS, command
 
 
-def test_no_command_lists_all_commands(terrainkit):
-    run = terrainkit()
+def test_no_command_lists_all_commands(terrainkit_process):
+    run = terrainkit_process()
     assert run.returncode == 0
     for name in COMMANDS:
         assert f"  {name} " in run.stdout
@@ -18,15 +18,16 @@ def test_no_command_lists_all_commands(terrainkit):
     assert max(map(len, lines)) <= 80
 
 
-def test_version_is_that_of_the_package(terrainkit):
+def test_version_is_that_of_the_package(terrainkit_process):
     assert (
-        terrainkit("--version").stdout == f"terrainkit {importlib.metadata.version('terrainkit')}\n"
+        terrainkit_process("--version").stdout
+        == f"terrainkit {importlib.metadata.version('terrainkit')}\n"
     )
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_describes_command_in_80_columns(terrainkit, name):
-    run = terrainkit(name, "--help")
+def test_help_describes_command_in_80_columns(terrainkit_process, name):
+    run = terrainkit_process(name, "--help")
     assert run.returncode == 0
     assert command(name).__doc__.partition("\n")[0] in run.stdout
     assert max(map(len, run.stdout.splitlines())) <= 80
@@ -143,6 +144,14 @@ def test_invalid_input_is_one_line_on_stderr(terrainkit, tmp_path, words, messag
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    "words", [("generat",), ("generate", "-o", "a.npz", "--rows", 0), ("train", "quadrupd")]
+)
+def test_invalid_input_ends_process_with_2(terrainkit_process, terrainkit, words):
+    run, expected = terrainkit_process(*words), terrainkit(*words)
+    assert (run.returncode, run.stdout, run.stderr) == (2, "", expected.stderr)
+
+
 def bash(command: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [
@@ -182,16 +191,16 @@ def test_full_stdout_is_one_line():
 
 
 @pytest.mark.usefixtures("small_map")
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize(
-    "words",
+    ("words", "name"),
     [
-        ("generate", "-o", "a.npz", "--rows", "1"),
-        ("export", "small.npz", "-o", "a.stl"),
-        ("check-robot", "unnamed.urdf", "--fix"),
-        ("onboard", "quadruped", "--no-pictures"),
+        (("generate", "-o", "a.npz", "--rows", "1"), "SIGTERM"),
+        (("generate", "-o", "a.npz", "--rows", "1"), "SIGHUP"),
+        (("export", "small.npz", "-o", "a.stl"), "SIGTERM"),
+        (("check-robot", "unnamed.urdf", "--fix"), "SIGHUP"),
+        (("onboard", "quadruped", "--no-pictures"), "SIGTERM"),
     ],
-    ids=lambda words: words[0],
+    ids=lambda value: value if isinstance(value, str) else value[0],
 )
 def test_signal_removes_temporary_files(tmp_path, words, name):
     (tmp_path / "unnamed.urdf").write_text("<robot><link name='base'/></robot>")

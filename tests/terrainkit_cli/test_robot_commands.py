@@ -69,8 +69,8 @@ def test_check_robot_exit_code(here, words, code):
 
 
 @pytest.mark.usefixtures("folder")
-def test_check_robot_prints_file_and_line(terrainkit):
-    run = terrainkit("check-robot", "bad.urdf", "--select", "negative-mass")
+def test_check_robot_prints_file_and_line(terrainkit_process):
+    run = terrainkit_process("check-robot", "bad.urdf", "--select", "negative-mass")
     assert "\nerror INR002 negative-mass\n  line 4: " in run.stdout
     assert run.stdout.endswith("\nbad.urdf: 1 error\n")
     assert run.stderr == ""
@@ -239,10 +239,10 @@ def test_check_robot_options_override_settings_file(here, folder):
     assert "pyproject.toml: config has no key 'selekt'; did you mean 'select'?" in run.stderr
 
 
-def test_check_robot_escapes_unencodable_names(terrainkit, folder, monkeypatch):
+def test_check_robot_escapes_unencodable_names(terrainkit_process, folder, monkeypatch):
     monkeypatch.setenv("PYTHONIOENCODING", "ascii")
     (folder / "good.urdf").write_text(GOOD.replace('name="box"', 'name="b\u00f6x"'))
-    run = terrainkit("check-robot", "good.urdf")
+    run = terrainkit_process("check-robot", "good.urdf")
     assert (run.returncode, run.stderr) == (0, "")
     assert "robot     b\\xf6x (URDF)" in run.stdout
 

@@ -30,8 +30,8 @@ width = 0.3
 """
 
 
-def test_generate_writes_map_and_prints_next_commands(terrainkit, tmp_path):
-    run = terrainkit("generate", "--rows", 3, "--cols", 10, "-o", "map.npz")
+def test_generate_writes_map_and_prints_next_commands(terrainkit_process, tmp_path):
+    run = terrainkit_process("generate", "--rows", 3, "--cols", 10, "-o", "map.npz")
     assert run.returncode == 0
     assert run.stderr == ""
     assert "wrote map.npz: 3 x 10 patches of 8 m x 8 m" in run.stdout
@@ -64,9 +64,9 @@ def test_generate_options_set_the_config(terrainkit, tmp_path):
     )
 
 
-def test_generate_jobs_give_same_bytes(terrainkit, tmp_path):
+def test_generate_jobs_give_same_bytes(terrainkit_process, tmp_path):
     for name, jobs in (("one.npz", 1), ("two.npz", 2)):
-        run = terrainkit("generate", "-o", name, "--rows", 3, "--seed", 4, "--jobs", jobs)
+        run = terrainkit_process("generate", "-o", name, "--rows", 3, "--seed", 4, "--jobs", jobs)
         assert run.returncode == 0
         assert run.stderr == ""
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
@@ -162,8 +162,10 @@ def test_generate_keeps_existing_file(terrainkit, tmp_path):
     assert tk.TerrainMap.load(tmp_path / "a.npz").config.rows == 1
 
 
-def test_generate_warns_of_preset_without_column(terrainkit):
-    run = terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs")
+def test_generate_warns_of_preset_without_column(terrainkit_process):
+    run = terrainkit_process(
+        "generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs"
+    )
     assert run.returncode == 0
     assert run.stderr == (
         "terrainkit: warning: cols: got 2, too few for 3 sub-terrains at these proportions: "
@@ -217,8 +219,8 @@ def test_list_terrain_shows_parameters(terrainkit):
     assert ["step_height", "0.05", "0.23", "Rise", "of", "a", "step", "[m]."] in lines
 
 
-def test_info_describes_the_map(terrainkit, small_map):
-    output = terrainkit("info", small_map).stdout
+def test_info_describes_the_map(terrainkit_process, small_map):
+    output = terrainkit_process("info", small_map).stdout
     assert "2 x 5 of 8 m x 6 m" in output
     assert "82 x" not in output
     assert "180 x 320, one every 0.1 m" in output  # 2 x 80 and 5 x 60 cells, and 10 on each side
@@ -246,8 +248,8 @@ def test_info_unknown_patch_is_rejected(terrainkit, small_map):
         assert f"no patch {patch} in a map of 2 rows and 5 columns" in run.stderr
 
 
-def test_preview_has_the_given_width(terrainkit, tmp_path, small_map):
-    run = terrainkit("preview", small_map, "-o", "a.png", "--width", 400)
+def test_preview_has_the_given_width(terrainkit_process, tmp_path, small_map):
+    run = terrainkit_process("preview", small_map, "-o", "a.png", "--width", 400)
     assert run.returncode == 0
     picture = cv2.imread(str(tmp_path / "a.png"))
     assert picture.shape[1] >= 400
@@ -284,8 +286,8 @@ def test_export_rejects_option_of_other_format(terrainkit, small_map):
     assert ".stl has no option 'collision'; it has: full, closed, y_up" in run.stderr
 
 
-def test_check_map_accepts_generated_map(terrainkit, small_map):
-    run = terrainkit("check-map", small_map)
+def test_check_map_accepts_generated_map(terrainkit_process, small_map):
+    run = terrainkit_process("check-map", small_map)
     assert run.returncode == 0
     assert "no issues" in run.stdout
 

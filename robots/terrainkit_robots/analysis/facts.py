@@ -22,6 +22,7 @@ from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
     simulator_orders,
 )
+from terrainkit_robots.analysis.symmetry.asymmetry import Misalignment, find_misalignments
 from terrainkit_robots.analysis.symmetry.copies import copied_pairs
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, detect_mirror
 from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
@@ -229,6 +230,17 @@ class Facts:
     def copied_pairs(self) -> tuple[MirrorPair, ...]:
         """The pairs of joints of assemblies that are mounted twice, parents first."""
         return copied_pairs(self.mirror_pairs)
+
+    @cached_property
+    def uncopied_pairs(self) -> tuple[MirrorPair, ...]:
+        """The pairs of mirrored joints without those of copied assemblies, parents first."""
+        copied = {pair.left.body.index for pair in self.copied_pairs}
+        return tuple(p for p in self.mirror_pairs if p.left.body.index not in copied)
+
+    @cached_property
+    def misalignments(self) -> tuple[list[Misalignment], set[int]]:
+        """The misaligned pairs of `uncopied_pairs`, and the indices of the displaced bodies."""
+        return find_misalignments(self.mirror, self.uncopied_pairs, self.leg_bodies)
 
     def outlier_first(
         self, left: MirrorSide, right: MirrorSide, value: Callable[[Body], Matrix | None]

@@ -161,7 +161,11 @@ class Geometry:
     """Coefficient of sliding friction; MJCF only."""
 
     priority: int = 0
-    """Priority of `friction` over that of the other geometry of a contact; MJCF only."""
+    """Priority of `friction` and `condim` over those of the other geometry of a contact; MJCF
+    only."""
+
+    condim: int = 3
+    """Dimension of the contact space: 1 without friction; MJCF only."""
 
     @property
     def contacts(self) -> bool:
@@ -356,6 +360,9 @@ class Actuator:
 
     gear: float = 1.0
     """Factor from the force of the actuator to that on the joint."""
+
+    stiffness: float | None = None
+    """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""
 
     commands: tuple[float, float] | None = None
     """Range of the commanded force of a motor; None if it is unlimited or commands something

@@ -102,6 +102,9 @@ MAX_FINDINGS = 50
 _UNREADABLE = ("XML001", "XML002", "XML005", "XML011")
 """Problems after which a file may contain no robot."""
 
+_NEEDS_ALL_FILES = ("TRE006", "TRE007", "INR001", "COL", "LEG", "SYM", "DYN", "OPT")
+"""Families and rules that would report what a missing included file may contain."""
+
 _NEEDS_COMPLETE_TREE = ("LEG", "SYM", "DYN")
 """Families that compare limbs or simulate. On an incomplete tree they would report consequences of
 the tree's own errors."""
@@ -125,8 +128,7 @@ def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool
         selected = [rule for rule in selected if rule.family == "XML"]  # no robot was read
     for rule in selected:
         try:
-            if rule.family in _NEEDS_COMPLETE_TREE and facts.tree.rejected:
-                raise CannotCheckError("links or joints are missing from the kinematic tree")
+            _require_complete(rule, facts)
             missing = _missing_need(rule, facts, simulate=simulate)
             if missing:
                 raise CannotCheckError(missing)
@@ -145,6 +147,15 @@ def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool
             skipped.append(Skipped(code=rule.code, reason=reason))
     findings.sort(key=_importance)
     return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped), simulated=simulate)
+
+
+def _require_complete(rule: Rule, facts: Facts) -> None:
+    """Raise CannotCheckError if a rule would report consequences of other errors."""
+    lacks_file = any(problem.code == "XML012" for problem in facts.model.problems)
+    if lacks_file and rule.code.startswith(_NEEDS_ALL_FILES):
+        raise CannotCheckError("an included file cannot be read (XML012)")
+    if rule.family in _NEEDS_COMPLETE_TREE and facts.tree.rejected:
+        raise CannotCheckError("links or joints are missing from the kinematic tree")
 
 
 def _importance(finding: Finding) -> tuple[int, int, str, str, int]:

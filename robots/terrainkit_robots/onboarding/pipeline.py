@@ -18,8 +18,8 @@ from terrainkit_robots.onboarding.folder import (
     write_files,
 )
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
-from terrainkit_robots.onboarding.negligible_repairs import with_negligible_repairs
 from terrainkit_robots.onboarding.placeholder_effort import placeholder_effort
+from terrainkit_robots.onboarding.repairs import with_onboarding_repairs
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.robot_files import MJCF, SpecOverride, make_robot_files
@@ -28,9 +28,12 @@ if TYPE_CHECKING:
     from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
     from terrainkit_robots.simulation.gain import GainSet
 
-_BLOCKING_RULES = ("XML", "MSH", "TRE", "INR", "JNT001", "JNT004", "JNT007", "JNT013")
-"""Codes, or starts of codes, of rules whose errors change the robot that would be written. For
-example, a joint of an unknown type would become fixed."""
+_BLOCKING_RULES = (
+    *("XML", "MSH", "TRE", "INR001", "INR002", "INR003", "INR004", "INR011"),
+    *("JNT001", "JNT004", "JNT007", "JNT013"),
+)
+"""Codes, or starts of codes, of rules whose errors change the robot that would be written, or that
+MuJoCo rejects. For example, a joint of an unknown type would become fixed."""
 
 _FIXED_BY_EXPORT = frozenset({"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
 """Rules whose errors cannot occur in the written files: each link has an <inertial>, meshes are
@@ -89,6 +92,8 @@ class OnboardOptions:
 
 def is_blocking(finding: Finding) -> bool:
     """Return whether a finding means that the written files would describe another robot."""
+    if finding.code == "MSH001" and not finding.measured.get("collisions"):
+        return False  # the written files have no visual mesh for it
     return finding.severity == "error" and finding.code.startswith(_BLOCKING_RULES)
 
 
@@ -185,12 +190,12 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     settings = options.settings.over(read_settings(path.parent))
     # All rules are needed to find blocking errors. The written files are simulated, not this one.
     settings = replace(settings, select=(), simulate=False)
-    report = with_negligible_repairs(check_robot(path, settings))
+    report = with_onboarding_repairs(check_robot(path, settings))
     fixed: tuple[Finding, ...] = ()
     if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
 
         def check(contents: Mapping[Path, bytes]) -> Report:
-            return with_negligible_repairs(check_robot(path, settings, contents=contents))
+            return with_onboarding_repairs(check_robot(path, settings, contents=contents))
 
         result = fix_robot(path, check, report=report, unsafe=options.unsafe_fixes)
         report, fixed = result.report, result.fixed

@@ -54,11 +54,15 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
 
 
 def _repairs(fixed: "Sequence[Finding]") -> Iterator[tuple[str, str]]:
-    """Yield the repairs of inertias, which change a number of the robot."""
+    """Yield the repairs of inertias and of mesh paths, which may change the robot."""
     links = [finding.subject for finding in fixed if finding.code in ("INR003", "INR004")]
     if links:
         noun = "inertia" if len(links) == 1 else "inertias"
         yield "repaired", f"the {noun} of {names(links, max_count=3)}; see report.md"
+    meshes = [finding.subject for finding in fixed if finding.code == "MSH001"]
+    if meshes:
+        noun = "path" if len(meshes) == 1 else "paths"
+        yield "repaired", f"the {noun} of {names(meshes, max_count=3)}; see report.md"
 
 
 def _list_files(robot: "RobotFiles") -> str:

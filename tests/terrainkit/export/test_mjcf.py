@@ -138,6 +138,29 @@ def test_mjcf_hfields_cover_patches_with_slopes(tmp_path):
     assert y.tolist() == pytest.approx([(-0.15 + 3.05) / 2, (5.95 + 12.15) / 2])
 
 
+def test_mjcf_divides_long_heightfields_beside_boxes(tmp_path):
+    slope = SubTerrain(terrain="pyramid_slope", parameters={"platform": 1.0, "grade": 0.2})
+    pit = SubTerrain(terrain="pit", parameters={"side": 1.0, "depth": 0.5})
+    terrain_map = generate(
+        MapConfig(
+            rows=8,
+            cols=2,
+            patch_size=(4.0, 4.0),
+            border=1.0,
+            spawn_radius=0.1,
+            terrains=(slope, pit),
+        )
+    )
+    model = loaded(terrain_map, tmp_path, collision="boxes")
+    # 32 m and two samples on both sides, in two parts that share a sample: 324 = 162 + 163 - 1.
+    assert model.hfield_ncol.tolist() == [162, 163]
+    half = model.hfield_size[:, 0]
+    x = model.geom_pos[model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD, 0]
+    assert x[0] + half[0] == pytest.approx(x[1] - half[1])
+    xy = points_in(terrain_map, away_from_walls(terrain_map))
+    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+
+
 def test_mjcf_flat_map_is_one_box(tmp_path):
     flat = generate(MapConfig(rows=2, cols=1, terrains=(SubTerrain(terrain="flat"),)))
     model = loaded(flat, tmp_path)

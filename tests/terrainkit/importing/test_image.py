@@ -103,6 +103,7 @@ def test_image_truncated_is_rejected(tmp_path, suffix):
         read(path, ReadOptions(file_cell=1.0, scale=1.0))
 
 
+@pytest.mark.usefixtures("real_child")
 def test_image_that_claims_huge_size_is_rejected(tmp_path):
     path = write(tmp_path / "a.png", PIXELS)
     data = bytearray(path.read_bytes())

@@ -182,6 +182,7 @@ def test_import_of_exported_image_is_the_same(tmp_path):
 
 
 @pytest.mark.parametrize("y_up", [False, True])
+@pytest.mark.usefixtures("real_child")
 def test_import_of_exported_mesh_is_the_same(tmp_path, y_up):
     stairs = tk.SubTerrain(terrain="pyramid_stairs")
     config = tk.MapConfig(rows=2, cols=1, patch_size=(8.0, 6.0), border=1.0, terrains=(stairs,))
@@ -243,6 +244,7 @@ def test_import_table_has_legs_and_solids(tmp_path):
     assert validate(terrain_map) == []
 
 
+@pytest.mark.usefixtures("real_child")
 def test_import_arch_is_decomposed(tmp_path):
     ring = trimesh.creation.annulus(1.0, 1.4, 2.0)
     ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, (1, 0, 0)))

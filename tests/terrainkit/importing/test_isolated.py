@@ -6,6 +6,8 @@ from terrainkit.errors import HeightFileError
 from terrainkit.importing import isolated
 from terrainkit.importing.isolated import check_file, run_isolated
 
+pytestmark = pytest.mark.usefixtures("real_child")
+
 
 @pytest.fixture
 def mesh(tmp_path):

@@ -83,6 +83,7 @@ def test_mesh_file_truncated_is_rejected(tmp_path, suffix, length):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.usefixtures("real_child")
 def test_mesh_file_claiming_many_vertices_is_rejected(tmp_path):
     path = tmp_path / "a.ply"
     trimesh.creation.box().export(path)
@@ -91,6 +92,7 @@ def test_mesh_file_claiming_many_vertices_is_rejected(tmp_path):
         read(path, ReadOptions())
 
 
+@pytest.mark.usefixtures("real_child")
 def test_mesh_file_claiming_large_accessor_is_rejected(tmp_path):
     # Without a buffer view, an accessor of glTF is an array of zeros of any size.
     document = {

@@ -126,3 +126,9 @@ def test_imported_sha256_must_match(grid, rng, file):
         ConfigError, match=r"^imported\.sha256: got [0-9a-f]{64} of .*; expected abc"
     ):
         Imported(file=file, file_cell=0.1, sha256="abc").build(grid, rng)
+
+
+def test_imported_rejects_solids():
+    message = r"^imported\.solids: .* terrainkit import --solids keeps the overhangs"
+    with pytest.raises(ConfigError, match=message):
+        tk.SubTerrain(terrain="imported", parameters={"solids": True})

@@ -3,6 +3,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.measured_difficulty import measured_difficulty
 from terrainkit.terrains.stepping_stones import SteppingStones
 
 
@@ -88,7 +89,29 @@ def test_stepping_stones_shrink_with_difficulty(difficulty, asked, built, grid):
     assert (realized["stone"], realized["distance"]) == built
     pitch = round((built[0] + built[1]) / 0.1)
     rows = (terrain.build(grid, np.random.default_rng(0))[:20, :20] == 0).any(axis=1)
-    assert np.flatnonzero(~rows).tolist() == list(range(pitch - 1, 20, pitch))
+    first, *_ = holes = np.flatnonzero(~rows).tolist()
+    assert first < pitch
+    assert holes == list(range(first, 20, pitch))
+
+
+@pytest.mark.parametrize("cell", [0.05, 0.1, 0.2])
+@pytest.mark.parametrize("size", [(8.0, 8.0), (8.0, 4.0), (7.3, 5.1), (10.0, 6.0)])
+@pytest.mark.parametrize("platform", [2.0, 3.0])
+def test_stepping_stones_are_never_easier_than_before(cell, size, platform):
+    grid = Grid(shape=tuple(round(side / cell) for side in size), cell=cell)
+    levels = [SteppingStones.at(row / 9, {"platform": platform}) for row in range(10)]
+    for seed in range(3):  # of a column
+        grounds = [each.build(grid, np.random.default_rng(seed)) for each in levels]
+        hard = [measured_difficulty(ground, cell, 0.0) for ground in grounds]
+        assert np.diff(hard).min() >= 0
+        assert hard[-1] > 2 * hard[0]
+
+
+def test_stepping_stones_have_the_holes_of_an_endless_field(grid):
+    free = 80 * 80 - 40 * 40
+    for seed in range(20):
+        holes = (build(grid, seed=seed, stone=0.6, distance=0.3) < 0).sum()
+        assert abs(holes - free * (1 - (6 / 9) ** 2)) <= 6 * 3 / 2
 
 
 @pytest.mark.parametrize(("stone", "distance"), [(0.01, 0.3), (0.5, 0.01)])

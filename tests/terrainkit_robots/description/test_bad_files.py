@@ -192,7 +192,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-def run(file: Path) -> tuple[int, str, str]:
+def run(*files: Path) -> tuple[int, str, str]:
     """Return exit code and output of check-robot; fails if it takes more than it may."""
     # Not what getrusage says: on Linux a process inherits the peak of the one that started it.
     watch = (
@@ -206,27 +206,49 @@ def run(file: Path) -> tuple[int, str, str]:
     )
     paths = os.pathsep.join(path for path in sys.path if path)
     done = subprocess.run(
-        [sys.executable, "-c", watch, "check-robot", str(file), "--format", "json"],
+        [sys.executable, "-c", watch, "check-robot", *map(str, files), "--format", "json"],
         capture_output=True,
         text=True,
         errors="replace",
         timeout=SECONDS,
         env=os.environ | {"PYTHONPATH": paths},
-        cwd=file.parent,
+        cwd=files[0].parent,
         check=False,
     )
     assert int(done.stderr.split("peak ")[-1]) < BYTES
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize("name", [*BY_HAND, "binary", "large"])
-def test_bad_file_is_a_finding(folder, name):
-    code, out, err = run(folder / f"{name}.urdf")
+LARGE = [
+    "long-chain", "wide-star", "entity-bomb", "external-entity", "deep", "many-attributes",
+    "long-name", "mesh-of-billions", "mesh-that-never-ends", "large",
+]  # fmt: skip
+SMALL = [name for name in [*BY_HAND, "binary"] if name not in LARGE]
+
+
+@pytest.fixture(scope="module")
+def small_outputs(folder):
+    """Return exit code, report and errors of each small file; one process checks all of them."""
+    code, out, err = run(*(folder / f"{name}.urdf" for name in SMALL))
+    return {name: (code, line, err) for name, line in zip(SMALL, out.splitlines(), strict=True)}
+
+
+def assert_is_finding(name, code, out, err):
     assert code in (0, 1)
     assert "Traceback" not in err
     assert INTERNAL_ERROR not in out
     expected = {"binary": "XML001", "large": "XML001"}.get(name) or BY_HAND[name][1]
     assert expected in out
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_bad_file_is_a_finding(small_outputs, name):
+    assert_is_finding(name, *small_outputs[name])
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_large_file_is_a_finding(folder, name):
+    assert_is_finding(name, *run(folder / f"{name}.urdf"))
 
 
 @pytest.mark.parametrize("name", ["no-such-file", ".", "pipe", "locked.urdf"])

@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.lint import rule as module
-from terrainkit_robots.lint.rule import FAMILIES, Violation, get_rule, rule, rules
+from terrainkit_robots.lint.rule import FAMILIES, IMPORTANCE, Violation, get_rule, rule, rules
 
 PAGE = """A mass is negative.
 
@@ -96,6 +96,10 @@ def test_rules_are_sorted_by_family_and_number():
     order = [(families.index(each.family), each.code) for each in rules()]
     assert order == sorted(order)
     assert {each.family for each in rules()} == set(FAMILIES)
+
+
+def test_importance_orders_every_family():
+    assert sorted(IMPORTANCE) == sorted(FAMILIES)
 
 
 def test_codes_and_names_are_unique():

@@ -210,7 +210,7 @@ class TestRobots:
         findings = lint(Facts(load_robot(robot_file(name))), own).findings
         told = {(name, f.code, f.subject) for f in findings if f.severity != "info"}
         assert told == {agreed for agreed in AGREED if agreed[0] == name}
-        assert not [f for f in findings if f.severity == "error"]
+        assert {f.code for f in findings if f.severity == "error"} <= {"MSH001"}
 
     @pytest.mark.parametrize("name", ["go2/urdf/go2.urdf", "h1/urdf/h1.urdf"])
     def test_name_rules_open_no_meshes(self, robot_file, name):

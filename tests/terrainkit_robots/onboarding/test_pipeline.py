@@ -313,6 +313,18 @@ def test_onboard_converts_mesh_of_other_format(tmp_path):
     assert (result.folder / "meshes/upper.stl").exists()
 
 
+def test_onboard_finds_mesh_in_other_folder(tmp_path):
+    import trimesh
+
+    (tmp_path / "assets").mkdir()
+    trimesh.creation.box((0.05, 0.05, 0.3)).export(tmp_path / "assets/upper.stl")
+    mesh = ('<box size="0.05 0.05 0.3"/>', '<mesh filename="meshes/upper.stl"/>')
+    result = onboard_arm(tmp_path, mesh, unsafe_fixes=False)
+    assert "MSH001" in {f.code for f in result.fixed}
+    assert (result.folder / "meshes/upper.stl").exists()
+    assert dict(summarize(result))["repaired"] == "the path of meshes/upper.stl; see report.md"
+
+
 def test_onboard_fixes_written_files_only(tmp_path):
     result = onboard_arm(tmp_path, ('axis xyz="0 1 0"', 'axis xyz="0 2 0"'))
     assert [f.code for f in result.fixed] == ["JNT005"]

@@ -1,12 +1,16 @@
 """Decide whether the first keyframe of a file is a standing pose."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.transforms import Matrix
 
 _MIN_CLEARANCE = 0.01
 """Clearance of the trunk, hips and thighs above the ground, at least, over the leg length."""
@@ -14,6 +18,10 @@ _MIN_CLEARANCE = 0.01
 _MAX_LIFT = 0.1
 """Height of a foot above the ground, at most, over the leg length. Legs are bent unequally if the
 trunk of the keyframe is not level."""
+
+_MAX_COM_OFFSET = 0.03
+"""Distance of the center of mass from the bounding rectangle of the feet, at most, over the leg
+length."""
 
 
 def has_leg_positions(robot: LegModel) -> bool:
@@ -54,7 +62,22 @@ def keyframe_defect(robot: LegModel) -> str:
     foot = max(feet, key=feet.__getitem__)
     if feet[foot] > ground + _MAX_LIFT * length:
         return f"{foot} is {feet[foot] - ground:.2g} m above the ground"
+    offset = _com_offset(robot, poses)
+    if offset > _MAX_COM_OFFSET * length:
+        return f"the center of mass is {offset:.2g} m outside of the feet"
     return ""
+
+
+def _com_offset(robot: LegModel, poses: Sequence[Matrix]) -> float:
+    """Return how far the center of mass is outside of the rectangle around the feet [m]."""
+    masses = np.array([body.mass for body in robot.bodies])
+    pairs = zip(robot.bodies, poses, strict=True)
+    centers = np.array([pose[:3, :3] @ body.center + pose[:3, 3] for body, pose in pairs])
+    feet = [leg.limb.chain[-1] for leg in robot.legs]
+    points = np.concatenate([contact_points(robot.bodies[i], poses[i], robot.meshes) for i in feet])
+    com = masses @ centers / masses.sum()
+    outside = np.maximum(points.min(axis=0) - com, com - points.max(axis=0))[:2]
+    return float(outside.max(initial=0.0)) if np.isfinite(com).all() else 0.0
 
 
 def _lower_leg(leg: Leg, robot: LegModel) -> Iterator[int]:

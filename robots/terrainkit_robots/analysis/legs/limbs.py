@@ -38,8 +38,11 @@ _LEG_NAME = re.compile(
 )
 _OTHER_NAME = re.compile(
     r"arm(?!at)|hand(?!le)|finger|thumb|wrist|elbow|shoulder|grip|palm|head|neck|tail|wheel|rotor"
-    r"|prop(?!r)|camera|mcp|knuckle|distal"
+    r"|prop(?!r)|camera|mcp|knuckle|distal|index|pinky|(?<![a-z])ring(?![a-z])"
 )
+
+_HAND_NAME = re.compile(r"hand(?!le)|palm|gripper")
+"""Name of a trunk whose limbs are fingers."""
 
 _MAX_WHEEL_OFFSET = 0.25
 """Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel on a
@@ -224,7 +227,9 @@ def _make_limb(
         for other in leaves
     )
     score += 0.5 * has_mirror_image
-    score += 0.5 if leg_names > other_names else -1.0 if other_names > leg_names else 0.0
+    is_finger = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
+    is_other = other_names > leg_names or (is_finger and not leg_names)
+    score += 0.5 if leg_names > other_names else -1.0 if is_other else 0.0
     return Limb(
         chain=leaf.chain,
         joints=leaf.joints,

@@ -29,7 +29,7 @@ class JointInertia:
     their mass [kg]."""
 
 
-def inertias_without_armature(
+def inertia_without_armature(
     bodies: Sequence[Body], actuated: Sequence[Joint]
 ) -> tuple[JointInertia, ...]:
     """Return the inertia of each actuated joint without armature, if it is positive and finite."""

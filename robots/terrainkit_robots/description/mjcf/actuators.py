@@ -33,6 +33,9 @@ class ActuatorData:
     gear: float
     """Factor from the force of the actuator to that on the joint."""
 
+    stiffness: float | None
+    """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""
+
     commands: tuple[float, float] | None
     """Range of the commanded force; None if it is unlimited or commands something else."""
 
@@ -52,6 +55,7 @@ class ActuatorData:
             joint=self.joint,
             effort=effort,
             gear=self.gear,
+            stiffness=None if self.stiffness is None else self.stiffness * factor,
             commands=self.commands,
         )
 
@@ -75,6 +79,7 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
             effort=None if force is None else force * abs(gear),
             armature=float(getattr(each, "armature", 0.0)) * gear**2,
             gear=gear,
+            stiffness=_stiffness(each, gear),
             commands=None
             if commanded is None
             else (float(each.ctrlrange[0]), float(each.ctrlrange[1])),
@@ -100,6 +105,17 @@ def _max_commanded_force(actuator: Any) -> float | None:
     command = _limit(actuator.ctrllimited, actuator.ctrlrange, actuator.compiler.autolimits)
     force = None if command is None else command * abs(float(actuator.gainprm[0]))
     return force if force is None or math.isfinite(force) else None
+
+
+def _stiffness(actuator: Any, gear: float) -> float | None:
+    """Return the position gain on the joint; None if the actuator does not control a position."""
+    import mujoco
+
+    fixed = actuator.gaintype == mujoco.mjtGain.mjGAIN_FIXED
+    affine = actuator.biastype == mujoco.mjtBias.mjBIAS_AFFINE
+    gain = float(actuator.gainprm[0])
+    is_position = fixed and affine and gain > 0 and float(actuator.biasprm[1]) == -gain
+    return gain * gear**2 if is_position else None
 
 
 def _limit(limited: Any, bounds: Sequence[float], autolimits: bool) -> float | None:

@@ -340,6 +340,7 @@ class _Reader:
             color=color_of(geom, self._materials),
             friction=float(geom.friction[0]),
             priority=int(geom.priority),
+            condim=int(geom.condim),
         )
         if shape == "mesh" or fitted:
             geometry = replace(self._with_mesh(geometry, geom, scale), fit_to_mesh=fitted)

@@ -292,6 +292,7 @@ class _Reader:
             data = self._contents[path] if path in self._contents else read_bytes(path)
         except RobotFileError as error:
             self._report(source, f"{name}: {error}", name)
+            self.complete = False
             return None
         self._bytes += len(data)
         part = parse_xml(path, data)

@@ -1,8 +1,9 @@
 """Read the colors of URDF materials, by value or by name."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
+from terrainkit_robots.description.urdf.tags import has_variable
 from terrainkit_robots.description.xml.numbers import parse_numbers
 
 if TYPE_CHECKING:
@@ -24,6 +25,19 @@ def named_colors(root: "etree._Element") -> dict[str, Color]:
             if name and color is not None:
                 colors.setdefault(name, color)
     return colors
+
+
+def undefined_materials(root: "etree._Element") -> Iterator["etree._Element"]:
+    """Yield the first use of each named material that has neither color nor texture anywhere."""
+    materials = [*root.iterfind("material"), *root.iterfind("link/visual/material")]
+    seen = {
+        _name(m) for m in materials if m.find("color") is not None or m.find("texture") is not None
+    }
+    for material in root.iterfind("link/visual/material"):
+        name = _name(material)
+        if name and name not in seen and not has_variable(name):
+            seen.add(name)
+            yield material
 
 
 def color_of(shape: "etree._Element", named: Mapping[str, Color]) -> Color | None:

@@ -27,7 +27,14 @@ from terrainkit_robots.description.model import (
     SafetyController,
 )
 from terrainkit_robots.description.package_resolver import PackageResolver
-from terrainkit_robots.description.urdf.colors import Color, color_of, named_colors
+from terrainkit_robots.description.urdf.colors import (
+    Color,
+    color_of,
+    named_colors,
+    undefined_materials,
+)
+from terrainkit_robots.description.urdf.references import invalid_references
+from terrainkit_robots.description.urdf.srdf import invalid_srdf
 from terrainkit_robots.description.urdf.tags import (
     has_variable,
     misspelled_names,
@@ -106,7 +113,16 @@ class _Reader:
             parent = element.getparent()
             owner = "" if parent is None else parent.tag
             message = f"second <{element.tag}> in a <{owner}>; expected one, and the first is read"
-            self._report("XML015", element, message)
+            first = None if parent is None else parent.find(element.tag)
+            is_copy = first is not None and _same_content(first, element)
+            self._report("XML015", element, message, copy="1" if is_copy else "")
+        for element in undefined_materials(root):
+            name = truncate(element.get("name", ""))
+            message = f"material {name}: has no color or texture anywhere; expected a definition"
+            self._report("XML016", element, message)
+        if not any(problem.code in ("XML001", "XML004") for problem in self._problems):
+            self._problems += invalid_references(self._doc)
+            self._problems += invalid_srdf(self._doc)
 
     # Numbers
 
@@ -207,9 +223,10 @@ class _Reader:
             values = [self._parse_number(tensor, name) for name in _DIAGONAL]
             values += [
                 self._parse_number(tensor, name) if tensor.get(name) is not None else 0.0
-                for name in ("ixy", "ixz", "iyz")
+                for name in _PRODUCTS
             ]
             inertia = _symmetric(values)
+            self._check_products(tensor)
         return Inertial(
             source=self._doc.source(element),
             mass=self._parse_number(element.find("mass"), "value"),
@@ -218,6 +235,13 @@ class _Reader:
             inertia_source=None if tensor is None else self._doc.source(tensor),
             missing=tuple(n for n in _DIAGONAL if tensor is None or tensor.get(n) is None),
         )
+
+    def _check_products(self, tensor: "etree._Element") -> None:
+        """Report missing products of inertia; INR003 reports missing moments."""
+        missing = [name for name in _PRODUCTS if tensor.get(name) is None]
+        if missing and set(tensor.keys()) >= set(_DIAGONAL):
+            message = f"<inertia> has no {', '.join(missing)}; MuJoCo rejects the file"
+            self._report("XML013", tensor, message, attributes=" ".join(missing))
 
     def _geometries(self, link: "etree._Element", tag: str) -> Iterator[Geometry]:
         for element in link.iterchildren(tag):
@@ -351,6 +375,7 @@ class _Reader:
 
 
 _DIAGONAL = ("ixx", "iyy", "izz")
+_PRODUCTS = ("ixy", "ixz", "iyz")
 
 _SIZES = {
     "box": {"size"},
@@ -382,3 +407,10 @@ def _owner(element: "etree._Element") -> str:
             return str(at.get("name"))
         at = at.getparent()
     return ""
+
+
+def _same_content(first: "etree._Element", second: "etree._Element") -> bool:
+    """Return whether two elements have the same attributes and children."""
+    if first.attrib != second.attrib or len(first) != len(second):
+        return False
+    return all(a.tag == b.tag and _same_content(a, b) for a, b in zip(first, second, strict=True))

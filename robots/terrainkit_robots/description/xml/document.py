@@ -82,6 +82,9 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
         return _rejected(
             file, data, f"the file has more than {MAX_BYTES // 2**20} MiB; it is not parsed"
         )
+    encoding = _wide_encoding(file, data)
+    if encoding is not None:
+        problems.append(encoding)
     text = _skip_leading_bytes(file, data, problems)
     if not text.strip():
         return _rejected(file, data, "the file is empty; expected a <robot> or <mujoco> element")
@@ -96,6 +99,7 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
                 subject=file.name,
             )
         )
+    text = _with_version(file, data, text, problems)
     parser = etree.XMLParser(
         recover=True, resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
     )
@@ -136,6 +140,39 @@ def _unparsed(file: Path, data: bytes, problems: Sequence[Problem]) -> XmlDocume
     return XmlDocument(file=file, data=data, root=None, sources={}, problems=tuple(problems))
 
 
+_VERSION = re.compile(rb"<\?xml\s+version\s*=\s*[\"'](?!1\.\d+[\"'])([^\"']{3})[\"']")
+"""XML declaration with a version that does not exist."""
+
+
+def _with_version(file: Path, data: bytes, text: bytes, problems: list[Problem]) -> bytes:
+    """Return `text` with version 1.0 in its XML declaration, and report another version."""
+    match = _VERSION.match(text)
+    if match is None:
+        return text
+    start = len(data) - len(text) + match.start(1)
+    version = match[1].decode("ascii", "replace")
+    problems.append(
+        Problem(
+            code="XML001",
+            message=f"version in <?xml?>: got {version!r}; expected 1.0, or strict readers reject "
+            "the file",
+            source=Source(file=file, line=1),
+            subject=file.name,
+            details={"start": str(start), "end": str(start + 3)},
+        )
+    )
+    return text[: match.start(1)] + b"1.0" + text[match.end(1) :]
+
+
+def version_fix(problem: Problem) -> Fix | None:
+    """Return the fix of a wrong version in the XML declaration; None for other problems."""
+    if "end" not in problem.details:
+        return None
+    start, end = int(problem.details["start"]), int(problem.details["end"])
+    edit = ReplaceBytes(source=problem.source, start=start, end=end, replacement=b"1.0")
+    return Fix(safety="safe", description="Set the version of the XML to 1.0.", edits=(edit,))
+
+
 def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> bytes:
     """Return `data` from the XML on, and report a byte order mark or white space before it."""
     leading = re.match(rb"(?:\xef\xbb\xbf|\s)*", data)
@@ -157,12 +194,50 @@ def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> byt
     return data[leading.end() :]
 
 
+_WIDE_ENCODINGS = {
+    "UTF-32": (b"\xff\xfe\0\0", b"\0\0\xfe\xff", b"<\0\0\0", b"\0\0\0<"),
+    "UTF-16": (b"\xff\xfe", b"\xfe\xff", b"<\0", b"\0<"),
+}
+"""First bytes of a file in an encoding with several bytes for each character."""
+
+
+def _wide_encoding(file: Path, data: bytes) -> Problem | None:
+    """Return a problem if a file is UTF-16 or UTF-32."""
+    for encoding, starts in _WIDE_ENCODINGS.items():
+        start = next((start for start in starts if data.startswith(start)), None)
+        if start is None:
+            continue
+        has_bom = b"<" not in start
+        is_big = start in starts[1::2]
+        codec = encoding if has_bom else f"{encoding}-{'BE' if is_big else 'LE'}"
+        text = data.decode(codec, "replace")
+        return Problem(
+            code="XML009",
+            message=f"the file is encoded as {encoding}, which MuJoCo and urdfdom reject; expected "
+            "UTF-8",
+            source=Source(file=file, line=1),
+            subject=file.name,
+            details={
+                "bytes": str(len(data)),
+                "text": re.sub(
+                    r'(<\?xml[^>]*?encoding=)["\'][^"\']*["\']', r'\1"UTF-8"', text, count=1
+                ),
+            },
+        )
+    return None
+
+
 def leading_bytes_fix(problem: Problem) -> Fix:
-    """Return the fix that removes the bytes reported by `_skip_leading_bytes`."""
+    """Return the fix that removes the reported bytes, or that writes the file as UTF-8."""
+    text = problem.details.get("text", "")
     edit = ReplaceBytes(
-        source=problem.source, start=0, end=int(problem.details["bytes"]), replacement=b""
+        source=problem.source,
+        start=0,
+        end=int(problem.details["bytes"]),
+        replacement=text.encode(),
     )
-    return Fix(safety="safe", description="Remove the leading bytes.", edits=(edit,))
+    description = "Write the file as UTF-8." if text else "Remove the leading bytes."
+    return Fix(safety="safe", description=description, edits=(edit,))
 
 
 def _syntax_errors(file: Path, parser: etree.XMLParser) -> list[Problem]:

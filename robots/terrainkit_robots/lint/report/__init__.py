@@ -1,6 +1,6 @@
 """Reports: format the findings on one or more robots as text.
 
-Each format is a module with a function `format_reports`. The formats for people, text and
+Each format is a module with a function `to_text`. The formats for people, text and
 markdown, merge findings that repeat over joints or links into one entry with a list. The formats
 for programs, json, sarif and github, keep one entry per finding, because their consumers need the
 line and the numbers of each.
@@ -23,8 +23,8 @@ FORMATS = tuple(_MODULES)
 """Names of the formats."""
 
 
-def format_reports(reports: Sequence[Report], format: str) -> str:  # noqa: A002 (as the option is called)
+def to_text(reports: Sequence[Report], format: str) -> str:  # noqa: A002 (as the option is called)
     """Return `reports` in one of FORMATS. The text ends with a newline unless it is empty."""
     module = importlib.import_module(f"{__name__}.{_MODULES[format]}")
-    format_module: Callable[[Sequence[Report]], str] = module.format_reports
+    format_module: Callable[[Sequence[Report]], str] = module.to_text
     return format_module(reports)

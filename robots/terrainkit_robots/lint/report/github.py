@@ -9,7 +9,7 @@ from terrainkit_robots.text import display_path
 _LEVELS = {"error": "error", "warning": "warning", "info": "notice"}
 
 
-def format_reports(reports: Sequence[Report]) -> str:
+def to_text(reports: Sequence[Report]) -> str:
     """Return one line per finding.
 
     Findings that repeat are not merged: each annotation belongs to one line of a file.

@@ -15,7 +15,7 @@ SCHEMA_VERSION = 1
 """Incremented when a key changes its meaning or is removed. New keys do not increment it."""
 
 
-def format_reports(reports: Sequence[Report]) -> str:
+def to_text(reports: Sequence[Report]) -> str:
     """Return one indented document, or one document per line for several robots.
 
     Findings that repeat are not merged: each has its own subject, line and numbers.

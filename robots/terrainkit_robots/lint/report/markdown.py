@@ -19,7 +19,7 @@ from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.text import display_path
 
 
-def format_reports(reports: Sequence[Report]) -> str:
+def to_text(reports: Sequence[Report]) -> str:
     """Return one section per robot. Findings that repeat over joints or links are one row."""
     return "\n".join(line for report in reports for line in _section(report))
 

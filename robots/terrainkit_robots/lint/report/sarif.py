@@ -20,7 +20,7 @@ SCHEMA = (
 _LEVELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 
 
-def format_reports(reports: Sequence[Report]) -> str:
+def to_text(reports: Sequence[Report]) -> str:
     """Return one document with the findings of all robots, including suppressed ones.
 
     Findings that repeat are not merged: code hosts show each result at its own line.

@@ -47,30 +47,30 @@ class Span:
 Line = tuple[Span, ...]
 
 
-def format_reports(reports: Sequence[Report], *, notes: bool = False) -> str:
+def to_text(reports: Sequence[Report], *, verbose: bool = False) -> str:
     """Return the reports without colors."""
-    lines = format_lines(reports, notes=notes)
+    lines = format_lines(reports, verbose=verbose)
     return "".join("".join(span.text for span in line) + "\n" for line in lines)
 
 
 def format_lines(
-    reports: Sequence[Report], width: int = DEFAULT_WIDTH, *, notes: bool = False
+    reports: Sequence[Report], width: int = DEFAULT_WIDTH, *, verbose: bool = False
 ) -> Iterator[Line]:
     """Yield the lines of the reports, wrapped at `width` characters.
 
     A finding that repeats over joints or links is one entry with a list. A note is one line unless
-    `notes` is set.
+    `verbose` is set.
     """
     for index, report in enumerate(reports):
         if index:
             yield ()
-        yield from _robot(report, width, notes=notes)
+        yield from _robot(report, width, verbose=verbose)
     if len(reports) > 1:
         yield ()
         yield _counts(f"{count(len(reports), 'file')}: ", reports)
 
 
-def _robot(report: Report, width: int, *, notes: bool) -> Iterator[Line]:
+def _robot(report: Report, width: int, *, verbose: bool) -> Iterator[Line]:
     model = report.facts.model
     file = escape_control(display_path(model.file))
     yield (Span(file, "bold"),)
@@ -86,7 +86,7 @@ def _robot(report: Report, width: int, *, notes: bool) -> Iterator[Line]:
             yield from _entry(group, f"{group.first.code}, {group.text}", model.file, width)
         yield ()
     groups = group_findings(model, report.findings)
-    short = [] if notes else [group for group in groups if group.first.severity == "info"]
+    short = [] if verbose else [group for group in groups if group.first.severity == "info"]
     by_rule = groupby(
         (group for group in groups if group not in short),
         lambda group: (group.first.severity, group.first.code, group.first.name),
@@ -99,7 +99,7 @@ def _robot(report: Report, width: int, *, notes: bool) -> Iterator[Line]:
         yield _note(group, width)
     if short:
         yield ()
-    footer = [*_help(report.findings, notes=notes), *_skipped(report, width)]
+    footer = [*_help(report.findings, verbose=verbose), *_skipped(report, width)]
     yield from footer
     if footer:
         yield ()
@@ -151,14 +151,14 @@ def _fix_description(finding: Finding) -> str:
     return f"{finding.subject}: {description}" if finding.subject else description
 
 
-def _help(findings: Sequence[Finding], *, notes: bool) -> Iterator[Line]:
+def _help(findings: Sequence[Finding], *, verbose: bool) -> Iterator[Line]:
     """Yield what `(likely)` means, and how to get help on notes, which are listed without help."""
-    shown = [finding for finding in findings if notes or finding.severity != "info"]
+    shown = [finding for finding in findings if verbose or finding.severity != "info"]
     if any(finding.certainty == "likely" for finding in shown):
         label, text = LIKELY.split(" ", 1)
         yield Span(f"{label} ", "dim"), Span(text)
     codes = [finding.code for finding in findings if finding.severity == "info"]
-    if codes and not notes:
+    if codes and not verbose:
         yield Span("notes in full: ", "dim"), Span("--notes")
     if codes:
         yield Span("details of a note: ", "dim"), Span(f"terrainkit rule CODE, such as {codes[0]}")

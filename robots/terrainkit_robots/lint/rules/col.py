@@ -14,6 +14,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
+from terrainkit_robots.export.canonical import has_floating_base
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import contrast, count
 
@@ -109,7 +110,8 @@ def no_trunk_collision(robot: Facts) -> Iterator[Violation]:
     """The trunk has no collision shape.
 
     Episodes usually terminate on contact of the trunk. Without a collision shape this contact never
-    occurs: a fallen robot lies with its trunk in the ground and keeps collecting rewards.
+    occurs: a fallen robot lies with its trunk in the ground and keeps collecting rewards. It is a
+    note if only the feet collide, which is a choice for speed.
 
     Fix:
         Give the trunk a <collision>; one box is sufficient.
@@ -123,11 +125,13 @@ def no_trunk_collision(robot: Facts) -> Iterator[Violation]:
     rest = [body for body in robot.bodies if used[body.index] != 1]
     if any(_has_contacts(body) for body in rest) or robot.bodies[0].virtual:
         return
-    if any(_has_contacts(body) for body in robot.bodies):
+    colliding = {body.index for body in robot.bodies if _has_contacts(body)}
+    if colliding:
         trunk = robot.bodies[0]
         yield Violation(
             subject=trunk.name,
             source=robot.tree.links[trunk.name].source,
+            severity="info" if colliding <= {leg.limb.chain[-1] for leg in robot.legs} else None,
             message=f"collision shapes of trunk {trunk.name} and all other bodies outside of the "
             "legs: got 0; expected 1 or more",
             certainty="likely",
@@ -138,7 +142,9 @@ def no_trunk_collision(robot: Facts) -> Iterator[Violation]:
 def no_collision(robot: Facts) -> Iterator[Violation]:
     """The robot has no collision shapes.
 
-    It falls through the ground and has no contacts.
+    It falls through the ground and has no contacts. Without legs and a free base it is a warning,
+    and a note in MJCF, where contacts are disabled on purpose: pendulums, swimmers and reachers
+    need none.
 
     Fix:
         Give the links <collision> elements; primitives are faster and more stable than meshes.
@@ -147,9 +153,13 @@ def no_collision(robot: Facts) -> Iterator[Violation]:
         All simulators compute contacts from collision shapes only.
     """
     if robot.bodies and not any(_has_contacts(body) for body in robot.bodies):
+        severity: Severity | None = None if has_floating_base(robot) else "warning"
+        if robot.model.kind == "mjcf":
+            severity = "info"
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
+            severity=None if robot.legs else severity,
             message=f"collision shapes of {count(len(robot.links), 'link')}: got 0; expected 1 or "
             "more",
         )

@@ -1,6 +1,7 @@
 """Rules on the pose, size and friction of collision shapes (COL)."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +20,9 @@ _MAX_OFFSET = 0.005
 _MAX_ANGLE = math.radians(3)
 """Allowed angle between them [rad]."""
 
+_MAX_SIZE_RATIO = 1.5
+"""Allowed ratio of the sizes of a primitive as collision and as visual shape."""
+
 _MIN_FRICTION, _MAX_FRICTION = 0.1, 10.0
 """Plausible sliding friction of a foot: ice and rubber, with a margin for models with sticky
 feet."""
@@ -36,8 +40,9 @@ def foot_friction(robot: Facts) -> Iterator[Violation]:
     """The friction of a foot is implausible, or differs from that of the other feet.
 
     MuJoCo uses the larger friction of the two geoms of a contact, or that of the geom with the
-    higher priority. A foot without friction slides; one with a friction of 100 never slips, and a
-    policy that relies on it falls on real ground.
+    higher priority. The same holds for condim, which is 1 for contacts without friction. A foot
+    without friction slides; one with a friction of 100 never slips, and a policy that relies on it
+    falls on real ground.
 
     Fix:
         Give the geoms of all feet the same sliding friction, between 0.4 and 1.2.
@@ -55,7 +60,8 @@ def foot_friction(robot: Facts) -> Iterator[Violation]:
             pose, meshes = body.zero_pose, robot.meshes
             lowest = min(shapes, key=lambda s: min_height(s, pose, meshes)).geometry
             if lowest.friction is not None:
-                feet[leg.foot] = lowest.friction, lowest
+                is_slippery = lowest.condim == 1 and lowest.priority > 0
+                feet[leg.foot] = 0.0 if is_slippery else lowest.friction, lowest
     values = [value for value, _ in feet.values()]
     for foot, (value, geometry) in feet.items():
         common = sorted(values)[len(values) // 2]
@@ -65,6 +71,8 @@ def foot_friction(robot: Facts) -> Iterator[Violation]:
             expected = f"expected {common:g}, as on the other feet"
         else:
             continue
+        if value == 0 and geometry.friction:
+            expected = f"condim 1 and priority {geometry.priority}; expected condim 3"
         yield Violation(
             subject=foot,
             source=geometry.source,
@@ -79,7 +87,8 @@ def displaced_collision_mesh(robot: Facts) -> Iterator[Violation]:
     """A mesh has another pose or scale as collision shape than as visual shape of the same link.
 
     The origin or the scale was changed in one of the two elements only. The robot collides where
-    it cannot be seen, for example with its own thighs.
+    it cannot be seen, for example with its own thighs. A primitive that is larger than the one that
+    is drawn at the same place is reported as well, such as a sphere with its diameter as radius.
 
     Fix:
         Copy <origin> and scale from the correct element to the other one.
@@ -103,6 +112,45 @@ def displaced_collision_mesh(robot: Facts) -> Iterator[Violation]:
                 f"got {differences[0]} the same mesh of the visual; expected the same pose and "
                 "scale",
             )
+    yield from _resized_primitives(robot)
+
+
+def _resized_primitives(robot: Facts) -> Iterator[Violation]:
+    """Yield collision primitives that are larger than the same primitive of the visual.
+
+    If several links agree in the ratio, it is intended: the feet of many quadrupeds.
+    """
+    found: list[tuple[str, Geometry, Geometry, float]] = []
+    for link in robot.links:
+        for collision in link.collisions:
+            same = [v for v in link.visuals if _is_same_place(collision, v)]
+            ratios = [max(a / b for a, b in zip(collision.size, v.size, strict=True)) for v in same]
+            if ratios and min(ratios) > _MAX_SIZE_RATIO:
+                visual = same[ratios.index(min(ratios))]
+                found.append((link.name, collision, visual, round(min(ratios), 2)))
+    counts = Counter(ratio for _, _, _, ratio in found)
+    for name, collision, visual, ratio in found:
+        if counts[ratio] == 1:
+            yield Violation(
+                subject=name,
+                source=collision.size_source or collision.source,
+                certainty="likely",
+                message=f"size of the collision {collision.shape} of link {name}: got "
+                f"{_format(np.array(collision.size))} m, {ratio:g} times the "
+                f"{_format(np.array(visual.size))} m of the visual at the same place (half "
+                "lengths); expected the same size",
+                measured={"ratio": ratio},
+            )
+
+
+def _is_same_place(a: Geometry, b: Geometry) -> bool:
+    """Return whether two primitives of a kind have the same pose and comparable sizes."""
+    is_primitive = a.mesh is None and a.shape == b.shape and len(a.size) == len(b.size) > 0
+    return (
+        is_primitive
+        and min(*a.size, *b.size, 1.0) > 0
+        and float(np.abs(a.origin - b.origin).max()) < _MAX_OFFSET
+    )
 
 
 def _is_same_file(a: Geometry, b: Geometry) -> bool:

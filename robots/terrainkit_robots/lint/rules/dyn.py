@@ -119,8 +119,8 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
     An episode starts with zero actions, that is, PD control with the suggested gains at the
     standing pose. A robot that falls within two seconds is reset before it learns anything. A robot
     that leans, stands on its shanks, lifts a foot or saturates a motor learns to do so. A tilt of 3
-    to 9 degrees is only a note. Robots with one or two legs need not balance: their joints are
-    locked, so that only the feet and the pose count.
+    to 9 degrees is only a note, and so are robots with more than six legs. Robots with one or two
+    legs need not balance: their joints are locked, so that only the feet and the pose count.
 
     Fix:
         The message names the cause. Otherwise check the pose, the feet and the effort limits.
@@ -138,7 +138,9 @@ def does_not_stand(robot: Facts) -> Iterator[Violation]:
         not locked and assess(_stand(robot, locked=locked, self_collision=False)).stands
     )
     level = assessment.degree
-    if locked or len(robot.legs) > _MAX_SINGLE_LEGS:
+    if len(robot.legs) > _MAX_SINGLE_LEGS:
+        level = 0
+    elif locked:
         level = min(level, 1)
     elif stands_without and _has_mesh_collision(robot):
         level = max(level - 1, 0)

@@ -28,6 +28,7 @@ from terrainkit_robots.analysis.inertia.physical import (
 from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholder_inertias
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
+from terrainkit_robots.export.canonical import has_floating_base
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.text import contrast, names
 from terrainkit_robots.transforms import Matrix
@@ -346,7 +347,7 @@ def inertia_too_large(robot: Facts) -> Iterator[Violation]:
     Mass inside a body is at most half the body's diagonal away from its center, which limits the
     radius of gyration sqrt(I / m). A larger value is usually a wrong unit (g mm2) or a wrong
     reference point (the origin of the robot). The joint then moves an inertia that the real robot
-    does not have.
+    does not have. It is a note for a base that is fixed to the ground.
 
     Fix:
         Give the inertia in kg m2 about the center of mass, and the mass in kg.
@@ -380,8 +381,10 @@ def inertia_too_large(robot: Facts) -> Iterator[Violation]:
     for body, radius, box in candidates:
         if body.name not in reported:
             is_error = radius > _MAX_GYRATION_ERROR * half_diagonal(box)
+            is_fixed = body.index == 0 and not has_floating_base(robot)
+            severity: Severity = "info" if is_fixed else "error" if is_error else "warning"
             limit = f"at most {_MAX_GYRATION:g}"
-            yield _report_radius(body, radius, box, limit, "error" if is_error else "warning")
+            yield _report_radius(body, radius, box, limit, severity)
 
 
 @rule("INR007", "inertia-too-small", "warning")

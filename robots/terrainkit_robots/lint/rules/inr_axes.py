@@ -4,8 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.link_source import inertia_source
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Link
 from terrainkit_robots.lint.rule import Violation, rule
 
 _MIN_ELONGATION = 2.5
@@ -13,6 +15,26 @@ _MIN_ELONGATION = 2.5
 
 _MIN_EXCESS = 1.5
 """Moment about the long axis over the other moments, from which axes are probably exchanged."""
+
+
+def _exchanged_link(body: Body, long: int) -> Link | None:
+    """Return the link with the largest moment about the long axis of a body, if it is exchanged.
+
+    Args:
+        body: The body.
+        long: Index of the long axis in the frame of the body.
+    """
+    largest, found = 0.0, None
+    for link, pose in zip(body.links, body.poses, strict=True):
+        if link.inertial is None or link.inertial.inertia is None:
+            continue
+        rotation = (pose @ link.inertial.origin)[:3, :3]
+        moments = np.diag(rotation @ link.inertial.inertia @ rotation.T)
+        if moments[long] > largest:
+            largest = float(moments[long])
+            is_exchanged = moments[long] > _MIN_EXCESS * float(np.min(np.delete(moments, long)))
+            found = link if is_exchanged else None
+    return found
 
 
 @rule("INR012", "exchanged-axes", "warning")
@@ -46,10 +68,13 @@ def exchanged_axes(robot: Facts) -> Iterator[Violation]:
             continue
         if moments[long] < 0.95 * others:
             continue
+        link = _exchanged_link(body, long)
+        if link is None:
+            continue  # parts beside the long axis raise the moment about it
         axis = "xyz"[long]
         yield Violation(
-            subject=body.name,
-            source=inertia_source(body.main_link),
+            subject=link.name,
+            source=inertia_source(link),
             certainty="likely",
             message=f"moments of inertia of body {body.name}: got "
             f"{', '.join(f'{m:.3g}' for m in moments)} kg m2 for a shape of "

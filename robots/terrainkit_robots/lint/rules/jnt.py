@@ -25,6 +25,10 @@ from terrainkit_robots.transforms import Matrix
 _MIN_AXIS_LENGTH = 1e-6
 """Axis length below which MuJoCo rejects the axis."""
 
+_MIN_OTHER_AXES = 3
+"""Number of other joints, none of which turns about x, from which a missing axis looks
+forgotten."""
+
 _MAX_AXIS_ERROR = 1e-3
 """Allowed deviation of the axis length from 1, for axes with three digits such as 0.707 0.707 0."""
 
@@ -153,7 +157,8 @@ def zero_axis(robot: Facts) -> Iterator[Violation]:
 
     A zero vector has no direction. MuJoCo rejects the file; other simulators divide by its length
     and produce NaN, or do not move the joint. A joint without an <axis> element is valid: its axis
-    is x.
+    is x. It is a warning if all other joints have one and none of them is x, since it was probably
+    forgotten.
 
     Fix:
         Write the axis as three numbers in the frame of the joint, such as 0 1 0.
@@ -172,6 +177,19 @@ def zero_axis(robot: Facts) -> Iterator[Violation]:
                 message=f"axis of joint {joint.name}: got {_format(joint.axis)} or no numbers; "
                 "expected a direction such as 0 1 0",
             )
+    moving = [joint for joint in robot.model.joints if joint.moves]
+    axisless = [joint for joint in moving if joint.axis is None]
+    has_x = any(joint.axis is not None and abs(joint.direction[0]) > 0.9 for joint in moving)
+    if len(axisless) == 1 and len(moving) > _MIN_OTHER_AXES and not has_x:
+        joint = axisless[0]
+        yield Violation(
+            subject=joint.name,
+            source=joint.source,
+            severity="warning",
+            certainty="likely",
+            message=f"axis of joint {joint.name}: got none, which means 1 0 0; expected an <axis>, "
+            f"as in the other {count(len(moving) - 1, 'joint')}, none of which turns about x",
+        )
 
 
 def _axis_length(joint: Joint) -> float:
@@ -495,15 +513,17 @@ def invalid_mimic(robot: Facts) -> Iterator[Violation]:
     """A joint mimics a joint that is missing or fixed, or mimics itself.
 
     MuJoCo ignores the <mimic>, so that the joint stays limp, and rejects a joint that mimics
-    itself. The positions of joints that mimic each other in a cycle are not defined.
+    itself. The positions of joints that mimic each other in a cycle are not defined. With a
+    multiplier of 0, which is a warning, the joint never moves.
 
     Fix:
-        Name the joint that is driven.
+        Name the joint that is driven, and give the ratio of the two positions as the multiplier.
 
     Source:
         Tested with MuJoCo 4.0: "<mimic> on joint ignored".
     """
     joints = {joint.name: joint for joint in reversed(robot.model.joints)}
+    unparsed = UnparsedNumbers(robot.model)
     checked: set[str] = set()
     for joint in robot.model.joints:
         if joint.mimic is None or not joint.moves or joint.name in checked:
@@ -519,6 +539,15 @@ def invalid_mimic(robot: Facts) -> Iterator[Violation]:
             got = "the joint itself"
         elif cycle:
             got = f"{target.name}, in the cycle {' -> '.join(cycle[:10])}"
+        elif joint.mimic.multiplier == 0 and not unparsed.has(joint.name, "multiplier"):
+            yield Violation(
+                subject=joint.name,
+                source=joint.mimic.source,
+                severity="warning",
+                message=f"multiplier of the mimic of joint {joint.name}: got 0, which holds the "
+                "joint still; expected another ratio, or a fixed joint",
+            )
+            continue
         else:
             continue
         yield Violation(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.joint_roles import robot_joints
 from terrainkit_robots.analysis.legs.stance import GRAVITY
-from terrainkit_robots.description.model import Joint, Source
+from terrainkit_robots.description.model import Actuator, Joint, Source
 from terrainkit_robots.lint.rule import Violation, rule
 
 _MIN_RANGE = 0.1
@@ -20,9 +20,20 @@ _MAX_FRICTION, _MAX_LEG_FRICTION = 0.99, 0.5
 """Allowed friction as a share of the effort, of all joints and of those of legs. Harmonic drives
 need up to 20 %."""
 
-_MIN_TOP_SPEED, _MIN_LEG_SPEED = 0.4, 1.0
+_MIN_TOP_SPEED, _MIN_LEG_SPEED = 0.4, 3.0
 """Smallest plausible speed at which damping consumes the whole effort, of all joints and of those
 of legs [rad/s]."""
+
+_MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 50.0
+"""The same speed of a leg joint as a share of its velocity limit, if the limit [rad/s] is not a
+placeholder."""
+
+_MAX_UNIT_COMMAND = 5.0
+"""Largest command of a motor that may be a normalized action instead of a torque."""
+
+_MAX_SAG = 1.0
+"""Allowed error of a position actuator that holds a leg at the standing pose [rad]. Those of
+published legged robots need 0.4 at most."""
 
 _MIN_ACCELERATION = 20.0
 """Smallest plausible ratio of effort to armature [rad/s2]. Motors with a high gear ratio reach
@@ -31,6 +42,9 @@ _MIN_ACCELERATION = 20.0
 _MAX_LEG_EFFORT = 5.0
 """Plausible effort of a leg joint, over the weight of the robot times its leg length. Published
 legged robots have 0.2 to 1.5."""
+
+_MAX_GEARED_EFFORT = 2.0
+"""The same if a gear multiplies a control range in N m, which is rarely right."""
 
 _MIN_LEG_VELOCITY = 0.2
 """Smallest plausible velocity limit of a leg joint [rad/s]. A yaw joint of Romeo has 0.32."""
@@ -187,13 +201,14 @@ def excessive_damping(robot: Facts) -> Iterator[Violation]:
     """The damping of a joint holds it almost still at full effort.
 
     At the top speed, damping consumes the whole effort. A gain of a controller that was written to
-    `damping` makes the robot move as if in tar.
+    `damping`, or damping per degree, makes the robot move as if in tar.
 
     Fix:
-        Use the viscous damping of the real joint, and give gains to the controller.
+        Use the viscous damping of the real joint in N m s/rad, and give gains to the controller.
 
     Source:
-        Top speed = effort / damping. Published legged robots have 5 rad/s and more.
+        Top speed = effort / damping. The legs of published robots have 4.6 rad/s and more, and at
+        least their velocity limit if that is no placeholder.
     """
     legs = {joint.name for joint in robot.leg_joints}
     for joint in _driven_hinges(robot):
@@ -202,6 +217,9 @@ def excessive_damping(robot: Facts) -> Iterator[Violation]:
             continue
         speed = effort / joint.damping
         limit = _MIN_LEG_SPEED if joint.name in legs else _MIN_TOP_SPEED
+        velocity = joint.limit.velocity if joint.limit and joint.name in legs else None
+        if velocity is not None and 0 < velocity <= _MAX_LEG_VELOCITY:
+            limit = max(min(limit, velocity), _MIN_SPEED_SHARE * velocity)
         if speed < limit:
             yield Violation(
                 subject=joint.name,
@@ -246,14 +264,26 @@ def excessive_armature(robot: Facts) -> Iterator[Violation]:
 def zero_gear(robot: Facts) -> Iterator[Violation]:
     """The gear of an actuator is zero.
 
-    The actuator then has no effect on the joint, and MuJoCo does not warn about it.
+    The actuator then has no effect on the joint, and MuJoCo does not warn about it. The
+    mechanicalReduction of a URDF <transmission> is a gear as well. Only ROS tools read it, so a
+    ratio of zero or one that is not a number is a warning there.
 
     Fix:
-        Set the gear to 1, or to the ratio of the transmission.
+        Set the gear to 1, or to the ratio of the transmission. A negative ratio inverts the
+        direction.
 
     Source:
-        MuJoCo's XML reference, actuator: gear scales the length and the force of the actuator.
+        MuJoCo's XML reference, actuator: gear scales the length and the force of the actuator;
+        wiki.ros.org/urdf/XML/Transmission.
     """
+    for problem in robot.model.problems:
+        if problem.code == "JNT024":
+            yield Violation(
+                subject=problem.subject,
+                source=problem.source,
+                severity="warning",
+                message=problem.message,
+            )
     for actuator in robot.model.actuators:
         if actuator.joint and actuator.gear == 0:
             yield Violation(
@@ -309,26 +339,69 @@ def oversized_effort(robot: Facts) -> Iterator[Violation]:
 
     Source:
         Effort over weight times leg length: published legged robots have 0.2 to 1.5. In MJCF this
-        is only a note, since benchmark models such as the ant of Gymnasium have 57.
+        is only a note, since benchmark models such as the ant of Gymnasium have 57, unless a gear
+        multiplies a control range that is a torque of the joint already.
     """
     weight = robot.total_mass * GRAVITY
     length = max(leg.length for leg in robot.legs)
-    limit = _MAX_LEG_EFFORT * weight * length
     for joint in robot.leg_joints:
         effort = robot.effort_limit(joint)
+        geared = _geared_torque(robot, joint)
+        share = _MAX_GEARED_EFFORT if geared else _MAX_LEG_EFFORT
+        limit = share * weight * length
         if effort is None or joint.kind != "revolute" or not effort > limit > 0:
             continue
         if effort >= max(1000.0, weight * robot.body_bounds.robot_size):
             continue  # reported by JNT011
         yield Violation(
             subject=joint.name,
-            source=_limit_source(joint),
-            severity="info" if robot.model.kind == "mjcf" else None,
+            source=geared.source if geared else _limit_source(joint),
+            severity="info" if robot.model.kind == "mjcf" and not geared else None,
             certainty="likely",
             message=f"effort limit of joint {joint.name}: got {effort:g} N m, "
             f"{effort / (weight * length):.3g} times the weight times the leg length; expected at "
-            f"most {_MAX_LEG_EFFORT:g} times ({limit:.4g} N m)",
+            f"most {share:g} times ({limit:.4g} N m)"
+            + (f"; the gear of its motor is {geared.gear:g}" if geared else ""),
             measured={"effort": effort, "most": limit},
+        )
+
+
+def _geared_torque(robot: Facts, joint: Joint) -> Actuator | None:
+    """Return the motor of a joint if it has a gear although it commands a torque."""
+    for motor in robot.model.actuators:
+        if motor.joint == joint.name and motor.commands is not None and abs(motor.gear) > 1:
+            return motor if max(map(abs, motor.commands)) > _MAX_UNIT_COMMAND else None
+    return None
+
+
+@rule("JNT028", "weak-position-gain", "warning", needs=("legs",))
+def weak_position_gain(robot: Facts) -> Iterator[Violation]:
+    """The gain of a position actuator is too low for the robot to stand.
+
+    A position actuator without `kp` has a gain of 1: the joint bends by a radian for each N m, and
+    the robot collapses whatever it is commanded.
+
+    Fix:
+        Give the actuator a `kp`, or set the gain in the training framework.
+
+    Source:
+        MuJoCo's XML reference, actuator/position: the default of kp is 1. The error is the holding
+        torque at the standing pose over the gain.
+    """
+    torques = robot.stance.torques if robot.stance is not None else {}
+    for actuator in robot.model.actuators:
+        torque = abs(torques.get(actuator.joint, 0.0))
+        stiffness = actuator.stiffness
+        if not stiffness or not _MAX_SAG * stiffness < torque < math.inf:
+            continue
+        yield Violation(
+            subject=actuator.joint,
+            source=actuator.source,
+            certainty="likely",
+            message=f"gain of the position actuator of joint {actuator.joint}: got {stiffness:g} "
+            f"N m/rad, which needs an error of {torque / stiffness:.3g} rad for the "
+            f"{torque:.3g} N m of standing; expected at most {_MAX_SAG:g} rad",
+            measured={"stiffness": stiffness, "torque": torque},
         )
 
 

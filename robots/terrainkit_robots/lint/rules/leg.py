@@ -12,7 +12,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.legs.limbs import Limb
-from terrainkit_robots.analysis.legs.stance import Stance
+from terrainkit_robots.analysis.legs.stance import Stance, is_statically_stable
 from terrainkit_robots.description.fix import Fix, SetAttribute
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 from terrainkit_robots.spec.per_joint import match_joints
@@ -113,7 +113,8 @@ def leg_count(robot: Facts) -> Iterator[Violation]:
 
     A leg that is not detected usually has a joint that is misnamed or fixed, or ends at another
     height than the other legs. Limbs that equal the legs but are not counted are reported as well:
-    a robot whose z axis does not point up stands on two of its four legs.
+    a robot whose z axis does not point up stands on two of its four legs. A robot with a single
+    limb is a hopper.
 
     Fix:
         Compare the missing leg with the others, from the trunk to the foot.
@@ -133,7 +134,7 @@ def leg_count(robot: Facts) -> Iterator[Violation]:
             certainty="likely",
             measured={"legs": count, "uncounted": len(uncounted)},
         )
-    elif count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
+    elif len(robot.limbs) > 1 and count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
         yield Violation(
             subject=robot.model.title,
             source=robot.model.source,
@@ -295,7 +296,9 @@ def com_outside_support(robot: Facts) -> Iterator[Violation]:
     """The center of mass is outside of the support polygon of the standing pose.
 
     The search for a standing pose moves the feet below the center of mass as far as the joints
-    allow. If the center of mass is still outside, the robot falls before the policy acts.
+    allow. If the center of mass is still outside, the robot falls before the policy acts. Robots on
+    wheels balance by driving and are not checked. A small distance from the edge is only a note for
+    bipeds, which a policy has to balance anyway.
 
     Fix:
         Check the center of mass of the heaviest links and the limits of the hips.
@@ -307,6 +310,8 @@ def com_outside_support(robot: Facts) -> Iterator[Violation]:
     assert stance is not None
     if math.isnan(stance.margin):
         raise CannotCheckError("MuJoCo computes a mass from a mesh")
+    if any(robot.is_wheel(robot.bodies[leg.limb.chain[-1]]) for leg in robot.legs):
+        raise CannotCheckError("the feet are wheels")
     if len(stance.support) < 3:
         raise CannotCheckError("the contacts of the feet are points or a line without area")
     max_margin = margin(stance.support.mean(axis=0), stance.support)
@@ -322,7 +327,7 @@ def com_outside_support(robot: Facts) -> Iterator[Violation]:
         message="distance of the center of mass from the edge of the support polygon at the "
         f"standing pose: got {got} mm {'outside' if outside else 'inside'}; expected at least "
         f"{expected} mm inside",
-        severity="error" if outside else "warning",
+        severity="error" if outside else "warning" if is_statically_stable(robot.legs) else "info",
         certainty="likely",
         measured={"margin": round(stance.margin, 5)},
     )

@@ -68,9 +68,9 @@ def missing_mesh(robot: Facts) -> Iterator[Violation]:
     """A mesh file does not exist.
 
     MuJoCo stops at the first collision mesh that it cannot open. Isaac Sim, Genesis and PyBullet
-    may continue with a link that has no collision shape or is invisible. A missing visual mesh is
-    a warning, because it does not affect training. MuJoCo requires the visual meshes of an MJCF
-    file as well.
+    may continue with a link that has no collision shape or is invisible. A missing visual mesh of a
+    URDF is a warning, because it does not affect training. MuJoCo requires the visual meshes of an
+    MJCF file as well, so there it is an error.
 
     Fix:
         Add the file, correct its path, or set the folder of a package with --package NAME=DIR. If a
@@ -81,13 +81,14 @@ def missing_mesh(robot: Facts) -> Iterator[Violation]:
     """
     for used in meshes_by_name(robot.model, robot.meshes):
         if is_missing(used) and not _is_written_absolute(robot, used):
-            is_required = robot.model.kind == "mjcf" and not used.collisions
+            is_mjcf = robot.model.kind == "mjcf"
             yield Violation(
                 subject=used.name,
                 source=used.source,
                 message=f"{_describe(used)}: does not exist; {_search_result(robot, used)}"
-                + ("; MuJoCo cannot load the robot without it" if is_required else ""),
-                severity="error" if used.collisions else "warning",
+                + ("; MuJoCo cannot load the robot without it" if is_mjcf else ""),
+                severity="error" if used.collisions or is_mjcf else "warning",
+                measured={"collisions": len(used.collisions)},
                 fix=_relative_fix(robot, used, "unsafe") if is_in_other_folder(used.mesh) else None,
             )
 

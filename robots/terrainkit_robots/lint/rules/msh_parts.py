@@ -96,7 +96,9 @@ def odd_leg_mesh(robot: Facts) -> Iterator[Violation]:
     """One leg has another mesh than the three legs that share one.
 
     Meshes are shared by all legs, by the legs of one side, or by the front and the rear legs. If
-    three legs share one and the fourth has its own, a file name was not changed after copying.
+    three legs share one and the fourth has its own, a file name was not changed after copying. A
+    mesh that only the fourth leg uses is meant for the other leg of its side as well, so that leg
+    is reported.
 
     Fix:
         Use the same mesh as on the opposite leg of the same side, or its mirrored version.
@@ -104,35 +106,35 @@ def odd_leg_mesh(robot: Facts) -> Iterator[Violation]:
     Source:
         Of the published quadrupeds that were tested, none has such meshes.
     """
-    if len(robot.legs) != 4:
-        return
     chains = [leg.limb.chain for leg in robot.legs]
-    if len({len(chain) for chain in chains}) != 1:
+    if len(chains) != 4 or len({len(chain) for chain in chains}) != 1:
         return
+    sides = [float(leg.limb.points[0] @ robot.mirror.normal) > 0 for leg in robot.legs]
     for kind in ("visuals", "collisions"):
+        uses = Counter(_stem(g) for link in robot.links for g in getattr(link, kind))
         for bodies in zip(*chains, strict=True):
-            found = [
-                tuple(sorted(_stem(s.geometry) for s in getattr(robot.bodies[i], kind)))
-                for i in bodies
-            ]
+            shapes = [getattr(robot.bodies[i], kind) for i in bodies]
+            found = [tuple(sorted(_stem(s.geometry) for s in each)) for each in shapes]
             groups = Counter(found)
             if len(set(bodies)) < 4 or sorted(groups.values()) != [1, 3]:
                 continue
-            common, odd = (names for names, _ in groups.most_common(2))
-            if not any(common) or not any(odd) or len(common) != len(odd):
+            common, odd = (stems for stems, _ in groups.most_common(2))
+            own = [name for name in odd if name and name not in common]
+            shared = [name for name in common if name and name not in odd]
+            if not own or not shared or len(common) != len(odd):
                 continue
-            body = robot.bodies[bodies[found.index(odd)]]
-            others = [
-                robot.bodies[i].name
-                for i, names in zip(bodies, found, strict=True)
-                if names == common
-            ]
-            a = ", ".join(name for name in odd if name and name not in common)
-            b = ", ".join(name for name in common if name and name not in odd)
+            wrong = single = found.index(odd)
+            if all(uses[name] == 1 for name in own) and sides.count(sides[single]) == 2:
+                wrong = next(k for k in range(4) if k != single and sides[k] == sides[single])
+            got, expected = (own, shared) if wrong == single else (shared, own)
+            odd_one = next(s for s in shapes[wrong] if _stem(s.geometry) in got)
+            others = [robot.bodies[bodies[k]].name for k in range(4) if found[k] == common]
             yield Violation(
-                subject=body.name,
-                source=getattr(body, kind)[0].geometry.source,
+                subject=odd_one.link,
+                source=odd_one.geometry.source,
                 certainty="likely",
-                message=f"{kind[:-1]} mesh of {body.name}: got {a}, and {b} for {', '.join(others)}"
-                "; expected two legs with each, or one mesh for all",
+                message=f"{kind[:-1]} mesh of {odd_one.link}: got {', '.join(got)}; expected "
+                f"{', '.join(expected)}, or one mesh for all legs, as "
+                f"{', '.join(others)} share {', '.join(shared)} and only "
+                f"{robot.bodies[bodies[single]].name} has {', '.join(own)}",
             )

@@ -34,7 +34,8 @@ def wrong_gravity(robot: Facts) -> Iterator[Violation]:
     """Gravity is off, or does not point down.
 
     The robot floats, falls sideways or falls up. Gravity is often switched off to look at a model,
-    and the file of a simulator in which y points up has gravity along y.
+    and the file of a simulator in which y points up has gravity along y. It is a warning if the
+    trunk has no free joint, since such files are parts of a scene with options of its own.
 
     Fix:
         Remove `gravity` from <option> and `gravity` from its <flag>; the default is 0 0 -9.81.
@@ -51,12 +52,13 @@ def wrong_gravity(robot: Facts) -> Iterator[Violation]:
     if error <= _MAX_GRAVITY_ERROR:
         return
     points_down = x == y == 0 and z < 0
+    is_part = not any(joint.kind == "floating" for joint in robot.model.joints)
     if points_down and abs(z + 100 * GRAVITY) < 1:
         return  # the unit of length is the centimeter, as for insects
     yield Violation(
         subject=robot.model.title,
         source=options.source,
-        severity="warning" if points_down or robot.model.floating is False else None,
+        severity="warning" if points_down or is_part else None,
         message=f"gravity{', which is disabled' if off else ''}: got {x:g} {y:g} {z:g} m/s2; "
         f"expected 0 0 {-GRAVITY:g} m/s2",
         measured={"x": x, "y": y, "z": z},

@@ -2,6 +2,8 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.text import truncate
@@ -10,7 +12,7 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.simulator_conventions.armature import (
     GENESIS_ARMATURE,
-    inertias_without_armature,
+    inertia_without_armature,
 )
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     KEEP_LINK_OPTIONS,
@@ -55,6 +57,9 @@ _EXPLAINED_BY: tuple[tuple[str, str], ...] = (
     (r"Error opening file|already included", "MSH001 MSH002 MSH003 MSH004 XML012"),
 )
 """Patterns of MuJoCo error messages, and the rules that may explain them."""
+
+_MAX_SIBLINGS, _MAX_BYTES = 200, 2**20
+"""Number and size of the files in a folder that are searched for an <include>."""
 
 _MESH_ERROR = r"Error opening file|decoder|mesh"
 """Pattern of MuJoCo error messages about mesh files. More errors may follow without them."""
@@ -104,8 +109,8 @@ def _format_order(order: SimulatorOrder, file: Sequence[str]) -> str:
     return f"{order.simulator}{unverified}: {indices}"
 
 
-def _join(words: Sequence[str]) -> str:
-    *first, last = words
+def _join(items: Sequence[str]) -> str:
+    *first, last = items
     return f"{', '.join(first)} and {last}" if first else last
 
 
@@ -160,7 +165,7 @@ def genesis_armature(robot: Facts) -> Iterator[Violation]:
         `default_armature` in genesis-world 1.4.5 is 0.1 unless MuJoCo compatibility is enabled. It
         is compared with the inertia about the joint axis of all links below, at joint positions 0.
     """
-    moved = inertias_without_armature(robot.bodies, robot.actuated)
+    moved = inertia_without_armature(robot.bodies, robot.actuated)
     slowed = [each for each in moved if each.inertia < GENESIS_ARMATURE]
     if not slowed:
         return
@@ -183,8 +188,9 @@ def mujoco_load_failure(robot: Facts) -> Iterator[Violation]:
     """MuJoCo cannot load the unmodified file.
 
     MuJoCo stops at the first error, so there may be more. mjlab and Genesis load robots with MuJoCo
-    as well. This is only a note if an error of another rule has the same cause, or if MuJoCo does
-    not find a mesh because its path starts with `package://`.
+    as well. This is only a note if an error of another rule has the same cause, if MuJoCo does not
+    find a mesh because its path starts with `package://`, or if the file is a part: a file beside
+    it includes it and may define the element that MuJoCo does not find.
 
     Fix:
         Correct the reported element; the rule in the help explains how. If MuJoCo does not find an
@@ -220,9 +226,19 @@ def mujoco_load_failure(robot: Facts) -> Iterator[Violation]:
         if refusal is not None:
             code, severity = _explaining_rule(robot, refusal.message)
             is_explained = severity == "error" or code == "MSH003"
+            if "not found in" in refusal.message and _is_included(robot.model.file):
+                is_explained = True
             yield _load_failure(
                 robot, "MuJoCo", refusal, code, severity="info" if is_explained else "error"
             )
+
+
+def _is_included(file: Path) -> bool:
+    """Return whether an MJCF file in the same folder includes a file."""
+    include = re.compile(rb"<include\s[^>]*file\s*=\s*[\"']" + re.escape(file.name).encode())
+    others = (path for path in islice(file.parent.glob("*.xml"), _MAX_SIBLINGS) if path != file)
+    small = (path for path in others if path.is_file() and path.stat().st_size < _MAX_BYTES)
+    return any(include.search(path.read_bytes()) for path in small)
 
 
 @rule("SIM005", "yourdfpy-load-failure", "info", needs=("simulation",))
@@ -266,6 +282,9 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
     Returns:
         Code and severity; an empty code if no rule with findings explains the error.
     """
+    for problem in robot.model.problems:
+        if message in problem.message:
+            return problem.code, "error"
     order: tuple[Severity, ...] = ("info", "warning", "error")
     best: tuple[str, Severity] = "", "info"
     codes = next((each for pattern, each in _EXPLAINED_BY if re.search(pattern, message)), "")

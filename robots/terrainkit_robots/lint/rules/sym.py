@@ -21,11 +21,10 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     Misalignment,
     find_flipped_joints,
     find_flipped_pairs,
-    find_misalignments,
     has_flipped_axes,
     limits_match,
 )
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Check, Measured, Violation, rule
 from terrainkit_robots.lint.rules.inr import (
@@ -77,7 +76,7 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     other_checks = _OtherChecks(robot, implausible_density, mass_ratio, massless_body)
-    for pair in _mirrored(robot):
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         difference = _relative_difference(left.body.mass, right.body.mass)
         if not _has_mass(left, right) or difference <= _MAX_MASS_DIFFERENCE:
@@ -95,12 +94,6 @@ def mass_asymmetry(robot: Facts) -> Iterator[Violation]:
             {"mass": odd.body.mass, "other": other.body.mass},
             mass_source(odd.body.main_link),
         )
-
-
-def _mirrored(robot: Facts) -> list[MirrorPair]:
-    """Return the pairs of mirrored joints without those of copied assemblies."""
-    copied = {pair.left.body.index for pair in robot.copied_pairs}
-    return [pair for pair in robot.mirror_pairs if pair.left.body.index not in copied]
 
 
 def _has_mass(left: MirrorSide, right: MirrorSide) -> bool:
@@ -143,9 +136,9 @@ def com_asymmetry(robot: Facts) -> Iterator[Violation]:
         plus 10 % of the radius of gyration.
     """
     _check_joint_types(robot)
-    _, displaced = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
+    _, displaced = robot.misalignments
     other_checks = _OtherChecks(robot, com_outside_body)
-    for pair in _mirrored(robot):
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         if pair.indices & displaced or not _has_mass(left, right):
             continue
@@ -248,7 +241,7 @@ def inertia_asymmetry(robot: Facts) -> Iterator[Violation]:
     """
     _check_joint_types(robot)
     other_checks = _OtherChecks(robot, *_INERTIA_RULES)
-    for pair in _mirrored(robot):
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         if not _has_mass(left, right) or not _has_same_parts(robot, left, right):
             continue
@@ -316,7 +309,7 @@ def limit_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     other_checks = _OtherChecks(robot, wide_range)
-    for pair in _mirrored(robot):
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None or limits_match(a, b, pair.sign):
@@ -367,7 +360,7 @@ def effort_asymmetry(robot: Facts) -> Iterator[Violation]:
         The limits of tested robots without defects agree exactly.
     """
     other_checks = _OtherChecks(robot, placeholder_limit)
-    for pair in _mirrored(robot):
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         differences: dict[str, tuple[float, float, float, _LimitOf]] = {}
         for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
@@ -430,7 +423,7 @@ def joint_origin_asymmetry(robot: Facts) -> Iterator[Violation]:
         The joint origins of tested robots without defects agree to 0.1 mm.
     """
     _check_joint_types(robot)
-    errors, _ = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
+    errors, _ = robot.misalignments
     for error in errors:
         if not error.is_axis:
             yield _report_pair(robot, error)
@@ -451,7 +444,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
         Tested robots have either the same axis on all legs, or mirrored axes on all legs.
     """
     _check_joint_types(robot)
-    errors, _ = find_misalignments(robot.mirror, _mirrored(robot), robot.leg_bodies)
+    errors, _ = robot.misalignments
     for error in errors:
         if error.is_axis:
             yield _report_pair(robot, error)
@@ -476,7 +469,7 @@ def joint_axis_asymmetry(robot: Facts) -> Iterator[Violation]:
 
 def _opposite_axes(robot: Facts, reported: set[str]) -> Iterator[Violation]:
     """Yield joints whose axis is opposite to that of the mirror image, but should not be."""
-    for pair in _mirrored(robot):
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
         if pair.sign == 0 or a is None or b is None:
@@ -494,8 +487,9 @@ def _opposite_axes(robot: Facts, reported: set[str]) -> Iterator[Violation]:
                 "expected the negated axis or the negated limits",
                 {"lower": b[0], "upper": b[1], "other_lower": a[0], "other_upper": a[1]},
             )
-    opposed_pairs = find_flipped_pairs(robot.legs, robot.mirror, _mirrored(robot), robot.leg_bodies)
-    for pair, others in opposed_pairs:
+    for pair, others in find_flipped_pairs(
+        robot.legs, robot.mirror, robot.uncopied_pairs, robot.leg_bodies
+    ):
         left, right = pair.left, pair.right
         if right.joint.name not in reported:
             yield _report_axis(

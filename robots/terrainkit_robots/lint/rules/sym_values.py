@@ -10,10 +10,9 @@ from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.link_source import inertia_source
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.asymmetry import find_misalignments
 from terrainkit_robots.analysis.symmetry.mirror import swap_sides
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
-from terrainkit_robots.description.model import Joint
+from terrainkit_robots.description.model import Geometry, Joint
 from terrainkit_robots.lint.rule import Violation, rule
 from terrainkit_robots.transforms import Matrix
 
@@ -32,6 +31,9 @@ _MAX_PRODUCT_ERROR = 0.1
 
 _MAX_MOMENT_ERROR = 0.05
 """Difference of principal moments above which SYM003 reports the pair, as the same share."""
+
+_MAX_SIZE_RATIO = 1.5
+"""Allowed ratio of the sizes of two mirrored primitives."""
 
 _MAX_SHAPE_ERROR, _SHAPE_MARGIN = 0.3, 0.01
 """Allowed distance between two mirrored bounding boxes: a share of the diagonal plus a constant
@@ -146,8 +148,8 @@ def product_asymmetry(robot: Facts) -> Iterator[Violation]:
         both sides share without mirroring them are not checked.
     """
     # The frames of bodies behind a misaligned joint are turned; SYM006 reports the joint.
-    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for pair in robot.mirror_pairs:
+    _, displaced = robot.misalignments
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         if displaced & pair.indices:
             continue
@@ -200,8 +202,8 @@ def _is_copy(a: Body, b: Body) -> bool:
 def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
     """A joint and its mirror image do not follow mirrored joints in the same way.
 
-    Only one of them is coupled, or it follows a joint of the other side, or its multiplier has a
-    wrong sign: names and signs were not changed after copying one side.
+    Only one of them is coupled, or it follows a joint of the other side or of another leg, or its
+    multiplier has a wrong sign: names and signs were not changed after copying one side.
 
     Fix:
         Give both joints a <mimic> of their own side. The multipliers are equal, or opposite if the
@@ -219,10 +221,16 @@ def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
     for pair in robot.mirror_pairs:
         left, right = pair.left.joint, pair.right.joint
         a, b = left.mimic, right.mimic
-        if (a is None and b is None) or _is_gripper(left, right):
+        in_legs = pair.indices <= robot.leg_bodies
+        if (a is None and b is None) or (_is_gripper(left, right) and not in_legs):
             continue
         odd, problem = right, ""
-        if a is None or b is None:
+        crossed = next(
+            (joint for joint in (left, right) if in_legs and _crosses(robot, joint)), None
+        )
+        if crossed is not None and crossed.mimic is not None:
+            odd, problem = crossed, f"got {crossed.mimic.joint}; expected a joint of the same leg"
+        elif a is None or b is None:
             odd, other = (left, right) if b is None else (right, left)
             assert odd.mimic is not None
             problem = f"got {odd.mimic.joint}, and no mimic for its mirror image {other.name}"
@@ -247,23 +255,36 @@ def mimic_asymmetry(robot: Facts) -> Iterator[Violation]:
             )
 
 
-def _is_gripper(left: Joint, right: Joint) -> bool:
-    """Return whether two joints are fingers of one gripper.
+def _crosses(robot: Facts, joint: Joint) -> bool:
+    """Return whether a joint of a leg follows a joint of another leg."""
+    target = "" if joint.mimic is None else joint.mimic.joint
+    chains = [
+        {body.joint.name for i in leg.limb.chain if (body := robot.bodies[i]).joint is not None}
+        for leg in robot.legs
+    ]
+    own = [chain for chain in chains if joint.name in chain]
+    return any(target in chain for chain in chains) and not any(target in each for each in own)
 
-    One follows the other, or their names have two sides, such as l_gripper_r_finger_joint.
+
+def _is_gripper(left: Joint, right: Joint) -> bool:
+    """Return whether two joints are fingers of one gripper, or of two equal ones.
+
+    One follows the other, or a name has two sides, such as l_gripper_r_finger_joint.
     """
     targets = {joint.mimic.joint for joint in (left, right) if joint.mimic is not None}
-    words = [word.lower() for word in re.findall(r"[a-zA-Z][a-z]*", left.name)]
-    sides = [word for word in words if swap_sides(word) != word]
-    return not targets.isdisjoint({left.name, right.name}) or len(sides) > 1
+    return not targets.isdisjoint({left.name, right.name}) or any(
+        sum(swap_sides(word) != word for word in re.findall(r"[a-zA-Z][a-z]*", joint.name)) > 1
+        for joint in (left, right)
+    )
 
 
-@rule("SYM013", "collision-asymmetry", "warning", needs=("legs",))
+@rule("SYM013", "collision-asymmetry", "warning")
 def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
-    """The collision shapes of a leg are not where those of its mirror image are.
+    """The collision shapes of a body are not where those of its mirror image are, or as large.
 
     A shape is turned, shifted or scaled on one side only, or has the mesh of another part. The legs
-    collide at different positions, and one foot may reach deeper than the other.
+    collide at different positions, and one foot may reach deeper than the other. The sizes of
+    primitives are compared on all pairs, arms included.
 
     Fix:
         Mirror the <origin> and the size of the collision shapes.
@@ -272,9 +293,13 @@ def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
         Bounding boxes at position 0. Those of published robots agree to 30 % of their diagonal.
     """
     # Bodies behind a misaligned joint are elsewhere; SYM006 reports the joint.
-    _, displaced = find_misalignments(robot.mirror, robot.mirror_pairs, robot.leg_bodies)
-    for pair in robot.mirror_pairs:
+    _, displaced = robot.misalignments
+    for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
+        resized = _resized(robot, pair)
+        if resized is not None:
+            yield resized
+            continue
         if displaced & pair.indices or not pair.indices <= robot.leg_bodies:
             continue
         a, b = _box(robot, left), _box(robot, right)
@@ -304,6 +329,46 @@ def collision_asymmetry(robot: Facts) -> Iterator[Violation]:
             f"most {1000 * limit:.3g} mm",
             measured={"difference": error, "mirror_image": other.body.name},
         )
+
+
+def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
+    """Return the violation of a pair whose primitives have different sizes, or None."""
+    shapes = _primitives(pair.left.body), _primitives(pair.right.body)
+    if [each.shape for each in shapes[0]] != [each.shape for each in shapes[1]]:
+        return None
+    for left, right in zip(*shapes, strict=True):
+        sizes = np.array(left.size), np.array(right.size)
+        ratio = float(max((sizes[0] / sizes[1]).max(), (sizes[1] / sizes[0]).max()))
+        if ratio <= _MAX_SIZE_RATIO:
+            continue
+
+        def size(body: Body, index: int = shapes[0].index(left)) -> Matrix | None:
+            siblings = _primitives(body)
+            return np.array(siblings[index].size) if len(siblings) == len(shapes[0]) else None
+
+        odd, other = robot.outlier_first(pair.left, pair.right, size)
+        own, mirrored = (left, right) if odd is pair.left else (right, left)
+        return Violation(
+            subject=odd.body.name,
+            source=own.size_source or own.source,
+            certainty="likely",
+            message=f"size of the collision {own.shape} of {odd.body.name}: got "
+            f"{_format_size(own)} m, and {_format_size(mirrored)} m for its mirror image "
+            f"{other.body.name} (radii and half lengths); expected at most a factor of "
+            f"{_MAX_SIZE_RATIO:g}",
+            measured={"ratio": ratio, "mirror_image": other.body.name},
+        )
+    return None
+
+
+def _primitives(body: Body) -> list[Geometry]:
+    """Return the collision primitives of a body, by shape and size."""
+    found = [s.geometry for s in body.collisions if s.geometry.size and min(s.geometry.size) > 0]
+    return sorted(found, key=lambda each: (each.shape, each.size))
+
+
+def _format_size(geometry: Geometry) -> str:
+    return " ".join(f"{value:g}" for value in geometry.size)
 
 
 def _box(robot: Facts, side: MirrorSide) -> Matrix | None:

@@ -366,3 +366,28 @@ def dummy_root(robot: Facts) -> Iterator[Violation]:
         + (", which welds it to the world; expected a floating joint" if is_welded else ""),
         severity="warning" if is_welded else None,
     )
+
+
+@rule("TRE010", "invalid-reference", "warning")
+def invalid_reference(robot: Facts) -> Iterator[Violation]:
+    """A tag for another tool, or the SRDF, names a link or joint that does not exist.
+
+    The names in <gazebo>, <transmission>, <sensor>, <ros2_control> and the SRDF were not changed
+    when a link or joint was renamed, removed or copied. A sensor, the friction of a foot or a motor
+    is then missing in that tool, or its controllers do not start. Two simple transmissions of one
+    joint are reported as well: another joint lacks its own.
+
+    Fix:
+        Correct the name, or remove the element.
+
+    Source:
+        wiki.ros.org/urdf/XML: gazebo, transmission and sensor; wiki.ros.org/srdf. An SRDF belongs
+        to the URDF of the same file name, beside it or in srdf/ or config/ of the package.
+    """
+    for problem in robot.model.problems:
+        if problem.code == "TRE010":
+            yield Violation(
+                subject=problem.subject or problem.source.file.name,
+                source=problem.source,
+                message=problem.message,
+            )

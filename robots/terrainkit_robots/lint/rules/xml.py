@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix, RemoveAttribute, RemoveElement, SetAttribute
 from terrainkit_robots.description.model import Problem
-from terrainkit_robots.description.xml.document import leading_bytes_fix
+from terrainkit_robots.description.xml.document import leading_bytes_fix, version_fix
 from terrainkit_robots.lint.rule import Severity, Violation, rule
 
 
@@ -25,22 +25,25 @@ def _violation(
     )
 
 
-@rule("XML001", "malformed-xml", "error")
+@rule("XML001", "malformed-xml", "error", fixes="safe")
 def malformed_xml(robot: Facts) -> Iterator[Violation]:
     """The file is not well-formed XML.
 
     Readers handle malformed XML differently: some stop, others silently drop every element after
     the error. Elements that can be recovered are still checked, so that one missing bracket does
-    not hide other problems.
+    not hide other problems. A version other than 1.0 in <?xml?> is a warning, since MuJoCo and
+    urdfdom do not read it.
 
     Fix:
-        Correct the XML at the reported line. An editor with XML support highlights it.
+        Correct the XML at the reported line. An editor with XML support highlights it. The safe fix
+        sets the version.
 
     Source:
         XML 1.0, section 2.1. The message is from libxml2.
     """
     for problem in _problems(robot, "XML001"):
-        yield _violation(robot, problem)
+        fix = version_fix(problem)
+        yield _violation(robot, problem, fix, "warning" if fix is not None else None)
 
 
 @rule("XML002", "unknown-root", "error")
@@ -181,17 +184,18 @@ def duplicate_material(robot: Facts) -> Iterator[Violation]:
 
 @rule("XML009", "byte-order-mark", "error", fixes="safe")
 def byte_order_mark(robot: Facts) -> Iterator[Violation]:
-    """There are invisible characters before the XML.
+    """There are invisible characters before the XML, or the file is UTF-16.
 
     Some editors write a byte order mark or a blank line before <?xml ...?>. Strict readers reject
-    the file, with an error message that points at nothing visible.
+    the file, with an error message that points at nothing visible. MuJoCo and urdfdom cannot read
+    UTF-16 and UTF-32 at all.
 
     Fix:
         Save the file as UTF-8 without a byte order mark, starting with <?xml ...?> or <robot>.
 
     Source:
         XML 1.0, section 2.8: the declaration must come first. lxml and other readers reject strings
-        that start with a byte order mark.
+        that start with a byte order mark. MuJoCo 4.0: `XML_ERROR_PARSING`.
     """
     for problem in _problems(robot, "XML009"):
         yield _violation(robot, problem, leading_bytes_fix(problem))
@@ -247,21 +251,29 @@ def invalid_include(robot: Facts) -> Iterator[Violation]:
         yield _violation(robot, problem)
 
 
-@rule("XML013", "missing-attribute", "error")
+@rule("XML013", "missing-attribute", "error", fixes="safe")
 def missing_attribute(robot: Facts) -> Iterator[Violation]:
     """A required attribute or element is missing.
 
-    Examples are a link without a name, a mesh without a file and a box without a size. Readers
-    reject them, or use an empty name and a size of zero.
+    Examples are a link without a name, a mesh without a file, a box without a size and an inertia
+    without its products. Readers reject them, or use an empty name and zeros.
 
     Fix:
-        Add the attribute or element that the message names.
+        Add the attribute or element that the message names. Products of inertia are 0 for a body
+        that is symmetric about the axes of its <inertial>.
 
     Source:
-        wiki.ros.org/urdf/XML: the attributes marked as required.
+        wiki.ros.org/urdf/XML: the attributes marked as required; MuJoCo 4.0: `required attribute
+        missing: 'ixy'`.
     """
     for problem in _problems(robot, "XML013"):
-        yield _violation(robot, problem)
+        products = problem.details.get("attributes", "").split()
+        fix = None
+        if products and problem.source.element is not None:
+            edits = tuple(SetAttribute(source=problem.source, name=n, value="0") for n in products)
+            description = f"Set {', '.join(products)} to 0, which lenient readers assume."
+            fix = Fix(safety="safe", description=description, edits=edits)
+        yield _violation(robot, problem, fix)
 
 
 @rule("XML014", "unsupported-quaternion", "error", fixes="unsafe")
@@ -291,7 +303,7 @@ def unsupported_quaternion(robot: Facts) -> Iterator[Violation]:
         yield _violation(robot, problem, fix)
 
 
-@rule("XML015", "repeated-element", "error")
+@rule("XML015", "repeated-element", "error", fixes="safe")
 def repeated_element(robot: Facts) -> Iterator[Violation]:
     """An element that may occur once occurs twice.
 
@@ -299,12 +311,35 @@ def repeated_element(robot: Facts) -> Iterator[Violation]:
     was merged. MuJoCo rejects most of them; other readers silently take the first or the last.
 
     Fix:
-        Remove the one that is wrong.
+        Remove the one that is wrong. The safe fix removes an exact copy.
 
     Source:
         wiki.ros.org/urdf/XML; MuJoCo 4.0: "repeated element".
     """
     for problem in _problems(robot, "XML015"):
+        fix = None
+        if problem.details.get("copy") and problem.source.element is not None:
+            edit = RemoveElement(source=problem.source)
+            fix = Fix(safety="safe", description="Remove the copy.", edits=(edit,))
+        yield _violation(robot, problem, fix)
+
+
+@rule("XML016", "undefined-material", "warning")
+def undefined_material(robot: Facts) -> Iterator[Violation]:
+    """A visual names a material that is not defined.
+
+    A <material> with a name only refers to one with a <color> or a <texture>. urdfdom rejects the
+    whole file without one, and so do the ROS tools that use it. Others draw the link in a default
+    color.
+
+    Fix:
+        Give the material a <color>, or correct its name. A <material> of the robot element is
+        valid for all links.
+
+    Source:
+        urdfdom: `link '...' material '...' undefined`; wiki.ros.org/urdf/XML/link.
+    """
+    for problem in _problems(robot, "XML016"):
         yield _violation(robot, problem)
 
 

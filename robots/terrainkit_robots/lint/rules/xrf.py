@@ -13,7 +13,7 @@ from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Mimic, Source
-from terrainkit_robots.lint.compare.body_masses import (
+from terrainkit_robots.lint.compare.body_mass import (
     body_difference,
     dropped_mass,
     has_valid_inertial,

@@ -26,6 +26,7 @@ def quadruped(bundled, **changes):
         ({}, ""),
         ({"thigh": 2.6, "calf": -2.6}, "base lies on the ground"),
         ({"FL_thigh": 1.2, "FL_calf": -2.5}, "FL_foot is 0.1"),
+        ({"thigh": -0.5, "calf": -1.0}, "the center of mass is 0.09"),
     ],
 )
 def test_keyframe_defect_names_cause(bundled, changes, defect):

@@ -277,6 +277,14 @@ def test_has_leg_names_takes_majority():
     assert chain("shoulder", "foot").has_leg_names
 
 
+def test_score_of_fingers_is_lower():
+    fingers = [limb(name, root) for name, root in FOUR]
+    trunk = link("trunk", mass=10)
+    assert set(scores(facts(*fingers, trunk=trunk)).values()) == {1.5}
+    hand = '<joint name="j" type="fixed"><parent link="trunk"/><child link="palm"/></joint>'
+    assert set(scores(facts(*fingers, link("palm"), hand, trunk=trunk)).values()) == {0.5}
+
+
 # Limbs that share joints
 
 

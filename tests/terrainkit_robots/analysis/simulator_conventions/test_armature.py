@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.simulator_conventions.armature import inertias_without_armature
+from terrainkit_robots.analysis.simulator_conventions.armature import inertia_without_armature
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 
@@ -20,7 +20,7 @@ def test_inertias_of_point_mass_on_rod(mjcf):
     )
     moved = {
         each.joint.name: each.inertia
-        for each in inertias_without_armature(facts.bodies, facts.actuated)
+        for each in inertia_without_armature(facts.bodies, facts.actuated)
     }
     assert moved == pytest.approx({"j1": 0.501, "j2": 0.001}, rel=1e-6)
 
@@ -31,7 +31,7 @@ def test_inertias_exclude_joints_with_armature(mjcf):
         f'<body name="b"><freejoint/>{geom}<body name="a">{geom}<joint name="j" armature="0.01"/>'
         f'</body><body name="s">{geom}<joint name="slide" type="slide"/></body></body>'
     )
-    (moved,) = inertias_without_armature(facts.bodies, facts.actuated)
+    (moved,) = inertia_without_armature(facts.bodies, facts.actuated)
     assert (moved.joint.name, moved.inertia) == ("slide", pytest.approx(1.0))
 
 
@@ -46,7 +46,7 @@ def test_inertias_match_mass_matrix_of_mujoco(name):
     mujoco.mj_fullM(model, data, matrix)
     diagonal = {model.joint(i).name: matrix[model.jnt_dofadr[i]] for i in range(model.njnt)}
     facts = Facts(load_robot(path))
-    moved = inertias_without_armature(facts.bodies, facts.actuated)
+    moved = inertia_without_armature(facts.bodies, facts.actuated)
     assert moved
     for each in moved:
         at = model.joint(each.joint.name).dofadr[0]

@@ -11,7 +11,7 @@ BOX = '<geometry><box size="1 1 1"/></geometry>'
 def visuals(inner):
     text = f'<robot name="r">{inner}</robot>'
     model = load_robot(FILE, contents={FILE: text.encode()})
-    assert model.problems == ()
+    assert {problem.code for problem in model.problems} <= {"XML016"}  # undefined materials
     return [visual.color for link in model.links for visual in link.visuals]
 
 

@@ -300,7 +300,7 @@ def test_geometry_in_document_order():
 def test_two_materials_are_reported():
     material = '<material name="m"/>'
     each = f'<visual><geometry><sphere radius="1"/></geometry>{material}{material}</visual>'
-    assert [problem.code for problem in link(each)[1]] == ["XML008"]
+    assert [problem.code for problem in link(each)[1]] == ["XML016", "XML008"]
 
 
 # What is missing or wrong

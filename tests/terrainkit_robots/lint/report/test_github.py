@@ -1,8 +1,8 @@
-from terrainkit_robots.lint.report.github import format_reports
+from terrainkit_robots.lint.report.github import to_text
 
 
 def test_each_finding_is_a_command(report):
-    assert format_reports([report]).splitlines() == [
+    assert to_text([report]).splitlines() == [
         "::error file=robot.urdf,line=12,title=INR002 negative-mass::"
         "the mass is -1 kg; expected > 0%0AWeigh it.",
         "::warning file=robot.urdf,line=40,title=JNT007 degrees::"
@@ -15,7 +15,7 @@ def test_each_finding_is_a_command(report):
 
 
 def test_command_escapes_names(nasty):
-    (line,) = format_reports([nasty]).split("\n")[:-1]
+    (line,) = to_text([nasty]).split("\n")[:-1]
     assert line.count("\r") == 0
     head, _, message = line.removeprefix("::error ").partition("::")
     properties = dict(part.split("=", 1) for part in head.split(","))
@@ -27,4 +27,4 @@ def test_command_escapes_names(nasty):
 
 
 def test_no_reports_give_empty_text():
-    assert format_reports([]) == ""
+    assert to_text([]) == ""

@@ -1,11 +1,11 @@
 import json
 
 import terrainkit
-from terrainkit_robots.lint.report.json_report import format_reports
+from terrainkit_robots.lint.report.json_report import to_text
 
 
 def test_one_robot_is_one_document(report):
-    document = json.loads(format_reports([report]))
+    document = json.loads(to_text([report]))
     assert document["schema_version"] == 1
     assert document["tool"] == {"name": "terrainkit", "version": terrainkit.__version__}
     assert (document["file"], document["kind"], document["verdict"]) == (
@@ -32,16 +32,16 @@ def test_one_robot_is_one_document(report):
 
 
 def test_several_robots_are_json_lines(report, nasty):
-    lines = format_reports([report, nasty, report]).splitlines()
+    lines = to_text([report, nasty, report]).splitlines()
     assert [json.loads(line)["verdict"] for line in lines] == ["fail"] * 3
 
 
 def test_no_reports_give_empty_text():
-    assert format_reports([]) == ""
+    assert to_text([]) == ""
 
 
 def test_infinite_numbers_are_null(nasty):
-    text = format_reports([nasty])
+    text = to_text([nasty])
     text.encode("ascii")
     document = json.loads(text, parse_constant=int)
     json.dumps(document, ensure_ascii=False).encode()  # no halves of characters
@@ -52,6 +52,6 @@ def test_infinite_numbers_are_null(nasty):
 
 
 def test_fixed_findings_are_listed(fixed_report):
-    document = json.loads(format_reports([fixed_report]))
+    document = json.loads(to_text([fixed_report]))
     assert [f["code"] for f in document["fixed"]] == ["XML003"]
     assert [(f["code"], f["reason"]) for f in document["unfixed"]] == [("JNT009", "no space")]

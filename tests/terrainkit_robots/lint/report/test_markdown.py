@@ -1,6 +1,6 @@
 import re
 
-from terrainkit_robots.lint.report.markdown import format_reports
+from terrainkit_robots.lint.report.markdown import to_text
 
 
 def rows(text):
@@ -10,7 +10,7 @@ def rows(text):
 
 
 def test_each_finding_is_a_row(report):
-    text = format_reports([report])
+    text = to_text([report])
     assert text.startswith(
         "## robot.urdf\n\n**1 error, 2 warnings, 1 note** (fixable: 1 with --fix)"
     )
@@ -26,7 +26,7 @@ def test_each_finding_is_a_row(report):
 
 
 def test_names_are_escaped(nasty):
-    text = format_reports([nasty])
+    text = to_text([nasty])
     (row,) = rows(text)
     assert len(row) == 5
     for wrong in ("<b>", "@me", "\x1b", "\r", "\u202e"):
@@ -36,10 +36,10 @@ def test_names_are_escaped(nasty):
 
 
 def test_fixed_and_unfixed_findings_are_listed(fixed_report):
-    text = format_reports([fixed_report])
+    text = to_text([fixed_report])
     assert "Fixed:\n\n- XML003: unnamed-robot: the mass is -1 kg; expected &gt; 0\n" in text
     assert "Not fixed:\n\n- JNT009: calf: no space\n" in text
 
 
 def test_each_robot_is_a_section(report):
-    assert format_reports([report, report]).count("\n## robot.urdf\n") == 1
+    assert to_text([report, report]).count("\n## robot.urdf\n") == 1

@@ -6,14 +6,14 @@ from urllib.parse import unquote_to_bytes
 import jsonschema
 import pytest
 
-from terrainkit_robots.lint.report.sarif import format_reports, uri
+from terrainkit_robots.lint.report.sarif import to_text, uri
 from terrainkit_robots.lint.rule import rules
 
 SCHEMA = json.loads((Path(__file__).parent / "sarif-2.1.0.schema.json").read_text())
 
 
 def document(*reports):
-    made = json.loads(format_reports(reports), parse_constant=int)
+    made = json.loads(to_text(reports), parse_constant=int)
     jsonschema.validate(made, SCHEMA)
     return made
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.lint.compare.body_masses import (
+from terrainkit_robots.lint.compare.body_mass import (
     body_difference,
     dropped_mass,
     has_valid_inertial,

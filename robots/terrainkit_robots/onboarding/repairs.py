@@ -1,4 +1,4 @@
-"""Repairs of inertias that have no noticeable effect, which onboarding applies by itself."""
+"""Repairs that onboarding applies by itself, since it works on a copy and reports them."""
 
 from dataclasses import replace
 
@@ -12,17 +12,20 @@ _MAX_CHANGE = 0.01
 are less accurate than this."""
 
 
-def with_negligible_repairs(report: Report) -> Report:
-    """Return a report in which the fixes of negligible inertias are safe.
+def with_onboarding_repairs(report: Report) -> Report:
+    """Return a report in which the fixes of negligible inertias and of mesh paths are safe.
 
     A sensor frame with a placeholder inertia prevents MuJoCo from loading a robot, but has no
-    effect on the motion of the body that it is fixed to.
+    effect on the motion of the body that it is fixed to. A missing mesh is replaced by the file of
+    the same name in another folder of the robot.
     """
     findings = tuple(_with_safe_fix(report, finding) for finding in report.findings)
     return replace(report, findings=findings)
 
 
 def _with_safe_fix(report: Report, finding: Finding) -> Finding:
+    if finding.code == "MSH001" and finding.fix is not None:
+        return replace(finding, fix=replace(finding.fix, safety="safe"))
     body = report.facts.body_of.get(finding.subject)
     if finding.code not in _RULES or finding.fix is None or body is None:
         return finding

@@ -1,0 +1,123 @@
+"""Write the map as an SDF model for Gazebo, with an STL file for the ground beside it."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from terrainkit.export.mesh_file import write_stl
+from terrainkit.mesh.node_grid import BYTES_PER_NODE
+from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
+from terrainkit.solids import Solids, rotation_matrices
+
+if TYPE_CHECKING:
+    from terrainkit.terrain_map import TerrainMap
+
+SUFFIXES = (".sdf",)
+BYTES_PER_SAMPLE = BYTES_PER_NODE
+
+
+def export(terrain_map: "TerrainMap", path: Path) -> None:
+    """Write a static model. Boxes and cylinders are shapes; hulls of one friction are one mesh.
+
+    Args:
+        terrain_map: The map.
+        path: Target. The ground has the same name with the suffix .stl; the hulls of the k-th
+            friction have _hulls_k.stl. Keep them in one folder.
+
+    Raises:
+        ExportError: if the ground has several friction coefficients.
+    """
+    terrain_map.require_one_ground_friction("a mesh in SDF")
+    contact = terrain_map.config.contact
+    root = ET.Element("sdf", version="1.9")
+    model = ET.SubElement(root, "model", name="terrain")
+    ET.SubElement(model, "static").text = "true"
+    link = ET.SubElement(model, "link", name="terrain")
+    ground = path.with_suffix(".stl")
+    write_stl(terrain_map.ground_mesh(), ground)
+    _add_geometry(link, "ground", _mesh_geometry(ground), contact, contact["static_friction"])
+    _add_shapes(link, terrain_map.solids, contact)
+    _add_hulls(link, terrain_map.solids, contact, path)
+    ET.indent(root)
+    ET.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+
+
+def _mesh_geometry(path: Path) -> ET.Element:
+    geometry = ET.Element("geometry")
+    ET.SubElement(ET.SubElement(geometry, "mesh"), "uri").text = path.name
+    return geometry
+
+
+def _add_geometry(
+    link: ET.Element,
+    name: str,
+    geometry: ET.Element,
+    contact: dict[str, float],
+    friction: float,
+    *,
+    pose: str = "",
+    kinds: tuple[str, ...] = ("collision", "visual"),
+) -> None:
+    """Add a geometry to the link as a collision shape, a visual shape, or both."""
+    for kind in kinds:
+        element = ET.SubElement(link, kind, name=f"{name}_{kind}")
+        if pose:
+            ET.SubElement(element, "pose").text = pose
+        element.append(geometry)
+        if kind == "collision":
+            surface = ET.SubElement(element, "surface")
+            ode = ET.SubElement(ET.SubElement(surface, "friction"), "ode")
+            ET.SubElement(ode, "mu").text = ET.SubElement(ode, "mu2").text = f"{friction:g}"
+            bounce = ET.SubElement(surface, "bounce")
+            ET.SubElement(bounce, "restitution_coefficient").text = f"{contact['restitution']:g}"
+
+
+def _kinds(solids: Solids, k: int) -> tuple[str, ...]:
+    shown = {"collision": solids.collides[k], "visual": solids.visible[k]}
+    return tuple(kind for kind, is_shown in shown.items() if is_shown)
+
+
+def _add_shapes(link: ET.Element, solids: Solids, contact: dict[str, float]) -> None:
+    """Add the boxes and cylinders."""
+    from scipy.spatial.transform import Rotation
+
+    shapes = np.concatenate([solids.boxes, solids.cylinders]).astype(float)
+    angles = Rotation.from_matrix(rotation_matrices(shapes[:, 6:])).as_euler("xyz")
+    friction = np.where(np.isnan(solids.friction), contact["static_friction"], solids.friction)
+    for k, (shape, rpy) in enumerate(zip(shapes, angles, strict=True)):
+        geometry = ET.Element("geometry")
+        if k < len(solids.boxes):
+            size = ET.SubElement(ET.SubElement(geometry, "box"), "size")
+            size.text = _numbers(*(2 * shape[3:6]))
+        else:
+            cylinder = ET.SubElement(geometry, "cylinder")
+            ET.SubElement(cylinder, "radius").text = _numbers(shape[3])
+            ET.SubElement(cylinder, "length").text = _numbers(2 * shape[5])
+        pose = _numbers(*shape[:3], *rpy)
+        kinds = _kinds(solids, k)
+        _add_geometry(
+            link, f"solid_{k}", geometry, contact, float(friction[k]), pose=pose, kinds=kinds
+        )
+
+
+def _add_hulls(link: ET.Element, solids: Solids, contact: dict[str, float], path: Path) -> None:
+    """Add the hulls: one mesh for those with the same friction and flags."""
+    hulls = solids.select(solids.kinds == 2)
+    meshes = solid_meshes(hulls)
+    friction = np.where(np.isnan(hulls.friction), contact["static_friction"], hulls.friction)
+    keys = list(
+        zip(friction.tolist(), hulls.collides.tolist(), hulls.visible.tolist(), strict=True)
+    )
+    for number, key in enumerate(dict.fromkeys(keys)):
+        members = [k for k, each in enumerate(keys) if each == key]
+        file = path.with_name(f"{path.stem}_hulls_{number}.stl")
+        write_stl(concatenate_meshes([meshes[k] for k in members]), file)
+        kinds = _kinds(hulls, members[0])
+        geometry = _mesh_geometry(file)
+        _add_geometry(link, f"hulls_{number}", geometry, contact, key[0], kinds=kinds)
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(f"{value:.6g}" for value in values)

@@ -1,0 +1,140 @@
+"""Write the map as a USD stage with colliders, friction, spawn positions and goals.
+
+The ground is a mesh without simplification, and each solid a cube, a cylinder or a convex mesh.
+"""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ExportError
+from terrainkit.mesh.node_grid import BYTES_PER_NODE
+from terrainkit.mesh.solid_mesh import solid_meshes
+from terrainkit.mesh.tri_mesh import TriMesh
+from terrainkit.solids import Solids
+
+if TYPE_CHECKING:
+    from terrainkit.terrain_map import TerrainMap
+
+SUFFIXES = (".usd", ".usda", ".usdc")
+BYTES_PER_SAMPLE = 3 * BYTES_PER_NODE
+
+
+def export(terrain_map: "TerrainMap", path: Path) -> None:
+    """Write the map in meters with z up. The prim `/terrain` is the default prim.
+
+    `/terrain/ground` is a static collider, `/terrain/solids` has the solids, and `/terrain/spawns`
+    and `/terrain/goals` are points. The friction of single cells is not written.
+
+    Args:
+        terrain_map: The map.
+        path: Target; .usda is text.
+
+    Raises:
+        ExportError: if usd-core is not installed, or the ground has several friction coefficients.
+    """
+    try:
+        from pxr import Kind, Usd, UsdGeom
+    except ModuleNotFoundError:
+        raise ExportError(
+            f"{path.suffix} requires usd-core; install it with: pip install terrainkit[usd]"
+        ) from None
+    terrain_map.require_one_ground_friction("a USD mesh")
+    config = terrain_map.config
+    usd_stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageUpAxis(usd_stage, UsdGeom.Tokens.z)
+    UsdGeom.SetStageMetersPerUnit(usd_stage, 1.0)
+    root = UsdGeom.Xform.Define(usd_stage, "/terrain")
+    usd_stage.SetDefaultPrim(root.GetPrim())
+    Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
+    ground = _add_mesh(usd_stage, "/terrain/ground", terrain_map.ground_mesh())
+    _set_collider(ground, "none", _material(usd_stage, "ground_material", config.contact))
+    _add_solids(usd_stage, terrain_map.solids, config.contact)
+    _add_points(usd_stage, "/terrain/spawns", terrain_map.spawns)
+    _add_points(usd_stage, "/terrain/goals", terrain_map.goals)
+    usd_stage.GetRootLayer().Save()
+
+
+def _add_mesh(usd_stage: Any, path: str, mesh: TriMesh) -> Any:
+    from pxr import UsdGeom, Vt
+
+    prim = UsdGeom.Mesh.Define(usd_stage, path)
+    prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(mesh.vertices)))
+    prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.triangles.ravel()))
+    counts = np.full(len(mesh.triangles), 3, dtype=np.int32)
+    prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(counts))
+    prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(prim.GetPointsAttr().Get()))
+    return prim
+
+
+def _material(usd_stage: Any, name: str, contact: dict[str, float]) -> Any:
+    from pxr import UsdPhysics, UsdShade
+
+    material = UsdShade.Material.Define(usd_stage, f"/terrain/materials/{name}")
+    physics = UsdPhysics.MaterialAPI.Apply(material.GetPrim())
+    physics.CreateStaticFrictionAttr(contact["static_friction"])
+    physics.CreateDynamicFrictionAttr(contact["dynamic_friction"])
+    physics.CreateRestitutionAttr(contact["restitution"])
+    return material
+
+
+def _set_collider(prim: Any, approximation: str, material: Any) -> None:
+    """Make `prim` a static collider."""
+    from pxr import UsdGeom, UsdPhysics, UsdShade
+
+    UsdPhysics.CollisionAPI.Apply(prim.GetPrim())
+    if prim.GetPrim().IsA(UsdGeom.Mesh):
+        mesh = UsdPhysics.MeshCollisionAPI.Apply(prim.GetPrim())
+        mesh.CreateApproximationAttr(approximation)
+    binding = UsdShade.MaterialBindingAPI.Apply(prim.GetPrim())
+    binding.Bind(material, UsdShade.Tokens.weakerThanDescendants, "physics")
+
+
+def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> None:
+    """Add a prim for each solid. Those that are not visible are drawn only as guides."""
+    from pxr import Gf, UsdGeom
+
+    meshes = solid_meshes(solids)
+    shapes = np.concatenate([solids.boxes, solids.cylinders])
+    for k, (mesh, friction) in enumerate(zip(meshes, solids.friction.tolist(), strict=True)):
+        path = f"/terrain/solids/solid_{k}"
+        if k < len(solids.boxes):
+            prim = UsdGeom.Cube.Define(usd_stage, path)
+            prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
+            prim.CreateSizeAttr(2.0)
+        elif k < len(shapes):
+            prim = UsdGeom.Cylinder.Define(usd_stage, path)
+            prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
+            prim.CreateHeightAttr(2.0)
+        else:
+            prim = _add_mesh(usd_stage, path, mesh)
+        if k < len(shapes):
+            pose = shapes[k].tolist()
+            prim.AddTranslateOp().Set(Gf.Vec3d(*pose[:3]))
+            prim.AddOrientOp().Set(Gf.Quatf(*pose[6:]))
+            prim.AddScaleOp().Set(Gf.Vec3f(*pose[3:6]))
+        if not solids.visible[k]:
+            prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
+        if solids.collides[k]:
+            name, values = "ground_material", contact
+            if not np.isnan(friction):
+                name = f"friction_{friction:g}".replace(".", "_").replace("-", "_")
+                values = contact | {"static_friction": friction, "dynamic_friction": friction}
+            _set_collider(prim, "convexHull", _material(usd_stage, name, values))
+
+
+def _add_points(usd_stage: Any, path: str, points: NDArray[np.float32]) -> None:
+    """Add the positions of all patches in the order of the rows, if there are any."""
+    from pxr import UsdGeom, Vt
+
+    positions = points[..., :3].reshape(-1, 3)
+    positions = np.ascontiguousarray(positions[~np.isnan(positions).any(axis=1)])
+    if len(positions):
+        prim = UsdGeom.Points.Define(usd_stage, path)
+        prim.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(positions))
+        prim.CreateWidthsAttr(Vt.FloatArray.FromNumpy(np.full(len(positions), 0.1, np.float32)))
+        prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(prim.GetPointsAttr().Get()))
+        prim.CreatePurposeAttr(UsdGeom.Tokens.guide)

@@ -1,0 +1,145 @@
+"""Maps in mjlab: a configuration of the terrain entity."""
+
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.export.mjcf import Collision
+from terrainkit.integrations import missing
+from terrainkit.integrations.mujoco import make_spec
+from terrainkit.terrain_map import TerrainMap
+
+try:
+    import mujoco
+    from mjlab.terrains import (
+        FlatPatchSamplingCfg,
+        SubTerrainCfg,
+        TerrainEntityCfg,
+        TerrainGeneratorCfg,
+    )
+    from mjlab.terrains.terrain_generator import TerrainOutput
+except ModuleNotFoundError as error:
+    raise missing("mjlab", "pip install mjlab") from error
+
+_BORDER_CELLS = 2
+"""Cells of the map's border that are kept: the ground slopes from a patch to the first of them."""
+
+
+def terrain_entity_cfg(
+    path: str | Path, *, collision: Collision = "auto", max_init_terrain_level: int | None = 5
+) -> TerrainEntityCfg:
+    """Return the configuration of a terrain entity with the map, centered at the world origin.
+
+    mjlab's own terrain generator places one sub-terrain for each column of the map, so that levels,
+    origins, bounds and names in the log are those of its curriculum. The flat patches `spawn` and
+    `goal` are the spawn positions and the goals of the map.
+
+    Args:
+        path: Path of a .npz file. mjlab writes its configuration to a file, so a map itself is not
+            accepted.
+        collision: Geometry that robots collide with; see :func:`terrainkit.export.mjcf.export`.
+        max_init_terrain_level: Highest initial level; None for the last row.
+    """
+    path = str(Path(path).resolve())
+    terrain_map = _load(path)
+    config = terrain_map.config
+    sampling = {
+        name: FlatPatchSamplingCfg(num_patches=points.shape[2], patch_radius=config.spawn_radius)
+        for name, points in _point_sets(terrain_map).items()
+    }
+    columns = {
+        name: MapColumnCfg(
+            path=path, column=column, collision=collision, flat_patch_sampling=sampling
+        )
+        for column, name in enumerate(column_names(terrain_map))
+    }
+    generator = TerrainGeneratorCfg(
+        curriculum=True,
+        size=config.patch_size,
+        num_rows=config.rows,
+        num_cols=config.cols,
+        border_width=config.border,
+        sub_terrains=columns,
+    )
+    return TerrainEntityCfg(
+        terrain_type="generator",
+        terrain_generator=generator,
+        max_init_terrain_level=max_init_terrain_level,
+    )
+
+
+def column_names(terrain_map: TerrainMap) -> list[str]:
+    """Return a unique name for each column: its terrain, and a number if it is not the first."""
+    names: list[str] = []
+    for types in terrain_map.patch_names.T:
+        name = str(types[0]) if (types == types[0]).all() else "mixed"
+        count = sum(each.split("#")[0] == name for each in names)
+        names.append(f"{name}#{count + 1}" if count else name)
+    return names
+
+
+@dataclass(kw_only=True)
+class MapColumnCfg(SubTerrainCfg):
+    """A column of a map as a sub-terrain of mjlab."""
+
+    path: str
+    """Path of the map."""
+
+    column: int
+    """Column of the map."""
+
+    collision: Collision = "auto"
+    """Geometry that robots collide with."""
+
+    def function(
+        self, difficulty: float, spec: mujoco.MjSpec, rng: np.random.Generator
+    ) -> TerrainOutput:
+        """Return the origins of a patch; for the first patch, add the geoms of all patches."""
+        del rng
+        terrain_map = _load(self.path)
+        row = round(difficulty * (terrain_map.config.rows - 1))
+        if row == self.column == 0:
+            # The border is a part of mjlab's own terrain.
+            child = make_spec(_with_narrow_border(terrain_map), collision=self.collision)
+            x, y = terrain_map.grid.center
+            frame = spec.body("terrain").add_frame(pos=[-x, -y, 0.0])
+            spec.attach(child, frame=frame, prefix="map/")
+        corner = np.array([*terrain_map.config.patch_grid(row, self.column).lower, 0.0])
+        points = {
+            name: each[row, self.column] - corner for name, each in _point_sets(terrain_map).items()
+        }
+        return TerrainOutput(
+            origin=terrain_map.env_origins[row, self.column] - corner,
+            geometries=[],
+            flat_patches={name: each[~np.isnan(each[:, 0])] for name, each in points.items()},
+        )
+
+
+@cache
+def _load(path: str) -> TerrainMap:
+    return TerrainMap.load(path)
+
+
+def _point_sets(terrain_map: TerrainMap) -> dict[str, NDArray[np.float64]]:
+    """Return the spawn positions and the goals, if any, shape (rows, cols, k, 3)."""
+    points = {"spawn": terrain_map.spawns, "goal": terrain_map.goals}
+    return {name: each[..., :3].astype(float) for name, each in points.items() if each.shape[2]}
+
+
+def _with_narrow_border(terrain_map: TerrainMap) -> TerrainMap:
+    removed = terrain_map.config.border_cells - _BORDER_CELLS
+    if removed <= 0:
+        return terrain_map
+    config = replace(terrain_map.config, border=_BORDER_CELLS * terrain_map.config.cell)
+    x, y = (each + removed * terrain_map.grid.cell for each in terrain_map.grid.lower)
+    inside = slice(removed, -removed)
+    return replace(
+        terrain_map,
+        config=config,
+        grid=replace(config.grid, lower=(x, y)),
+        heights=terrain_map.heights[inside, inside],
+        friction=terrain_map.friction[inside, inside],
+    )

@@ -1,0 +1,111 @@
+"""Import a map with Isaac Lab's own TerrainImporter; the simulator, Isaac Sim, is a stand-in.
+
+Needs the wheel of Isaac Lab without its dependencies; `make integrations` runs it.
+"""
+
+import importlib.util
+import sys
+from dataclasses import field
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from importlib.metadata import version
+from pathlib import Path
+from types import ModuleType
+from unittest.mock import MagicMock
+
+import numpy as np
+import torch
+
+STAND_INS = ("carb", "flatdict", "gymnasium", "hid", "isaacsim", "omni", "prettytable", "pxr")
+STAND_INS += ("einops", "toml", "transformers", "warp", "yaml")
+
+
+class StandIns(MetaPathFinder, Loader):
+    """Imports the packages of the simulator as mocks."""
+
+    def find_spec(self, name, path, target=None):
+        del path, target
+        return ModuleSpec(name, self, is_package=True) if name.split(".")[0] in STAND_INS else None
+
+    def create_module(self, spec):
+        module = MagicMock(name=spec.name)
+        module.__spec__, module.__path__, module.__name__ = spec, [], spec.name
+        return module
+
+    def exec_module(self, module):
+        pass
+
+
+sys.meta_path.insert(0, StandIns())
+source = Path(importlib.util.find_spec("isaaclab").origin).parent / "source" / "isaaclab"
+if source.exists():  # the wheel has the package inside of a package of the same name
+    sys.modules.pop("isaaclab", None)
+    sys.path.insert(0, str(source))
+
+from isaaclab.utils import configclass  # noqa: E402
+
+
+@configclass
+class RigidBodyMaterialCfg:
+    """The fields of Isaac Lab's class, which is defined in a module of the simulator."""
+
+    static_friction: float = 0.5
+    dynamic_friction: float = 0.5
+    restitution: float = 0.0
+    friction_combine_mode: str = "average"
+    restitution_combine_mode: str = "average"
+
+
+@configclass
+class PreviewSurfaceCfg:
+    """A visual material."""
+
+    diffuse_color: tuple = field(default=(0.0, 0.0, 0.0))
+
+
+simulator = ModuleType("isaaclab.sim")
+simulator.RigidBodyMaterialCfg, simulator.PreviewSurfaceCfg = (
+    RigidBodyMaterialCfg,
+    PreviewSurfaceCfg,
+)
+simulator.SimulationContext = MagicMock()
+simulator.SimulationContext.instance.return_value.device = "cpu"
+simulator.__getattr__ = MagicMock(side_effect=lambda name: MagicMock(name=name))
+sys.modules["isaaclab.sim"] = simulator
+for name in ("isaaclab.markers", "isaaclab.markers.config", "isaaclab.utils.warp"):
+    sys.modules[name] = MagicMock()
+
+import isaaclab.terrains.terrain_importer  # noqa: E402
+
+import terrainkit  # noqa: E402
+from terrainkit.integrations.isaaclab import terrain_importer_cfg  # noqa: E402
+
+prims = {}
+isaaclab.terrains.terrain_importer.create_prim_from_mesh = lambda path, mesh, **materials: (
+    prims.update({path: (mesh, materials["physics_material"])})
+)
+path = Path(sys.argv[1]) / "map.npz"
+config = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
+terrain_map = terrainkit.generate(config)
+terrain_map.save(path)
+cfg = terrain_importer_cfg(path, max_init_terrain_level=2)
+cfg.num_envs = 16
+importer = cfg.class_type(cfg)
+
+center = np.array([*terrain_map.grid.center, 0.0])
+mesh, material = prims["/World/ground/terrain"]
+np.testing.assert_allclose(mesh.bounds[:, :2], [[-21.0, -26.0], [21.0, 26.0]], atol=1e-4)
+assert (material.static_friction, material.friction_combine_mode) == (1.0, "multiply")
+np.testing.assert_allclose(importer.terrain_origins, terrain_map.env_origins - center, atol=1e-4)
+assert importer.terrain_levels.max() <= 2
+points = importer.flat_patches
+assert points["init_pos"].shape == (4, 7, 1, 3)
+assert points["target"].shape == (4, 7, terrain_map.goals.shape[2], 3)
+assert all(torch.isfinite(each).all() for each in points.values())
+before = importer.terrain_levels.clone()
+up = torch.ones(16, dtype=torch.bool)
+importer.update_env_origins(torch.arange(16), up, ~up)
+assert (importer.terrain_levels == before + 1).all()
+origins = importer.env_origins.numpy() + center
+np.testing.assert_allclose(terrain_map.scan(np.add(origins, [0, 0, 0.5])), origins[:, 2], atol=1e-4)
+print(f"Isaac Lab {version('isaaclab')}: levels move, origins on the ground; simulator: stand-in")

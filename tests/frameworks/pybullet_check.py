@@ -1,0 +1,31 @@
+"""Drop balls on maps in PyBullet. Needs pybullet; `make integrations` runs it."""
+
+import numpy as np
+import pybullet
+
+import terrainkit
+from terrainkit.integrations.pybullet import add_map
+
+for preset in ("legged_gym", "parkour"):
+    config = terrainkit.MapConfig(rows=4, cols=10, patch_size=(8.0, 6.0), border=5.0, preset=preset)
+    terrain_map = terrainkit.generate(config)
+    client = pybullet.connect(pybullet.DIRECT)
+    pybullet.setGravity(0, 0, -9.81)
+    body = add_map(terrain_map, client=client)
+    assert pybullet.getDynamicsInfo(body, -1)[1] == config.static_friction
+    lower, upper = (np.array(each) for each in (terrain_map.grid.lower, terrain_map.grid.upper))
+    xy = np.random.default_rng(0).uniform(lower + 0.3, upper - 0.3, (200, 2))
+    starts, ends = (np.column_stack([xy, np.full(200, z)]) for z in (20.0, -20.0))
+    hits = np.array([hit[3] for hit in pybullet.rayTestBatch(starts.tolist(), ends.tolist())])
+    error = np.abs(hits[:, 2] - terrain_map.scan(starts)).max()
+    assert error < 1e-3, error
+    sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.1)
+    origins = np.add(terrain_map.env_origins.reshape(-1, 3), [0, 0, 0.3])
+    balls = [pybullet.createMultiBody(1, sphere, basePosition=p.tolist()) for p in origins]
+    for _ in range(400):
+        pybullet.stepSimulation()
+    position = np.array([pybullet.getBasePositionAndOrientation(ball)[0] for ball in balls])
+    gap = np.abs(position[:, 2] - 0.1 - terrain_map.scan(position)).max()
+    assert gap < 2e-3, gap
+    pybullet.disconnect(client)
+    print(f"PyBullet, {preset}: rays within {error * 1e3:.1g} mm, balls within {gap * 1e3:.1g} mm")

@@ -1,0 +1,38 @@
+"""Run the checks of the integrations, each in a virtual environment with its real framework.
+
+python tests/frameworks/run.py [NAME ...] [--environments FOLDER]
+"""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import venv
+from pathlib import Path
+
+FOLDER = Path(__file__).parent
+PACKAGES = {
+    "mjlab": [["mjlab==1.6.0"]],
+    "pybullet": [["pybullet==3.2.7"]],
+    "isaaclab": [["torch"], ["--no-deps", "isaaclab==2.3.2.post1"]],
+}
+"""Arguments of `pip install` for each check."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", default=list(PACKAGES), metavar="NAME")
+    parser.add_argument("--environments", type=Path, default=FOLDER.parents[1] / ".frameworks")
+    arguments = parser.parse_args()
+    for name in arguments.names:
+        python = arguments.environments / name / "bin" / "python"
+        if not python.exists():
+            venv.create(python.parents[1], with_pip=True)
+            for packages in [[FOLDER.parents[1]], *PACKAGES[name]]:
+                subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([python, FOLDER / f"{name}_check.py", folder], check=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
