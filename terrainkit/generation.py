@@ -1,5 +1,6 @@
 """Generate a TerrainMap from a MapConfig."""
 
+import itertools
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
@@ -77,7 +78,7 @@ def generate(
     goals = np.empty(size, dtype=object)
     deviations: Counter[str] = Counter()
     moved_spawns: Counter[str] = Counter()
-    indices: Iterator[tuple[int, int]] = iter(np.ndindex(size))
+    indices = itertools.product(range(config.rows), range(config.cols))
     with closing(_build_patches(config, columns, executor)) as patches:
         for row, col in progress(indices, config.rows * config.cols) if progress else indices:
             terrain_type, patch = next(patches)
@@ -119,7 +120,7 @@ def _build_patches(
     config: MapConfig, columns: list[int], executor: "Executor | None"
 ) -> Generator[tuple[int, Patch], None, None]:
     """Yield terrain type and patch of each (row, col), row by row."""
-    indices = list(np.ndindex(config.rows, config.cols))
+    indices = list(itertools.product(range(config.rows), range(config.cols)))
     build = partial(_build_task, config, columns)
     if executor is None:
         for index in indices:
@@ -145,7 +146,10 @@ def _build_task(
 
 def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     """Return the poses (k, 4) of all patches, shape (rows, cols, k, 4), padded with NaN."""
-    number = max(len(each) for each in poses.ravel().tolist())
+    lengths = {len(each) for each in poses.ravel().tolist()}
+    number = max(lengths)
+    if len(lengths) == 1:
+        return np.array(poses.tolist(), dtype=np.float32).reshape(*poses.shape, number, 4)
     padded = np.full((*poses.shape, number, 4), np.nan, dtype=np.float32)
     for row, col in np.ndindex(poses.shape):
         padded[row, col, : len(poses[row, col])] = poses[row, col]
@@ -154,11 +158,11 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
 
 def _deviations(patch: Patch, sub_terrain: SubTerrain, cell: float) -> list[str]:
     """Return the parameters that differ from the request by more than the grid requires."""
-    declared, record = sub_terrain.declarations, patch.parameters
+    declared, realized = sub_terrain.declarations, patch.parameters.realized
     return [
         f"{patch.terrain}.{name}"
-        for name, requested in record.requested.items()
-        if declared[name].deviates(requested, record.realized[name], cell)
+        for name, requested in patch.parameters.requested.items()
+        if requested != realized[name] and declared[name].deviates(requested, realized[name], cell)
     ]
 
 

@@ -5,7 +5,9 @@ along y. A grid of shape (80, 40) and cell 0.1 m covers exactly 8 m x 4 m.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,19 +73,27 @@ class Grid:
         A block can only be centered if its count is even where the grid's is even, and odd where it
         is odd. The count is the nearest of that parity, so it may differ from `size` by one cell.
         """
-        return self._centered(size, 0), self._centered(size, 1)
-
-    def _centered(self, size: float, k: int) -> int:
-        odd = self.shape[k] % 2
-        return max(0, 2 * math.floor((size / self.cell - odd) / 2 + 0.5 + _CELL_TOLERANCE) + odd)
+        odd_x, odd_y = (n % 2 for n in self.shape)
+        x = _centered(size / self.cell, odd_x)
+        return x, x if odd_x == odd_y else _centered(size / self.cell, odd_y)
 
     def rings(self, inner: tuple[int, int]) -> NDArray[np.int32]:
-        """Return the ring around the centered block `inner` of each cell, shape `shape`.
+        """Return the ring around the centered block `inner` of each cell, shape `shape`, read-only.
 
         Ring 0 is the block itself, ring 1 the cells that touch its sides or corners, and so on.
         """
-        x, y = map(_distance_to_block, self.shape, inner)
-        return np.maximum.outer(x, y)
+        return _rings(self.shape, inner)
+
+    def by_ring(
+        self, inner: tuple[int, int], value: Callable[[NDArray[np.int64]], NDArray[np.floating]]
+    ) -> NDArray[np.floating]:
+        """Return the value of the ring of each cell, shape `shape`; see :meth:`rings`.
+
+        Args:
+            inner: Cells of the centered block along x and y.
+            value: Returns the values of rings, given their numbers.
+        """
+        return value(np.arange(max(self.margins(inner)) + 1))[self.rings(inner)]
 
     def margins(self, inner: tuple[int, int]) -> tuple[int, int]:
         """Return the cells along x and y between the centered block `inner` and the edge."""
@@ -103,6 +113,18 @@ class Grid:
         """Return weights that rise from 0 on the centered block `inner` to 1 at `distance` [m]."""
         rise = self.rings(inner) * (self.cell / max(distance, self.cell))
         return np.asarray(np.minimum(rise, 1.0), dtype=np.float64)
+
+
+def _centered(cells: float, odd: int) -> int:
+    return max(0, 2 * math.floor((cells - odd) / 2 + 0.5 + _CELL_TOLERANCE) + odd)
+
+
+@lru_cache(maxsize=8)
+def _rings(shape: tuple[int, int], inner: tuple[int, int]) -> NDArray[np.int32]:
+    # Most patches of a map have one of few platforms.
+    rings: NDArray[np.int32] = np.maximum.outer(*map(_distance_to_block, shape, inner))
+    rings.flags.writeable = False
+    return rings
 
 
 def _distance_to_block(n: int, block: int) -> NDArray[np.int32]:

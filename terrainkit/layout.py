@@ -1,6 +1,7 @@
 """The terrain type and the difficulty of each patch."""
 
 import warnings
+from typing import Any
 
 import numpy as np
 
@@ -93,10 +94,11 @@ def patch_rng(config: MapConfig, terrain: Terrain, row: int, col: int) -> "np.ra
     It depends on the seed and the patch only. In mode curriculum, all rows of a column share it for
     terrains with :attr:`~terrainkit.terrain.Terrain.has_column_seed`.
     """
-    if config.mode == "curriculum" and terrain.has_column_seed:
-        seed = np.random.SeedSequence([config.seed, col], spawn_key=_COLUMN_STREAM)
-    else:
-        seed = np.random.SeedSequence([config.seed, row, col])
+    is_column = config.mode == "curriculum" and terrain.has_column_seed
+    words: Any = [config.seed, col] if is_column else [config.seed, row, col]
+    if config.seed < 2**32:
+        words = np.array(words, dtype=np.uint32)  # takes half as long to convert
+    seed = np.random.SeedSequence(words, spawn_key=_COLUMN_STREAM if is_column else ())
     return np.random.default_rng(seed)
 
 

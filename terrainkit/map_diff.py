@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.config import MapConfig
 from terrainkit.errors import listing
@@ -82,24 +82,24 @@ def _diff_grids(a: TerrainMap, b: TerrainMap) -> Iterator[str]:
         yield f"{texts[0]} -> {texts[1]} patches; the common ones are compared"
     elif a.heights.shape == b.heights.shape:
         (i, j), border = a.heights.shape, a.config.border_cells
-        difference = np.abs(a.heights - b.heights)
+        difference = _difference(a.heights, b.heights)
         difference[border : i - border, border : j - border] = 0
-        if difference.max() > 0:
+        if difference.any():
             yield f"the border: heights differ by up to {difference.max():.3g} m"
 
 
 def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
     if a.terrain != b.terrain:
         yield f"terrain {a.terrain} -> {b.terrain}"
-    if a.difficulty != b.difficulty:
+    if _difference(a.difficulty, b.difficulty).any():
         yield f"difficulty {a.difficulty:g} -> {b.difficulty:g}"
     if a.parameters != b.parameters:
         records = [(p.parameters.requested, p.parameters.realized) for p in (a, b)]
         names = dict.fromkeys(name for record in records for name in record[0])
         changed = [n for n in names if len({tuple(r.get(n) for r in rs) for rs in records}) > 1]
         yield f"parameters {listing(changed)}"
-    difference = np.abs(a.heights - b.heights)
-    if not (difference == 0).all():
+    difference = _difference(a.heights, b.heights)
+    if difference.any():
         number = int((difference != 0).sum())
         yield f"heights by up to {difference.max():.3g} m at {number:,} of {difference.size:,}"
     if not np.array_equal(a.friction, b.friction):
@@ -107,8 +107,8 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
         yield f"friction at {number:,} of {a.friction.size:,}"
     yield from _diff_solids(_in_patch_frame(a), _in_patch_frame(b))
     shift = np.array([*a.grid.lower, 0, 0]) - [*b.grid.lower, 0, 0]
-    moved = float(np.linalg.norm(a.origin - b.origin - shift[:3]))
-    if moved > TOLERANCE:
+    moved = float(np.linalg.norm(_difference(a.origin, b.origin + shift[:3])))
+    if not moved <= TOLERANCE:
         yield f"spawn origin by {moved:.3g} m"
     yield from _diff_poses("spawn positions", a.spawns[1:], b.spawns[1:] + shift)
     yield from _diff_poses("goals", a.goals, b.goals + shift)
@@ -117,8 +117,16 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
 def _diff_poses(name: str, a: NDArray[np.floating], b: NDArray[np.floating]) -> Iterator[str]:
     if len(a) != len(b):
         yield f"{len(a)} -> {len(b)} {name}"
-    elif not np.allclose(a, b, rtol=0, atol=TOLERANCE, equal_nan=True):
-        yield f"{name} by up to {np.abs(a - b).max():.3g} m or rad"
+    elif not (difference := _difference(a, b)).max(initial=0) <= TOLERANCE:
+        yield f"{name} by up to {difference.max():.3g} m or rad"
+
+
+def _difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
+    """Return the absolute difference: 0 of two NaN, and NaN of a number and NaN."""
+    a, b = np.asarray(a), np.asarray(b)
+    with np.errstate(invalid="ignore"):
+        difference = np.abs(a - b)
+    return np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, difference)
 
 
 def _diff_solids(a: Solids, b: Solids) -> Iterator[str]:

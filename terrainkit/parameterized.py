@@ -28,8 +28,11 @@ class Parameterized:
     def realized(self, grid: Grid) -> dict[str, Realized]:
         """Return the parameters after snapping to the cells of `grid`, by name."""
         kind: Any = type(self)
-        parameters = parameters_of(kind).items()
-        return {name: p.realized(getattr(self, name), grid) for name, p in parameters}
+        realized = self.requested()
+        for name, parameter in parameters_of(kind).items():
+            if parameter.snap != "none":
+                realized[name] = parameter.realized(realized[name], grid)
+        return realized
 
 
 @cache

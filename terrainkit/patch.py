@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,9 @@ from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized, Value, parameters_of
 from terrainkit.patch_geometry import PatchGeometry, uniform_friction
 from terrainkit.solids import Solids
+from terrainkit.spawn import find_spawn, sample_spawns
 from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
-
-if TYPE_CHECKING:
-    from terrainkit.spawn import Disk
 
 EDGE_TOLERANCE = 1e-3
 """Distance by which a solid may extend beyond its patch [m]."""
@@ -107,7 +105,8 @@ def build_patch(
     _check_slopes(terrain, config)
     grid, name = config.patch_grid(row, col), sub_terrain.name
     child_rng = partial(_child_rng, config, terrain, row, col)
-    heights = terrain.build(grid, patch_rng(config, terrain, row, col))
+    rng: Any = patch_rng(config, terrain, row, col) if terrain.has_random_heights else None
+    heights = terrain.build(grid, rng)
     geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, heights, grid, child_rng)
     spawn_offset = 0.0
     if overlays:
@@ -226,12 +225,10 @@ def place_spawns(
     Raises:
         ConfigError: if the patch has no place to spawn.
     """
-    from terrainkit.spawn import sample_spawns
-
     origin = _find_origin(config, name, grid, heights, solids, position)
     if config.spawns_per_patch == 1:
         return np.array([origin])
-    disk, number = spawn_disk(config), config.spawns_per_patch
+    disk, number = config.spawn_disk, config.spawns_per_patch
     return sample_spawns(heights, grid, origin, disk, number, solids=solids, rng=rng())
 
 
@@ -244,9 +241,7 @@ def _find_origin(
     position: tuple[float, float],
 ) -> tuple[float, float, float]:
     """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
-    from terrainkit.spawn import find_spawn
-
-    disk = spawn_disk(config)
+    disk = config.spawn_disk
     origin = find_spawn(
         heights, grid, position, disk, solids=solids, threshold=config.wall_threshold
     )
@@ -258,17 +253,6 @@ def _find_origin(
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
         )
     return origin
-
-
-def spawn_disk(config: MapConfig) -> "Disk":
-    """Return the free place that a robot needs on a map."""
-    from terrainkit.spawn import Disk
-
-    return Disk(
-        radius=config.spawn_radius,
-        tolerance=config.spawn_tolerance,
-        headroom=config.spawn_headroom,
-    )
 
 
 def _finish(
@@ -309,8 +293,8 @@ def with_headings(
     positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
 ) -> NDArray[np.float32]:
     """Return spawn positions with headings, shape (k, 4): toward the first goal, else `default`."""
-    spawns = np.full((len(positions), 4), default, dtype=np.float32)
-    spawns[:, :3] = positions
+    spawns = np.empty((len(positions), 4), dtype=np.float32)
+    spawns[:, :3], spawns[:, 3] = positions, default
     if len(goals):
         dx, dy = (goals[0, :2] - positions[:, :2]).T
         spawns[:, 3] = np.arctan2(dy, dx)

@@ -110,8 +110,10 @@ class SubTerrain(Config):
 
     def friction_at(self, difficulty: float) -> float | None:
         """Return the friction of the patches at `difficulty`, 0 to 1; None for the map's."""
-        raw: Any = self.friction
-        return _FRICTION.value_at(raw, difficulty)  # type: ignore[return-value]
+        if self.friction is None:
+            return None
+        friction: float = _FRICTION.value_at(self.friction, difficulty)  # type: ignore[assignment]
+        return friction
 
     @cached_property
     def declarations(self) -> dict[str, Parameter]:

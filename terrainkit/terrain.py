@@ -44,13 +44,18 @@ class Terrain(Parameterized, ABC):
     than the one before.
     """
 
+    has_random_heights: ClassVar[bool] = True
+    """Whether :meth:`heights` takes random numbers. Where it does not, maps save the time of
+    creating a generator, which is that of a small patch, and pass None."""
+
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
             raw: Any = getattr(self, name)
-            if raw is parameter.default:
-                raw = parameter.hard
-            value = convert_parameter(self.kind(), name, raw, parameter)
-            object.__setattr__(self, name, value)
+            value = parameter.hard if raw is parameter.default else raw
+            if not parameter.is_plain(value):
+                value = convert_parameter(self.kind(), name, value, parameter)
+            if value is not raw:
+                object.__setattr__(self, name, value)
 
     @classmethod
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
@@ -68,8 +73,9 @@ class Terrain(Parameterized, ABC):
                 f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
             )
         known, values = parameters_of(cls), values or {}
-        check_names(cls.kind(), values, known)
         fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
+        if values:
+            check_names(cls.kind(), values, known)
         for name, value in values.items():
             result: Any = convert_range(cls.kind(), name, value, known[name])
             fixed[name] = known[name].value_at(result, difficulty)

@@ -28,7 +28,7 @@ def m(tmp_path, monkeypatch):
 
 
 def test_integrations_all_blocks_are_tested():
-    assert len(BLOCKS) == 10
+    assert len(BLOCKS) == 13
 
 
 def test_numpy_block_reads_map(m):

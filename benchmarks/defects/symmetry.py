@@ -44,7 +44,7 @@ def mass(robot: Mutant) -> Subjects:
     return _pair_names(robot, link.get("name"))
 
 
-@mutation("SYM002", "warning", "different center of mass on one side")
+@mutation("SYM002 INR008", "warning", "different center of mass on one side")
 def com(robot: Mutant) -> Subjects:
     link = _pick_link(robot)
     where = origin(link.find("inertial"))

@@ -6,10 +6,12 @@ from defects.mutant import (
     Mutant,
     NotApplicableError,
     Subjects,
+    child,
     limit,
     mirror_names,
     mutation,
     origin,
+    parent,
 )
 
 
@@ -172,6 +174,25 @@ def other_mesh(robot: Mutant) -> Subjects:
     return [name]
 
 
+@mutation("MSH016 MSH015 SYM013", "warning", "mesh of another joint")
+def mesh_of_calf(robot: Mutant) -> Subjects:
+    calves = [robot.link(child(joint)) for joint in robot.knee_joints()]
+    meshes = [m for calf in calves if (m := calf.find("visual/geometry/mesh")) is not None]
+    link = robot.pick(e for e in robot.leg_links() if e not in calves)
+    mesh = link.find("visual/geometry/mesh")
+    if len(meshes) < 4 or mesh is None:
+        raise NotApplicableError
+    mesh.set("filename", meshes[0].get("filename"))
+    return robot.body_names(link.get("name"))
+
+
+@mutation("TRE011", "warning", "parent of another leg")
+def crossed_parent(robot: Mutant) -> Subjects:
+    joint = robot.pick(j for j in robot.leg_joints() if len(mirror_names(parent(j))) == 2)
+    joint.find("parent").set("link", mirror_names(parent(joint))[1])
+    return [joint.get("name")]
+
+
 @mutation("INR012 SYM011 SYM003", "warning", "exchanged moments of inertia")
 def exchanged_moments(robot: Mutant) -> Subjects:
     def moments(link: etree._Element) -> tuple[float, float]:
@@ -215,7 +236,7 @@ def armature(robot: Mutant) -> Subjects:
 @mutation("JNT025", "warning", "MJCF: one-sided control range", "mjcf")
 def one_sided(robot: Mutant) -> Subjects:
     motor = robot.pick(robot.root.iterfind("actuator/motor"))
-    motor.set("ctrlrange", robot.pick(["0 20", "-20 0"]))
+    motor.set("ctrlrange", robot.pick(["0 20", "-20 0", "-20 2"]))
     return [motor.get("joint")]
 
 

@@ -114,6 +114,8 @@ class Onboard(Command):
         render.result(f"wrote {result.folder}; view the robot with:")
         scene = quote(str(result.folder / "scene.xml"))
         render.result(f"  python -m mujoco.viewer --mjcf={scene}")
+        for line in _train_command(result):
+            render.result(line)
         errors, warnings = _remaining_errors(result), _warnings(result)
         for error in errors:
             render.error(f"{self.file}: {error}")
@@ -152,6 +154,19 @@ class Onboard(Command):
         if num_fixable and not self.unsafe_fixes:
             return f", {num_fixable} of them fixable with --unsafe-fixes"
         return "; --force ignores them where MuJoCo accepts the robot"
+
+
+def _train_command(result: "OnboardResult") -> list[str]:
+    """Return the command that trains the robot in mjlab, if its configuration was written."""
+    from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name
+    from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
+
+    assert result.folder is not None
+    assert result.robot is not None
+    file, _, task = train_arguments(result.robot.spec).partition(" ")
+    if not task or config_file_name("mjlab") not in result.configs:
+        return []
+    return ["train it in mjlab with:", f"  python {quote(str(result.folder / file))} {task}"]
 
 
 def _blocking_errors(result: "OnboardResult") -> str:

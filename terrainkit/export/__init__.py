@@ -62,11 +62,9 @@ def get_exporter(path: Path) -> ModuleType:
         ExportError: if there is none.
     """
     exporters = exporters_by_suffix()
+    suffix = repr(path.suffix) if path.suffix else "a name without suffix"
     if path.suffix.lower() not in exporters:
-        raise ExportError(
-            f"no format for {path.suffix or 'a name without suffix'!r} ({path}); "
-            f"there are: {listing(exporters)}"
-        )
+        raise ExportError(f"no format for {suffix} ({path}); there are: {listing(exporters)}")
     return exporters[path.suffix.lower()]
 
 

@@ -7,8 +7,7 @@ defaults would apply otherwise.
 """
 
 import itertools
-import re
-from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 from xml.etree import ElementTree as ET
@@ -23,6 +22,7 @@ from terrainkit.box_decomposition import (
     merge_boxes,
     neighborhood,
 )
+from terrainkit.grid import Grid
 from terrainkit.memory import check_memory
 from terrainkit.mesh.closed import THICKNESS
 from terrainkit.mesh.node_grid import NodeGrid
@@ -44,6 +44,9 @@ _QUANTUM = 1e-4
 BYTES_PER_SAMPLE = 100
 """Peak memory per sample [bytes]: its elevation as a number and as text."""
 
+_ROWS_PER_BAND = 256
+"""Samples along x that are searched for slopes at a time."""
+
 _RINGS = 2
 """Samples around the patches that belong to the heightfield. The ground of the border's first cell
 slopes toward the patch, so the heightfield has to extend beyond that cell."""
@@ -57,8 +60,8 @@ _Part = tuple[slice, slice]
 
 MAX_BOXES = 100
 """Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
-step of the bundled quadruped takes about 1.8 times that on a plane. Two runs of
-benchmarks/collision.py gave 91."""
+step of the bundled quadruped takes about 1.8 times that on a plane. Three runs of
+benchmarks/collision.py gave 91 to 103."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
@@ -104,19 +107,21 @@ def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -
         for center, half_size, friction in boxes:
             _set_friction(_add_box(world, center, half_size), friction, static)
     split = [each for part in parts for each in _split_by_friction(terrain_map, part)]
-    for k, (part, friction) in enumerate(split):
-        name = "terrain" if cover is None and len(split) == 1 else f"terrain_{k}"
-        geom = _add_hfield(asset, world, name, terrain_map, heights, (part, k))
+    is_single = cover is None and len(split) == 1
+    hfields = {"terrain" if is_single else f"terrain_{k}": each for k, each in enumerate(split)}
+    for name, (part, friction) in hfields.items():
+        geom = _add_hfield_geom(world, name, terrain_map.grid, heights, part)
         _set_friction(geom, friction, static)
     _add_solids(asset, world, terrain_map.solids, static)
-    ET.indent(root)
-    # The elevation data are the larger part of the file. They are written row by row.
-    texts = re.split('(?<=elevation=")([0-9]+)(?=")', ET.tostring(root, encoding="unicode"))
-    file.write('<?xml version="1.0" encoding="utf-8"?>\n')
-    for text, number in zip(texts[::2], [*texts[1::2], ""], strict=True):
-        file.write(text)
-        if number:
-            file.writelines(_elevation_rows(heights, split[int(number)][0]))
+    # The elevation data are the larger part of the file, so they are not kept as one text.
+    file.write('<?xml version="1.0" encoding="utf-8"?>\n<mujoco model="terrain">\n  <asset>\n')
+    for name, (part, _) in hfields.items():
+        _write_hfield(file, name, heights, part, terrain_map.grid.cell)
+    file.write("  </asset>\n")
+    for section in root:  # MuJoCo merges the two sections <asset>
+        ET.indent(section, level=1)
+        file.write(f"  {ET.tostring(section, encoding='unicode').strip()}\n")
+    file.write("</mujoco>\n")
 
 
 def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
@@ -124,15 +129,26 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
     if collision == "hfield":
         return None
     if collision == "auto":
-        threshold = terrain_map.config.wall_threshold
-        grid = NodeGrid.from_heights(terrain_map.heights, terrain_map.grid, threshold)
-        if not flat_cells(grid).all():
+        if not _is_flat(terrain_map):
             return None
         cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
         num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
         # Of two geoms of either kind, a box was measured to be faster than a heightfield.
         return cover if len(cover.centers) <= max(MAX_BOXES, 2 * num_hfields) else None
     return terrain_map.boxes()
+
+
+def _is_flat(terrain_map: "TerrainMap") -> bool:
+    """Return whether all cells are flat, band by band: most maps have a slope in an early one."""
+    heights, grid = terrain_map.heights, terrain_map.grid
+    for start in range(0, len(heights), _ROWS_PER_BAND):
+        band = heights[start : start + _ROWS_PER_BAND + 1]  # the next one repeats the last row
+        nodes = NodeGrid.from_heights(
+            band, replace(grid, shape=band.shape), terrain_map.config.wall_threshold
+        )
+        if not flat_cells(nodes).all():
+            return False
+    return True
 
 
 def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
@@ -251,51 +267,41 @@ def _set_friction(geom: ET.Element, friction: float, static: float) -> None:
         geom.set("priority", "2")
 
 
-def _add_hfield(
-    asset: ET.Element,
-    world: ET.Element,
-    name: str,
-    terrain_map: "TerrainMap",
-    heights: NDArray[np.float32],
-    numbered_part: tuple[_Part, int],
+def _add_hfield_geom(
+    world: ET.Element, name: str, grid: Grid, heights: NDArray[np.float32], part: _Part
 ) -> ET.Element:
-    """Add a part of the heights as a heightfield; its elevation data is the number of the part."""
-    (part, number), cell = numbered_part, terrain_map.config.cell
-    samples = heights[_on_map(part, heights.shape)]
-    low = float(samples.min())
-    span = max(int(_levels(samples.max(), low)), 1) * _QUANTUM  # MuJoCo requires a range above 0
-    nx, ny = (each.stop - each.start for each in part)
-    half = [(n - 1) * cell / 2 for n in (nx, ny)]
-    middle = [((s.start + s.stop) / 2 - _RINGS) * cell for s in part]
-    ET.SubElement(
-        asset,
-        "hfield",
-        name=name,
-        nrow=str(ny),  # MuJoCo's rows are along y, its columns along x
-        ncol=str(nx),
-        size=_numbers(*half, span, THICKNESS),
-        elevation=str(number),
-    )
-    position = _numbers(*np.add(terrain_map.grid.lower, middle), low)
+    """Add the geom of the heightfield of a part."""
+    low = heights[_on_map(part, heights.shape)].min()
+    middle = [((each.start + each.stop) / 2 - _RINGS) * grid.cell for each in part]
+    position = _numbers(*np.add(grid.lower, middle), low)
     about = {"class": "terrain", "type": "hfield", "hfield": name, "pos": position}
     return ET.SubElement(world, "geom", about)
 
 
-def _levels(heights: Any, low: float) -> NDArray[np.int32]:
-    """Return the heights above `low` in units of `_QUANTUM`."""
-    return np.asarray(np.rint((heights - low) / _QUANTUM), dtype=np.int32)
-
-
-def _elevation_rows(heights: NDArray[np.float32], part: _Part) -> Iterator[str]:
-    """Yield the elevation data of a part; inline data starts with the row of the largest y."""
-    low = float(heights[_on_map(part, heights.shape)].min())
+def _write_hfield(
+    file: TextIO, name: str, heights: NDArray[np.float32], part: _Part, cell: float
+) -> None:
+    """Write the heightfield of a part, row by row; the first row is that of the largest y."""
+    samples = heights[_on_map(part, heights.shape)]
+    low = float(samples.min())
+    span = max(int(_levels(samples.max(), low)), 1) * _QUANTUM  # MuJoCo requires a range above 0
     # Samples beyond the map, where there is no border, have the height of its edge.
     x, y = (
         np.clip(np.arange(each.start, each.stop) - _RINGS, 0, size - 1)
         for each, size in zip(part, heights.shape, strict=True)
     )
+    # MuJoCo's rows are along y, its columns along x.
+    size = _numbers((len(x) - 1) * cell / 2, (len(y) - 1) * cell / 2, span, THICKNESS)
+    file.write(f'    <hfield name="{name}" nrow="{len(y)}" ncol="{len(x)}" size="{size}"')
+    file.write(' elevation="')
     for j in y[::-1].tolist():
-        yield " ".join(map(str, _levels(heights[x, j], low).tolist())) + "\n"
+        file.write(" ".join(map(str, _levels(heights[x, j], low).tolist())) + "\n")
+    file.write('"/>\n')
+
+
+def _levels(heights: Any, low: float) -> NDArray[np.int32]:
+    """Return the heights above `low` in units of `_QUANTUM`."""
+    return np.asarray(np.rint((heights - low) / _QUANTUM), dtype=np.int32)
 
 
 def _border_boxes(

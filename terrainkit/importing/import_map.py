@@ -135,9 +135,10 @@ def _make_config(
     counts, sizes = [], []
     for k, count in enumerate((options.rows, options.cols)):
         axis, extent = "xy"[k], source.upper[k] - float(origin[k])
-        if origin[k] < source.lower[k] - cell / 2:
+        if origin[k] < source.lower[k] - cell / 2 or extent < cell / 2:
             raise ConfigError(
-                f"origin: got {axis} = {origin[k]:g} m; the file begins at {source.lower[k]:g} m"
+                f"origin: got {axis} = {origin[k]:g} m; the file extends from "
+                f"{source.lower[k]:g} m to {source.upper[k]:g} m"
             )
         if options.patch_size:
             size = options.patch_size[k]
@@ -148,7 +149,7 @@ def _make_config(
         if count < 1 or size < cell or count * size > extent + cell / 2:
             raise ConfigError(
                 f"patches along {axis}: got {max(count, 1)} of {size or cell:g} m; {path} has "
-                f"{max(extent, 0):g} m from the origin on"
+                f"{extent:g} m from the origin on"
             )
         counts.append(count)
         sizes.append(size)

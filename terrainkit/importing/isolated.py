@@ -51,7 +51,7 @@ def run_isolated(
 
 
 def check_file(path: Path) -> None:
-    """Raise HeightFileError if `path` is no regular file, or is too large."""
+    """Raise HeightFileError if `path` is no regular file, or is empty or too large."""
     try:
         if not path.exists():
             raise HeightFileError(f"no file {path}")
@@ -60,5 +60,7 @@ def check_file(path: Path) -> None:
         size = path.stat().st_size
     except (OSError, ValueError) as error:
         raise HeightFileError(f"cannot read {path}: {error}") from error
+    if not size:
+        raise HeightFileError(f"{path}: got an empty file")
     if size > MAX_FILE_BYTES:
         raise HeightFileError(f"{path}: got {size} bytes; expected at most {MAX_FILE_BYTES}")

@@ -50,11 +50,9 @@ def open_source(path: Path, options: ReadOptions) -> Source:
         ConfigError: if an option is missing or does not apply to the file.
     """
     readers = readers_by_suffix()
+    suffix = repr(path.suffix) if path.suffix else "a name without suffix"
     if path.suffix.lower() not in readers:
-        raise HeightFileError(
-            f"no reader for {path.suffix or 'a name without suffix'!r} ({path}); "
-            f"there are: {listing(readers)}"
-        )
+        raise HeightFileError(f"no reader for {suffix} ({path}); there are: {listing(readers)}")
     check_file(path)
     source: Source = readers[path.suffix.lower()].read(path, options)
     return source

@@ -1,6 +1,7 @@
 """A gap around a platform."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from terrainkit.terrain import Terrain
 @dataclass(frozen=True, kw_only=True)
 class Gap(Terrain):
     """A gap of constant width around a central platform, with flat ground beyond it."""
+
+    has_random_heights: ClassVar[bool] = False
 
     width: float = parameter.length(0.0, 1.0, allow_zero=True)
     """Width of the gap [m]; it ends at the edge of the patch."""
@@ -32,6 +35,8 @@ class Gap(Terrain):
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the rings of the gap."""
-        rings = grid.rings(grid.centered(self.platform))
-        gap = (rings > 0) & (rings <= grid.cells(self.width, minimum=0))
-        return np.where(gap, -self.depth, 0.0)
+        width = grid.cells(self.width, minimum=0)
+        return grid.by_ring(
+            grid.centered(self.platform),
+            lambda k: np.where((k > 0) & (k <= width), -self.depth, 0.0),
+        )

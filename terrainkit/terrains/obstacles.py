@@ -51,7 +51,8 @@ class Obstacles(Terrain):
         starts = (draws[:, 2:4] * (np.array(grid.shape) - sides + 1)).astype(np.int64)
         levels = self.height * np.array([-1.0, -0.5, 0.5, 1.0])[(draws[:, 4] * 4).astype(np.int64)]
         ground = np.zeros(grid.shape)
-        for (i, j), (di, dj), level in zip(starts, sides, levels, strict=True):
+        layout = zip(starts.tolist(), sides.tolist(), levels.tolist(), strict=True)
+        for (i, j), (di, dj), level in layout:
             ground[i : i + di, j : j + dj] = level
         ground[grid.centered_slices(grid.centered(self.platform))] = 0.0
         return ground

@@ -1,6 +1,7 @@
 """A square pit."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ class Pit(Terrain):
 
     The robot is spawned at the bottom and climbs out.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     depth: float = parameter.height(0.0, 1.0)
     """Depth of the pit [m]."""

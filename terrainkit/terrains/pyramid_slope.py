@@ -1,6 +1,7 @@
 """A pyramid with a flat top."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ class PyramidSlope(Terrain):
     The slopes end at height 0. On a patch that is not square, they are as long on every side as
     the shorter side permits, and the ground beyond them is flat.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides."""
@@ -37,7 +40,5 @@ class PyramidSlope(Terrain):
                 f"pyramid_slope: a platform of {self.platform:g} m leaves no slope in a patch of "
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
-        rise: NDArray[np.floating] = (
-            self.grade * grid.cell * np.maximum(run - grid.rings(platform), 0)
-        )
+        rise = grid.by_ring(platform, lambda k: self.grade * grid.cell * np.maximum(run - k, 0))
         return -rise if self.inverted else rise

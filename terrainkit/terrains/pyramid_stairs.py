@@ -1,6 +1,7 @@
 """A pyramid of stairs."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ class PyramidStairs(Terrain):
     remaining cells. On a patch that is not square, the shorter side determines the number of steps.
     """
 
+    has_random_heights: ClassVar[bool] = False
+
     step_height: float = parameter.height(0.05, 0.23)
     """Rise of a step [m]."""
 
@@ -35,14 +38,14 @@ class PyramidStairs(Terrain):
         """Return the treads, counted outward from the platform."""
         width = grid.cells(self.step_width)
         platform = grid.centered(self.platform)
-        rings, risers = grid.rings(platform), min(grid.margins(platform)) // width
+        risers = min(grid.margins(platform)) // width
         if risers == 0:
             raise ConfigError(
                 f"pyramid_stairs: no step of {self.step_width:g} m fits between the platform of "
                 f"{self.platform:g} m and the edge of a patch of "
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
-        rise: NDArray[np.floating] = self.step_height * (
-            risers - np.minimum(-(-rings // width), risers)
+        rise = grid.by_ring(
+            platform, lambda k: self.step_height * (risers - np.minimum(-(-k // width), risers))
         )
         return -rise if self.inverted else rise

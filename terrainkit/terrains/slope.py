@@ -1,6 +1,7 @@
 """A slope up and down along x."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ class Slope(Terrain):
     The robot is spawned at low x. The ridge is in the middle and spans the width of the patch. Both
     ends are at height 0; the sides along x end at a cliff unless the next column is the same.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the slope."""

@@ -1,6 +1,7 @@
 """Stairs up and down along x."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ class Stairs(Terrain):
     remaining cells. Both ends are at height 0; the sides along x end at a cliff unless the next
     column is the same.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     step_height: float = parameter.height(0.05, 0.23)
     """Rise of a step [m]."""

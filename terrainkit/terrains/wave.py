@@ -1,6 +1,7 @@
 """Sine waves."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ class Wave(Terrain):
 
     A whole number of waves fits between the outermost samples, which are at height 0.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     amplitude: float = parameter.height(0.0, 0.2)
     """Height of a crest above 0 and depth of a trough below 0 [m]."""

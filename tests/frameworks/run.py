@@ -4,6 +4,7 @@ python tests/frameworks/run.py [NAME ...] [--environments FOLDER]
 """
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -14,6 +15,8 @@ FOLDER = Path(__file__).parent
 PACKAGES = {
     "mjlab": [["mjlab==1.6.0"]],
     "pybullet": [["pybullet==3.2.7"]],
+    "warp": [["newton==1.8.0", "mujoco-warp==4.0.0"]],
+    "mjx": [["mujoco-mjx==3.17.0"]],
     "isaaclab": [["torch"], ["--no-deps", "isaaclab==2.3.2.post1"]],
 }
 """Arguments of `pip install` for each check."""
@@ -32,6 +35,12 @@ def main() -> None:
                 subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run([python, FOLDER / f"{name}_check.py", folder], check=True)
+        if name == "mjlab":  # trains onboarded robots
+            test = FOLDER.parent / "terrainkit_robots/onboarding/frameworks/test_mjlab.py"
+            variables = os.environ | {"TERRAINKIT_MJLAB_PYTHON": str(python.absolute())}
+            subprocess.run(
+                [sys.executable, "-m", "pytest", "-n", "0", test], env=variables, check=True
+            )
 
 
 if __name__ == "__main__":

@@ -150,3 +150,22 @@ def test_diff_maps_with_other_cells_compares_the_config():
         "patches of 80 x 80 cells of 0.1 m -> 40 x 40 cells of 0.2 m; their contents are not "
         "compared",
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "index", "message"),
+    [
+        ("heights", (0, 0), "the border: heights differ by up to nan m"),
+        ("heights", (20, 20), "heights by up to nan m at 1 of 6,400"),
+        ("spawns", (0, 0, 0, 2), "spawn origin by nan m"),
+        ("difficulty", (0, 0), "difficulty 0 -> nan"),
+    ],
+)
+def test_diff_maps_finds_values_that_are_not_finite(name, index, message):
+    terrain_map = generate(MapConfig(rows=1, cols=1, border=1.0, terrains=(ROUGH,)))
+    array = getattr(terrain_map, name).copy()
+    array[index] = np.nan
+    invalid = dataclasses.replace(terrain_map, **{name: array})
+    found = diff_maps(terrain_map, invalid)
+    assert [*found.grid, *found.patches.get((0, 0), ())] == [message]
+    assert not diff_maps(invalid, invalid)

@@ -98,7 +98,7 @@ def test_help_describes_command_in_80_columns(terrainkit_process, name):
         ),
         (("generate", "-o", "a.npz", "--config", "none.toml"), "cannot read none.toml"),
         (("generate", "-o", "a.abc"), "no format for '.abc' (a.abc); there are: "),
-        (("generate", "-o", "a"), "no format for 'a name without suffix'"),
+        (("generate", "-o", "a"), "no format for a name without suffix (a); there are: "),
         (("generate", "-o", "nowhere/a.npz"), "the folder nowhere does not exist"),
         (("generate", "-o", "/proc/a.npz"), "cannot write /proc/a.npz"),
         (("list", "moon"), "no terrain 'moon' is built in, installed, or registered"),

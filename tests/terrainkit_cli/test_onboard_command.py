@@ -38,7 +38,10 @@ def test_onboard_quadruped(here, tmp_path):
     assert (code, err) == (0, "")
     assert "standing  yes: 5 s with the gains of robot.toml" in out
     assert "python -m mujoco.viewer --mjcf=robot/scene.xml" in out
-    assert (tmp_path / "robot/mjlab_config.py").exists()
+    command = "mjlab_config.py Mjlab-Velocity-Flat-Quadruped"
+    assert f"python robot/{command}\n" in out
+    assert f"\npython {command}  #" in (tmp_path / "robot/report.md").read_text()
+    assert f"python {command}" in (tmp_path / "robot/mjlab_config.py").read_text()
     assert (tmp_path / "robot/genesis_config.py").exists()
 
 

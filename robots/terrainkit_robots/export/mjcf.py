@@ -20,6 +20,9 @@ from terrainkit_robots.transforms import Matrix, invert_poses, matrix_to_quat
 FLOOR = "floor"
 """Name of the ground geom in the scene."""
 
+COLLISION_SUFFIX = "_collision"
+"""A collision geom is named after its body, with this suffix and a number if there are several."""
+
 _VISUAL_COLOR = "0.75 0.77 0.8 1"
 
 
@@ -262,9 +265,13 @@ def _body(
             for later in joints[index + 1 :]:
                 after = after @ later.origin
             _joint(body, joint, invert_poses(after), extras.actuators.get(joint.name))
-    for kind, shapes in (("visual", link.visuals), ("collision", link.collisions)):
-        for shape in shapes:
-            _geom(body, shape, kind, meshes, used_names)
+    for shape in link.visuals:
+        _geom(body, shape, "visual", meshes)
+    for index, shape in enumerate(link.collisions, 1):
+        number = str(index) if len(link.collisions) > 1 else ""
+        name = free_name(f"{link.name}{COLLISION_SUFFIX}{number}", used_names)
+        used_names.add(name)
+        _geom(body, shape, "collision", meshes).set("name", name)
     for site in sites:
         _site(body, site)
     return body
@@ -311,13 +318,8 @@ def _joint(body: Any, joint: Joint, frame: Matrix, actuator: ActuatorConfig | No
         element.set("armature", number_text(armature))
 
 
-def _geom(
-    body: Any, shape: Geometry, kind: str, meshes: Mapping[_MeshKey, str], used_names: set[str]
-) -> None:
+def _geom(body: Any, shape: Geometry, kind: str, meshes: Mapping[_MeshKey, str]) -> Any:
     geom = etree.SubElement(body, "geom", {"class": kind})
-    if kind == "collision" and shape.name and shape.name not in used_names:
-        geom.set("name", shape.name)
-        used_names.add(shape.name)
     if shape.shape == "mesh":
         geom.set("type", "mesh")
         geom.set("mesh", meshes[_mesh_key(shape)])
@@ -331,6 +333,7 @@ def _geom(
                 geom.set(attribute, str(getattr(shape, attribute)))
     elif shape.color is not None:
         geom.set("rgba", number_text(shape.color))
+    return geom
 
 
 def _site(body: Any, site: Site) -> None:

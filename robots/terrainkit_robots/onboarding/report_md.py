@@ -16,6 +16,7 @@ from terrainkit_robots.lint.report.summary import (
     group_skipped,
     summarize_findings,
 )
+from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.text import count, display_path
@@ -253,6 +254,9 @@ def _next_steps(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
         ("check an edited robot.toml", f"terrainkit check-robot {urdf} --spec robot.toml"),
         ("compare the two files", f"terrainkit check-robot {urdf} --against {mjcf}"),
     ]
+    arguments = train_arguments(robot.spec)
+    if arguments.partition(" ")[0] in result.configs:
+        commands.append(("train the robot in mjlab", f"python {arguments}"))
     yield "```sh"
     for purpose, command in commands:
         yield f"{command}  # {purpose}"

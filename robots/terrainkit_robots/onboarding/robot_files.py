@@ -20,6 +20,7 @@ from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_changes, imu_site
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.onboarding.placeholder_effort import without_effort
+from terrainkit_robots.spec.column import rounded_length
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
@@ -116,7 +117,9 @@ def make_robot_files(
     texts = {
         URDF: urdf_text(facts.model, feet=spec.feet),
         MJCF: _mjcf_text(facts, spec, excluded),
-        SCENE: scene_text(facts.model.name, MJCF, height=max(_base_height(facts), 0.1)),
+        SCENE: scene_text(
+            facts.model.name, MJCF, height=max(rounded_length(_base_height(facts)), 0.1)
+        ),
         SPEC: spec.to_toml(),
     }
     return RobotFiles(
@@ -218,7 +221,7 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
     other_frames = [f for f in frames if f.name == imu.name and not _is_same_site(f, imu)]
     if imu.name in spec.feet or other_frames:
         imu = replace(imu, name=f"{imu.name}_site")
-    height = _base_height(facts)
+    height = rounded_length(_base_height(facts))
     extras = Extras(
         actuators=actuators,
         feet=foot_sites(facts, spec.feet),
@@ -227,7 +230,7 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         excluded=merged.model.excluded,
         keyframe=facts.positions,
         height=height,
-        height_at_zero=max(height, _clearance(facts, {})) if facts.stance else None,
+        height_at_zero=max(height, rounded_length(_clearance(facts, {}))) if facts.stance else None,
     )
     return mjcf_text(merged.model, extras)
 

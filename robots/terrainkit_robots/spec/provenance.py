@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, Provenance, RobotSpec
 
 
@@ -30,11 +31,18 @@ def _field_provenance(
     if value == derived_value:
         yield from known.items()
         return
-    if name not in JOINT_TABLES or not set(value) <= set(spec.joint_order):
+    if name not in JOINT_TABLES:
         yield name, given
         return
     if name in known:
         yield name, known[name]
-    changed = [joint for joint in value if value[joint] != derived_value.get(joint)]
-    yield from ((key, item) for key, item in known.items() if key.partition(".")[2] not in changed)
-    yield from ((f"{name}.{joint}", given) for joint in changed)
+    before = match_joints(derived_value, spec.joint_order)
+    origins = {key: known.get(f"{name}.{key}", known.get(name, given)) for key in derived_value}
+    origin_of = match_joints(origins, spec.joint_order).values
+    for key in value:
+        joints = match_joints({key: value[key]}, spec.joint_order).values
+        unchanged = {origin_of[j] for j in joints if before.values.get(j) == value[key]}
+        is_derived = len(unchanged) == 1 and all(before.values.get(j) == value[key] for j in joints)
+        origin = unchanged.pop() if is_derived else given
+        if origin != known.get(name):
+            yield f"{name}.{key}", origin

@@ -38,3 +38,10 @@ def test_isolated_size_limit(mesh, monkeypatch):
     monkeypatch.setattr(isolated, "MAX_FILE_BYTES", 100)
     with pytest.raises(HeightFileError, match=r"got 684 bytes; expected at most 100"):
         check_file(mesh)
+
+
+def test_check_file_rejects_empty_file(tmp_path):
+    path = tmp_path / "a.glb"
+    path.touch()
+    with pytest.raises(HeightFileError, match=r"a\.glb: got an empty file$"):
+        check_file(path)

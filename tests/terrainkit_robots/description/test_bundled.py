@@ -12,7 +12,8 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.onboarding.robot_files import make_robot_files
-from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.spec.per_joint import by_joint
+from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec
 
 every_robot = pytest.mark.parametrize("name", bundled.robot_names())
 every_format = pytest.mark.parametrize("suffix", [".urdf", ".xml"])
@@ -327,6 +328,13 @@ def test_check_robot_has_no_findings(name, suffix):
     assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
 
 
+MAX_ROUNDING = {"default_pose": 0.02, "soft_limits": 0.006, "reset_range": 0.011} | dict.fromkeys(
+    ("base_height_target", "spawn_height", "leg_length", "stance_width", "foot_radius"), 0.005
+)
+"""Largest difference of derived values, which are rounded, from the bundled specs, which have the
+exact values that the bundled policies were trained with."""
+
+
 @every_robot
 def test_spec_is_derived_except_edits(name):
     spec = RobotSpec.load(bundled.urdf_path(name).with_name("robot.toml"))
@@ -337,10 +345,24 @@ def test_spec_is_derived_except_edits(name):
         if each.name in ("urdf", "mjcf"):
             assert own == bundled.urdf_path(name).with_suffix(Path(other).suffix).name
         elif each.name == "provenance":
-            assert {k: v for k, v in own.items() if k.partition(".")[0] not in edited} == {
-                k: v for k, v in other.items() if k.partition(".")[0] not in edited
+            fields = {k: v for k, v in own.items() if "." not in k and k not in edited}
+            assert {k: v.origin for k, v in fields.items()} == {
+                k: v.origin for k, v in other.items() if "." not in k and k not in edited
             }
-        elif each.name not in edited:
+        elif each.name in edited:
+            continue
+        elif each.name == "soft_limits":
+            own, other = (by_joint(table, spec.joint_order) for table in (own, other))
+            for joint, limits in own.items():
+                assert limits == pytest.approx(other[joint], abs=MAX_ROUNDING[each.name])
+        elif each.name in JOINT_TABLES:
+            largest = MAX_ROUNDING.get(each.name, 0.0)
+            assert spec.per_joint(each.name) == pytest.approx(
+                derived.per_joint(each.name), rel=0, abs=largest
+            )
+        elif each.name in MAX_ROUNDING:
+            assert own == pytest.approx(other, abs=MAX_ROUNDING[each.name]), each.name
+        else:
             assert own == other, each.name
 
 
@@ -363,9 +385,10 @@ def test_spec_names_exist_in_model(name):
     named = {spec.base, *spec.feet, *spec.shanks, *spec.thighs}
     named |= {*spec.termination_contacts, *spec.penalized_contacts}
     assert named <= set(bodies(model))
-    for joint, (lower, upper) in spec.soft_limits.items():
-        low, high = model.joint(joint).range
-        assert low < lower < spec.default_pose[joint] < upper < high
+    soft_limits = by_joint(spec.soft_limits, spec.joint_order)
+    for joint, position in spec.per_joint("default_pose").items():
+        (low, high), (lower, upper) = model.joint(joint).range, soft_limits[joint]
+        assert low < lower < position < upper < high
     for joint, effort in spec.per_joint("effort").items():
         assert model.actuator(joint.removesuffix("_joint")).ctrlrange[1] == effort
 

@@ -149,18 +149,18 @@ def edit_spec(result, tmp_path, *replacements):
 
 def test_onboard_applies_edited_spec(onboarded, tmp_path):
     first = onboarded(QUADRUPED)
-    angle = first.robot.spec.per_joint("default_pose")["FL_thigh_joint"]
-    old = f"FL_thigh_joint = {angle:g}"
-    edited = edit_spec(first, tmp_path, (old, "FL_thigh_joint = 0.85"))
+    old, new = ('".*_thigh_joint" = 0.75', '"F.*_thigh_joint" = 0.85\n"R.*_thigh_joint" = 0.75')
+    edited = edit_spec(first, tmp_path, (old, new))
     expected = RobotSpec.load(edited)
     result = onboard(QUADRUPED, tmp_path / "robot", replace(options(), spec=edited))
     spec = result.robot.spec
     assert replace(spec, provenance={}) == replace(expected, provenance={})
-    assert spec.provenance["default_pose.FL_thigh_joint"].origin == "given"
+    assert spec.provenance["default_pose.F.*_thigh_joint"].origin == "given"
+    assert "default_pose.R.*_thigh_joint" not in spec.provenance
     assert spec.provenance["default_pose"].origin == "solved"
     model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
     joint = model.joint("FL_thigh_joint")
-    assert model.key("home").qpos[joint.qposadr[0]] == expected.default_pose["FL_thigh_joint"]
+    assert model.key("home").qpos[joint.qposadr[0]] == 0.85
 
 
 def test_onboard_accepts_any_link_as_foot(onboarded, tmp_path):
@@ -357,8 +357,8 @@ def test_onboard_replaces_crouching_keyframe(tmp_path):
 def test_onboard_training_gains(onboarded, tmp_path):
     stiff = onboarded(QUADRUPED)
     result = onboard(QUADRUPED, tmp_path / "robot", options(gains="train"))
-    assert result.robot.spec.stiffness["FL_calf_joint"] == 20.0
-    assert result.robot.spec.action_scale["FL_calf_joint"] == 0.25
+    assert result.robot.spec.stiffness == {".*": 20.0}
+    assert result.robot.spec.action_scale == {".*": 0.25}
     checks = result.verification
     assert checks.is_stable
     assert checks.stand_gains
@@ -382,7 +382,7 @@ def test_onboard_replaces_placeholder_efforts(tmp_path):
     file = tmp_path / "quadruped.urdf"
     file.write_text(QUADRUPED.read_text().replace('effort="23.7"', 'effort="1000"'))
     result = onboard(file, tmp_path / "robot", options())
-    effort = result.robot.spec.effort
+    effort = result.robot.spec.per_joint("effort")
     assert effort["FL_hip_joint"] == 33.0
     assert effort["FL_calf_joint"] == 45.43
     assert "x weight x leg length" in str(result.robot.spec.provenance)

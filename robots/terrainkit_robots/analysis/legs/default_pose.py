@@ -4,7 +4,11 @@ from collections.abc import Mapping, Sequence
 
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.analysis.legs.leg_model import LegModel
-from terrainkit_robots.analysis.legs.standing_pose import clip_to_limits, solve_standing_pose
+from terrainkit_robots.analysis.legs.standing_pose import (
+    clip_to_limits,
+    round_position,
+    solve_standing_pose,
+)
 from terrainkit_robots.spec.per_joint import match_joints
 
 
@@ -40,6 +44,8 @@ def _positions(
 
 def _near_zero(robot: LegModel) -> dict[str, float]:
     return {
-        joint.name: robot.keyframe.get(joint.name, clip_to_limits(joint, joint.reference))
+        joint.name: robot.keyframe.get(
+            joint.name, round_position(joint, clip_to_limits(joint, joint.reference))
+        )
         for joint in robot.joints
     }

@@ -54,6 +54,15 @@ more does not stand."""
 _OUTWARD_COST = 0.05
 """Cost of a knee that is a leg length outside of its hip. It only breaks ties."""
 
+_STEPS = (0.05, 0.01)
+"""Hip and knee are multiples of the first step [rad] at which the cost is close to the lowest."""
+
+_MAX_ROUNDING_COST = 0.25
+"""Increase of the cost by rounding, at most: the foot moves by 1 % of the leg length."""
+
+_MAX_ROUNDED = 1e6
+"""Larger positions are not rounded [rad] or [m]."""
+
 _MIN_KNEE_HEIGHT = 0.15
 """Smallest height of the knee above the ground, over the leg length."""
 
@@ -74,8 +83,18 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
             positions |= solution
             if mirror_leg is not None:
                 positions |= _mirror_solution(solution, leg, mirror_leg, signs)
+    positions = {joint.name: round_position(joint, positions[joint.name]) for joint in robot.joints}
     mimicked = mimic_positions(robot.joints, positions)
     return positions | {name: float(position) for name, position in mimicked.items()}
+
+
+def round_position(joint: Joint, position: float) -> float:
+    """Return a position in steps of 0.01 rad or 1 mm within the limits, if there is one."""
+    digits = 3 if joint.kind == "prismatic" else 2
+    step = 10.0**-digits if abs(position) < _MAX_ROUNDED else 0.0
+    lower, upper = joint_range(joint)
+    nearby = (round(position + shift * step, digits) + 0.0 for shift in (0, 1, -1))
+    return next((near for near in nearby if lower <= near <= upper), position)
 
 
 def clip_to_limits(joint: Joint, position: float) -> float:
@@ -248,7 +267,7 @@ def _solve_leg(
     cost = objective.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
     # The knee may bend both ways, and only the refined minima tell which way is better.
     starts = np.array([(axes[0, i], axes[1, j]) for i, j in _local_minima(cost)[:_MAX_STARTS]])
-    hip, knee = _minimize(objective, starts, limits)
+    hip, knee = _round(objective, _minimize(objective, starts, limits))
     return {name: float(q) for name, q in objective.positions(hip, knee).items()}
 
 
@@ -272,6 +291,22 @@ def _minimize(objective: _LegObjective, starts: Matrix, limits: Matrix) -> Matri
         hip, knee = np.divmod(cost.argmin(axis=1), _GRID_SIZE)
         best = np.stack([axes[rows, 0, hip], axes[rows, 1, knee]], axis=1)
     return np.asarray(best[cost.min(axis=1).argmin()])
+
+
+def _round(objective: _LegObjective, best: Matrix) -> Matrix:
+    """Return hip and knee as multiples of the first step that does not move the foot much."""
+    max_cost = float(objective.cost(*best)) + _MAX_ROUNDING_COST
+    for step in _STEPS:
+        axes = [
+            [near for near in step * (round(q / step) + np.arange(-1, 2)) if low <= near <= high]
+            for joint, q in zip((objective.hip, objective.knee), best, strict=True)
+            for low, high in [joint_range(joint)]
+        ]
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        cost = objective.cost(*grid.T)
+        if len(grid) and cost.min() <= max_cost:
+            return np.asarray(grid[cost.argmin()]).round(2)
+    return best
 
 
 def _search_range(joint: Joint) -> tuple[float, float]:

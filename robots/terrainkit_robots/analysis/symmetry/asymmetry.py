@@ -133,11 +133,16 @@ def _misalignment(
 def _is_rotated(mirror: Mirror, pair: MirrorPair, angle: float) -> bool:
     """Return whether the center of mass of a body is rotated like the joint below it.
 
-    If it is not, the joint below is misplaced rather than the frame of this body.
+    If it is not, the joint below is misplaced rather than the frame of this body. A center of mass
+    at the joint shows nothing; then the frames themselves are compared.
     """
     arm = float(np.linalg.norm(pair.right.arm))
+    if arm < _MIN_COM_DISTANCE:
+        left, right = (side.body.zero_pose[:3, :3] for side in (pair.left, pair.right))
+        mirrored = mirror.image(mirror.image(left).T).T
+        return bool(np.abs(mirrored - right).max() > math.sin(MAX_AXIS_ERROR))
     distance = float(np.linalg.norm(mirror.image(pair.left.arm) - pair.right.arm))
-    return arm < _MIN_COM_DISTANCE or distance > 0.5 * 2 * math.sin(angle / 2) * arm
+    return distance > 0.5 * 2 * math.sin(angle / 2) * arm
 
 
 def limits_match(a: tuple[float, float], b: tuple[float, float], sign: int) -> bool:

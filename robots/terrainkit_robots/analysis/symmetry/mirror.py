@@ -222,6 +222,11 @@ def _has_lone_letter(name: str) -> bool:
     return sides in (["l"], ["r"])
 
 
+def side_words(name: str) -> list[str]:
+    """Return the words of a name that mark a side, such as FL or left, as they are written."""
+    return [word for word in _TOKEN.findall(name) if word.lower() in _SIDES]
+
+
 def swap_sides(name: str) -> str:
     """Return a name with left and right swapped: FL_calf becomes FR_calf, left_toe right_toe.
 

@@ -67,12 +67,13 @@ def invalid_references(doc: XmlDocument) -> Iterator[Problem]:
         ratio = parse_numbers(text, 1)
         if (ratio is None or ratio[0] == 0) and not has_variable(text):
             owner = next(reduction.iterancestors("transmission"))
+            subject = _driven_joint(owner) or owner.get("name", "")
             yield Problem(
                 code="JNT024",
-                message=f"mechanicalReduction of transmission {owner.get('name', '')}: got "
+                message=f"mechanicalReduction of the transmission of {subject}: got "
                 f"{truncate(text, 40)!r}; expected a ratio other than 0",
                 source=doc.source(reduction),
-                subject=_driven_joint(owner) or owner.get("name", ""),
+                subject=subject,
             )
 
 

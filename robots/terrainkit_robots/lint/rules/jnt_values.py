@@ -16,7 +16,7 @@ and more; 2 rad divided by 57.3 are 0.035."""
 _MAX_SHIFT = math.pi * 1.05
 """Distance of a whole range from zero above which the range is probably off by a turn [rad]."""
 
-_MAX_FRICTION, _MAX_LEG_FRICTION = 0.99, 0.5
+_MAX_FRICTION, _MAX_LEG_FRICTION = 0.99, 0.3
 """Allowed friction as a share of the effort, of all joints and of those of legs. Harmonic drives
 need up to 20 %."""
 
@@ -27,6 +27,9 @@ of legs [rad/s]."""
 _MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 50.0
 """The same speed of a leg joint as a share of its velocity limit, if the limit [rad/s] is not a
 placeholder."""
+
+_MAX_COMMAND_RATIO = 4.0
+"""Allowed ratio of the two ends of the control range of a motor."""
 
 _MAX_UNIT_COMMAND = 5.0
 """Largest command of a motor that may be a normalized action instead of a torque."""
@@ -299,7 +302,8 @@ def one_sided_motor(robot: Facts) -> Iterator[Violation]:
     """A motor can push a hinge in one direction only.
 
     Its control range starts or ends at zero, usually because a sign is missing. The joint cannot
-    brake or return.
+    brake or return. A range with one end several times larger than the other one is reported as
+    well: a digit is missing.
 
     Fix:
         Give both ends of ctrlrange: "-23.7 23.7".
@@ -316,13 +320,15 @@ def one_sided_motor(robot: Facts) -> Iterator[Violation]:
         joint = joints.get(actuator.joint)
         lower, upper = actuator.commands
         hinge = joint is not None and joint.kind == "revolute"
-        if hinge and lower < upper and (lower >= 0 or upper <= 0):
+        ends = sorted((abs(lower), abs(upper)))
+        is_one_sided = lower >= 0 or upper <= 0 or ends[1] > _MAX_COMMAND_RATIO * ends[0]
+        if hinge and lower < upper and is_one_sided:
             yield Violation(
                 subject=actuator.joint,
                 source=actuator.source,
                 severity=None if robot.legs else "info",
                 message=f"control range of the motor of joint {actuator.joint}: got {lower:g} to "
-                f"{upper:g}; expected both signs",
+                f"{upper:g}; expected both signs with similar values",
                 measured={"lower": lower, "upper": upper},
             )
 

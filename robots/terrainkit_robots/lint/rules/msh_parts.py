@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import PurePosixPath
 
 from terrainkit_robots.analysis.facts import Facts
@@ -98,7 +98,7 @@ def odd_leg_mesh(robot: Facts) -> Iterator[Violation]:
     Meshes are shared by all legs, by the legs of one side, or by the front and the rear legs. If
     three legs share one and the fourth has its own, a file name was not changed after copying. A
     mesh that only the fourth leg uses is meant for the other leg of its side as well, so that leg
-    is reported.
+    is reported. One thigh with the mesh of all calves is reported, too.
 
     Fix:
         Use the same mesh as on the opposite leg of the same side, or its mirrored version.
@@ -110,6 +110,7 @@ def odd_leg_mesh(robot: Facts) -> Iterator[Violation]:
     if len(chains) != 4 or len({len(chain) for chain in chains}) != 1:
         return
     sides = [float(leg.limb.points[0] @ robot.mirror.normal) > 0 for leg in robot.legs]
+    yield from _meshes_of_other_joints(robot, chains)
     for kind in ("visuals", "collisions"):
         uses = Counter(_stem(g) for link in robot.links for g in getattr(link, kind))
         for bodies in zip(*chains, strict=True):
@@ -137,4 +138,32 @@ def odd_leg_mesh(robot: Facts) -> Iterator[Violation]:
                 f"{', '.join(expected)}, or one mesh for all legs, as "
                 f"{', '.join(others)} share {', '.join(shared)} and only "
                 f"{robot.bodies[bodies[single]].name} has {', '.join(own)}",
+            )
+
+
+def _meshes_of_other_joints(robot: Facts, chains: Sequence[Sequence[int]]) -> Iterator[Violation]:
+    """Yield a violation for each body of one leg with the mesh of another joint of all others."""
+    for kind in ("visuals", "collisions"):
+        users: dict[str, set[tuple[int, int]]] = {}
+        for leg, chain in enumerate(chains):
+            for position, index in enumerate(chain):
+                for shape in getattr(robot.bodies[index], kind):
+                    users.setdefault(_stem(shape.geometry), set()).add((position, leg))
+        users.pop("", None)
+        for stem, places in users.items():
+            counts = Counter(position for position, _ in places)
+            single = [place for place in places if counts[place[0]] == 1]
+            if len(counts) != 2 or len(single) != 1 or len(places) < len(chains):
+                continue
+            ((position, leg),) = single
+            others = {p: q for q in counts for p in counts if p != q}
+            body = robot.bodies[chains[leg][position]]
+            wrong = next(s for s in getattr(body, kind) if _stem(s.geometry) == stem)
+            owner = robot.bodies[chains[leg][others[position]]]
+            yield Violation(
+                subject=wrong.link,
+                source=wrong.geometry.source,
+                certainty="likely",
+                message=f"{kind[:-1]} mesh of {wrong.link}: got {stem}, which {len(places) - 1} "
+                f"legs have at {owner.name} instead; expected another mesh",
             )

@@ -1,7 +1,6 @@
 """Rules on the symmetry of losses, gears, products of inertia, mimics and shapes (SYM)."""
 
 import math
-import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +9,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
 from terrainkit_robots.analysis.bodies.link_source import inertia_source
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror import swap_sides
+from terrainkit_robots.analysis.symmetry.mirror import side_words
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
 from terrainkit_robots.description.model import Geometry, Joint
 from terrainkit_robots.lint.rule import Violation, rule
@@ -273,8 +272,7 @@ def _is_gripper(left: Joint, right: Joint) -> bool:
     """
     targets = {joint.mimic.joint for joint in (left, right) if joint.mimic is not None}
     return not targets.isdisjoint({left.name, right.name}) or any(
-        sum(swap_sides(word) != word for word in re.findall(r"[a-zA-Z][a-z]*", joint.name)) > 1
-        for joint in (left, right)
+        len(side_words(joint.name)) > 1 for joint in (left, right)
     )
 
 

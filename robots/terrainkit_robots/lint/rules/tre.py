@@ -1,11 +1,13 @@
 """TRE: rules on the kinematic tree of links and joints."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 
 from terrainkit.text import closest, truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.symmetry.mirror import side_words
 from terrainkit_robots.description.fix import Fix, InsertChild
 from terrainkit_robots.description.model import Joint, Link
 from terrainkit_robots.lint.rule import Violation, get_rule, rule
@@ -390,4 +392,38 @@ def invalid_reference(robot: Facts) -> Iterator[Violation]:
                 subject=problem.subject or problem.source.file.name,
                 source=problem.source,
                 message=problem.message,
+            )
+
+
+@rule("TRE011", "parent-of-another-leg", "warning")
+def parent_of_another_leg(robot: Facts) -> Iterator[Violation]:
+    """A link is attached to the link of another leg or side.
+
+    Its name says one side and that of its parent another one, while the parent of its own side has
+    no such child. The parent was not changed after copying the joint.
+
+    Fix:
+        Attach the joint to the link of its own side.
+
+    Source:
+        Sides are words such as FL, RR, left and r in the names of the links. Fixed joints are not
+        checked.
+    """
+    tree = robot.tree
+    for joint in tree.parent_joint.values():
+        own, other = side_words(joint.child), side_words(joint.parent)
+        is_paired = len(own) == len(other) == 1 and own[0].lower() != other[0].lower()
+        if not is_paired or not joint.moves:
+            continue  # a stereo camera has a left and a right frame
+        expected = re.sub(rf"(?<![A-Za-z]){other[0]}(?![a-z])", own[0], joint.parent, count=1)
+        lacks_child = expected in tree.links and len(tree.child_joints.get(expected, ())) < len(
+            tree.child_joints[joint.parent]
+        )
+        if lacks_child and expected != joint.parent:
+            yield Violation(
+                subject=joint.name,
+                source=joint.source,
+                certainty="likely",
+                message=f"parent of link {truncate(joint.child)} in joint {truncate(joint.name)}: "
+                f"got {truncate(joint.parent)}; expected {truncate(expected)}, which lacks a child",
             )

@@ -18,7 +18,8 @@ from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
     velocity_column,
 )
 from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
-from terrainkit_robots.spec.column import Column, collect_provenance, rounded
+from terrainkit_robots.spec.column import Column, collect_provenance, rounded, rounded_length
+from terrainkit_robots.spec.name_patterns import by_pattern
 from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
 from terrainkit_robots.text import names
 
@@ -71,6 +72,7 @@ def derive_spec(
     pose = columns["default_pose"].values
     reset, reset_reason = _reset_range(facts, pose)
     lengths = _lengths(facts)
+    columns = {name: column.by_pattern() for name, column in columns.items()}
     values: dict[str, Any] = {name: column.values for name, column in columns.items()}
     heights: dict[str, Any] = {name: value for name, (value, _) in lengths.items()}
     return RobotSpec(
@@ -86,7 +88,7 @@ def derive_spec(
         termination_contacts=named_bodies.termination_contacts(facts),
         penalized_contacts=named_bodies.penalized_contacts(facts),
         **values,
-        soft_limits=_soft_limits(facts, pose),
+        soft_limits=by_pattern(_soft_limits(facts, pose), [j.name for j in facts.actuated]),
         reset_range=reset,
         **heights,
         mirror=mirror,
@@ -114,12 +116,12 @@ def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
         pose.add(joint.name, rounded(facts.positions[joint.name]), origin)
         stiffness.add(
             joint.name,
-            rounded(gain.stiffness, 3),
+            rounded(gain.stiffness, 2),
             _provenance("suggested", gain.reason),
         )
         damping.add(
             joint.name,
-            rounded(gain.damping, 3),
+            rounded(gain.damping, 2),
             _provenance("suggested", "see stiffness"),
         )
     return {"default_pose": pose, "stiffness": stiffness, "damping": damping}
@@ -147,7 +149,9 @@ def _soft_limits(facts: Facts, pose: Mapping[str, float]) -> dict[str, tuple[flo
             continue
         lower, upper = joint.range
         margin = (1 - _SOFT_LIMIT_FACTOR) / 2 * (upper - lower)
-        soft = rounded(lower + margin), rounded(upper - margin)
+        soft = rounded(lower + margin, 3), rounded(upper - margin, 3)
+        if not lower <= soft[0] < soft[1] <= upper:  # a small range far from 0
+            soft = lower + margin, upper - margin
         position = pose[joint.name]
         limits[joint.name] = min(soft[0], position), max(soft[1], position)
     return limits
@@ -217,7 +221,7 @@ def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:
     if facts.bodies[0].virtual:  # the base is the world, which has no height
         del found["base_height_target"], found["spawn_height"]
     return {
-        name: (rounded(value), origin)
+        name: (rounded_length(value), origin)
         for name, (value, origin) in found.items()
         if value is not None and math.isfinite(value)
     }

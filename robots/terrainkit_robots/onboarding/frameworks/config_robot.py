@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from statistics import median
 from typing import Literal, TypeVar
@@ -34,10 +34,18 @@ class ConfigRobot:
     passive_joints: Sequence[str] = ()
     """Movable joints of the URDF without an actuator, such as mimic joints."""
 
+    roles: Mapping[str, str] = field(default_factory=dict)
+    """Role of each joint of the legs, such as hip, knee or ankle."""
+
     @property
     def title(self) -> str:
         """Return the name of the robot for messages."""
         return truncate(re.sub(r"[^\w .+-]", "_", self.spec.name).strip() or "the robot", 60)
+
+    @property
+    def all_joints(self) -> tuple[str, ...]:
+        """Return the names of all movable joints, which patterns have to tell apart."""
+        return (*self.spec.joint_order, *self.passive_joints)
 
     @cached_property
     def all_bodies(self) -> tuple[str, ...]:
@@ -57,7 +65,7 @@ class ConfigRobot:
                 soft_lower, soft_upper = soft_limits[joint]
                 factors.append((soft_upper - soft_lower) / (upper - lower))
         factor = median(factors) if factors else DEFAULT_SOFT_LIMIT_FACTOR
-        return round(factor, 4) if 0 < factor <= 1 else 1.0
+        return round(factor, 2) if 0 < factor <= 1 else 1.0
 
     @cached_property
     def velocity_joints(self) -> tuple[str, ...]:

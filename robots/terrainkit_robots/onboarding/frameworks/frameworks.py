@@ -20,6 +20,7 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.analysis.legs.legs import Leg
 
 
 @cache
@@ -48,6 +49,7 @@ def config_text(
     bodies: Sequence[str] = (),
     limits: Mapping[str, tuple[float, float]] | None = None,
     passive_joints: Sequence[str] = (),
+    roles: Mapping[str, str] | None = None,
 ) -> str:
     """Return the configuration of a robot, a Python file for the folder of its robot.toml.
 
@@ -59,12 +61,19 @@ def config_text(
         limits: Lower and upper limit of each joint in the URDF. Without limits, the default
             factor of the soft limits is used.
         passive_joints: Movable joints of the URDF without an actuator.
+        roles: Role of each joint of the legs, such as hip, knee or ankle.
 
     Raises:
         ConfigError: if the framework is unknown, or does not support the robot.
     """
     config_file_name(name)
-    robot = ConfigRobot(spec=spec, bodies=bodies, limits=limits, passive_joints=passive_joints)
+    robot = ConfigRobot(
+        spec=spec,
+        bodies=bodies,
+        limits=limits,
+        passive_joints=passive_joints,
+        roles=roles or {},
+    )
     module = _get_module(name)
     if module.LEGGED_ONLY:
         others = [other for other in framework_names() if not _get_module(other).LEGGED_ONLY]
@@ -91,7 +100,17 @@ def robot_config_text(name: str, facts: "Facts", spec: RobotSpec) -> str:
         bodies=(*(body_name(body) for body in facts.bodies), *spec.feet),
         limits={joint.name: joint.range for joint in joints if joint.range is not None},
         passive_joints=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
+        roles={name: role for leg in facts.legs for name, role in _roles(leg).items()},
     )
+
+
+def _roles(leg: "Leg") -> dict[str, str]:
+    """Return the role of each joint of a leg; those below the knee belong to the ankle."""
+    roles: dict[str, str] = {}
+    for joint, role in zip(leg.joints, leg.roles, strict=True):
+        is_ankle = "knee" in roles.values() and role != "slide"
+        roles[joint.name] = "ankle" if is_ankle else role
+    return roles
 
 
 def _get_module(name: str) -> ModuleType:

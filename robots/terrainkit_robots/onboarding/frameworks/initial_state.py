@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
+from terrainkit_robots.onboarding.frameworks.patterns import merge_patterns
 from terrainkit_robots.onboarding.frameworks.source import (
     dict_entries,
     float_literal,
@@ -19,7 +20,7 @@ def initial_state(robot: ConfigRobot, patterns: Mapping[str, str], *, depth: int
         depth: Indentation of the fields, in steps of four spaces.
     """
     pose = robot.all_joint_values("default_pose")
-    entries = dict_entries({patterns[joint]: angle for joint, angle in pose.items()})
+    entries = dict_entries(merge_patterns(pose, patterns))
     return [
         *robot.provenance_comment("spawn_height", depth=depth, prefix="x, y, z"),
         f"pos=(0.0, 0.0, {float_literal(robot.spec.spawn_height or 0.0)}),",

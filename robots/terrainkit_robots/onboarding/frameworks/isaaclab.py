@@ -1,12 +1,17 @@
 """Write the configuration of a robot for Isaac Lab: articulation and velocity task."""
 
+import re
 from collections.abc import Mapping, Sequence
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_name, package_name
-from terrainkit_robots.onboarding.frameworks.patterns import usd_patterns
+from terrainkit_robots.onboarding.frameworks.patterns import (
+    merge_names,
+    merge_patterns,
+    usd_patterns,
+)
 from terrainkit_robots.onboarding.frameworks.source import (
     GENERATED_NOTE,
     PARENT_FOLDER,
@@ -26,14 +31,21 @@ from terrainkit_robots.onboarding.frameworks.source import (
 LEGGED_ONLY = False
 """Whether the framework supports only robots with legs."""
 
-_LIMITS = {
-    "effort_limit_sim": "effort",
-    "velocity_limit_sim": "velocity",
-    "stiffness": "stiffness",
-    "damping": "damping",
-    "armature": "armature",
+_IMPLICIT, _DC_MOTOR = "ImplicitActuatorCfg", "DCMotorCfg"
+
+_GAINS = {"stiffness": "stiffness", "damping": "damping", "armature": "armature"}
+
+_FIELDS = {
+    _IMPLICIT: {"effort_limit_sim": "effort", "velocity_limit_sim": "velocity", **_GAINS},
+    _DC_MOTOR: {"effort_limit": "effort", "velocity_limit": "velocity", **_GAINS},
 }
-"""Fields of ImplicitActuatorCfg, and the corresponding fields of the spec."""
+"""Fields of each type of actuator, and the corresponding fields of the spec."""
+
+_MIN_MOTOR_FEET = 4
+"""From this number of feet on, legs have DC motors, as Isaac Lab's own quadrupeds."""
+
+_MAX_PART_LENGTH = 20
+"""Longest name of an actuator that is made of the names of its joints."""
 
 
 def config_text(robot: ConfigRobot) -> str:
@@ -45,12 +57,13 @@ def config_text(robot: ConfigRobot) -> str:
     if not robot.spec.joint_order:
         raise ConfigError(f"{robot.title} has no joints, which Isaac Lab requires")
     name = f"{constant_name(robot.spec.name)}_CFG"
+    actuators = ", ".join(sorted(set(_actuators(robot).values())))
     is_legged = bool(robot.spec.feet) and robot.spec.floating
     return join_lines(
         [
             docstring(_about(robot, name, is_legged)),
             ["", "from pathlib import Path", "", "import isaaclab.sim as sim_utils"],
-            ["from isaaclab.actuators import ImplicitActuatorCfg"],
+            [f"from isaaclab.actuators import {actuators}"],
             ["from isaaclab.assets import ArticulationCfg", ""],
             sum_assignment("ROBOT_URDF", PARENT_FOLDER, "/", string_literal(robot.spec.urdf)),
             [""],
@@ -105,13 +118,16 @@ def _articulation(robot: ConfigRobot, name: str) -> list[str]:
         *indent(_spawn(robot)),
         "),",
         "init_state=ArticulationCfg.InitialStateCfg(",
-        *indent(initial_state(robot, usd_patterns(robot.spec.joint_order), depth=2)),
+        *indent(initial_state(robot, usd_patterns(robot.all_joints), depth=2)),
         "),",
         *robot.soft_limit_comment(depth=1),
         f"soft_joint_pos_limit_factor={float_literal(robot.soft_limit_factor)},",
         "actuators={",
-        *indent(_actuator(robot, "joints", robot.position_joints)),
-        *indent(_actuator(robot, "wheels", robot.velocity_joints)),
+        *(
+            line
+            for (name, joints), kind in _actuators(robot).items()
+            for line in indent(_actuator(robot, name, kind, joints))
+        ),
         "},",
     ]
     return [f"{name} = ArticulationCfg(", *indent(lines), ")"]
@@ -146,14 +162,41 @@ def _spawn(robot: ConfigRobot) -> list[str]:
     ]
 
 
-def _actuator(robot: ConfigRobot, name: str, joints: Sequence[str]) -> list[str]:
-    """Return the source of an actuator of some joints, or nothing without joints."""
-    if not joints:
-        return []
-    patterns = usd_patterns(robot.spec.joint_order)
-    names = format_strings(patterns[joint] for joint in joints)
+def _actuators(robot: ConfigRobot) -> dict[tuple[str, tuple[str, ...]], str]:
+    """Return the type of each actuator by its name and joints.
+
+    A DC motor has one saturation effort, so joints with other effort limits have their own motor.
+    """
+    effort, velocity = robot.joint_values("effort"), robot.joint_values("velocity")
+    has_motors = len(robot.spec.feet) >= _MIN_MOTOR_FEET
+    motors: dict[float, list[str]] = {}
+    groups: dict[str, list[str]] = {}
+    for joint in robot.spec.joint_order:
+        role = robot.roles.get(joint, "")
+        is_leg = role not in ("", "waist")
+        if joint in robot.velocity_joints:
+            groups.setdefault("wheels", []).append(joint)
+        elif has_motors and (is_leg or not robot.roles) and joint in effort and joint in velocity:
+            motors.setdefault(effort[joint], []).append(joint)
+        else:
+            body_part = "feet" if role == "ankle" else "legs" if is_leg else "upper_body"
+            groups.setdefault(body_part if robot.roles else "joints", []).append(joint)
+    patterns = usd_patterns(robot.all_joints)
+    found = {}
+    for index, joints in enumerate(motors.values(), 1):
+        words = re.findall(r"[A-Za-z]+", " ".join(merge_names(joints, patterns)))
+        part = "_".join(word for word in dict.fromkeys(words) if word.lower() != "joint")
+        name = part if 0 < len(part) <= _MAX_PART_LENGTH else f"legs_{index}"
+        found[name if len(motors) > 1 else "legs", tuple(joints)] = _DC_MOTOR
+    return found | {(name, tuple(joints)): _IMPLICIT for name, joints in groups.items()}
+
+
+def _actuator(robot: ConfigRobot, name: str, kind: str, joints: Sequence[str]) -> list[str]:
+    """Return the source of an actuator of some joints."""
+    patterns = usd_patterns(robot.all_joints)
+    names = format_strings(merge_names(joints, patterns))
     lines = format_collection("joint_names_expr=", names, depth=3, suffix=",")
-    for field, source in _LIMITS.items():
+    for field, source in _FIELDS[kind].items():
         required = field in ("stiffness", "damping")
         known = robot.all_joint_values(source) if required else robot.joint_values(source)
         values = {joint: known[joint] for joint in joints if joint in known}
@@ -161,12 +204,15 @@ def _actuator(robot: ConfigRobot, name: str, joints: Sequence[str]) -> list[str]
             lines += robot.provenance_comment(source, depth=3)
             complete = len(values) == len(joints)
             lines += _value(f"{field}=", values, patterns, complete=complete, depth=3, suffix=",")
-    return [f'"{name}": ImplicitActuatorCfg(', *indent(lines), "),"]
+        if kind == _DC_MOTOR and field == "effort_limit":
+            lines.append(f"saturation_effort={float_literal(values[joints[0]])},")
+    friction = ["friction=0.0,"] if kind == _DC_MOTOR else []
+    return [f'"{name}": {kind}(', *indent([*lines, *friction]), "),"]
 
 
 def _scales(robot: ConfigRobot) -> list[str]:
     """Return the action scales of joints with position targets and with velocity targets."""
-    patterns = usd_patterns(robot.spec.joint_order)
+    patterns = usd_patterns(robot.all_joints)
     lines = []
     if robot.position_joints:
         lines += ["", *robot.provenance_comment("action_scale")]
@@ -174,10 +220,10 @@ def _scales(robot: ConfigRobot) -> list[str]:
     if robot.velocity_joints:
         lines += ["", *robot.velocity_scale_comment()]
         lines += _value("SPEED_SCALE = ", robot.action_scales(robot.velocity_joints), patterns)
-        wheels = format_strings(patterns[joint] for joint in robot.velocity_joints)
+        wheels = format_strings(merge_names(robot.velocity_joints, patterns))
         lines += format_collection("WHEELS = ", wheels)
     if robot.position_joints and (robot.velocity_joints or robot.passive_joints):
-        joints = format_strings(patterns[joint] for joint in robot.position_joints)
+        joints = format_strings(merge_names(robot.position_joints, patterns))
         lines += format_collection("JOINTS = ", joints)
     return lines
 
@@ -195,7 +241,7 @@ def _value(
     different = set(format_floats(values.values()))
     if complete and len(different) == 1:
         return [f"{prefix}{different.pop()}{suffix}"]
-    entries = dict_entries({patterns[joint]: value for joint, value in values.items()})
+    entries = dict_entries(merge_patterns(values, patterns))
     return format_collection(prefix, entries, "{}", depth=depth, suffix=suffix)
 
 
@@ -272,5 +318,6 @@ def _bodies(robot: ConfigRobot) -> list[str]:
         ("TERMINATION", "termination_contacts"),
     ):
         names = robot.check_bodies(getattr(spec, field), field)
-        lines += format_collection(f"{name} = ", format_strings(patterns[body] for body in names))
+        merged = format_strings(merge_names(names, patterns))
+        lines += format_collection(f"{name} = ", merged)
     return lines

@@ -16,7 +16,12 @@ from terrainkit_robots.onboarding.frameworks.source import (
     string_literal,
     sum_assignment,
 )
-from terrainkit_robots.onboarding.frameworks.substrings import common_key, gain_keys, keys_for
+from terrainkit_robots.onboarding.frameworks.substrings import (
+    Keys,
+    common_key,
+    gain_keys,
+    keys_for,
+)
 from terrainkit_robots.text import names
 
 BEFORE_IMPORTS = ["# ruff: noqa: RUF012", "", "from pathlib import Path", ""]
@@ -88,6 +93,14 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
     stiffness, damping = robot.all_joint_values("stiffness"), robot.all_joint_values("damping")
     pairs = {joint: (stiffness[joint], damping[joint]) for joint in robot.spec.joint_order}
     result = gain_keys(robot.spec.joint_order, pairs)
+    values = {key: pairs[key] for key in result.keys}
+    groups: dict[tuple[float, float], list[str]] = {}
+    for joint, pair in pairs.items():
+        groups.setdefault(pair, []).append(joint)
+    shared = {pair: keys_for(joints, robot.spec.joint_order) for pair, joints in groups.items()}
+    if not any(keys.clashes for keys in shared.values()):
+        result = Keys(keys=tuple(key for keys in shared.values() for key in keys.keys))
+        values = {key: pair for pair, keys in shared.items() for key in keys.keys}
     scale, difference = robot.shared_value(
         robot.action_scales(robot.position_joints).values(), "median", depth=2
     )
@@ -106,9 +119,9 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
         "# A key applies to every joint whose name contains it.",
         *comment(warning, depth=2),
         *robot.provenance_comment("stiffness", depth=2),
-        *_table("stiffness", stiffness, result.keys),
+        *_table("stiffness", {key: pair[0] for key, pair in values.items()}),
         *robot.provenance_comment("damping", depth=2),
-        *_table("damping", damping, result.keys),
+        *_table("damping", {key: pair[1] for key, pair in values.items()}),
         *robot.provenance_comment("action_scale", depth=2),
         *difference,
         f"action_scale = {float_literal(scale)}",
@@ -173,9 +186,8 @@ def path_in_folder(attribute: str, name: str) -> list[str]:
     return sum_assignment(attribute, "HERE", "+", string_literal("/" + escaped), depth=2)
 
 
-def _table(name: str, values: dict[str, float], keys: tuple[str, ...]) -> list[str]:
-    entries = dict_entries({key: values[key] for key in keys})
-    return format_collection(f"{name} = ", entries, "{}", depth=2)
+def _table(name: str, values: dict[str, float]) -> list[str]:
+    return format_collection(f"{name} = ", dict_entries(values), "{}", depth=2)
 
 
 def _body_keys(robot: ConfigRobot, field: str, attribute: str) -> list[str]:

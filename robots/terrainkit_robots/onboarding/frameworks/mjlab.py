@@ -1,11 +1,16 @@
-"""Write the configuration of a robot for mjlab: entity and actuators."""
+"""Write the configuration of a robot for mjlab: entity, actuators and velocity task."""
 
 from collections.abc import Mapping, Sequence
 
+from terrainkit_robots.onboarding.frameworks import mjlab_task
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
-from terrainkit_robots.onboarding.frameworks.naming import constant_name, package_name
-from terrainkit_robots.onboarding.frameworks.patterns import mjlab_patterns
+from terrainkit_robots.onboarding.frameworks.naming import package_name
+from terrainkit_robots.onboarding.frameworks.patterns import (
+    merge_names,
+    merge_patterns,
+    mjlab_patterns,
+)
 from terrainkit_robots.onboarding.frameworks.source import (
     GENERATED_NOTE,
     PARENT_FOLDER,
@@ -19,6 +24,7 @@ from terrainkit_robots.onboarding.frameworks.source import (
     string_literal,
     sum_assignment,
 )
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 LEGGED_ONLY = False
 """Whether the framework supports only robots with legs."""
@@ -32,7 +38,27 @@ _FIELDS = {
 """Fields of BuiltinPositionActuatorCfg, and the corresponding fields of the spec.
 BuiltinVelocityActuatorCfg has the same fields except for the stiffness."""
 
+_ROBOT_CFG = '''
+
+def get_robot_cfg() -> EntityCfg:
+    """Return a new configuration of the robot."""
+    return EntityCfg(
+        spec_fn=get_spec,
+        init_state=INIT_STATE,
+        articulation=ARTICULATION,
+        # Actuators in the order of the joints.
+        sort_actuators=True,
+    )
+'''
+
 _POSITION, _VELOCITY = "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg"
+
+
+def train_arguments(spec: RobotSpec) -> str:
+    """Return the arguments with which Python trains a robot in its folder; empty without a task."""
+    if not (spec.feet and spec.joint_order and spec.floating):
+        return ""
+    return f"mjlab_config.py {mjlab_task.task_id(spec, 'Flat')}"
 
 
 def config_text(robot: ConfigRobot) -> str:
@@ -41,42 +67,47 @@ def config_text(robot: ConfigRobot) -> str:
     Raises:
         ConfigError: if two joints have the same name in mjlab.
     """
-    name = constant_name(robot.spec.name)
-    patterns = mjlab_patterns(robot.spec.joint_order)
+    patterns = mjlab_patterns(robot.all_joints)
+    has_task = bool(train_arguments(robot.spec))
     kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
     return join_lines(
         [
-            docstring(_about(robot, name)),
+            docstring(_about(robot, has_task=has_task)),
             ["", "from pathlib import Path", "", "import mujoco"],
             [f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
-            ["from mjlab.entity import EntityArticulationInfoCfg, EntityCfg", ""],
+            ["from mjlab.entity import EntityArticulationInfoCfg, EntityCfg"],
+            mjlab_task.imports(robot) if has_task else [],
+            [""],
             sum_assignment("ROBOT_XML", PARENT_FOLDER, "/", string_literal(robot.spec.mjcf)),
             _get_spec(),
-            ["", f"{name}_INIT_STATE = EntityCfg.InitialStateCfg("],
+            ["", "INIT_STATE = EntityCfg.InitialStateCfg("],
             [*indent(initial_state(robot, patterns, depth=1)), ")"],
-            _articulation(robot, name, patterns),
-            _scales(robot, name, patterns),
-            _robot_cfg(name),
+            _articulation(robot, patterns),
+            _scales(robot, patterns),
+            _ROBOT_CFG.rstrip().split("\n"),
+            mjlab_task.task(robot) if has_task else [],
         ]
     )
 
 
-def _about(robot: ConfigRobot, name: str) -> list[str]:
+def _about(robot: ConfigRobot, *, has_task: bool) -> list[str]:
     package = package_name(robot.spec.name)
+    title = f"{robot.title} for mjlab: entity" + (", actuators and velocity task." * has_task)
     paragraphs = [
-        f"{robot.title} for mjlab: entity and actuators.",
+        title if has_task else f"{title} and actuators.",
         f"{GENERATED_NOTE} A pattern matches the whole name of a joint.",
+        *_training(robot) * has_task,
         f"Copy the folder into your Python package as {package}, and use",
         f"    from {package}.mjlab_config import get_robot_cfg\n\n"
         '    cfg.scene.entities = {"robot": get_robot_cfg()}',
         "mjlab orders actions as the joints in robot.xml. Its position actuators have no velocity "
         "limits; these are in robot.toml.",
     ]
-    if robot.velocity_joints:
+    if robot.velocity_joints and not has_task:
         paragraphs.append(
             "Joints without stiffness have velocity targets: use a JointVelocityActionCfg with "
-            f"actuator_names=tuple({name}_SPEED_SCALE), and a JointPositionActionCfg with the "
-            f"names of {name}_ACTION_SCALE."
+            "actuator_names=tuple(SPEED_SCALE), and a JointPositionActionCfg with the names of "
+            "ACTION_SCALE."
         )
     return paragraphs
 
@@ -97,7 +128,17 @@ def _get_spec() -> list[str]:
     ]
 
 
-def _articulation(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
+def _training(robot: ConfigRobot) -> list[str]:
+    """Return how to train the task, and how to register it."""
+    return [
+        "Train it with mjlab 1.6, on flat ground or with Rough for Flat:",
+        f"    python {train_arguments(robot.spec)} \\\n        --env.scene.num-envs 4096",
+        "mjlab's other commands, such as `play`, find the tasks if a package with an entry point "
+        "in the group `mjlab.tasks` calls `register_tasks`.",
+    ]
+
+
+def _articulation(robot: ConfigRobot, patterns: Mapping[str, str]) -> list[str]:
     """Return the source of the actuators; joints with the same values share an actuator."""
     tables = {
         field: robot.joint_values(source)
@@ -116,7 +157,7 @@ def _articulation(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) ->
         groups.setdefault((_VELOCITY if is_wheel else _POSITION, *arguments), []).append(joint)
     actuators = []
     for (kind, *arguments), joints in groups.items():
-        names = format_strings(patterns[joint] for joint in joints)
+        names = format_strings(merge_names(joints, patterns))
         expression = format_collection("target_names_expr=", names, "()", depth=3, suffix=",")
         actuators += [f"{kind}(", *indent([*expression, *arguments]), "),"]
     origins = [
@@ -128,7 +169,7 @@ def _articulation(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) ->
     return [
         "",
         *origins,
-        f"{name}_ARTICULATION = EntityArticulationInfoCfg(",
+        "ARTICULATION = EntityArticulationInfoCfg(",
         *(block if actuators else ["    actuators=(),"]),
         *indent(robot.soft_limit_comment(depth=1)),
         f"    soft_joint_pos_limit_factor={float_literal(robot.soft_limit_factor)},",
@@ -136,35 +177,18 @@ def _articulation(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) ->
     ]
 
 
-def _scales(robot: ConfigRobot, name: str, patterns: Mapping[str, str]) -> list[str]:
+def _scales(robot: ConfigRobot, patterns: Mapping[str, str]) -> list[str]:
     """Return the action scales of joints with position targets and with velocity targets."""
 
     def entries(joints: Sequence[str]) -> list[str]:
-        scales = robot.action_scales(joints)
-        return dict_entries({patterns[joint]: scale for joint, scale in scales.items()})
+        return dict_entries(merge_patterns(robot.action_scales(joints), patterns))
 
     lines = []
     if robot.position_joints or not robot.velocity_joints:
         origin = robot.provenance_comment("action_scale")
         lines += ["", "# For JointPositionActionCfg.scale.", *origin]
-        lines += format_collection(f"{name}_ACTION_SCALE = ", entries(robot.position_joints), "{}")
+        lines += format_collection("ACTION_SCALE = ", entries(robot.position_joints), "{}")
     if robot.velocity_joints:
         lines += ["", "# For JointVelocityActionCfg.scale.", *robot.velocity_scale_comment()]
-        lines += format_collection(f"{name}_SPEED_SCALE = ", entries(robot.velocity_joints), "{}")
+        lines += format_collection("SPEED_SCALE = ", entries(robot.velocity_joints), "{}")
     return lines
-
-
-def _robot_cfg(name: str) -> list[str]:
-    return [
-        "",
-        "",
-        "def get_robot_cfg() -> EntityCfg:",
-        '    """Return a new configuration of the robot."""',
-        "    return EntityCfg(",
-        "        spec_fn=get_spec,",
-        f"        init_state={name}_INIT_STATE,",
-        f"        articulation={name}_ARTICULATION,",
-        "        # Actuators in the order of the joints.",
-        "        sort_actuators=True,",
-        "    )",
-    ]

@@ -4,6 +4,9 @@ import keyword
 import re
 import unicodedata
 
+_PACKAGE_WORDS = ("description", "urdf")
+"""Last words of names that ROS packages and CAD exporters add to the name of a robot."""
+
 _MAX_LENGTH = 40
 """Longer names are truncated."""
 
@@ -12,6 +15,8 @@ def words(name: str) -> list[str]:
     """Return the words of a name in ASCII letters and digits, at least one word."""
     ascii_name = unicodedata.normalize("NFKD", name[:1000]).encode("ascii", "ignore").decode()
     found = re.findall(r"[A-Za-z0-9]+", ascii_name[:_MAX_LENGTH]) or ["robot"]
+    if len(found) > 1 and found[-1].lower() in _PACKAGE_WORDS:
+        found.pop()
     return ["robot", *found] if found[0][0].isdigit() else found
 
 

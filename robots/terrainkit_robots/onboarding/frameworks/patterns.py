@@ -1,9 +1,13 @@
 """Make regular expressions that match one joint or body each, for Isaac Lab and mjlab."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from typing import TypeVar
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.spec.name_patterns import by_pattern
+
+_Value = TypeVar("_Value", bound=Hashable)
 
 _NON_ASCII_END = "|_+)"
 """End of the pattern of non-ASCII letters. The importer replaces them by one or more underscores.
@@ -37,6 +41,33 @@ def mjlab_patterns(names: Sequence[str]) -> dict[str, str]:
         is_prefix = any(other != short and other.startswith(short) for other in base_names.values())
         patterns[name] = re.escape(short) + ("$" if is_prefix else "")
     return _check_unique(patterns, "mjlab", base_names)
+
+
+def merge_patterns(values: Mapping[str, _Value], patterns: Mapping[str, str]) -> dict[str, _Value]:
+    """Return values by pattern, in which joints with the same value share patterns.
+
+    Names that differ in the framework keep a pattern each.
+
+    Args:
+        values: Values of some joints by name.
+        patterns: A pattern for each joint.
+    """
+    if all(pattern == name for name, pattern in patterns.items()):
+        merged = by_pattern(values, list(patterns))
+        # mjlab matches some patterns at the start of a name only.
+        if not any(_is_start(pattern, name) for pattern in merged for name in patterns):
+            return merged
+    return {patterns[name]: value for name, value in values.items()}
+
+
+def merge_names(names: Iterable[str], patterns: Mapping[str, str]) -> list[str]:
+    """Return few patterns that match some names and no others."""
+    return list(merge_patterns(dict.fromkeys(names, 0), patterns))
+
+
+def _is_start(pattern: str, name: str) -> bool:
+    match = re.match(pattern, name)
+    return match is not None and re.fullmatch(pattern, name) is None
 
 
 def _usd_pattern(name: str) -> str:

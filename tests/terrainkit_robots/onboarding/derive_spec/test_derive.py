@@ -41,12 +41,14 @@ def test_derive_spec_of_quadruped(bundled, gains):
     assert spec.thighs == tuple(f"{leg}_thigh" for leg in legs)
     assert spec.termination_contacts == ("base",)
     assert spec.penalized_contacts == (*spec.thighs, *spec.shanks)
-    assert spec.default_pose == pytest.approx(dict(facts.stance.positions), abs=1e-5)
-    assert spec.effort["FL_calf_joint"] == 45.43
-    assert spec.velocity["FL_hip_joint"] == 30.1
-    assert spec.soft_limits["FL_hip_joint"] == pytest.approx((-0.94248, 0.94248))
-    assert spec.base_height_target == pytest.approx(facts.stance.height, abs=1e-5)
-    assert spec.spawn_height == pytest.approx(facts.stance.height + 0.01, abs=1e-5)
+    hip, thigh, calf = (f".*_{part}_joint" for part in ("hip", "thigh", "calf"))
+    assert spec.default_pose == {hip: 0.0, thigh: 0.75, calf: -1.5}
+    assert spec.per_joint("default_pose") == dict(facts.stance.positions)
+    assert spec.effort == {hip: 23.7, thigh: 23.7, calf: 45.43}
+    assert spec.velocity[hip] == 30.1
+    assert spec.soft_limits[hip] == (-0.942, 0.942)
+    assert spec.base_height_target == round(facts.stance.height, 3)
+    assert spec.spawn_height == round(facts.stance.height + 0.01, 3)
     assert spec.foot_radius == pytest.approx(0.022)
     assert spec.stance_width == pytest.approx(0.284, abs=1e-3)
     assert (spec.urdf, spec.mjcf, spec.floating) == ("robot.urdf", "robot.xml", True)
@@ -114,7 +116,7 @@ def test_derive_spec_reset_range_is_within_limits(bundled, gains):
     spec = derived(facts, gains)
     limits = {joint.name: joint.range for joint in facts.actuated}
     assert spec.reset_range != (0.5, 1.5)
-    for name, position in spec.default_pose.items():
+    for name, position in spec.per_joint("default_pose").items():
         for factor in spec.reset_range:
             assert limits[name][0] <= factor * position <= limits[name][1]
     assert "calf_joint" in spec.provenance["reset_range"].reason

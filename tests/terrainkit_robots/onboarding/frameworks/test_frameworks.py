@@ -167,11 +167,11 @@ def test_robot_config_text_finds_unactuated_joints(robots, bundled_xml):
 
 
 def test_robot_config_text_uses_bodies_and_limits(robots, bundled_xml):
-    """The range of the calf joints is 1.88 rad; the soft limits of the spec span 1.5 rad."""
+    """The range of the calf joints is 1.88 rad; the soft limits of the spec span 1.5 rad: 0.796."""
     facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()
     text = robot_config_text("legged_gym", facts, spec)
-    assert "soft_dof_pos_limit = 0.7958" in text
+    assert "soft_dof_pos_limit = 0.8\n" in text
     ranges = {joint.name: joint.range for joint in facts.model.joints if joint.moves}
     assert text == config_text("legged_gym", spec, bodies=robots.bodies, limits=ranges)
 

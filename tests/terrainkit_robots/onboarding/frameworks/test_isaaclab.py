@@ -17,6 +17,11 @@ def modules(stand_in):
         **dict.fromkeys(("effort_limit", "velocity_limit", "effort_limit_sim", "armature")),
         **dict.fromkeys(("velocity_limit_sim", "stiffness", "damping", "friction")),
     )
+    motor = refusing(
+        "DCMotorCfg",
+        *("joint_names_expr", "effort_limit", "velocity_limit", "saturation_effort"),
+        **dict.fromkeys(("stiffness", "damping", "armature", "friction")),
+    )
     articulation = refusing(
         "ArticulationCfg",
         spawn=None,
@@ -62,7 +67,9 @@ def modules(stand_in):
     made = {
         "isaaclab": stand_in.module("isaaclab", sim=sim),
         "isaaclab.sim": sim,
-        "isaaclab.actuators": stand_in.module("actuators", ImplicitActuatorCfg=actuator),
+        "isaaclab.actuators": stand_in.module(
+            "actuators", ImplicitActuatorCfg=actuator, DCMotorCfg=motor
+        ),
         "isaaclab.assets": stand_in.module("assets", ArticulationCfg=articulation),
         task: stand_in.module(task, LocomotionVelocityRoughEnvCfg=lambda: velocity_task(stand_in)),
     }
@@ -105,6 +112,18 @@ def velocity_task(stand_in):
     )
 
 
+def driven_by(actuators, names):
+    """Return the actuator of each joint; each pattern must match, and each name only one."""
+    found = {}
+    for actuator in actuators.values():
+        for pattern in actuator.joint_names_expr:
+            matched = [name for name in names if re.fullmatch(pattern, name)]
+            assert matched
+            assert not found.keys() & set(matched)
+            found |= dict.fromkeys(matched, actuator)
+    return found
+
+
 def resolved(value, names):
     """Return values by joint; each pattern must match, and each name at most one pattern."""
     if not isinstance(value, dict):
@@ -127,19 +146,39 @@ def test_isaaclab_config_of_quadruped(load, modules, robots, tmp_path):
         joint: -1.8 if "calf" in joint else 0.9 if "thigh" in joint else 0.0
         for joint in spec.joint_order
     }
-    (actuator,) = config.actuators.values()
-    driven = [n for n in names if any(re.fullmatch(p, n) for p in actuator.joint_names_expr)]
-    assert tuple(driven) == spec.joint_order
+    # A DC motor has one saturation effort, so the calves have their own motor.
+    assert {n: type(a).__name__ for n, a in config.actuators.items()} == {
+        "hip_thigh": "DCMotorCfg",
+        "calf": "DCMotorCfg",
+    }
+    motors = driven_by(config.actuators, names)
+    assert set(motors) == set(spec.joint_order)
     for field, calf, other in (
-        ("effort_limit_sim", 45.43, 23.7),
-        ("velocity_limit_sim", 15.7, 30.1),
+        ("effort_limit", 45.43, 23.7),
+        ("saturation_effort", 45.43, 23.7),
+        ("velocity_limit", 15.7, 30.1),
         ("stiffness", 30.0, 20.0),
         ("damping", 0.75, 0.5),
         ("armature", 0.04, 0.01),
+        ("friction", 0.0, 0.0),
     ):
-        values = resolved(getattr(actuator, field), spec.joint_order)
+        values = {joint: getattr(motors[joint], field) for joint in spec.joint_order}
         assert values == robots.of(spec, calf=calf, other=other)
     assert config.soft_joint_pos_limit_factor == 0.9
+
+
+def test_isaaclab_actuators_of_biped(load, modules, robots):
+    joints = ("l_hip", "l_knee", "l_ankle", "r_hip", "r_knee", "r_ankle", "torso")
+    spec = robots.plain(joints, velocity=dict.fromkeys(joints, 20.0), feet=("l_foot", "r_foot"))
+    roles = {joint: joint.partition("_")[2] for joint in joints[:6]}
+    actuators = load("isaaclab", spec, modules, roles=roles).ARM_CFG.actuators
+    assert {type(each).__name__ for each in actuators.values()} == {"ImplicitActuatorCfg"}
+    names = {name: each.joint_names_expr for name, each in actuators.items()}
+    assert names["feet"] == [".*_ankle"]
+    assert names["upper_body"] == ["torso"]
+    assert set(driven_by({"legs": actuators["legs"]}, joints)) == set(joints) - {
+        *("l_ankle", "r_ankle", "torso")
+    }
 
 
 def test_isaaclab_velocity_task(load, modules, robots):
@@ -152,9 +191,9 @@ def test_isaaclab_velocity_task(load, modules, robots):
     assert scale == robots.of(spec, calf=0.2, other=0.25)
     assert task.events.reset_robot_joints.params["position_range"] == (0.6, 1.4)
     assert task.events.add_base_mass.params["asset_cfg"].body_names == "base"
-    assert task.rewards.feet_air_time.params["sensor_cfg"].body_names == list(spec.feet)
+    assert task.rewards.feet_air_time.params["sensor_cfg"].body_names == [".*_foot"]
     penalized = task.rewards.undesired_contacts.params["sensor_cfg"].body_names
-    assert penalized == list(spec.penalized_contacts)
+    assert penalized == [".*_thigh", ".*_calf"]
     assert task.terminations.base_contact.params["sensor_cfg"].body_names == ["base"]
 
 
@@ -184,15 +223,15 @@ def test_isaaclab_config_of_wheels(load, modules, robots):
     wheels, others = robots.wheels_of(spec)
     actuators = loaded.QUAD_4_CFG.actuators
     assert set(actuators) == {"joints", "wheels"}
-    assert tuple(actuators["joints"].joint_names_expr) == others
-    assert tuple(actuators["wheels"].joint_names_expr) == wheels
+    for name, joints in (("joints", others), ("wheels", wheels)):
+        assert set(driven_by({name: actuators[name]}, spec.joint_order)) == set(joints)
     assert (actuators["joints"].stiffness, actuators["wheels"].stiffness) == (20.0, 0.0)
     assert (actuators["joints"].damping, actuators["wheels"].damping) == (0.5, 0.75)
     assert resolved(actuators["wheels"].effort_limit_sim, wheels) == dict.fromkeys(wheels, 45.43)
     assert (loaded.ACTION_SCALE, loaded.SPEED_SCALE) == (0.25, 5.0)
     actions = loaded.rough_env_cfg().actions
-    assert tuple(actions.joint_pos.joint_names) == others
-    assert tuple(actions.joint_vel.joint_names) == wheels
+    assert actions.joint_pos.joint_names == [".*_hip_joint", ".*_thigh_joint"]
+    assert actions.joint_vel.joint_names == [".*_calf_joint"]
     assert (actions.joint_vel.asset_name, actions.joint_vel.scale) == ("robot", 5.0)
     text = Path(loaded.__file__).read_text()
     assert "[rad/s or m/s]; suggested: a share\nSPEED_SCALE = 5.0\n" in text
@@ -204,7 +243,9 @@ def test_isaaclab_config_of_wheels(load, modules, robots):
 def test_isaaclab_actions_exclude_unactuated_joints(load, modules, robots):
     spec = robots.quadruped()
     task = load("isaaclab", spec, modules, passive_joints=["tail_joint"]).rough_env_cfg()
-    assert tuple(task.actions.joint_pos.joint_names) == spec.joint_order
+    names = (*spec.joint_order, "tail_joint")
+    actions = SimpleNamespace(joint_names_expr=task.actions.joint_pos.joint_names)
+    assert set(driven_by({"actions": actions}, names)) == set(spec.joint_order)
 
 
 def test_isaaclab_config_with_only_wheels(load, modules, robots):

@@ -1,22 +1,66 @@
 """Tests of the configuration for mjlab, with stub modules and with mjlab if available."""
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 
 import mujoco
 import pytest
 
+from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.frameworks import config_text
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 PROBE = Path(__file__).with_name("mjlab_probe.py")
 
+SENSOR_FIELDS = ("primary", "secondary", "fields", "reduce", "num_slots", "history_length")
+
+
+def velocity_env_cfg():
+    """Return the parts of mjlab's velocity task that a configuration changes."""
+
+    def term(name):
+        return SimpleNamespace(params={name: SimpleNamespace()})
+
+    def group():
+        names = ("base_lin_vel", "base_ang_vel", "height_scan")
+        terms = {name: SimpleNamespace(params={}) for name in names}
+        return SimpleNamespace(terms=terms, enable_corruption=True)
+
+    rewards = ("pose", "upright", "body_ang_vel", "angular_momentum")
+    rewards += ("foot_clearance", "foot_slip", "foot_swing_height")
+    return SimpleNamespace(
+        sim=SimpleNamespace(mujoco=SimpleNamespace()),
+        viewer=SimpleNamespace(),
+        scene=SimpleNamespace(
+            terrain=SimpleNamespace(terrain_generator=SimpleNamespace()),
+            sensors=(
+                SimpleNamespace(name="terrain_scan", frame=SimpleNamespace()),
+                SimpleNamespace(name="foot_height_scan"),
+            ),
+        ),
+        observations={"actor": group(), "critic": group()},
+        actions={"joint_pos": SimpleNamespace(actuator_names=(".*",), scale=0.5)},
+        events={"foot_friction": term("asset_cfg"), "base_com": term("asset_cfg"), "push_robot": 0},
+        rewards={name: term("asset_cfg") for name in rewards},
+        terminations={"fell_over": 0, "out_of_terrain_bounds": 0},
+        curriculum={"terrain_levels": 0, "command_vel": 0},
+    )
+
 
 @pytest.fixture
-def modules(stand_in):
-    refusing = stand_in.refusing
+def registered():
+    """Return the registered tasks by name."""
+    return {}
+
+
+@pytest.fixture
+def modules(stand_in, registered):
+    refusing, module = stand_in.refusing, stand_in.module
     actuator = refusing(
         "BuiltinPositionActuatorCfg",
         "target_names_expr",
@@ -43,17 +87,66 @@ def modules(stand_in):
     articulation = refusing(
         "EntityArticulationInfoCfg", actuators=(), soft_joint_pos_limit_factor=1.0
     )
-    return {
-        "mjlab": stand_in.module("mjlab"),
-        "mjlab.actuator": stand_in.module(
-            "actuator",
-            BuiltinPositionActuatorCfg=actuator,
-            BuiltinVelocityActuatorCfg=rolling,
+    term = {"func": None, "params": None}
+    ring = SimpleNamespace(single_ring=lambda **options: options)
+    sensor = refusing(
+        "ContactSensorCfg", "name", **dict.fromkeys((*SENSOR_FIELDS, "track_air_time"))
+    )
+    made = {
+        "mjlab": module("mjlab"),
+        "actuator": module(
+            "actuator", BuiltinPositionActuatorCfg=actuator, BuiltinVelocityActuatorCfg=rolling
         ),
-        "mjlab.entity": stand_in.module(
-            "entity", EntityCfg=entity, EntityArticulationInfoCfg=articulation
+        "entity": module("entity", EntityCfg=entity, EntityArticulationInfoCfg=articulation),
+        "envs": module("envs", ManagerBasedRlEnvCfg=None, mdp=SimpleNamespace(randomize_terrain=0)),
+        "envs.mdp": module("mdp"),
+        "envs.mdp.actions": module(
+            "actions",
+            JointVelocityActionCfg=refusing("Action", "entity_name", "actuator_names", "scale"),
         ),
+        "managers": module("managers"),
+        "managers.event_manager": module("m", EventTermCfg=refusing("Event", **term, mode="")),
+        "managers.reward_manager": module("m", RewardTermCfg=refusing("R", **term, weight=0.0)),
+        "managers.termination_manager": module("m", TerminationTermCfg=refusing("T", **term)),
+        "rl": module(
+            "rl",
+            RslRlModelCfg=refusing("Model", hidden_dims=0, obs_normalization=0, distribution_cfg=0),
+            RslRlPpoAlgorithmCfg=refusing("Ppo", entropy_coef=0.0),
+            RslRlOnPolicyRunnerCfg=refusing(
+                "Runner", *("actor", "critic", "algorithm", "experiment_name", "max_iterations")
+            ),
+        ),
+        "sensor": module(
+            "sensor",
+            ContactMatch=refusing("ContactMatch", "mode", "pattern", entity=None),
+            ContactSensorCfg=sensor,
+            ObjRef=lambda *words: words,
+            RingPatternCfg=ring,
+        ),
+        "tasks": module("tasks"),
+        "tasks.registry": module(
+            "registry",
+            register_mjlab_task=lambda task_id, **parts: registered.update({task_id: parts}),
+        ),
+        "tasks.velocity": module(
+            "velocity", mdp=SimpleNamespace(self_collision_cost=0, illegal_contact=0)
+        ),
+        "tasks.velocity.rl": module("rl", VelocityOnPolicyRunner="runner"),
+        "tasks.velocity.velocity_env_cfg": module("v", make_velocity_env_cfg=velocity_env_cfg),
     }
+    return {name if name == "mjlab" else f"mjlab.{name}": each for name, each in made.items()}
+
+
+def resolved(value, names):
+    """Return the value of each name; each pattern must match, and each name only one."""
+    found = {name: [p for p in value if re.fullmatch(p, name)] for name in names}
+    assert {p for patterns in found.values() for p in patterns} == set(value)
+    assert all(len(patterns) <= 1 for patterns in found.values())
+    return {name: value[patterns[0]] for name, patterns in found.items() if patterns}
+
+
+def by_target(actuators, names):
+    return resolved({p: each for each in actuators for p in each.target_names_expr}, names)
 
 
 def test_mjlab_config_of_quadruped(load, modules, robots):
@@ -62,15 +155,10 @@ def test_mjlab_config_of_quadruped(load, modules, robots):
     entity = loaded.get_robot_cfg()
     assert entity is not loaded.get_robot_cfg()
     assert entity.init_state.pos == (0.0, 0.0, 0.3)
-    assert entity.init_state.joint_pos["RR_calf_joint"] == -1.8
+    assert resolved(entity.init_state.joint_pos, spec.joint_order)["RR_calf_joint"] == -1.8
     assert entity.articulation.soft_joint_pos_limit_factor == 0.9
-    found = {}
-    for actuator in entity.articulation.actuators:
-        for name in actuator.target_names_expr:
-            assert name not in found
-            found[name] = actuator
-    assert set(found) == set(spec.joint_order)
     assert len(entity.articulation.actuators) == 2
+    found = by_target(entity.articulation.actuators, spec.joint_order)
     for field, calf, other in (
         ("stiffness", 30.0, 20.0),
         ("damping", 0.75, 0.5),
@@ -79,35 +167,95 @@ def test_mjlab_config_of_quadruped(load, modules, robots):
     ):
         values = {joint: getattr(found[joint], field) for joint in spec.joint_order}
         assert values == robots.of(spec, calf=calf, other=other)
-    assert robots.of(spec, calf=0.2, other=0.25) == loaded.QUAD_4_ACTION_SCALE
+    scales = resolved(loaded.ACTION_SCALE, spec.joint_order)
+    assert scales == robots.of(spec, calf=0.2, other=0.25)
+
+
+def test_mjlab_tasks_of_quadruped(load, modules, robots, registered):
+    spec = robots.quadruped(leg_length=0.2)
+    loaded = load("mjlab", spec, modules, bodies=robots.bodies, roles={"FL_hip_joint": "roll"})
+    loaded.register_tasks()
+    assert list(registered) == ["Mjlab-Velocity-Flat-Quad4", "Mjlab-Velocity-Rough-Quad4"]
+    flat, rough = (task["env_cfg"] for task in registered.values())
+    sensors = {sensor.name: sensor for sensor in rough.scene.sensors}
+    assert sensors["terrain_scan"].frame.name == "base"
+    assert sensors["foot_height_scan"].frame == tuple(("site", n, "robot") for n in spec.feet)
+    assert sensors["feet_ground_contact"].primary.pattern == spec.feet
+    assert sensors["undesired_contact"].primary.pattern == (".*_thigh", ".*_calf")
+    assert sensors["illegal_contact"].primary.pattern == ("base",)
+    assert sensors["self_collision"].primary.pattern == "base"
+    geoms = rough.events["foot_friction"].params["asset_cfg"].geom_names
+    assert all(re.fullmatch(geoms[0], f"FL_foot_collision{end}") for end in ("", "1", "12"))
+    assert not re.fullmatch(geoms[0], "FL_foot_collision_mesh")
+    pose = rough.rewards["pose"].params
+    assert resolved(pose["std_walking"], spec.joint_order)["FL_hip_joint"] == 0.15
+    assert rough.rewards["foot_clearance"].params["target_height"] == 0.05
+    assert "angular_momentum" not in rough.rewards
+    assert rough.terminations["illegal_contact"].params == {"sensor_name": "illegal_contact"}
+    assert flat.scene.terrain.terrain_type == "plane"
+    assert "terrain_scan" not in [sensor.name for sensor in flat.scene.sensors]
+    assert "height_scan" not in flat.observations["actor"].terms
+    assert flat.curriculum == {"command_vel": 0}
+    assert not registered["Mjlab-Velocity-Flat-Quad4"]["play_env_cfg"].curriculum
+    assert registered["Mjlab-Velocity-Flat-Quad4"]["rl_cfg"].experiment_name == "quad_4"
+
+
+@pytest.mark.parametrize("format_name", ["urdf", "xml"])
+def test_mjlab_names_are_in_robot_xml(onboarded, load, modules, format_name):
+    """The names of bodies, sites, geoms and sensors exist in the written file."""
+    path = bundled.urdf_path("biped").with_suffix(f".{format_name}")
+    result = onboarded(path)
+    with quiet_mujoco():
+        model = mujoco.MjModel.from_xml_path(str(result.folder / "robot.xml"))
+    loaded = load("mjlab", result.robot.spec, modules)
+    body = [model.body(index).name for index in range(model.nbody)]
+    geoms = [model.geom(index).name for index in range(model.ngeom)]
+    sensors = [model.sensor(index).name for index in range(model.nsensor)]
+    assert loaded.BASE in body
+    for foot, pattern in zip(loaded.FEET, loaded.FOOT_GEOMS, strict=True):
+        assert foot in body
+        assert model.site(foot).bodyid[0] == model.body(foot).id
+        assert [geom for geom in geoms if re.fullmatch(pattern, geom)]
+    for patterns in (loaded.PENALIZED, loaded.TERMINATION):
+        assert all(any(re.fullmatch(p, name) for name in body) for p in patterns)
+    for terms in loaded.flat_env_cfg().observations.values():
+        names = [
+            terms.terms[name].params["sensor_name"] for name in ("base_lin_vel", "base_ang_vel")
+        ]
+        assert all(name.removeprefix("robot/") in sensors for name in names)
 
 
 def test_mjlab_config_of_wheels(load, modules, robots):
     spec = robots.wheeled()
     loaded = load("mjlab", spec, modules)
     wheels, others = robots.wheels_of(spec)
-    by_kind = {type(a).__name__: a for a in loaded.QUAD_4_ARTICULATION.actuators}
+    by_kind = {type(a).__name__: a for a in loaded.ARTICULATION.actuators}
     rolling = by_kind.pop("BuiltinVelocityActuatorCfg")
-    assert set(rolling.target_names_expr) == set(wheels)
+    assert set(by_target([rolling], spec.joint_order)) == set(wheels)
     assert (rolling.damping, rolling.effort_limit, rolling.armature) == (0.75, 45.43, 0.04)
     (held,) = by_kind.values()
-    assert set(held.target_names_expr) == set(others)
-    assert dict.fromkeys(others, 0.25) == loaded.QUAD_4_ACTION_SCALE
-    assert dict.fromkeys(wheels, 5.0) == loaded.QUAD_4_SPEED_SCALE
+    assert set(by_target([held], spec.joint_order)) == set(others)
+    assert resolved(loaded.ACTION_SCALE, spec.joint_order) == dict.fromkeys(others, 0.25)
+    assert resolved(loaded.SPEED_SCALE, spec.joint_order) == dict.fromkeys(wheels, 5.0)
     text = Path(loaded.__file__).read_text()
     assert "# For JointVelocityActionCfg.scale.\n# [rad/s or m/s]; suggested: a share\n" in text
-    assert "actuator_names=tuple(QUAD_4_SPEED_SCALE)" in loaded.__doc__
+    actions = loaded.flat_env_cfg().actions
+    assert actions["joint_pos"].actuator_names == (".*_hip_joint", ".*_thigh_joint")
+    assert actions["joint_vel"].actuator_names == (".*_calf_joint",)
     plain = load("mjlab", robots.quadruped(), modules)
     assert "SPEED_SCALE" not in Path(plain.__file__).read_text()
+    assert plain.flat_env_cfg().actions["joint_pos"].actuator_names == (".*",)
 
 
 def test_mjlab_config_with_only_wheels(load, modules, robots):
     spec = robots.plain(("left", "right"), stiffness={".*": 0.0})
     loaded = load("mjlab", spec, modules)
-    kinds = {type(actuator).__name__ for actuator in loaded.ARM_ARTICULATION.actuators}
+    kinds = {type(actuator).__name__ for actuator in loaded.ARTICULATION.actuators}
     assert kinds == {"BuiltinVelocityActuatorCfg"}
-    assert loaded.ARM_SPEED_SCALE == {"left": 0.25, "right": 0.25}
-    assert not hasattr(loaded, "ARM_ACTION_SCALE")
+    assert loaded.SPEED_SCALE == {".*": 0.25}
+    assert not hasattr(loaded, "ACTION_SCALE")
+    assert "actuator_names=tuple(SPEED_SCALE)" in loaded.__doc__
+    assert not hasattr(loaded, "register_tasks")  # no legs
 
 
 @pytest.mark.parametrize("more", ["", '<actuatorfrc actuator="FL_calf"/>'])
@@ -126,10 +274,10 @@ def test_mjlab_get_spec_removes_actuators(load, modules, robots, tmp_path, bundl
 def test_mjlab_config_of_arm_without_limits(load, modules, robots):
     spec = robots.plain(("joint1", "joint10", "robot/wrist"), effort={}, armature={})
     loaded = load("mjlab", spec, modules)
-    actuators = loaded.ARM_ARTICULATION.actuators
+    actuators = loaded.ARTICULATION.actuators
     assert [a.target_names_expr for a in actuators] == [("joint1$",), ("joint10",), ("wrist",)]
     assert all(a.effort_limit is None and a.armature is None for a in actuators)
-    assert loaded.ARM_INIT_STATE.joint_pos == {"joint1$": 0.1, "joint10": 0.1, "wrist": 0.1}
+    assert loaded.INIT_STATE.joint_pos == {"joint1$": 0.1, "joint10": 0.1, "wrist": 0.1}
 
 
 def test_mjlab_config_without_joints(load, modules, robots):
@@ -137,15 +285,39 @@ def test_mjlab_config_without_joints(load, modules, robots):
     assert loaded.get_robot_cfg().articulation.actuators == ()
 
 
-@pytest.mark.parametrize("which", ["quadruped", "wheeled"])
-def test_mjlab_config_in_mjlab(robots, tmp_path, bundled_xml, which):
-    """Set TERRAINKIT_MJLAB_PYTHON to a Python interpreter with mjlab."""
+@pytest.fixture
+def mjlab_python():
+    """Return the Python interpreter in TERRAINKIT_MJLAB_PYTHON, which has mjlab 1.6."""
     python = os.environ.get("TERRAINKIT_MJLAB_PYTHON")
     if not python:
         pytest.skip("TERRAINKIT_MJLAB_PYTHON is not set to a Python interpreter with mjlab")
+    return python
+
+
+@pytest.mark.parametrize("which", ["quadruped", "wheeled"])
+def test_mjlab_config_in_mjlab(robots, tmp_path, bundled_xml, mjlab_python, which):
     shutil.copy(bundled_xml, tmp_path / "robot.xml")
     text = config_text("mjlab", getattr(robots, which)(), bodies=robots.bodies)
     (tmp_path / "mjlab_config.py").write_text(text)
-    command = [python, PROBE, tmp_path, which]
+    command = [mjlab_python, PROBE, tmp_path, which]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("terrain", ["Flat", "Rough"])
+@pytest.mark.parametrize("name", ["quadruped", "biped"])
+def test_mjlab_trains_onboarded_robot(tmp_path, mjlab_python, name, terrain):
+    options = OnboardOptions(frameworks=("mjlab",), render_images=False)
+    onboard(bundled.urdf_path(name), tmp_path / "robot", options)
+    task = f"Mjlab-Velocity-{terrain}-{name.capitalize()}"
+    command = [mjlab_python, "robot/mjlab_config.py", task, "--env.scene.num-envs", "4"]
+    command += ["--agent.max-iterations", "2", "--agent.logger", "tensorboard"]
+    done = subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        env=os.environ | {"WANDB_MODE": "off"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Learning iteration 1/2" in done.stdout

@@ -10,7 +10,7 @@ from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_
     [
         ("go2", "Go2", "GO2", "go2"),
         ("anymal_c", "AnymalC", "ANYMAL_C", "anymal_c"),
-        ("go2 description!", "Go2Description", "GO2_DESCRIPTION", "go2_description"),
+        ("go2 description!", "Go2", "GO2", "go2"),
         ("H1-2", "H12", "H1_2", "h1_2"),
         ("class", "Class", "CLASS", "class_robot"),
         ("1st", "Robot1st", "ROBOT_1ST", "robot_1st"),

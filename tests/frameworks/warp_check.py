@@ -1,0 +1,61 @@
+"""Drop balls on a map in MuJoCo Warp and Newton on the CPU; `make integrations` runs it."""
+
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import mujoco
+import mujoco_warp
+import newton
+import numpy as np
+import warp
+
+import terrainkit
+from terrainkit.integrations.mujoco import add_map
+
+RADIUS = 0.1
+config = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
+terrain_map = terrainkit.generate(config)
+starts = terrain_map.env_origins.reshape(-1, 3)[:16] + np.float32([0.0, 0.0, RADIUS + 0.02])
+
+
+def gap(positions):
+    return float(np.abs(positions[:, 2] - RADIUS - terrain_map.scan(positions)).max())
+
+
+spec = mujoco.MjSpec()
+ball = spec.worldbody.add_body()
+ball.add_freejoint()
+ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0, 0])
+add_map(spec, terrain_map)
+model = spec.compile()
+with warp.ScopedDevice("cpu"):
+    warp_model = mujoco_warp.put_model(model)
+    # A ball can touch the ground and a solid; a foot on a heightfield has up to 50 contacts.
+    data = mujoco_warp.make_data(model, nworld=16, nconmax=64, njmax=256)
+    positions = np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (16, 1))
+    positions[:, :3] = starts
+    data.qpos.assign(positions)
+    for _ in range(200):
+        mujoco_warp.step(warp_model, data)
+    error = gap(data.qpos.numpy()[:, :3].astype(float))
+assert error < 5e-3, error
+print(f"MuJoCo Warp {version('mujoco-warp')}: balls within {error * 1e3:.1f} mm")
+
+path = terrain_map.save(Path(sys.argv[1]) / "map.xml")
+with warp.ScopedDevice("cpu"):
+    builder = newton.ModelBuilder()
+    builder.add_mjcf(str(path))
+    for start in starts:
+        body = builder.add_body(xform=warp.transform(start.tolist(), warp.quat_identity()))
+        builder.add_shape_sphere(body, radius=RADIUS)
+    newton_model = builder.finalize()
+    solver = newton.solvers.SolverMuJoCo(newton_model, nconmax=512, njmax=2048)
+    state, after = newton_model.state(), newton_model.state()
+    for _ in range(400):
+        state.clear_forces()
+        solver.step(state, after, newton_model.control(), None, 0.002)
+        state, after = after, state
+    error = gap(state.body_q.numpy()[:, :3].astype(float))
+assert error < 5e-3, error
+print(f"Newton {version('newton')}: balls within {error * 1e3:.1f} mm")
