@@ -18,7 +18,7 @@ from terrainkit_robots.rl.run import create_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import Plane
 
-FILES = ["policy.json", "policy.onnx", "policy.pt"]
+FILES = ["policy.json", "policy.onnx", "policy.pt", "robot.xml"]
 
 
 @pytest.fixture(scope="module")

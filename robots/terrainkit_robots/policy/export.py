@@ -1,4 +1,4 @@
-"""Export a policy as ONNX, as TorchScript, and as a JSON description of its inputs and outputs."""
+"""Export a policy as ONNX and TorchScript, with a JSON description and the model of the robot."""
 
 import io
 import json
@@ -19,6 +19,7 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.policy.evaluate import FloatArray, eval_task
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
@@ -26,6 +27,7 @@ from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.terrain import load_terrain
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
+ROBOT_FILE = "robot.xml"
 
 FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
 """Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots know."""
@@ -46,9 +48,9 @@ _FORMULAS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ExportResult:
-    """The ONNX, TorchScript and JSON files of a policy, and the action errors of the first two."""
+    """The ONNX, TorchScript, JSON and MJCF files, and the action errors of the first two."""
 
-    files: tuple[Path, Path, Path]
+    files: tuple[Path, Path, Path, Path]
     errors: tuple[float, float]
     num_observations: int
     num_actions: int
@@ -65,12 +67,14 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
         ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, or if
             an exported policy does not match the live one.
     """
-    files = folder / ONNX_FILE, folder / TORCHSCRIPT_FILE, folder / JSON_FILE
+    names = ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE
+    files = (folder / names[0], folder / names[1], folder / names[2], folder / names[3])
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
     task = eval_task(run.task, num_envs=8)
     env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
+    robot_files = model_files(run.robot.mjcf)
     iteration = read_checkpoint(last_checkpoint(run))["iteration"]
     text = json.dumps(describe_policy(env) | {"iteration": iteration}, indent=2) + "\n"
     limits = task.normalization.clip_observations, task.normalization.clip_actions
@@ -98,8 +102,26 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
         path.write_text(text, encoding="utf-8")
         path.with_name(ONNX_FILE).write_bytes(onnx_data)
         path.with_name(TORCHSCRIPT_FILE).write_bytes(script_file.getvalue())
+        for name, data in robot_files.items():
+            path.with_name(name).write_bytes(data)
     sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
     return ExportResult(files=files, errors=errors, **sizes)
+
+
+def model_files(mjcf: Path) -> dict[str, bytes]:
+    """Return the MJCF of a robot, in one file, and its meshes and textures, by file name."""
+    with quiet_mujoco():
+        spec = mujoco.MjSpec.from_file(str(mjcf))
+        names: dict[Path, str] = {}
+        for folder, assets in ((spec.meshdir, spec.meshes), (spec.texturedir, spec.textures)):
+            for asset in assets:
+                if asset.file:
+                    source = mjcf.parent / folder / asset.file
+                    asset.file = names.setdefault(source, f"{len(names)}_{source.name}")
+        spec.meshdir = spec.texturedir = ""
+        spec.assets = files = {name: source.read_bytes() for source, name in names.items()}
+        spec.compile()
+        return files | {ROBOT_FILE: spec.to_xml().encode()}
 
 
 def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> bytes:

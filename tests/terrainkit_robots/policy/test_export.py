@@ -25,7 +25,7 @@ from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 
 DOCS = Path(__file__).parents[3] / "docs" / "exported_policy.md"
-FILES = ["policy.json", "policy.onnx", "policy.pt"]
+FILES = ["policy.json", "policy.onnx", "policy.pt", "robot.xml"]
 SMALL = Task(env=Env(num_envs=4, num_threads=1))
 
 
@@ -185,7 +185,6 @@ def test_json_reproduces_the_torques(quadruped, wheels, control_type, drive):
 def run_example(folder, robot, tmp_path, monkeypatch):
     """Run the program of the docs for 5 s, and return its data."""
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
-    shutil.copy(robot.mjcf, tmp_path / "robot.xml")
     monkeypatch.chdir(tmp_path)
     names = {}
     with quiet_mujoco():
@@ -209,6 +208,21 @@ def test_docs_example_walks_with_bundled_policies(name, tmp_path, monkeypatch):
     export_policy(run, tmp_path / "exported")
     data = run_example(tmp_path / "exported", run.robot, tmp_path, monkeypatch)
     assert data.qpos[0] > 1.5  # of 2.5 m at 0.5 m/s
+
+
+def test_model_files_are_complete(onboarded, robot_file, tmp_path):
+    """The copy of an MJCF with meshes loads from another folder, with the same masses."""
+    source = onboarded(robot_file("a1/urdf/a1.urdf")).folder / "scene.xml"
+    for name, data in module.model_files(source).items():
+        (tmp_path / name).write_bytes(data)
+    with quiet_mujoco():
+        before, copy = (
+            mujoco.MjModel.from_xml_path(str(path)) for path in (source, tmp_path / "robot.xml")
+        )
+    assert (copy.nq, copy.nu, copy.nmesh) == (before.nq, before.nu, before.nmesh)
+    assert copy.nmesh > 0
+    np.testing.assert_allclose(copy.body_mass, before.body_mass)
+    np.testing.assert_allclose(copy.geom_size, before.geom_size, atol=1e-6)
 
 
 def test_export_policy_of_a_large_task(trained, tmp_path):

@@ -1,0 +1,160 @@
+"""Measure the recall of check-robot on the held-out defects: `python -m benchmarks.held_out`."""
+
+import argparse
+import json
+import os
+import re
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from operator import itemgetter
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from lxml import etree
+
+from benchmarks.held_out.defect import Defect, Mutant
+
+ROOT = Path(__file__).resolve().parents[2]
+SHARED = Path(os.environ.get("TERRAINKIT_ROBOTS", ROOT.parent / "shared" / "robots"))
+BUNDLED = ROOT / "robots/terrainkit_robots/description/bundled"
+ROBOTS = {
+    "a1": SHARED / "a1/urdf/a1.urdf",
+    "go2": SHARED / "go2/urdf/go2.urdf",
+    "h1": SHARED / "h1/urdf/h1.urdf",
+    "g1": SHARED / "g1/g1_29dof.urdf",
+    "quadruped": BUNDLED / "quadruped/quadruped.urdf",
+    "biped": BUNDLED / "biped/biped.urdf",
+    "go2.xml": SHARED / "go2_mjcf/go2.xml",
+    "h1.xml": SHARED / "h1/h1.xml",
+    "g1.xml": SHARED / "g1/g1_29dof.xml",
+    "quadruped.xml": BUNDLED / "quadruped/quadruped.xml",
+    "biped.xml": BUNDLED / "biped/biped.xml",
+}
+SEVERITIES = ("error", "warning")
+ORIGINALS: dict[str, list[dict[str, Any]]] = {}
+
+
+def read(robot: str) -> Any:
+    """Return the tree of a robot; the mesh that go2.xml lacks is taken out of it."""
+    tree = etree.parse(ROBOTS[robot], etree.XMLParser(huge_tree=True)).getroot()
+    if robot == "go2.xml":
+        for element in tree.xpath("//*[@file='base_4.obj' or @mesh='base_4']"):
+            element.getparent().remove(element)
+    return tree
+
+
+def check(robot: str, tree: Any, mutant: Mutant) -> list[dict[str, Any]] | None:
+    """Return what check-robot finds in a tree, written next to links to the robot's meshes.
+
+    The command is called, not the Python API: it has been the same for longer.
+
+    Returns:
+        The findings of the JSON report; None if the command refuses the file.
+    """
+    from terrainkit_cli.main import main as terrainkit
+
+    source = ROBOTS[robot]
+    top = source.parents[1] if source.parent.name == "urdf" else source.parent
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / top.name
+        path = folder / source.relative_to(top)
+        path.parent.mkdir(parents=True)
+        for item in top.iterdir():
+            if item.is_dir() and item != source.parent:
+                (folder / item.name).symlink_to(item)
+        text = etree.tostring(tree, encoding="unicode")
+        header = '<?xml version="1.0" encoding="utf-8"?>\n'
+        path.write_bytes((mutant.encode or str.encode)(header + text))
+        for file, content in mutant.files.items():
+            (path.parent / file).write_text(content)
+        report = Path(name) / "report.json"
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            code = terrainkit(["check-robot", str(path), "--format", "json", "-o", str(report)])
+        return None if code == 2 else json.loads(report.read_text())["findings"]
+
+
+def is_about(finding: Any, mutant: Mutant) -> bool:
+    """Return whether a finding names a broken element."""
+    text = f"{finding['subject']}\n{finding['message']}"
+    names = "|".join(rf"(?<![\w-]){re.escape(name)}(?![\w-])" for name in mutant.names)
+    return any(p and re.search(p, text, re.IGNORECASE) for p in (names, mutant.about))
+
+
+def new_findings(original: list[Any], found: list[Any], mutant: Mutant) -> list[Any]:
+    """Return the findings about the broken elements that the original does not have."""
+    key = itemgetter("code", "subject", "severity")
+    known = {key(f) for f in original if is_about(f, mutant)}
+    return [f for f in found if is_about(f, mutant) and key(f) not in known]
+
+
+def measure(defect: Defect, seed: int) -> Iterator[dict[str, Any]]:
+    """Yield the result for each robot that a defect is applied to."""
+    for robot in defect.robots:
+        original, tree = read(robot), read(robot)
+        if defect.prepare:
+            defect.prepare(original)
+            defect.prepare(tree)
+        mutant = defect.apply(tree, Random(f"{defect.name} {robot} {seed}"))
+        result = {"kind": defect.name, "family": defect.family, "robot": robot}
+        found = check(robot, tree, mutant)
+        if found is None:
+            yield result | {"found": "refused", "rules": [], "names": mutant.names}
+            continue
+        key = robot + defect.name * bool(defect.prepare)
+        if key not in ORIGINALS:
+            ORIGINALS[key] = check(robot, original, Mutant()) or []
+        before = ORIGINALS[key]
+        new = new_findings(before, found, mutant)
+        severities = {f["severity"] for f in new}
+        level = next((s for s in (*SEVERITIES, "info") if s in severities), "")
+        rules = sorted({f"{f['code']} {f['severity']}" for f in new})
+        yield result | {"found": level, "rules": rules, "names": mutant.names}
+
+
+def table(results: list[dict[str, Any]]) -> str:
+    """Return the recall by family."""
+    lines = [f"{'family':<12} kinds mutants found notes recall"]
+    families = dict.fromkeys(r["family"] for r in results)
+    for family in (*families, "all"):
+        rows = [r for r in results if family in (r["family"], "all")]
+        count = Counter(r["found"] for r in rows)
+        found = count["error"] + count["warning"] + count["refused"]
+        kinds = len({r["kind"] for r in rows})
+        lines.append(
+            f"{family:<12} {kinds:5} {len(rows):7} {found:5} {count['info']:5} "
+            f"{found / len(rows):6.0%}"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run the sets that the command line names, and print the recall of each."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sets", nargs="*", default=["a"], help="a, b or both")
+    parser.add_argument("--tree", type=Path, default=ROOT, help="the terrainkit tree to measure")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="", help="regular expression for the kinds")
+    parser.add_argument("--output", type=Path, help="write the results as JSON")
+    options = parser.parse_args()
+    sys.path[:0] = [str(options.tree / part) for part in ("", "robots", "cli")]
+    everything = {}
+    for name in options.sets:
+        module = __import__(f"benchmarks.held_out.set_{name}", fromlist=["DEFECTS"])
+        chosen = [d for d in module.DEFECTS if re.search(options.only, d.name)]
+        results = [r for d in chosen for r in measure(d, options.seed)]
+        everything[name] = results
+        print(f"set {name.upper()}\n{table(results)}\nmissed:")
+        for r in results:
+            if r["found"] in ("", "info"):
+                print(f"  {r['family']:<12} {r['kind']} {r['robot']} {r['found']}")
+    if options.output:
+        options.output.write_text(json.dumps(everything, indent=1))
+
+
+if __name__ == "__main__":
+    main()
