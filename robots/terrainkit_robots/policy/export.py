@@ -22,6 +22,7 @@ from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
+from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.terrain import load_terrain
 
@@ -37,6 +38,8 @@ TOLERANCE = 1e-5
 _FORMULAS = {
     "observation": "obs = clip((raw - offset) * scale, -clip, clip), part by part; a part with a "
     "clip of its own is (clip(raw - offset, *clip)) * scale",
+    "gait": "gait_phase = (sin, cos)(2 pi time / period); 0 while commanded to stand: no linear "
+    "velocity, and a yaw rate below min_yaw_rate",
     "action": "target = action_offset + action_scale * action",
     "torque": "clip(gain * target - stiffness * position - damping * velocity, -effort, effort), "
     "every physics_dt; a new action every policy_dt",
@@ -177,6 +180,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "unit": "m",
         "points": [[x, y] for x in scan_x for y in scan_y],
     }
+    gait = {"period": float(f"{env.gait.period:.7g}"), "min_yaw_rate": MIN_YAW_RATE}
     names = "name", "base", "spawn_height", "base_height_target"
     dt, decimation = task.sim.dt, task.control.decimation
     return {
@@ -199,6 +203,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "drive": drive.tolist(),
             **{name: _to_list(values) for name, values in joints.items()},
         },
+        "gait": gait if env.gait.period else None,
         "height_scan": scan if env.state.height_scan.shape[1] else None,
     }
 
@@ -211,7 +216,7 @@ def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str,
         "dof_vel": [f"{unit}/s" for unit in joint_units],
     }
     units |= {"commands": ["m/s", "m/s", "rad/s"], "base_ang_vel": "rad/s", "height_scan": "m"}
-    units |= {"projected_gravity": "1", "actions": "1"}
+    units |= {"projected_gravity": "1", "actions": "1", "gait_phase": "1"}
     parts, start = [], 0
     for term in env.obs_groups["policy"]:
         size = term.function(env.state).shape[1]
