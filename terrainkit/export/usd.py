@@ -26,11 +26,11 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     """Write the map in meters with z up. The prim `/terrain` is the default prim.
 
     `/terrain/ground` is a static collider, `/terrain/solids` has the solids, and `/terrain/spawns`
-    and `/terrain/goals` are points. The friction of single cells is not written.
+    and `/terrain/goals` are points.
 
     Args:
         terrain_map: The map.
-        path: Target; .usda is text.
+        path: Target; .usda is text, and the others are binary.
 
     Raises:
         ExportError: if usd-core is not installed, or the ground has several friction coefficients.

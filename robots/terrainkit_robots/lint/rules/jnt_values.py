@@ -24,7 +24,7 @@ _MIN_TOP_SPEED, _MIN_LEG_SPEED = 0.4, 3.0
 """Smallest plausible speed at which damping consumes the whole effort, of all joints and of those
 of legs [rad/s]."""
 
-_MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 50.0
+_MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 60.0
 """The same speed of a leg joint as a share of its velocity limit, if the limit [rad/s] is not a
 placeholder."""
 
