@@ -432,13 +432,13 @@ class EvaluationRollout:
         mirror = mirror_feet(scene.foot_pos)
         work = 9.81 * scene.model.body_subtreemass[scene.base] * speed.sum()
         return result | {
-            "step_frequency": float(step_frequency(contact, measured, self.env.cfg.dt)),
-            "foot_slip": foot_slip(contact, foot_speed, measured),
+            "step_frequency": _number(step_frequency(contact, measured, self.env.cfg.dt)),
+            "foot_slip": _number(foot_slip(contact, foot_speed, measured)),
             "asymmetry": max(asymmetry(each, mirror) for each in (heights, duty)),
             "base_pitch": float(pitch.sum() / count.sum()),
             "cost_of_transport": float(power.sum() / work) if work else None,
-            "swing_height": tuple(None if np.isnan(each) else float(each) for each in heights),
-            "duty_factor": tuple(map(float, duty)),
+            "swing_height": tuple(map(_number, heights)),
+            "duty_factor": tuple(map(_number, duty)),
         }
 
     def contacts(self) -> dict[str, str]:
@@ -449,6 +449,11 @@ class EvaluationRollout:
         rows = [contact[robot] for moving, contact, *_ in self.gait if moving[robot]][-steps:]
         feet = self.env.robot.spec.feet
         return {foot: "".join(str(int(row[k])) for row in rows) for k, foot in enumerate(feet)}
+
+
+def _number(value: float) -> float | None:
+    """Return a number of numpy as a float; None for NaN, which JSON does not have."""
+    return None if np.isnan(value) else float(value)
 
 
 def summarize(
