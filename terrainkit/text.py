@@ -1,4 +1,4 @@
-"""Names in messages: shortened, listed, and the nearest to a misspelled one."""
+"""Text of numbers in XML, and of names in messages, such as the nearest to a misspelled one."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -15,6 +15,11 @@ MIN_RATIO = 0.7
 def truncate(text: str, max_length: int = MAX_LENGTH) -> str:
     """Return `text`, cut if it is longer than `max_length` characters."""
     return text if len(text) <= max_length else f"{text[: max_length - 3]}..."
+
+
+def format_numbers(*values: float) -> str:
+    """Return numbers with up to six decimals, separated by spaces."""
+    return " ".join(f"{value:.6f}".rstrip("0").rstrip(".") for value in values)
 
 
 def closest(word: str, names: Iterable[str], min_ratio: float = MIN_RATIO) -> str:

@@ -29,6 +29,7 @@ from terrainkit.mesh.node_grid import NodeGrid
 from terrainkit.solid_raster import SolidRaster
 from terrainkit.solids import Solids
 from terrainkit.surface import HeightfieldSurface
+from terrainkit.text import format_numbers
 from terrainkit.type_hint import convert
 
 if TYPE_CHECKING:
@@ -156,7 +157,7 @@ def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
     # MuJoCo has one sliding friction and no restitution; keep the values for other readers.
     custom = ET.SubElement(root, "custom")
     for name, value in config.contact.items():
-        ET.SubElement(custom, "numeric", name=f"terrain_{name}", data=_numbers(value))
+        ET.SubElement(custom, "numeric", name=f"terrain_{name}", data=format_numbers(value))
     terrain = ET.SubElement(ET.SubElement(root, "default"), "default", {"class": "terrain"})
     ET.SubElement(
         terrain,
@@ -166,7 +167,7 @@ def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
         condim="3",
         group="0",
         priority="0",
-        friction=_numbers(config.static_friction, 0.005, 0.0001),
+        friction=format_numbers(config.static_friction, 0.005, 0.0001),
         solmix="1",
         solref="0.02 1",
         solimp="0.9 0.95 0.001 0.5 2",
@@ -263,7 +264,7 @@ def _set_friction(geom: ET.Element, friction: float, static: float) -> None:
     Its priority is above that of a robot, since MuJoCo otherwise uses the larger of two frictions.
     """
     if np.float32(friction) != np.float32(static):
-        geom.set("friction", _numbers(friction, 0.005, 0.0001))
+        geom.set("friction", format_numbers(friction, 0.005, 0.0001))
         geom.set("priority", "2")
 
 
@@ -273,7 +274,7 @@ def _add_hfield_geom(
     """Add the geom of the heightfield of a part."""
     low = heights[_on_map(part, heights.shape)].min()
     middle = [((each.start + each.stop) / 2 - _RINGS) * grid.cell for each in part]
-    position = _numbers(*np.add(grid.lower, middle), low)
+    position = format_numbers(*np.add(grid.lower, middle), low)
     about = {"class": "terrain", "type": "hfield", "hfield": name, "pos": position}
     return ET.SubElement(world, "geom", about)
 
@@ -291,7 +292,7 @@ def _write_hfield(
         for each, size in zip(part, heights.shape, strict=True)
     )
     # MuJoCo's rows are along y, its columns along x.
-    size = _numbers((len(x) - 1) * cell / 2, (len(y) - 1) * cell / 2, span, THICKNESS)
+    size = format_numbers((len(x) - 1) * cell / 2, (len(y) - 1) * cell / 2, span, THICKNESS)
     file.write(f'    <hfield name="{name}" nrow="{len(y)}" ncol="{len(x)}" size="{size}"')
     file.write(' elevation="')
     for j in y[::-1].tolist():
@@ -354,7 +355,7 @@ def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDAr
 def _add_box(
     world: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]
 ) -> ET.Element:
-    position, size = _numbers(*center), _numbers(*half_size)
+    position, size = format_numbers(*center), format_numbers(*half_size)
     return ET.SubElement(world, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
 
 
@@ -362,16 +363,16 @@ def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids, static: fl
     """Add one geom for each solid. Rays of group 3 are off by default, as for hidden geoms."""
     hulls = solids.hulls()
     for k, vertices in enumerate(hulls):
-        text = _numbers(*vertices.ravel())
+        text = format_numbers(*vertices.ravel())
         ET.SubElement(asset, "mesh", name=f"solid_{k}", vertex=text, inertia="convex")
     shapes = [("box", [3, 4, 5], row) for row in solids.boxes]
     shapes += [("cylinder", [3, 5], row) for row in solids.cylinders]
     attributes = [
         {
             "type": kind,
-            "pos": _numbers(*row[:3]),
-            "size": _numbers(*row[size]),
-            "quat": _numbers(*row[6:]),
+            "pos": format_numbers(*row[:3]),
+            "size": format_numbers(*row[size]),
+            "quat": format_numbers(*row[6:]),
         }
         for kind, size, row in shapes
     ]
@@ -386,7 +387,3 @@ def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids, static: fl
             geom.set("conaffinity", "0")
         if not visible:
             geom.set("group", "3")
-
-
-def _numbers(*values: float) -> str:
-    return " ".join(f"{value:.6f}".rstrip("0").rstrip(".") for value in values)

@@ -10,6 +10,7 @@ from terrainkit.export.mesh_file import write_stl
 from terrainkit.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.solids import Solids, rotation_matrices
+from terrainkit.text import format_numbers
 
 if TYPE_CHECKING:
     from terrainkit.terrain_map import TerrainMap
@@ -91,12 +92,12 @@ def _add_shapes(link: ET.Element, solids: Solids, contact: dict[str, float]) -> 
         geometry = ET.Element("geometry")
         if k < len(solids.boxes):
             size = ET.SubElement(ET.SubElement(geometry, "box"), "size")
-            size.text = _numbers(*(2 * shape[3:6]))
+            size.text = format_numbers(*(2 * shape[3:6]))
         else:
             cylinder = ET.SubElement(geometry, "cylinder")
-            ET.SubElement(cylinder, "radius").text = _numbers(shape[3])
-            ET.SubElement(cylinder, "length").text = _numbers(2 * shape[5])
-        pose = _numbers(*shape[:3], *rpy)
+            ET.SubElement(cylinder, "radius").text = format_numbers(shape[3])
+            ET.SubElement(cylinder, "length").text = format_numbers(2 * shape[5])
+        pose = format_numbers(*shape[:3], *rpy)
         tags = _tags(solids, k)
         _add_geometry(
             link, f"solid_{k}", geometry, contact, float(friction[k]), pose=pose, tags=tags
@@ -118,7 +119,3 @@ def _add_hulls(link: ET.Element, solids: Solids, contact: dict[str, float], path
         tags = _tags(hulls, members[0])
         geometry = _mesh_geometry(file)
         _add_geometry(link, f"hulls_{number}", geometry, contact, key[0], tags=tags)
-
-
-def _numbers(*values: float) -> str:
-    return " ".join(f"{value:.6g}" for value in values)

@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit.text import closest, expected_names, truncate
+from terrainkit.text import closest, expected_names, format_numbers, truncate
 
 
 def test_shorten_cuts_long_text():
@@ -52,3 +52,7 @@ def test_known_names_suggests_the_nearest():
     assert expected_names("gapp", ["flat", "gap"]) == "did you mean 'gap'? There are: flat, gap"
     assert expected_names("x", ["flat", "gap"], "it has") == "it has: flat, gap"
     assert expected_names("x", ["a"], closest_name="b.x") == "did you mean 'b.x'? There are: a"
+
+
+def test_format_numbers_keeps_micrometers_of_kilometers():
+    assert format_numbers(1234.567891, 0.1, 20.0, -3) == "1234.567891 0.1 20 -3"
