@@ -63,7 +63,7 @@ class Budget:
     """Collision geometry that `auto` selects."""
 
     file_sizes: Mapping[str, int | str]
-    """Size of each file that the map exports to [bytes], or why it cannot be exported."""
+    """Size of each format [bytes], with the files beside it, or why it cannot be written."""
 
     foot_contacts: int
     """Largest number of contacts of a foot with a heightfield, before MuJoCo's limit."""
@@ -85,17 +85,17 @@ def compute_budget(terrain_map: "TerrainMap", foot_radius: float = 0.03) -> Budg
     contacts = foot_contacts(foot_radius, terrain_map.config.cell)
     sizes: dict[str, int | str] = {}
     collisions = {}
-    with TemporaryDirectory() as folder:
-        for name, path, options in _exports(Path(folder)):
+    for name, file, options in _exports():
+        with TemporaryDirectory() as folder:
+            path = Path(folder) / file
             try:
                 terrain_map.save(path, **options)
             except ExportError as error:
                 sizes[name] = str(error)
                 continue
-            sizes[name] = path.stat().st_size
+            sizes[name] = sum(each.stat().st_size for each in Path(folder).iterdir())
             if "collision" in options:
                 collisions[options["collision"]] = _collision_budget(path)
-            path.unlink()
     return Budget(
         full_triangles=len(terrain_map.mesh(merged=False).triangles),
         merged_triangles=len(terrain_map.mesh().triangles),
@@ -138,17 +138,17 @@ def box_step_time(num_boxes: int) -> float:
     return float(np.interp(log, logs, costs) + slope * max(log - logs[-1], 0))
 
 
-def _exports(folder: Path) -> Iterator[tuple[str, Path, dict[str, Any]]]:
-    """Yield name, path and options of each file that a map exports to."""
+def _exports() -> Iterator[tuple[str, Path, dict[str, Any]]]:
+    """Yield name, file and options of each format."""
     from terrainkit.export import export_options, exporters_by_suffix
 
     for suffix in exporters_by_suffix():
-        path = folder / f"map{suffix}"
-        if "collision" in export_options(path):
+        file = Path(f"map{suffix}")
+        if "collision" in export_options(file):
             for collision in ("hfield", "boxes"):
-                yield f"{suffix} ({collision})", path, {"collision": collision}
+                yield f"{suffix} ({collision})", file, {"collision": collision}
         else:
-            yield suffix, path, {}
+            yield suffix, file, {}
 
 
 def _collision_budget(path: Path) -> CollisionBudget:

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from msgspec import Meta
 
@@ -15,6 +15,9 @@ from terrainkit.parameter import MAX_VALUE
 from terrainkit.schema import Config
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.type_hint import SORTED, Fraction
+
+if TYPE_CHECKING:
+    from terrainkit.spawn import Disk
 
 MAX_CELLS = 10**6
 """Largest number of cells along a side of a map; memory would not hold more."""
@@ -175,6 +178,17 @@ class MapConfig(Config):
         else:
             lower = (-self.border, -self.border)
         return Grid(shape=shape, cell=self.cell, lower=lower)
+
+    @cached_property
+    def spawn_disk(self) -> "Disk":
+        """The free place that a robot needs."""
+        from terrainkit.spawn import Disk
+
+        return Disk(
+            radius=self.spawn_radius,
+            tolerance=self.spawn_tolerance,
+            headroom=self.spawn_headroom,
+        )
 
     def check_patch(self, row: int, col: int) -> None:
         """Raise IndexError if the map has no patch (row, col)."""

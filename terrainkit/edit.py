@@ -11,7 +11,7 @@ from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.generation import pad_poses
 from terrainkit.parameter import MAX_VALUE
-from terrainkit.patch import place_spawns, spawn_disk, with_headings
+from terrainkit.patch import place_spawns, with_headings
 from terrainkit.solids import Solids
 from terrainkit.terrain_map import TerrainMap
 
@@ -88,7 +88,7 @@ def place_patch_spawns(
     lower, upper = (corner[:, :2] for corner in solids.bounds())
     reaches = np.all((upper >= grid.lower) & (lower <= grid.upper), axis=1)
     near = solids.select(np.asarray(reaches))
-    disk, threshold = spawn_disk(config), config.wall_threshold
+    disk, threshold = config.spawn_disk, config.wall_threshold
     kept = [
         find_spawn(block, grid, (x, y), disk, solids=near, threshold=threshold)
         for x, y in spawns[:, :2].tolist()

@@ -59,61 +59,80 @@ def generate(
         ConfigError: if a terrain does not fit in a patch, or has no place to spawn.
         MemoryLimitError: if the map would not fit in memory; nothing was allocated.
     """
-    grid, size = config.grid, (config.rows, config.cols)
+    grid = config.grid
     samples = grid.shape[0] * grid.shape[1]
     check_memory(
         samples * 4 + config.rows * config.cols * _BYTES_PER_PATCH,
         f"a map of {grid.shape[0]} x {grid.shape[1]} samples",
     )
-    columns = terrain_columns(config)
-    heights = np.zeros(grid.shape, dtype=np.float32)
-    # A view of one number takes no memory, and most maps have one friction.
-    friction = uniform_friction(config.static_friction, grid.shape)
-    plain = uniform_friction(config.static_friction, config.patch_shape)
-    spawns = np.empty(size, dtype=object)
-    terrain_types = np.empty(size, dtype=np.int32)
-    difficulty = np.empty(size, dtype=np.float32)
-    parameters = np.empty(size, dtype=object)
-    solids: list[Solids] = []
-    goals = np.empty(size, dtype=object)
-    deviations: Counter[str] = Counter()
-    moved_spawns: Counter[str] = Counter()
+    builder = _MapBuilder(config)
     indices = itertools.product(range(config.rows), range(config.cols))
-    with closing(_build_patches(config, columns, executor)) as patches:
+    with closing(_build_patches(config, terrain_columns(config), executor)) as patches:
         for row, col in progress(indices, config.rows * config.cols) if progress else indices:
-            terrain_type, patch = next(patches)
-            sub_terrain = config.sub_terrains[terrain_type]
-            i, j = config.patch_start(row, col)
-            block = (slice(i, i + patch.grid.shape[0]), slice(j, j + patch.grid.shape[1]))
-            heights[block] = patch.heights
-            if patch.friction is not plain and (patch.friction != plain).any():
-                friction = friction if friction.flags.writeable else friction.copy()
-                friction[block] = patch.friction
-            spawns[row, col] = patch.spawns
-            terrain_types[row, col] = terrain_type
-            difficulty[row, col] = patch.difficulty
-            parameters[row, col] = patch.parameters
-            solids.append(patch.solids)
-            goals[row, col] = patch.goals
-            for name in _deviations(patch, sub_terrain, config.cell):
-                deviations[name] += 1
-            moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
-    _warn(config, deviations, +moved_spawns)
-    terrain_map = TerrainMap(
-        config=config,
-        grid=grid,
-        heights=heights,
-        friction=friction,
-        spawns=pad_poses(spawns),
-        terrain_types=terrain_types,
-        terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
-        difficulty=difficulty,
-        parameters=parameters,
-        solids=Solids.concatenate(solids),
-        goals=pad_poses(goals),
-    )
+            builder.add(row, col, *next(patches))
+    _warn(config, builder.deviations, +builder.moved_spawns)
+    terrain_map = builder.build()
     _warn_about_map(terrain_map)
     return terrain_map
+
+
+class _MapBuilder:
+    """A map whose patches are added one by one, so that they are in memory once."""
+
+    def __init__(self, config: MapConfig) -> None:
+        self.deviations: Counter[str] = Counter()
+        """Number of patches on which a parameter differs from the request, by parameter."""
+
+        self.moved_spawns: Counter[str] = Counter()
+        """Number of patches whose spawn origin was moved, by sub-terrain."""
+
+        grid, size = config.grid, (config.rows, config.cols)
+        self._config, self._grid = config, grid
+        self._heights = np.zeros(grid.shape, dtype=np.float32)
+        # A view of one number takes no memory, and most maps have one friction.
+        self._friction = uniform_friction(config.static_friction, grid.shape)
+        self._patch_friction = uniform_friction(config.static_friction, config.patch_shape)
+        self._terrain_types = np.empty(size, dtype=np.int32)
+        self._difficulty = np.empty(size, dtype=np.float32)
+        self._parameters = np.empty(size, dtype=object)
+        self._spawns = np.empty(size, dtype=object)
+        self._goals = np.empty(size, dtype=object)
+        self._solids: list[Solids] = []
+
+    def add(self, row: int, col: int, terrain_type: int, patch: Patch) -> None:
+        """Add a patch."""
+        config, sub_terrain = self._config, self._config.sub_terrains[terrain_type]
+        i, j = config.patch_start(row, col)
+        block = (slice(i, i + patch.grid.shape[0]), slice(j, j + patch.grid.shape[1]))
+        self._heights[block] = patch.heights
+        uniform = self._patch_friction
+        if patch.friction is not uniform and (patch.friction != uniform).any():
+            if not self._friction.flags.writeable:
+                self._friction = self._friction.copy()
+            self._friction[block] = patch.friction
+        self._terrain_types[row, col] = terrain_type
+        self._difficulty[row, col] = patch.difficulty
+        self._parameters[row, col] = patch.parameters
+        self._spawns[row, col], self._goals[row, col] = patch.spawns, patch.goals
+        self._solids.append(patch.solids)
+        self.deviations.update(_deviations(patch, sub_terrain, config.cell))
+        self.moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
+
+    def build(self) -> TerrainMap:
+        """Return the map of all patches."""
+        return TerrainMap(
+            config=self._config,
+            grid=self._grid,
+            heights=self._heights,
+            friction=self._friction,
+            spawns=pad_poses(self._spawns),
+            terrain_types=self._terrain_types,
+            terrain_names=tuple(each.name for each in self._config.sub_terrains),
+            difficulty=self._difficulty,
+            parameters=self._parameters,
+            solids=Solids.concatenate(self._solids),
+            goals=pad_poses(self._goals),
+        )
 
 
 def _build_patches(

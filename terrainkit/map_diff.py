@@ -97,19 +97,20 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
         records = [(p.parameters.requested, p.parameters.realized) for p in (a, b)]
         names = dict.fromkeys(name for record in records for name in record[0])
         changed = [n for n in names if len({tuple(r.get(n) for r in rs) for rs in records}) > 1]
-        yield f"parameters {listing(changed)}"
+        yield f"parameters differ: {listing(changed)}"
     difference = _difference(a.heights, b.heights)
     if difference.any():
         number = int((difference != 0).sum())
-        yield f"heights by up to {difference.max():.3g} m at {number:,} of {difference.size:,}"
+        total = f"{number:,} of {difference.size:,} samples"
+        yield f"heights differ by up to {difference.max():.3g} m at {total}"
     if not np.array_equal(a.friction, b.friction):
         number = int((a.friction != b.friction).sum())
-        yield f"friction at {number:,} of {a.friction.size:,}"
+        yield f"friction differs in {number:,} of {a.friction.size:,} cells"
     yield from _diff_solids(_in_patch_frame(a), _in_patch_frame(b))
     shift = np.array([*a.grid.lower, 0, 0]) - [*b.grid.lower, 0, 0]
     moved = float(np.linalg.norm(_difference(a.origin, b.origin + shift[:3])))
     if not moved <= TOLERANCE:
-        yield f"spawn origin by {moved:.3g} m"
+        yield f"spawn origin moved by {moved:.3g} m"
     yield from _diff_poses("spawn positions", a.spawns[1:], b.spawns[1:] + shift)
     yield from _diff_poses("goals", a.goals, b.goals + shift)
 
@@ -118,7 +119,7 @@ def _diff_poses(name: str, a: NDArray[np.floating], b: NDArray[np.floating]) -> 
     if len(a) != len(b):
         yield f"{len(a)} -> {len(b)} {name}"
     elif not (difference := _difference(a, b)).max(initial=0) <= TOLERANCE:
-        yield f"{name} by up to {difference.max():.3g} m or rad"
+        yield f"{name} differ by up to {difference.max():.3g} m or rad"
 
 
 def _difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
@@ -144,7 +145,7 @@ def _diff_solids(a: Solids, b: Solids) -> Iterator[str]:
         or not np.allclose(one, other, rtol=0, atol=TOLERANCE, equal_nan=True)
     ]
     if changed:
-        yield f"solids: {listing(changed)}"
+        yield f"solids differ: {listing(changed)}"
 
 
 def _in_patch_frame(patch: Patch) -> Solids:

@@ -17,7 +17,7 @@ from terrainkit.overlay import Overlay
 from terrainkit.parameter import Realized, Value, parameters_of
 from terrainkit.patch_geometry import PatchGeometry, uniform_friction
 from terrainkit.solids import Solids
-from terrainkit.spawn import Disk, find_spawn, sample_spawns
+from terrainkit.spawn import find_spawn, sample_spawns
 from terrainkit.sub_terrain import SubTerrain, overlay_path
 from terrainkit.terrain import Terrain
 
@@ -228,7 +228,7 @@ def place_spawns(
     origin = _find_origin(config, name, grid, heights, solids, position)
     if config.spawns_per_patch == 1:
         return np.array([origin])
-    disk, number = spawn_disk(config), config.spawns_per_patch
+    disk, number = config.spawn_disk, config.spawns_per_patch
     return sample_spawns(heights, grid, origin, disk, number, solids=solids, rng=rng())
 
 
@@ -241,7 +241,7 @@ def _find_origin(
     position: tuple[float, float],
 ) -> tuple[float, float, float]:
     """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
-    disk = spawn_disk(config)
+    disk = config.spawn_disk
     origin = find_spawn(
         heights, grid, position, disk, solids=solids, threshold=config.wall_threshold
     )
@@ -253,15 +253,6 @@ def _find_origin(
             "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
         )
     return origin
-
-
-def spawn_disk(config: MapConfig) -> Disk:
-    """Return the free place that a robot needs on a map."""
-    return Disk(
-        radius=config.spawn_radius,
-        tolerance=config.spawn_tolerance,
-        headroom=config.spawn_headroom,
-    )
 
 
 def _finish(

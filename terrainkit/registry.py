@@ -36,7 +36,7 @@ class _Group:
     """The classes of one parent."""
 
     noun: str
-    """What they are called in errors, and in the names of the functions below."""
+    """What a class is called in errors: terrain or overlay."""
 
     parent: Any
     """Their parent class."""
@@ -111,7 +111,7 @@ def register_terrain(terrain: _Terrain) -> _Terrain:
     `@dataclass`, or as a function.
 
     Args:
-        terrain: The class; a class that exists under this name already is not registered again.
+        terrain: The class. Nothing changes if it is built in, or that of an installed package.
 
     Returns:
         `terrain`.

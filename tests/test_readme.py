@@ -91,7 +91,8 @@ def test_readme_terrain_commands_run(tmp_path):
     for line in lines.splitlines():
         words = shlex.split(line, comments=True)
         assert words[0] == "terrainkit"
-        assert main(words[1:]) == 0, line
+        if words[1] != "view":  # it runs until it is interrupted
+            assert main(words[1:]) == 0, line
 
 
 def check_robot_lines():

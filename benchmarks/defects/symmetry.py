@@ -148,3 +148,19 @@ def flipped_axis(robot: Mutant) -> Subjects:
     element = joint.find("axis")
     set_numbers(element, "xyz", -numbers(element, "xyz"))
     return _pair_names(robot, child(joint)) + mirror_names(joint.get("name"))
+
+
+@mutation("SYM002 INR008", "warning", "center of mass of the trunk on one side")
+def trunk_com(robot: Mutant) -> Subjects:
+    link = robot.base_link()
+    add_offset(origin(link.find("inertial")), "xyz", [0, robot.pick([-0.06, 0.06]), 0])
+    return robot.body_names(link.get("name"))
+
+
+@mutation("SYM011 INR003 INR004", "warning", "product of inertia of the trunk")
+def trunk_product(robot: Mutant) -> Subjects:
+    link = robot.base_link()
+    element = link.find("inertial/inertia")
+    largest = max(float(element.get(name)) for name in ("ixx", "iyy", "izz"))
+    element.set(robot.pick(["ixy", "iyz"]), f"{0.2 * largest:.4g}")
+    return robot.body_names(link.get("name"))

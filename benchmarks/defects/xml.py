@@ -209,7 +209,7 @@ def two_materials(robot: Mutant) -> Subjects:
     return [visual.getparent().get("name")]
 
 
-@mutation("XML009", "error", "byte order mark")
+@mutation("XML009", "warning", "byte order mark")
 def byte_order_mark(robot: Mutant) -> Subjects:
     robot.rewrite = lambda text: b"\xef\xbb\xbf" + text
     return ()

@@ -152,7 +152,7 @@ class Evaluate(PolicyCommand):
             with atomic_write(output, overwrite=self.overwrite) as path:
                 path.write_text(result.as_json(), encoding="utf-8")
         if diagram is not None:
-            from terrainkit_robots.policy.gait import draw_contacts
+            from terrainkit_cli.contact_diagram import draw_contacts
 
             with atomic_write(diagram, overwrite=self.overwrite) as path:
                 path.write_bytes(draw_contacts(result.contacts, result.dt))

@@ -19,14 +19,15 @@ from terrainkit_cli.terrain_commands import written
 class Export(Command):
     """Export a map to other formats, or a policy to ONNX.
 
-    A map (.npz) is written as .xml (MuJoCo), .usd, .sdf, .stl, .ply, .obj, .glb or .png: the suffix
-    of --output selects the format.
+    A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png:
+    the suffix of --output selects the format. A .sdf has its meshes in .stl files beside it, and a
+    .png its scale in a .json file.
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt
     (TorchScript) and policy.json, which describes the observations and their scales, the default
-    pose, gains, limits, and the order of the joints. The exported policies are verified against
-    the checkpoint.
+    pose, gains, limits, and the order of the joints, and robot.xml (MJCF) with its meshes. The
+    exported policies are verified against the checkpoint.
     """
 
     source: Annotated[
@@ -45,7 +46,7 @@ class Export(Command):
         tyro.conf.arg(metavar="{auto,hfield,boxes}", help_behavior_hint="(default: auto)"),
     ] = None
     """For .xml: export the terrain as one heightfield, or as boxes, whose walls are vertical. auto
-    selects boxes if a moderate number of them covers the whole terrain."""
+    selects boxes if they cover the whole terrain and are few (see terrainkit info --budget)."""
 
     full: Flag = False
     """For meshes: write two triangles per cell instead of merging coplanar faces."""

@@ -17,6 +17,7 @@ COMMAND_GROUPS = {
         "list": "terrain_commands",
         "info": "terrain_commands",
         "preview": "terrain_commands",
+        "view": "view_command",
         "check-map": "terrain_commands",
         "diff": "terrain_commands",
         "export": "export_command",
@@ -108,7 +109,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _print_overview() -> None:
-    render.result("usage: terrainkit COMMAND [OPTIONS]\n")
+    render.result("usage: terrainkit COMMAND [OPTIONS]")
     render.result("Generate terrain for legged robots, check robot files, and train policies.\n")
     rows: list[tuple[str, str]] = []
     for group, names in COMMAND_GROUPS.items():

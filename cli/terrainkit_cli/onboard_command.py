@@ -180,9 +180,11 @@ def _blocking_errors(result: "OnboardResult") -> str:
 
 def _remaining_errors(result: "OnboardResult") -> list[str]:
     """Return a summary of the errors of a robot that was written."""
+    from terrainkit_robots.lint.report.grouping import group_findings
     from terrainkit_robots.text import count
 
-    errors = [finding for finding in result.report.findings if finding.severity == "error"]
+    findings = [finding for finding in result.report.findings if finding.severity == "error"]
+    errors = [group.first for group in group_findings(result.report.facts.model, findings)]
     codes = ", ".join(dict.fromkeys(finding.code for finding in errors))
     remain = "remains" if len(errors) == 1 else "remain"
     return [f"{count(len(errors), 'error')} {remain} ({codes}); see report.md"] if errors else []
@@ -192,6 +194,8 @@ def _warnings(result: "OnboardResult") -> list[str]:
     """Return what was skipped, and why a robot that was written may not be ready for training."""
     skipped = result.skipped_configs.items()
     warnings = [f"no configuration for {framework}: {reason}" for framework, reason in skipped]
+    # A robot whose legs were not all found was onboarded as another robot.
+    warnings += [f.message for f in result.report.findings if f.code == "LEG002"]
     verification = result.verification
     if verification is not None and not verification.is_stable:
         warnings.append(f"the robot does not stand: {'; '.join(verification.failures)}")

@@ -293,7 +293,9 @@ def _print_budget(terrain_map: TerrainMap, foot_radius: float) -> None:
     from terrainkit.budget import MAX_CONTACTS, compute_budget
 
     budget = compute_budget(terrain_map, foot_radius)
-    contacts = f"at most {budget.foot_contacts} with a heightfield, of a foot of {foot_radius:g} m"
+    contacts = (
+        f"a foot of radius {foot_radius:g} m has at most {budget.foot_contacts} with a heightfield"
+    )
     if budget.foot_contacts > MAX_CONTACTS:
         contacts += f"; MuJoCo drops those beyond {MAX_CONTACTS}: use larger cells, or boxes"
     else:
@@ -313,7 +315,7 @@ def _print_budget(terrain_map: TerrainMap, foot_radius: float) -> None:
     render.table(rows)
     render.result("")
     sizes = budget.file_sizes.items()
-    texts = [(name, f"{n / 1e3:,.1f} kB" if isinstance(n, int) else n) for name, n in sizes]
+    texts = [(name, _bytes_text(n) if isinstance(n, int) else n) for name, n in sizes]
     render.table([("file", "size"), *texts])
 
 
@@ -436,8 +438,12 @@ def written(terrain_map: TerrainMap, path: Path) -> str:
     config, grid = terrain_map.config, terrain_map.grid
     return (
         f"wrote {path}: {config.rows} x {config.cols} patches of {_size_text(*config.patch_size)}, "
-        f"{grid.shape[0]} x {grid.shape[1]} samples, {path.stat().st_size / 1e6:.1f} MB"
+        f"{grid.shape[0]} x {grid.shape[1]} samples, {_bytes_text(path.stat().st_size)}"
     )
+
+
+def _bytes_text(number: int) -> str:
+    return f"{number / 1e3:.1f} kB" if number < 1e6 else f"{number / 1e6:,.1f} MB"
 
 
 def _size_text(x: float, y: float) -> str:

@@ -41,7 +41,7 @@ def export(
     known = export_options(path)
     for name in options:
         if name not in known:
-            raise ExportError(f"{path.suffix} has no option {name!r}; it has: {listing(known)}")
+            raise ExportError(f"option of {path.suffix}: got {name!r}; expected {listing(known)}")
     terrain_map.require_finite()
     with atomic_write(path, overwrite=overwrite) as temporary:
         write(terrain_map, temporary, **options)

@@ -60,8 +60,8 @@ _Part = tuple[slice, slice]
 
 MAX_BOXES = 100
 """Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
-step of the bundled quadruped takes about 1.8 times that on a plane. Two runs of
-benchmarks/collision.py gave 91."""
+step of the bundled quadruped takes about 1.8 times that on a plane. Three runs of
+benchmarks/collision.py gave 91 to 103."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:

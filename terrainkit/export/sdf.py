@@ -58,15 +58,15 @@ def _add_geometry(
     friction: float,
     *,
     pose: str = "",
-    kinds: tuple[str, ...] = ("collision", "visual"),
+    tags: tuple[str, ...] = ("collision", "visual"),
 ) -> None:
     """Add a geometry to the link as a collision shape, a visual shape, or both."""
-    for kind in kinds:
-        element = ET.SubElement(link, kind, name=f"{name}_{kind}")
+    for tag in tags:
+        element = ET.SubElement(link, tag, name=f"{name}_{tag}")
         if pose:
             ET.SubElement(element, "pose").text = pose
         element.append(geometry)
-        if kind == "collision":
+        if tag == "collision":
             surface = ET.SubElement(element, "surface")
             ode = ET.SubElement(ET.SubElement(surface, "friction"), "ode")
             ET.SubElement(ode, "mu").text = ET.SubElement(ode, "mu2").text = f"{friction:g}"
@@ -74,9 +74,10 @@ def _add_geometry(
             ET.SubElement(bounce, "restitution_coefficient").text = f"{contact['restitution']:g}"
 
 
-def _kinds(solids: Solids, k: int) -> tuple[str, ...]:
-    shown = {"collision": solids.collides[k], "visual": solids.visible[k]}
-    return tuple(kind for kind, is_shown in shown.items() if is_shown)
+def _tags(solids: Solids, k: int) -> tuple[str, ...]:
+    """Return the elements of a solid: collision if it collides, visual if it is visible."""
+    flags = {"collision": solids.collides[k], "visual": solids.visible[k]}
+    return tuple(tag for tag, is_set in flags.items() if is_set)
 
 
 def _add_shapes(link: ET.Element, solids: Solids, contact: dict[str, float]) -> None:
@@ -96,9 +97,9 @@ def _add_shapes(link: ET.Element, solids: Solids, contact: dict[str, float]) -> 
             ET.SubElement(cylinder, "radius").text = _numbers(shape[3])
             ET.SubElement(cylinder, "length").text = _numbers(2 * shape[5])
         pose = _numbers(*shape[:3], *rpy)
-        kinds = _kinds(solids, k)
+        tags = _tags(solids, k)
         _add_geometry(
-            link, f"solid_{k}", geometry, contact, float(friction[k]), pose=pose, kinds=kinds
+            link, f"solid_{k}", geometry, contact, float(friction[k]), pose=pose, tags=tags
         )
 
 
@@ -114,9 +115,9 @@ def _add_hulls(link: ET.Element, solids: Solids, contact: dict[str, float], path
         members = [k for k, each in enumerate(keys) if each == key]
         file = path.with_name(f"{path.stem}_hulls_{number}.stl")
         write_stl(concatenate_meshes([meshes[k] for k in members]), file)
-        kinds = _kinds(hulls, members[0])
+        tags = _tags(hulls, members[0])
         geometry = _mesh_geometry(file)
-        _add_geometry(link, f"hulls_{number}", geometry, contact, key[0], kinds=kinds)
+        _add_geometry(link, f"hulls_{number}", geometry, contact, key[0], tags=tags)
 
 
 def _numbers(*values: float) -> str:

@@ -26,11 +26,11 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     """Write the map in meters with z up. The prim `/terrain` is the default prim.
 
     `/terrain/ground` is a static collider, `/terrain/solids` has the solids, and `/terrain/spawns`
-    and `/terrain/goals` are points. The friction of single cells is not written.
+    and `/terrain/goals` are points.
 
     Args:
         terrain_map: The map.
-        path: Target; .usda is text.
+        path: Target; .usda is text, and the others are binary.
 
     Raises:
         ExportError: if usd-core is not installed, or the ground has several friction coefficients.
@@ -71,6 +71,7 @@ def _add_mesh(usd_stage: Any, path: str, mesh: TriMesh) -> Any:
 
 
 def _material(usd_stage: Any, name: str, contact: dict[str, float]) -> Any:
+    """Return the material `name`, which is added to the stage if there is none."""
     from pxr import UsdPhysics, UsdShade
 
     material = UsdShade.Material.Define(usd_stage, f"/terrain/materials/{name}")
@@ -119,11 +120,16 @@ def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> No
         if not solids.visible[k]:
             prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
         if solids.collides[k]:
-            name, values = "ground_material", contact
-            if not np.isnan(friction):
-                name = f"friction_{friction:g}".replace(".", "_").replace("-", "_")
-                values = contact | {"static_friction": friction, "dynamic_friction": friction}
-            _set_collider(prim, "convexHull", _material(usd_stage, name, values))
+            _set_collider(prim, "convexHull", _solid_material(usd_stage, friction, contact))
+
+
+def _solid_material(usd_stage: Any, friction: float, contact: dict[str, float]) -> Any:
+    """Return the material of solids with this friction; NaN for that of the ground."""
+    if np.isnan(friction):
+        return _material(usd_stage, "ground_material", contact)
+    name = f"friction_{friction:g}".replace(".", "_").replace("-", "_")
+    values = contact | {"static_friction": friction, "dynamic_friction": friction}
+    return _material(usd_stage, name, values)
 
 
 def _add_points(usd_stage: Any, path: str, points: NDArray[np.float32]) -> None:

@@ -1,7 +1,7 @@
 """Use maps in other frameworks.
 
-There is one module for each framework. It imports the framework, which terrainkit does not depend
-on.
+There is one module for each framework. terrainkit does not depend on the frameworks: a module
+raises an error with one line if its framework is not installed.
 """
 
 from pathlib import Path

@@ -97,6 +97,6 @@ class MapGeneratorCfg(TerrainGeneratorCfg):
 
 
 def _filled(points: np.ndarray, origins: np.ndarray) -> np.ndarray:
-    """Return the points of each patch with its first one, or else its origin, in place of NaN."""
+    """Replace NaN by the first point of the patch, or by its origin if it has no points."""
     first = np.where(np.isnan(points[:, :, :1]), origins[:, :, None], points[:, :, :1])
     return np.where(np.isnan(points), first, points)

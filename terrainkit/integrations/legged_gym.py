@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.integrations import load_map
 from terrainkit.terrain_map import TerrainMap, int16_heights
@@ -42,13 +43,7 @@ class Terrain:
         if cfg.mesh_type != "trimesh":
             raise ConfigError(f"mesh_type: got {cfg.mesh_type!r}; expected 'trimesh'")
         config = terrain_map.config
-        cfg.num_rows, cfg.num_cols = config.rows, config.cols
-        cfg.num_sub_terrains = config.rows * config.cols
-        cfg.terrain_length, cfg.terrain_width = config.patch_size
-        cfg.horizontal_scale, cfg.border_size = config.cell, config.border
-        cfg.max_init_terrain_level = min(cfg.max_init_terrain_level, config.rows - 1)
-        for name, value in config.contact.items():
-            setattr(cfg, name, value)
+        _set_layout(cfg, config)
         self.cfg, self.num_robots, self.type = cfg, num_robots, cfg.mesh_type
         self.env_length, self.env_width = config.patch_size
         self.length_per_env_pixels, self.width_per_env_pixels = config.patch_shape
@@ -56,10 +51,8 @@ class Terrain:
         self.tot_rows, self.tot_cols = terrain_map.heights.shape
         # LeggedRobot shifts the mesh by -border_size, but not the origins.
         corner = np.array([*terrain_map.grid.lower, 0.0])
-        mesh, first_patch = (
-            terrain_map.mesh(),
-            corner + np.array([config.border, config.border, 0.0]),
-        )
+        first_patch = corner + np.array([config.border, config.border, 0.0])
+        mesh = terrain_map.mesh()
         self.vertices = (mesh.vertices - corner).astype(np.float32)
         self.triangles = mesh.triangles.astype(np.uint32)
         self.env_origins = (terrain_map.env_origins - first_patch).astype(np.float64)
@@ -72,6 +65,17 @@ class Terrain:
         if hasattr(cfg, "num_goals"):
             self.goals = padded_goals(terrain_map) - first_patch
             self.num_goals = cfg.num_goals = self.goals.shape[2]
+
+
+def _set_layout(cfg: Any, config: MapConfig) -> None:
+    """Set the layout and the friction of a map in `cfg.terrain` of an environment."""
+    cfg.num_rows, cfg.num_cols = config.rows, config.cols
+    cfg.num_sub_terrains = config.rows * config.cols
+    cfg.terrain_length, cfg.terrain_width = config.patch_size
+    cfg.horizontal_scale, cfg.border_size = config.cell, config.border
+    cfg.max_init_terrain_level = min(cfg.max_init_terrain_level, config.rows - 1)
+    for name, value in config.contact.items():
+        setattr(cfg, name, value)
 
 
 def top_heights(terrain_map: TerrainMap) -> NDArray[np.float64]:

@@ -72,7 +72,7 @@ def terrain_entity_cfg(
 
 
 def column_names(terrain_map: TerrainMap) -> list[str]:
-    """Return a unique name for each column: its terrain, and a number if it is not the first."""
+    """Return a unique name for each column, such as `stairs` and `stairs#2`."""
     names: list[str] = []
     for types in terrain_map.patch_names.T:
         name = str(types[0]) if (types == types[0]).all() else "mixed"

@@ -89,11 +89,13 @@ def _shifts(
         expected: Area of the holes of each row on an endless field [cells], shape (rows,).
         draws: Random numbers from 0 to 1.
     """
-    shifts, missing = np.zeros(len(areas), dtype=np.int64), 0.0
-    for k, area in enumerate(areas):
-        missing += expected[k]
-        error = np.abs(area - missing)
-        nearest = np.flatnonzero(error <= error.min() + 1e-9)
-        shifts[k] = nearest[int(draws[k % len(draws)] * len(nearest))]
+    shifts, missing = [], 0.0
+    # Lists, since a row has few offsets.
+    for k, (area, share) in enumerate(zip(areas.tolist(), expected.tolist(), strict=True)):
+        missing += share
+        error = [abs(each - missing) for each in area]
+        limit = min(error) + 1e-9
+        nearest = [offset for offset, each in enumerate(error) if each <= limit]
+        shifts.append(nearest[int(draws[k % len(draws)] * len(nearest))])
         missing -= area[shifts[k]]
-    return shifts
+    return np.array(shifts)

@@ -56,9 +56,11 @@ def test_budget_counts_what_mujoco_loads(terrain_map, tmp_path):
 
 def test_budget_sizes_are_those_of_the_files(flat_map, flat_budget, tmp_path):
     assert flat_budget.file_sizes[".stl"] == 84 + 50 * 2
-    for suffix in (".npz", ".ply", ".obj", ".glb", ".png"):
-        path = flat_map.save(tmp_path / f"map{suffix}")
-        assert flat_budget.file_sizes[suffix] == path.stat().st_size
+    for suffix in (".npz", ".ply", ".obj", ".glb", ".png", ".sdf"):
+        (tmp_path / suffix).mkdir()
+        path = flat_map.save(tmp_path / suffix / f"map{suffix}")
+        files = path.parent.iterdir()  # .json beside .png, and .stl beside .sdf
+        assert flat_budget.file_sizes[suffix] == sum(file.stat().st_size for file in files)
 
 
 def test_budget_says_which_format_has_no_solids():

@@ -64,7 +64,7 @@ def test_diff_maps_compares_heights(terrain_map):
     height = terrain_map.heights[90, 170]
     edited = changed(terrain_map, "heights", (slice(90, 92), 170), height + np.float32(0.25))
     assert diff_maps(terrain_map, edited).patches == {
-        (1, 2): ("heights by up to 0.25 m at 2 of 6,400",)
+        (1, 2): ("heights differ by up to 0.25 m at 2 of 6,400 samples",)
     }
     border = diff_maps(terrain_map, changed(terrain_map, "heights", (2, 3), 0.5))
     assert border.grid == ("the border: heights differ by up to 0.5 m",)
@@ -75,39 +75,41 @@ def test_diff_maps_compares_friction(terrain_map):
     friction = terrain_map.friction.copy()
     friction[85 + 3, 6] = friction[85 + 4, 6] = 0.5
     diff = diff_maps(replace(terrain_map, friction=friction), terrain_map)
-    assert diff.patches == {(1, 0): ("friction at 2 of 6,400",)}
+    assert diff.patches == {(1, 0): ("friction differs in 2 of 6,400 cells",)}
 
 
 def test_diff_maps_reports_invalid_heights(terrain_map):
     edited = changed(terrain_map, "heights", (90, 170), np.nan)
     assert diff_maps(terrain_map, edited).patches == {
-        (1, 2): ("heights by up to nan m at 1 of 6,400",)
+        (1, 2): ("heights differ by up to nan m at 1 of 6,400 samples",)
     }
 
 
 def test_diff_maps_compares_spawns_and_goals(terrain_map):
     x = terrain_map.spawns[1, 1, 0, 0]
     moved = changed(terrain_map, "spawns", (1, 1, 0, 0), x + np.float32(0.5))
-    assert diff_maps(terrain_map, moved).patches == {(1, 1): ("spawn origin by 0.5 m",)}
+    assert diff_maps(terrain_map, moved).patches == {(1, 1): ("spawn origin moved by 0.5 m",)}
     fewer = changed(terrain_map, "spawns", (1, 2, 1), np.nan)
     assert diff_maps(terrain_map, fewer).patches == {(1, 2): ("1 -> 0 spawn positions",)}
     heading = terrain_map.goals[0, 0, 0, 3]
     turned = changed(terrain_map, "goals", (0, 0, 0, 3), heading + np.float32(0.25))
-    assert diff_maps(terrain_map, turned).patches == {(0, 0): ("goals by up to 0.25 m or rad",)}
+    assert diff_maps(terrain_map, turned).patches == {
+        (0, 0): ("goals differ by up to 0.25 m or rad",)
+    }
 
 
 def test_diff_maps_compares_solids(terrain_map):
     solids = terrain_map.solids
     rough = dataclasses.replace(solids, friction=np.full_like(solids.friction, 0.4))
     found = diff_maps(terrain_map, replace(terrain_map, solids=rough)).patches
-    assert found == {(row, 0): ("solids: friction",) for row in range(2)}
+    assert found == {(row, 0): ("solids differ: friction",) for row in range(2)}
     none = replace(terrain_map, solids=solids.select(solids.patch[:, 0] == 1))
     number = int((solids.patch[:, 0] == 0).sum())
     assert diff_maps(terrain_map, none).patches == {(0, 0): (f"{number} -> 0 solids",)}
     box = make_boxes([4.0, 4.0, 1.0], [0.2, 0.2, 0.2])
     cylinder = make_cylinders([4.0, 4.0, 1.0], 0.1, 0.2)
     found = diff_maps(replace(terrain_map, solids=box), replace(terrain_map, solids=cylinder))
-    assert found.patches == {(0, 0): ("solids: boxes, cylinders",)}
+    assert found.patches == {(0, 0): ("solids differ: boxes, cylinders",)}
 
 
 def test_diff_maps_compares_type_difficulty_and_parameters(terrain_map):
@@ -119,7 +121,7 @@ def test_diff_maps_compares_type_difficulty_and_parameters(terrain_map):
     requested = {**parameters[1, 2].requested, "step_width": 0.5}
     parameters[1, 2] = dataclasses.replace(parameters[1, 2], requested=requested)
     found = diff_maps(terrain_map, replace(terrain_map, parameters=parameters))
-    assert found.patches == {(1, 2): ("parameters step_width",)}
+    assert found.patches == {(1, 2): ("parameters differ: step_width",)}
 
 
 def test_diff_maps_ignores_the_frame(terrain_map):
@@ -156,8 +158,8 @@ def test_diff_maps_with_other_cells_compares_the_config():
     ("name", "index", "message"),
     [
         ("heights", (0, 0), "the border: heights differ by up to nan m"),
-        ("heights", (20, 20), "heights by up to nan m at 1 of 6,400"),
-        ("spawns", (0, 0, 0, 2), "spawn origin by nan m"),
+        ("heights", (20, 20), "heights differ by up to nan m at 1 of 6,400 samples"),
+        ("spawns", (0, 0, 0, 2), "spawn origin moved by nan m"),
         ("difficulty", (0, 0), "difficulty 0 -> nan"),
     ],
 )

@@ -52,17 +52,19 @@ def test_make_patch_records_requested_and_realized():
     assert parameters.realized == {"width": 0.3, "platform": 3.2, "depth": 2.0}
 
 
-def test_make_patch_is_seeded_by_row_and_column():
-    patch = make_patch(MapConfig(seed=7, terrains=(SubTerrain(terrain="rough"),)), 3, 5)
-    rng = np.random.default_rng(np.random.SeedSequence([7, 3, 5]))
+@pytest.mark.parametrize("seed", [7, 2**40 + 7])
+def test_make_patch_is_seeded_by_row_and_column(seed):
+    patch = make_patch(MapConfig(seed=seed, terrains=(SubTerrain(terrain="rough"),)), 3, 5)
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 3, 5]))
     # Row 3 of 0 to 9 has difficulty 1/3.
     alone = Rough.at(3 / 9).build(patch.grid, rng)
     assert patch.heights.tobytes() == alone.tobytes()
 
 
-def test_make_patch_with_column_layout_is_seeded_by_column():
-    patch = make_patch(MapConfig(seed=7, terrains=(OBSTACLES,)), 3, 5)
-    rng = np.random.default_rng(np.random.SeedSequence([7, 5], spawn_key=(2,)))
+@pytest.mark.parametrize("seed", [7, 2**40 + 7])
+def test_make_patch_with_column_layout_is_seeded_by_column(seed):
+    patch = make_patch(MapConfig(seed=seed, terrains=(OBSTACLES,)), 3, 5)
+    rng = np.random.default_rng(np.random.SeedSequence([seed, 5], spawn_key=(2,)))
     alone = Obstacles.at(3 / 9).build(patch.grid, rng)
     assert patch.heights.tobytes() == alone.tobytes()
 

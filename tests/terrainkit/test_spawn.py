@@ -34,7 +34,7 @@ def spawn(
 
 
 def disk(heights, origin, *, radius=0.5, threshold=WALL, grid=PLOT):
-    """Return the height of the ground all over the disk neighborhood `origin` [m]."""
+    """Return the height of the ground all over the disk around `origin` [m]."""
     r, angle = np.meshgrid(np.linspace(0.0, radius, 26), np.linspace(0.0, 2 * math.pi, 121))
     points = np.stack([origin[0] + r * np.cos(angle), origin[1] + r * np.sin(angle)], axis=-1)
     place = (points.reshape(-1, 2) - grid.lower) / grid.cell - 0.5

@@ -175,7 +175,7 @@ def test_validate_finds_decreasing_difficulty(sound):
 
 
 def test_validate_finds_deviating_width():
-    # A moat of 1 m neighborhood a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
+    # A moat of 1 m around a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
     config = tk.MapConfig(
         rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.SubTerrain(terrain="gap"),)
     )

@@ -18,7 +18,7 @@ from terrainkit_robots.rl.run import create_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import Plane
 
-FILES = ["policy.json", "policy.onnx", "policy.pt"]
+FILES = ["policy.json", "policy.onnx", "policy.pt", "robot.xml"]
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def test_export_run_into_its_own_folder(here, run_folder):
     assert names(run_folder / "exported") == FILES
     first, second = run.stdout.splitlines()
     assert first.startswith("wrote run/exported/policy.onnx, run/exported/policy.pt, ")
-    assert first.endswith("45 observations to 12 actions, from model_2.pt")
+    assert first.endswith("47 observations to 12 actions, from model_2.pt")
     assert second.startswith("verified: largest difference from the checkpoint: policy.onnx ")
     assert second.endswith(", policy.pt 0.0e+00")
     config = json.loads((run_folder / "exported" / "policy.json").read_text())

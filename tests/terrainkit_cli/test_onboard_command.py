@@ -6,6 +6,7 @@ import pytest
 
 from terrainkit_cli.main import main
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from tests.robots import ARM
 
@@ -250,3 +251,14 @@ def test_onboard_interrupted_leaves_no_files(tmp_path):
     )
     assert run.returncode == 130, run.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_onboard_warns_about_legs_that_are_not_counted(here, tmp_path):
+    """A quadruped that lies on its side, as files with y up do, is no biped."""
+    text = bundled.urdf_path("quadruped").read_text()
+    turned = """<link name="root"/><joint name="up" type="fixed"><parent link="root"/>
+        <child link="base"/><origin xyz="0 0 0" rpy="-1.5708 0 0"/></joint></robot>"""
+    (tmp_path / "side.urdf").write_text(text.replace("</robot>", turned))
+    err = here("side.urdf", NO_PICTURES)[2]
+    assert "warning: side.urdf: number of legs: got 2 " in err
+    assert "expected 4, since FR_calf, RR_calf have the joints and masses of a leg" in err

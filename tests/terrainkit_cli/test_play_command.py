@@ -68,17 +68,21 @@ def test_play_prints_a_table_for_a_map(here, tmp_path):
     generate(config).save(tmp_path / "map.npz")
     code, out, _ = here("walk", "--terrain", "map.npz", "--no-video", "--seconds", "0.1")
     assert code == 0
-    lines = [line.split() for line in out.splitlines()[1:]]
+    assert out.splitlines()[1] == "commands followed: 0%"
+    lines = [line.split() for line in out.splitlines()[2:]]
     assert lines[0] == ["terrain", "robots", "fell", "m/s", "rad/s", "success", "level", "0", "1"]
     assert lines[1] == ["flat", "2", "0", "-", "-", "0%", "0%", "0%"]
-    assert [line[0] for line in lines[1:]] == ["flat", "stairs"]
+    assert [line[0] for line in lines[1:]] == ["flat", "stairs", "forward"]
     assert sorted(each.name for each in tmp_path.iterdir()) == ["map.npz", "walk"]
 
 
-def test_play_prints_a_line_for_a_plane(here):
+def test_play_prints_lines_for_a_plane(here):
     code, out, _ = here("walk", *QUICK, "--no-video")
     assert code == 0
-    assert out.count("\n") == 1
+    assert [line.split(",")[0] for line in out.splitlines()] == [
+        "quadruped",
+        "commands followed: 0%",
+    ]
 
 
 def test_play_prints_the_table_without_a_renderer(here, tmp_path, monkeypatch):

@@ -283,7 +283,7 @@ def test_generate_quotes_paths_in_commands(terrainkit):
 def test_export_rejects_option_of_other_format(terrainkit, small_map):
     run = terrainkit("export", small_map, "-o", "a.stl", "--collision", "boxes")
     assert run.returncode == 2
-    assert ".stl has no option 'collision'; it has: full, closed, y_up" in run.stderr
+    assert "option of .stl: got 'collision'; expected full, closed, y_up" in run.stderr
 
 
 def test_check_map_accepts_generated_map(terrainkit_process, small_map):
@@ -339,7 +339,7 @@ def test_diff_exit_codes(terrainkit, tmp_path):
     run = terrainkit("diff", "a.npz", "c.npz")
     assert run.returncode == 1
     assert "config: seed: 0 -> 1\n" in run.stdout
-    assert "patch (0, 1): heights by up to 0." in run.stdout
+    assert "patch (0, 1): heights differ by up to 0." in run.stdout
     assert run.stdout.endswith("\na.npz -> c.npz: 2 of 2 patches differ\n")
     (tmp_path / "d.npz").write_bytes(b"PK")
     run = terrainkit("diff", "a.npz", "d.npz")
@@ -354,7 +354,9 @@ def test_info_budget_prints_costs(terrainkit):
     assert (run.returncode, run.stderr) == (0, "")
     rows = [" ".join(line.split()) for line in run.stdout.splitlines()]
     assert "triangles 2 merged, 5,002 full" in rows  # 2 x 41 x 61 quads
-    assert rows[1].startswith("contacts at most 98 with a heightfield, of a foot of 0.3 m; MuJoCo")
+    assert rows[1].startswith(
+        "contacts a foot of radius 0.3 m has at most 98 with a heightfield; MuJoCo drops"
+    )
     assert "boxes (auto) 1 1 0 about 1.0 x a plane" in rows
     assert ".stl 0.2 kB" in rows
 

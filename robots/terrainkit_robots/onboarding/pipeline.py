@@ -22,7 +22,12 @@ from terrainkit_robots.onboarding.placeholder_effort import placeholder_effort
 from terrainkit_robots.onboarding.repairs import with_onboarding_repairs
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
-from terrainkit_robots.onboarding.robot_files import MJCF, SpecOverride, make_robot_files
+from terrainkit_robots.onboarding.robot_files import (
+    MJCF,
+    RobotFiles,
+    SpecOverride,
+    make_robot_files,
+)
 
 if TYPE_CHECKING:
     from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
@@ -119,7 +124,6 @@ def onboard(
         TerrainkitError: if a file cannot be read or written, an option is invalid, or MuJoCo
             rejects the robot.
     """
-    from terrainkit_robots.onboarding.verify import verify
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
     path, options = Path(path), options or OnboardOptions()
@@ -148,39 +152,16 @@ def onboard(
         cache_dir=options.cache_dir,
         progress=options.progress,
     )
-    configs: dict[str, bytes] = {}
-    skipped_configs: dict[str, str] = {}
-    for name, file in config_names.items():
-        try:
-            configs[file] = robot_config_text(name, robot.facts, robot.spec).encode()
-        except ConfigError as error:
-            skipped_configs[name] = str(error)
-    edits = find_edits(target, {**robot.files, **configs})
-    with new_folder(target, overwrite=options.overwrite) as folder:
-        options.on_step("simulating the standing pose")
-        write_files(folder, {**robot.files, **configs})
-        # The pictures are rendered by another process at the same time.
-        with ThreadPoolExecutor(1) as executor:
-            images_job = executor.submit(_render_images, folder, options.render_images)
-            is_soft = options.gains == "train" and user_spec is None
-            verification = verify(report.facts, robot, folder, soft_gains=is_soft)
-            options.on_step("rendering pictures")
-        images, images_error = images_job.result()
-        write_files(folder, {**images, **edits})
-        result = OnboardResult(
-            report=report,
-            fixed=fixed,
-            folder=target,
-            robot=robot,
-            verification=verification,
-            configs=tuple(configs),
-            skipped_configs=skipped_configs,
-            images=tuple(images),
-            images_error=images_error,
-            edits=tuple(edits),
-        )
-        write_files(folder, {"report.md": report_markdown(result).encode()})
-    return result
+    configs, skipped_configs = _config_files(config_names, robot)
+    result = OnboardResult(
+        report=report,
+        fixed=fixed,
+        folder=target,
+        robot=robot,
+        configs=tuple(configs),
+        skipped_configs=skipped_configs,
+    )
+    return _write_folder(result, target, {**robot.files, **configs}, options)
 
 
 def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[Finding, ...]]:
@@ -204,6 +185,55 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     # The fix of the lint rule is not applied, so its description is removed.
     fixed = (*fixed, *(replace(finding, fix=None) for finding in by_export))
     return replace(report, findings=remaining), fixed
+
+
+def _config_files(
+    file_names: Mapping[str, str], robot: RobotFiles
+) -> tuple[dict[str, bytes], dict[str, str]]:
+    """Return the configurations by file name, and why frameworks are skipped.
+
+    Args:
+        file_names: File of the configuration of each framework.
+        robot: The robot.
+    """
+    configs: dict[str, bytes] = {}
+    skipped: dict[str, str] = {}
+    for name, file in file_names.items():
+        try:
+            configs[file] = robot_config_text(name, robot.facts, robot.spec).encode()
+        except ConfigError as error:
+            skipped[name] = str(error)
+    return configs, skipped
+
+
+def _write_folder(
+    result: OnboardResult, target: Path, files: Mapping[str, bytes], options: OnboardOptions
+) -> OnboardResult:
+    """Write the folder, and return the result with its verification, pictures and edited files."""
+    from terrainkit_robots.onboarding.verify import verify
+
+    assert result.robot is not None
+    edits = find_edits(target, files)
+    with new_folder(target, overwrite=options.overwrite) as folder:
+        options.on_step("simulating the standing pose")
+        write_files(folder, files)
+        # The pictures are rendered by another process at the same time.
+        with ThreadPoolExecutor(1) as executor:
+            images_job = executor.submit(_render_images, folder, options.render_images)
+            is_soft = options.gains == "train" and options.spec is None
+            verification = verify(result.report.facts, result.robot, folder, soft_gains=is_soft)
+            options.on_step("rendering pictures")
+        images, images_error = images_job.result()
+        write_files(folder, {**images, **edits})
+        result = replace(
+            result,
+            verification=verification,
+            images=tuple(images),
+            images_error=images_error,
+            edits=tuple(edits),
+        )
+        write_files(folder, {"report.md": report_markdown(result).encode()})
+    return result
 
 
 def _render_images(folder: Path, enabled: bool) -> tuple[dict[str, bytes], str]:

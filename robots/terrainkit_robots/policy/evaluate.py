@@ -89,12 +89,10 @@ class RolloutMetrics:
     `_1s` are of velocities averaged over 1 s, without the sway of a gait. They are None if no robot
     was measured, and `success`, the fraction of successful robots, is None on a plane.
 
-    The gait is that of robots that are commanded to move, None without any: swing height [m] and
-    duty factor of each foot (in the order of the robot's feet), swings of a foot per second, speed
-    of feet in contact [m/s], the largest relative difference of left and right in swing height or
-    duty factor, the pitch of the base (nose down is positive) [rad], the fraction of robots that
-    follow their command (at least half of its linear and of its yaw velocity), and the cost of
-    transport, mechanical power / (weight * speed).
+    The gait is that of robots that are commanded to move, None without any; see :mod:`.gait`.
+    Tuples have one value per foot. The pitch is positive when the nose is down. `asymmetry` is the
+    larger one of swing height and duty factor, `followed` the fraction of robots that reach half of
+    their command's linear and yaw velocity, `cost_of_transport` power / (weight * speed).
     """
 
     command: tuple[float, ...] | None = None
@@ -320,16 +318,14 @@ class EvaluationRollout:
         self._settling_steps = round(SETTLING_TIME / dt)
         self._window = max(1, round(AVERAGING_TIME / dt))
         self._recent_errors = np.zeros((self._window, n, 3), np.float32)  # ring buffer
-        self._last_commands = np.full((n, 3), np.nan, np.float32)
+        self.last_commands = np.full((n, 3), np.nan, np.float32)
         self._command_steps = np.zeros(n, np.int64)  # since the command changed
         self._measured_steps = np.zeros(n, np.int64)  # without interruption
         self._num_steps = 0
-        # Of each robot: sums of v . c, c^2, yaw rate times its command, yaw command^2, pitch,
-        # power and speed while it is commanded to travel, and of 1.
+        # Sums over steps; see `_update_gait`.
         self.sums = np.zeros((8, n))
-        # Of each step: measured robots, and contact, height and speed of their feet.
+        # Of each step: measured robots; contact, height and speed of their feet.
         self.gait: list[tuple[BoolArray, BoolArray, FloatArray, FloatArray]] = []
-        self.commands = np.zeros((n, 3), np.float32)  # of the last step
 
     def run(
         self,
@@ -367,16 +363,14 @@ class EvaluationRollout:
         self.crossed |= active & (distance > self.half_patch)
 
     def _update_gait(self, commands: FloatArray, velocity: FloatArray, settled: BoolArray) -> None:
-        state, self.commands = self.env.state, commands
         squares, along = np.square(commands), velocity * commands
         lin_sq, yaw_sq, lin, yaw = (
             part for each in (squares, along) for part in (each[:, :2].sum(axis=1), each[:, 2])
         )
-        gravity, moving = state.projected_gravity, settled & (commands != 0).any(axis=1)
-        pitch = np.arctan2(gravity[:, 0], -gravity[:, 2])
-        travels = lin_sq > 0
-        power = np.abs(state.torques * state.dof_vel).sum(axis=1) * travels
-        speed = np.hypot(velocity[:, 0], velocity[:, 1]) * travels
+        state, moving = self.env.state, settled & (commands != 0).any(axis=1)
+        pitch = np.arctan2(state.projected_gravity[:, 0], -state.projected_gravity[:, 2])
+        power = np.abs(state.torques * state.dof_vel).sum(axis=1) * (lin_sq > 0)
+        speed = np.hypot(velocity[:, 0], velocity[:, 1]) * (lin_sq > 0)
         values = (lin, lin_sq, yaw, yaw_sq, pitch, power, speed, np.ones_like(pitch))
         self.sums[:, moving] += np.array(values)[:, moving]
         if len(self.gait) < MAX_GAIT_STEPS and settled.any():
@@ -390,9 +384,9 @@ class EvaluationRollout:
         # A heading command changes the yaw velocity at every step, which is no new command.
         command = self.env.velocity_command
         axes = 2 if command.heading_command and command.fixed is None else 3
-        same = (commands[:, :axes] == self._last_commands[:, :axes]).all(axis=1)
+        same = (commands[:, :axes] == self.last_commands[:, :axes]).all(axis=1)
         self._command_steps = np.where(same, self._command_steps + 1, 1)
-        self._last_commands[:] = commands
+        self.last_commands[:] = commands
         settled = active & (self._command_steps > self._settling_steps)
         self._measured_steps = np.where(settled, self._measured_steps + 1, 0)
         self._recent_errors[self._num_steps % self._window] = error
@@ -426,42 +420,40 @@ class EvaluationRollout:
     def _gait_metrics(self, mask: BoolArray) -> dict[str, Any]:
         """Return the gait of the robots in a mask, as fields of :class:`RolloutMetrics`."""
         lin, lin_sq, yaw, yaw_sq, pitch, power, speed, count = self.sums[:, mask]
-        total, scene = float(count.sum()), self.env.scene
-        commanded = (self.commands[mask] != 0).any(axis=1) | (count > 0)
+        scene, commanded = self.env.scene, (self.last_commands[mask] != 0).any(axis=1) | (count > 0)
         followed = (lin >= MIN_FOLLOWED * lin_sq) & (yaw >= MIN_FOLLOWED * yaw_sq) & (count > 0)
-        result: dict[str, Any] = {}
-        if commanded.any():
-            result["followed"] = float(followed[commanded].mean())
-        if not total or not self.gait:
+        result = {"followed": float(followed[commanded].mean())} if commanded.any() else {}
+        if not count.any():
             return result
         measured, contact, height, foot_speed = (
             np.array([step[k][mask] for step in self.gait]) for k in range(4)
         )
         heights, duty = swing_heights(contact, height, measured), duty_factors(contact, measured)
         mirror = mirror_feet(scene.foot_pos)
-        weight = float(scene.model.body_subtreemass[scene.base]) * 9.81
-        result |= {
-            "step_frequency": step_frequency(contact, measured, self.env.cfg.dt),
-            "foot_slip": foot_slip(contact, foot_speed, measured),
+        work = 9.81 * scene.model.body_subtreemass[scene.base] * speed.sum()
+        return result | {
+            "step_frequency": _number(step_frequency(contact, measured, self.env.cfg.dt)),
+            "foot_slip": _number(foot_slip(contact, foot_speed, measured)),
             "asymmetry": max(asymmetry(each, mirror) for each in (heights, duty)),
-            "base_pitch": pitch.sum() / total,
-            "cost_of_transport": power.sum() / (weight * speed.sum()) if speed.any() else None,
-            "swing_height": tuple(None if np.isnan(each) else float(each) for each in heights),
-            "duty_factor": tuple(None if np.isnan(each) else float(each) for each in duty),
+            "base_pitch": float(pitch.sum() / count.sum()),
+            "cost_of_transport": float(power.sum() / work) if work else None,
+            "swing_height": tuple(map(_number, heights)),
+            "duty_factor": tuple(map(_number, duty)),
         }
-        return {k: float(v) if isinstance(v, np.floating) else v for k, v in result.items()}
 
     def contacts(self) -> dict[str, str]:
-        """Return the contacts of the robot that is commanded to walk ahead fastest.
-
-        By foot, one character per step, 1 in contact, for the last steps that were measured.
-        """
-        forward, left, yaw = self.commands.T
+        """Return the contacts that :class:`EvaluationResult` has."""
+        forward, left, yaw = self.last_commands.T
         robot = int((forward - np.abs(left) - np.abs(yaw)).argmax())
         steps = round(DIAGRAM_TIME / self.env.cfg.dt)
         rows = [contact[robot] for moving, contact, *_ in self.gait if moving[robot]][-steps:]
         feet = self.env.robot.spec.feet
         return {foot: "".join(str(int(row[k])) for row in rows) for k, foot in enumerate(feet)}
+
+
+def _number(value: float) -> float | None:
+    """Return a number of numpy as a float; None for NaN, which JSON does not have."""
+    return None if np.isnan(value) else float(value)
 
 
 def summarize(
@@ -486,11 +478,10 @@ def summarize(
     if not env.terrain.is_flat:
         types, all_levels = dict.fromkeys(names.ravel().tolist()), np.unique(levels).tolist()
         for name, command in direction_commands(env.cfg.commands).items():
-            mask = (rollout.commands == command).all(axis=1)
+            mask = (rollout.last_commands == command).all(axis=1)
             add_group("by_direction", mask, direction=name)
-            for level in all_levels:
-                mine = mask & (levels == level)
-                add_group("by_direction_and_level", mine, direction=name, level=level)
+            for k in all_levels:
+                add_group("by_direction_and_level", mask & (levels == k), direction=name, level=k)
         for name in types:
             add_group("by_terrain", terrains == name, terrain=name)
         for level in all_levels:

@@ -1,4 +1,4 @@
-"""Export a policy as ONNX, as TorchScript, and as a JSON description of its inputs and outputs."""
+"""Export a policy as ONNX and TorchScript, with a JSON description and the model of the robot."""
 
 import io
 import json
@@ -19,12 +19,15 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.policy.evaluate import FloatArray, eval_task
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
+from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.terrain import load_terrain
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
+ROBOT_FILE = "robot.xml"
 
 FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
 """Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots know."""
@@ -35,6 +38,8 @@ TOLERANCE = 1e-5
 _FORMULAS = {
     "observation": "obs = clip((raw - offset) * scale, -clip, clip), part by part; a part with a "
     "clip of its own is (clip(raw - offset, *clip)) * scale",
+    "gait": "gait_phase = (sin, cos)(2 pi time / period); 0 while commanded to stand: no linear "
+    "velocity, and a yaw rate below min_yaw_rate",
     "action": "target = action_offset + action_scale * action",
     "torque": "clip(gain * target - stiffness * position - damping * velocity, -effort, effort), "
     "every physics_dt; a new action every policy_dt",
@@ -43,9 +48,9 @@ _FORMULAS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ExportResult:
-    """The ONNX, TorchScript and JSON files of a policy, and the action errors of the first two."""
+    """The ONNX, TorchScript, JSON and MJCF files, and the action errors of the first two."""
 
-    files: tuple[Path, Path, Path]
+    files: tuple[Path, Path, Path, Path]
     errors: tuple[float, float]
     num_observations: int
     num_actions: int
@@ -62,12 +67,14 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
         ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, or if
             an exported policy does not match the live one.
     """
-    files = folder / ONNX_FILE, folder / TORCHSCRIPT_FILE, folder / JSON_FILE
+    names = ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE
+    files = (folder / names[0], folder / names[1], folder / names[2], folder / names[3])
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
     task = eval_task(run.task, num_envs=8)
     env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
+    robot_files = model_files(run.robot.mjcf)
     iteration = read_checkpoint(last_checkpoint(run))["iteration"]
     text = json.dumps(describe_policy(env) | {"iteration": iteration}, indent=2) + "\n"
     limits = task.normalization.clip_observations, task.normalization.clip_actions
@@ -95,8 +102,26 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
         path.write_text(text, encoding="utf-8")
         path.with_name(ONNX_FILE).write_bytes(onnx_data)
         path.with_name(TORCHSCRIPT_FILE).write_bytes(script_file.getvalue())
+        for name, data in robot_files.items():
+            path.with_name(name).write_bytes(data)
     sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
     return ExportResult(files=files, errors=errors, **sizes)
+
+
+def model_files(mjcf: Path) -> dict[str, bytes]:
+    """Return the MJCF of a robot, in one file, and its meshes and textures, by file name."""
+    with quiet_mujoco():
+        spec = mujoco.MjSpec.from_file(str(mjcf))
+        names: dict[Path, str] = {}
+        for folder, assets in ((spec.meshdir, spec.meshes), (spec.texturedir, spec.textures)):
+            for asset in assets:
+                if asset.file:
+                    source = mjcf.parent / folder / asset.file
+                    asset.file = names.setdefault(source, f"{len(names)}_{source.name}")
+        spec.meshdir = spec.texturedir = ""
+        spec.assets = files = {name: source.read_bytes() for source, name in names.items()}
+        spec.compile()
+        return files | {ROBOT_FILE: spec.to_xml().encode()}
 
 
 def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> bytes:
@@ -155,6 +180,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "unit": "m",
         "points": [[x, y] for x in scan_x for y in scan_y],
     }
+    gait = {"period": float(f"{env.gait.period:.7g}"), "min_yaw_rate": MIN_YAW_RATE}
     names = "name", "base", "spawn_height", "base_height_target"
     dt, decimation = task.sim.dt, task.control.decimation
     return {
@@ -177,6 +203,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "drive": drive.tolist(),
             **{name: _to_list(values) for name, values in joints.items()},
         },
+        "gait": gait if env.gait.period else None,
         "height_scan": scan if env.state.height_scan.shape[1] else None,
     }
 
@@ -189,7 +216,7 @@ def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str,
         "dof_vel": [f"{unit}/s" for unit in joint_units],
     }
     units |= {"commands": ["m/s", "m/s", "rad/s"], "base_ang_vel": "rad/s", "height_scan": "m"}
-    units |= {"projected_gravity": "1", "actions": "1"}
+    units |= {"projected_gravity": "1", "actions": "1", "gait_phase": "1"}
     parts, start = [], 0
     for term in env.obs_groups["policy"]:
         size = term.function(env.state).shape[1]

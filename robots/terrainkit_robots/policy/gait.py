@@ -4,8 +4,6 @@ Arrays have the shape (t, n, f): t steps of n robots with f feet. Contacts are B
 `measured`, shape (t, n), selects the steps that count.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,9 +13,6 @@ BoolArray = NDArray[np.bool_]
 
 MIN_SWING_STEPS = 2
 """Shorter interruptions of a contact are vibrations, not swings [steps]."""
-
-ROW_HEIGHT, LABEL_WIDTH, STEP_WIDTH = 24, 180, 8
-"""Sizes in a contact diagram [pixels]."""
 
 
 def find_swings(contact: BoolArray, measured: BoolArray) -> tuple[NDArray[np.int64], ...]:
@@ -75,25 +70,3 @@ def asymmetry(values: FloatArray, mirror: NDArray[np.int64]) -> float:
     values = np.nan_to_num(values)
     mean, difference = (values + values[mirror]) / 2, np.abs(values - values[mirror])
     return float(np.divide(difference, mean, out=np.zeros_like(mean), where=mean > 0).max())
-
-
-def draw_contacts(contacts: Mapping[str, str], dt: float) -> bytes:
-    """Return a contact diagram as a PNG: one row per foot, black while it is in contact.
-
-    Args:
-        contacts: Contacts of each foot, by name: one character per step, 1 in contact.
-        dt: Time between steps [s].
-    """
-    import cv2
-
-    rows = np.array([[each == "1" for each in text] for text in contacts.values()])
-    cell = np.zeros((ROW_HEIGHT, STEP_WIDTH))
-    cell[4:-4] = 1
-    blocks = np.kron(rows, cell)
-    image = np.full((len(blocks) + ROW_HEIGHT, LABEL_WIDTH + blocks.shape[1]), 255, np.uint8)
-    image[: len(blocks), LABEL_WIDTH:][blocks > 0] = 0
-    labels = [*contacts, f"{rows.shape[1] * dt:.2f} s"]
-    for row, label in enumerate(labels):
-        at = (8, ROW_HEIGHT * (row + 1) - 7)
-        cv2.putText(image, label, at, cv2.FONT_HERSHEY_SIMPLEX, 0.45, 0, 1, cv2.LINE_AA)
-    return bytes(cv2.imencode(".png", image)[1])

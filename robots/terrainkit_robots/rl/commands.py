@@ -1,10 +1,14 @@
-"""Velocity commands: sampling, resampling and heading control."""
+"""Velocity commands: sampling, resampling, heading control, and the gait."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
+
+GAIT_PERIOD = 2.3
+"""Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m."""
 
 
 def sample_commands(
@@ -57,3 +61,25 @@ class VelocityCommand:
         elif self.heading_command:
             rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
             self.commands[:, 2] = np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
+
+
+class Gait:
+    """The gait to follow while commanded to move: neighboring feet swing in turn."""
+
+    def __init__(self, cfg: Commands, leg_length: float, foot_pos: FloatArray) -> None:
+        default = GAIT_PERIOD * np.sqrt(leg_length / 9.81)
+        self.period = default if cfg.gait_period is None else cfg.gait_period
+        x, left = foot_pos[:, 0], foot_pos[:, 1] > 0
+        in_front = ((x > x[:, None]) & (left == left[:, None])).sum(axis=1)  # on the same side
+        self.offset = 0.5 * ((in_front + left) % 2)
+        self._swing_fraction = cfg.swing_fraction
+
+    def phases(self, time: FloatArray, moving: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
+        """Return the `gait_phase` and `swing_phase` of a state, from times (n,) [s]."""
+        phase = np.outer(time, [1 / self.period]) if self.period else np.zeros((len(time), 1))
+        angle, foot_phase = 2 * np.pi * phase, (phase + self.offset) % 1
+        walks = moving[:, None] & (self.period > 0)
+        swings = walks & (foot_phase < self._swing_fraction)
+        gait_phase = np.hstack([np.sin(angle), np.cos(angle)]) * walks
+        swing_phase = np.where(swings, foot_phase / self._swing_fraction, 0)
+        return gait_phase.astype(np.float32), swing_phase.astype(np.float32)

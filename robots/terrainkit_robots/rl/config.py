@@ -129,6 +129,11 @@ class Commands(Config):
     """Norm below which linear and yaw velocity commands are set to zero [m/s, rad/s]."""
     standing: Fraction = 0.1
     """Fraction of the commands that are zero."""
+    gait_period: NonNegativeFloat | None = None
+    """Period of the gait, whose phase the policy observes [s]; none: 2.3 sqrt(leg length / g); 0
+    for no gait. Feet that are neighbors swing in turn: two legs walk, four trot."""
+    swing_fraction: Fraction = 0.45
+    """Fraction of the period that a foot is in the air."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,69 +162,51 @@ class DomainRand(Config):
 class Rewards(Config):
     """Scale of each reward, per second, and the parameters of the rewards.
 
-    A reward with the scale 0 is not computed.
+    Scales are dimensionless: masses are in units of the robot's mass, lengths of its leg length,
+    and times of sqrt(leg length / g). A reward with the scale 0 is not computed.
     """
 
     tracking_lin_vel: float = 1.5
     """Tracking of the linear velocity command."""
     tracking_ang_vel: float = 0.75
     """Tracking of the yaw velocity command."""
-    lin_vel_z: float = -2.0
+    progress: float = 0.5
+    """Velocity along the command, which is also worth something far from it."""
+    feet_gait: float = 0.5
+    """Feet that are in contact when the gait says so."""
+    upright: float = 0.25
+    """A level base."""
+    lin_vel_z: float = -9.0
     """Vertical base velocity, squared."""
-    ang_vel_xy: float = -0.05
+    ang_vel_xy: float = -1.0
     """Roll and pitch velocity of the base, squared."""
-    orientation: float = -1.0
-    """Tilt of the base."""
     base_height: float = 0.0
     """Deviation of the base height from its target."""
-    torques: float = -0.0002
+    torques: float = -1.0
     """Joint torques, squared."""
     dof_power: float = 0.0
     """Mechanical power of the joints."""
-    dof_vel: float = 0.0
-    """Joint velocities, squared."""
-    dof_acc: float = -2.5e-7
+    dof_acc: float = -0.0015
     """Joint accelerations, squared."""
-    action_rate: float = -0.01
+    action_rate: float = -0.12
     """Change of the action, squared."""
-    action_smoothness: float = 0.0
-    """Second difference of the action, squared."""
     collision: float = -1.0
     """Contacts of penalized bodies."""
-    termination: float = 0.0
+    termination: float = -100.0
     """Falls."""
     dof_pos_limits: float = -10.0
     """Joint positions beyond their soft limits."""
-    dof_vel_limits: float = 0.0
-    """Joint velocities beyond their soft limits."""
-    torque_limits: float = 0.0
-    """Torques beyond their soft limits."""
-    feet_air_time: float = 1.0
-    """Time that the feet spend in the air."""
-    foot_clearance: float = 0.0
-    """Deviation of the swing height of the feet from its target."""
-    stumble: float = 0.0
-    """Feet that hit vertical surfaces."""
-    stand_still: float = -0.2
+    foot_swing_height: float = -2.0
+    """Deviation of swinging feet from an arc of the height `swing_height`."""
+    foot_slip: float = -5.0
+    """Horizontal velocity of feet in contact, squared."""
+    stand_still: float = -2.4
     """Deviation from the default pose at zero command."""
-    feet_contact_forces: float = 0.0
-    """Large contact forces on the feet."""
-    tracking_sigma: PositiveFloat = 0.25
-    """Tracking rewards are exp(-error^2 / sigma) [m2/s2]."""
-    only_positive_rewards: bool = False
-    """Whether the total reward of a step, without `termination`, is clipped at 0."""
-    soft_dof_vel_limit: NonNegativeFloat = 0.9
-    """Soft velocity limit of a joint, as a fraction of its velocity limit."""
-    soft_torque_limit: NonNegativeFloat = 0.9
-    """Soft torque limit of a joint, as a fraction of its torque limit."""
-    base_height_target: float | None = None
-    """Base height above the ground [m]; none: that of the robot's spec."""
-    air_time_target: NonNegativeFloat = 0.15
-    """Air time above which `feet_air_time` is positive [s]."""
-    foot_clearance_target: NonNegativeFloat = 0.08
-    """Height of a swinging foot above the ground [m]."""
-    max_contact_force: NonNegativeFloat = 100.0
-    """Contact force above which `feet_contact_forces` counts [N]."""
+    tracking_sigma: PositiveFloat = 0.06
+    """Width of the tracking rewards, exp(-error^2 / sigma), at zero command [m2/s2]; otherwise it
+    is proportional to the squared command."""
+    swing_height: PositiveFloat = 0.2
+    """Height of a swinging foot above the ground, as a fraction of the leg length."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -331,8 +318,9 @@ class Algorithm(Config):
     """KL divergence that the adaptive schedule aims at."""
     max_grad_norm: PositiveFloat = 1.0
     """Largest gradient norm."""
-    symmetry: Literal["none", "augmentation", "loss"] = "none"
-    """Symmetry: add mirrored samples to each batch, or add a mirror loss."""
+    symmetry: Literal["auto", "none", "augmentation", "loss"] = "auto"
+    """Symmetry: add mirrored samples to each batch, or add a mirror loss; auto: a loss if left and
+    right of the robot are mirror images."""
     mirror_loss_coeff: NonNegativeFloat = 0.5
     """Weight of the mirror loss."""
 

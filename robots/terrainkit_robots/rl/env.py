@@ -11,7 +11,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.commands import VelocityCommand
+from terrainkit_robots.rl.commands import Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
@@ -21,7 +21,7 @@ from terrainkit_robots.rl.observations import (
     privileged_group,
     uses_height_scan,
 )
-from terrainkit_robots.rl.rewards import active_rewards
+from terrainkit_robots.rl.rewards import active_rewards, is_moving
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
@@ -51,6 +51,7 @@ class LeggedEnv(VecEnv):
         heading = task.commands.heading_command
         heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
+        self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
         self.pushes = Pushes(task.domain_rand, n, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.obs_groups = {
@@ -65,9 +66,9 @@ class LeggedEnv(VecEnv):
         self.steps_since_reset = np.zeros(n, np.int64)
         self.start_pos = np.zeros((n, 2))  # base position at the last reset
         self.path_length = np.zeros(n)  # since the last reset [m]
-        self.actions = np.zeros((3, n, joints), np.float32)  # of the last three steps
+        self.actions = np.zeros((2, n, joints), np.float32)  # of the last two steps
         self.joint_offset = np.zeros((n, joints), np.float32)
-        self.rewards = active_rewards(task.rewards)
+        self.rewards = active_rewards(task.rewards, weight / 9.81, robot.leg_length)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
         self.commands = self.velocity_command.commands  # a view of the current commands
 
@@ -122,8 +123,7 @@ class LeggedEnv(VecEnv):
         self.velocity_command.update_heading(self._yaw())
         if len(env_ids):
             state.update(env_ids, self._compute_state(env_ids, after_reset=True))
-        np.copyto(state.commands, self.commands)
-        self._compute_observations()
+        self._update_commands()
         rewards_tensor = torch.from_numpy(rewards).to(self.device)
         return self._observations, rewards_tensor, torch.from_numpy(done).to(self.device), extras
 
@@ -143,8 +143,7 @@ class LeggedEnv(VecEnv):
         if commands is None:
             self.velocity_command.resample(self.rng, np.arange(self.num_envs))
         self.velocity_command.update_heading(self._yaw())
-        np.copyto(self.state.commands, self.commands)
-        self._compute_observations()
+        self._update_commands()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
         """Return the actuator controls for actions of shape (n, j)."""
@@ -176,14 +175,25 @@ class LeggedEnv(VecEnv):
             **measured,
             actions=self.actions[0, rows].copy(),
             last_actions=self.actions[1, rows].copy(),
-            last_last_actions=self.actions[2, rows].copy(),
-            commands=self.commands[rows].copy(),
+            **self._command_state(rows),
             push_vel=self.pushes.velocity[rows].copy(),
             friction=self.params.friction[rows].copy(),
             added_mass=self.params.added_mass[rows].copy(),
             com_shift=self.params.com_shift[rows].copy(),
             joint_offset=self.joint_offset[rows].copy(),
         )
+
+    def _command_state(self, rows: Any) -> dict[str, Any]:
+        """Return the fields of `State` that depend on the commands."""
+        commands, time = self.commands[rows].copy(), self.steps_since_reset[rows] * self.cfg.dt
+        gait_phase, swing_phase = self.gait.phases(time, is_moving(commands))
+        return {"commands": commands, "gait_phase": gait_phase, "swing_phase": swing_phase}
+
+    def _update_commands(self) -> None:
+        """Apply new commands to the state, and observe it."""
+        for name, values in self._command_state(slice(None)).items():
+            np.copyto(getattr(self.state, name), values)
+        self._compute_observations()
 
     def _compute_rewards(self, state: State, unstable: BoolArray) -> FloatArray:
         """Return the rewards of a step, shape (n,), and add them to the episode sums.
@@ -201,8 +211,6 @@ class LeggedEnv(VecEnv):
                 term[unstable] = 0
                 total += term
             self.episode_sums[name] += term
-        if settings.only_positive_rewards:
-            np.maximum(total, 0, out=total)
         return total + termination
 
     def _compute_observations(self) -> None:
@@ -303,12 +311,11 @@ class LeggedEnv(VecEnv):
             "joint_offset": self.joint_offset,
             "push_vel": self.pushes.velocity,
             "steps_until_push": self.pushes.steps_until_push,
-            "air_time": self.sensors.air_time,
             "steps_since_reset": self.steps_since_reset,
             "start_pos": self.start_pos,
             "path_length": self.path_length,
         }
         sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
-        # Computing the state again would advance the air time and draw noise.
+        # Computing the state again would draw noise.
         state = {f"state_{name}": array for name, array in vars(self.state).items()}
         return arrays | sums | state | vars(self.params)

@@ -27,7 +27,9 @@ class ObservationTerm:
     """Name in logs and exports."""
     function: Callable[[State], FloatArray]
     """Computes the term, shape (n, width)."""
-    symmetry: Literal["scalar", "vector", "axial", "command", "joints", "feet", "scan"] = "scalar"
+    symmetry: Literal["scalar", "vector", "axial", "command", "joints", "feet", "scan", "phase"] = (
+        "scalar"
+    )
     """How the term transforms when left and right are swapped; see :mod:`.symmetry`."""
     scale: tuple[float, ...] | float = 1.0
     """Scale factor, or one per number."""
@@ -42,7 +44,7 @@ def uses_height_scan(task: Task, *, is_flat: bool) -> bool:
 
 
 def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTerm, ...]:
-    """Return the policy's terms: 45 numbers for 12 joints, and 187 with the height scan."""
+    """Return the policy's terms: 47 numbers for 12 joints, and 187 with the height scan."""
     term, scales = ObservationTerm, task.normalization.obs_scales
     noise = {key: task.noise.noise_level * value for key, value in vars(task.noise).items()}
     command_scale = (scales.lin_vel, scales.lin_vel, scales.ang_vel)
@@ -55,7 +57,7 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
     def height_scan(state: State) -> FloatArray:
         return np.clip(state.height_scan - np.float32(HEIGHT_SCAN_OFFSET), -1, 1)
 
-    group = (
+    group: tuple[ObservationTerm, ...] = (
         term("commands", lambda s: s.commands, "command", command_scale),
         term("projected_gravity", lambda s: s.projected_gravity, "vector", 1.0, noise["gravity"]),
         term("base_ang_vel", lambda s: s.base_ang_vel, "axial", scales.ang_vel, noise["ang_vel"]),
@@ -63,6 +65,8 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
         term("dof_vel", lambda s: s.dof_vel, "joints", scales.dof_vel, noise["dof_vel"]),
         term("actions", lambda s: s.actions, "joints"),
     )
+    if task.commands.gait_period != 0:
+        group += (term("gait_phase", lambda s: s.gait_phase, "phase"),)
     scan_scale, scan_noise = scales.height_measurements, noise["height_measurements"]
     scan_term = term("height_scan", height_scan, "scan", scan_scale, scan_noise)
     return (*group, scan_term) if scan else group

@@ -1,6 +1,9 @@
-"""Reward terms, mostly those of legged_gym (Rudin et al., Learning to Walk in Minutes, 2021).
+"""Reward terms of legged_gym (Rudin et al., Learning to Walk in Minutes, 2021), and of a gait.
 
-Each takes the state of n robots and returns n numbers, before the scale and the time step.
+Each takes the state of n robots and returns n numbers, before the scale and the time step. Scales
+are dimensionless: they fit robots of any size, since a term is divided by its unit in `UNITS`. The
+gait is that of Siekmann et al., Sim-to-Real Learning of All Common Bipedal Gaits via Periodic
+Reward Composition, 2021: each foot has a phase, in which it should be in the air or on the ground.
 """
 
 from collections.abc import Callable
@@ -9,12 +12,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Rewards
-from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.state import CONTACT_FORCE, State
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
 
 MIN_YAW_RATE = 0.1
 """Yaw rate from which a command counts as moving [rad/s]: heading control never reaches 0."""
+
+STANDING_TRACKING = 0.25
+"""Share of the tracking rewards that a robot earns by standing, whatever the command."""
+
+LEVEL_SIN2 = 0.01
+"""Squared sine of the tilt at which `upright` is exp(-1)."""
+
+UNITS = {
+    "base_height": (0, 2, 0),
+    "lin_vel_z": (0, 2, -2),
+    "ang_vel_xy": (0, 0, -2),
+    "foot_slip": (0, 2, -2),
+    "torques": (2, 4, -4),
+    "dof_power": (1, 2, -3),
+    "dof_acc": (0, 0, -4),
+}
+"""Powers of the robot's mass, its leg length, and sqrt(leg length / g), by term."""
 
 Reward = Callable[[State, Robot, Rewards], FloatArray]
 
@@ -28,40 +48,70 @@ def reward(function: Reward) -> Reward:
     return function
 
 
-def active_rewards(cfg: Rewards) -> dict[str, tuple[Reward, float]]:
-    """Return each term with a scale other than 0, and that scale."""
+def active_rewards(cfg: Rewards, mass: float, leg_length: float) -> dict[str, tuple[Reward, float]]:
+    """Return each term with a scale other than 0, and that scale in SI units."""
+    time = np.sqrt(leg_length / 9.81)
     scales = {name: float(getattr(cfg, name, 0.0)) for name in REWARDS}
-    return {name: (REWARDS[name], scale) for name, scale in scales.items() if scale}
+    units = {k: mass**a * leg_length**b * time**c for k, (a, b, c) in UNITS.items()}
+    return {k: (REWARDS[k], scale / units.get(k, 1.0)) for k, scale in scales.items() if scale}
 
 
 def _sum_squares(values: FloatArray) -> FloatArray:
     return np.einsum("ij,ij->i", values, values)
 
 
-def _height_error(height: FloatArray, target: float) -> FloatArray:
-    """Return height minus target, at most `target`: over a deep pit the error stays bounded."""
-    limit = 2 * target if target > 0 else np.inf
-    return np.minimum(height, np.float32(limit)) - np.float32(target)
-
-
-def _is_moving(state: State) -> NDArray[np.bool_]:
+def is_moving(commands: FloatArray) -> NDArray[np.bool_]:
     """Return which commands ask to move, shape (n,)."""
-    linear = (state.commands[:, :2] != 0).any(axis=1)
-    return linear | (np.abs(state.commands[:, 2]) >= MIN_YAW_RATE)
+    return (commands[:, :2] != 0).any(axis=1) | (np.abs(commands[:, 2]) >= MIN_YAW_RATE)
+
+
+def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
+    """Return how well linear and yaw velocity are tracked, 0 to 1.
+
+    The width of each kernel is proportional to the command. Where one of the two is not commanded,
+    it counts only as far as the other one is tracked: standing is never worth more.
+    """
+    commands = state.commands
+    errors = (
+        _sum_squares(commands[:, :2] - state.base_lin_vel[:, :2]),
+        np.square(commands[:, 2] - state.base_ang_vel[:, 2]),
+    )
+    squares = _sum_squares(commands[:, :2]), np.square(commands[:, 2])
+    log, rest = np.float32(np.log(STANDING_TRACKING)), np.float32(cfg.tracking_sigma)
+    widths = (np.where(square > 0, -square / log, rest) for square in squares)
+    lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
+    moving = is_moving(commands)
+    only_yaw, only_lin = moving & (squares[0] == 0), moving & (squares[1] < MIN_YAW_RATE**2)
+    return lin * np.where(only_yaw, yaw, 1), yaw * np.where(only_lin, lin, 1)
 
 
 @reward
 def tracking_lin_vel(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Reward tracking of the linear velocity command, 0 to 1."""
-    error = _sum_squares(state.commands[:, :2] - state.base_lin_vel[:, :2])
-    return np.exp(-error / cfg.tracking_sigma)
+    return _tracking(state, cfg)[0]
 
 
 @reward
 def tracking_ang_vel(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Reward tracking of the yaw rate command, 0 to 1."""
-    error = np.square(state.commands[:, 2] - state.base_ang_vel[:, 2])
-    return np.exp(-error / cfg.tracking_sigma)
+    return _tracking(state, cfg)[1]
+
+
+@reward
+def progress(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+    """Reward velocity along the command, as a fraction of it, -1 to 1; the mean of both parts."""
+    lin, yaw = state.commands[:, :2], state.commands[:, 2]
+    along = np.einsum("ij,ij->i", state.base_lin_vel[:, :2], lin), state.base_ang_vel[:, 2] * yaw
+    squares = np.array([_sum_squares(lin), np.square(yaw)])
+    fractions = np.array(along) / np.where(squares > 0, squares, np.inf)
+    total = np.clip(fractions, -1, 1).sum(axis=0) / np.maximum((squares > 0).sum(axis=0), 1)
+    return total.astype(np.float32)
+
+
+@reward
+def upright(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+    """Reward a level base, 0 to 1."""
+    return np.exp(-_sum_squares(state.projected_gravity[:, :2]) / np.float32(LEVEL_SIN2))
 
 
 @reward
@@ -77,17 +127,10 @@ def ang_vel_xy(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 
 
 @reward
-def orientation(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize a tilted base by the squared sine of the tilt."""
-    return _sum_squares(state.projected_gravity[:, :2])
-
-
-@reward
 def base_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize a base above or below its target height, squared [m2]."""
-    default = robot.spec.base_height_target or 0.0
-    target = default if cfg.base_height_target is None else cfg.base_height_target
-    return np.square(_height_error(state.base_height, target))
+    """Penalize a base off its target height, squared; bounded over a pit [m2]."""
+    target = np.float32(robot.spec.base_height_target or 0.0)
+    return np.square(np.minimum(state.base_height, 2 * target) - target)
 
 
 @reward
@@ -103,27 +146,15 @@ def dof_power(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 
 
 @reward
-def dof_vel(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize joint velocities, squared [rad2/s2]."""
-    return _sum_squares(state.dof_vel)
-
-
-@reward
 def dof_acc(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize joint accelerations, squared [rad2/s4]."""
-    return _sum_squares(state.dof_acc)
+    """Penalize joint accelerations, mean square [rad2/s4]."""
+    return np.square(state.dof_acc).mean(axis=1)
 
 
 @reward
 def action_rate(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize changes of the action, squared."""
-    return _sum_squares(state.actions - state.last_actions)
-
-
-@reward
-def action_smoothness(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize second differences of the action, squared."""
-    return _sum_squares(state.actions - 2 * state.last_actions + state.last_last_actions)
+    """Penalize changes of the action, mean square."""
+    return np.square(state.actions - state.last_actions).mean(axis=1)
 
 
 @reward
@@ -145,51 +176,29 @@ def dof_pos_limits(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 
 
 @reward
-def dof_vel_limits(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize joint velocities beyond their soft limits, at most 1 rad/s each [rad/s]."""
-    excess = np.abs(state.dof_vel) - robot.velocity * np.float32(cfg.soft_dof_vel_limit)
-    return np.clip(excess, 0, 1).sum(axis=1)
+def feet_gait(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+    """Reward the fraction of feet that are in contact exactly when the gait says so."""
+    contact = state.foot_force[..., 2] > CONTACT_FORCE
+    return (contact == (state.swing_phase == 0)).mean(axis=1, dtype=np.float32)
 
 
 @reward
-def torque_limits(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize torques beyond their soft limits [N m]."""
-    excess = np.abs(state.torques) - robot.effort * np.float32(cfg.soft_torque_limit)
-    return np.maximum(excess, 0).sum(axis=1)
+def foot_swing_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+    """Penalize feet off the arc that they should swing in, mean square, relative to its height."""
+    arc = np.sin(np.pi * state.swing_phase)
+    height = state.foot_height / np.float32(cfg.swing_height * robot.leg_length)
+    return (np.square(np.clip(height, 0, 2) - arc) * (state.swing_phase > 0)).mean(axis=1)
 
 
 @reward
-def feet_air_time(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Reward air time above the target at first contact, when commanded to move [s]."""
-    excess = (state.air_time - np.float32(cfg.air_time_target)) * state.first_contact
-    return excess.sum(axis=1) * _is_moving(state)
-
-
-@reward
-def foot_clearance(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize the squared height error of feet, weighted by their horizontal speed [m3/s]."""
-    error = np.square(_height_error(state.foot_height, cfg.foot_clearance_target))
-    speed = np.hypot(state.foot_vel[..., 0], state.foot_vel[..., 1])
-    return (error * speed).sum(axis=1)
-
-
-@reward
-def stumble(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize a foot whose horizontal force exceeds five times its vertical force."""
-    horizontal = np.hypot(state.foot_force[..., 0], state.foot_force[..., 1])
-    hit = horizontal > 5 * np.abs(state.foot_force[..., 2])
-    return np.asarray(hit.any(axis=1), np.float32)
+def foot_slip(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+    """Penalize the horizontal velocity of feet in contact, mean square [m2/s2]."""
+    contact = state.foot_force[..., 2] > CONTACT_FORCE
+    return (np.square(state.foot_vel[..., :2]).sum(axis=2) * contact).mean(axis=1)
 
 
 @reward
 def stand_still(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize leaving the default pose when commanded to stand, except for wheels [rad]."""
     error = np.abs(state.dof_pos - robot.default_pose) * ~robot.wheels
-    return error.sum(axis=1) * ~_is_moving(state)
-
-
-@reward
-def feet_contact_forces(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize contact forces of feet above the limit [N]."""
-    force = np.sqrt(np.square(state.foot_force).sum(axis=2))
-    return np.maximum(force - np.float32(cfg.max_contact_force), 0).sum(axis=1)
+    return error.mean(axis=1) * ~is_moving(state.commands)

@@ -22,6 +22,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.checkpoint import open_checkpoint, save_checkpoint
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.symmetry import has_symmetry
 
 OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 """Observation groups of each network."""
@@ -144,7 +145,7 @@ class LeggedRunner(OnPolicyRunner):
         self.folder = folder
         self._progress_callback, self._should_stop = progress_callback, should_stop
         with redirect_stdout(None):
-            super().__init__(env, runner_config(env.cfg), None, device)
+            super().__init__(env, runner_config(env.cfg, has_symmetry(env)), None, device)
         self.is_main_process = self.gpu_global_rank == 0
         self.logger = MetricsLogger(self)
 
@@ -307,10 +308,12 @@ class LeggedRunner(OnPolicyRunner):
         self.cfg["multi_gpu"] = {"global_rank": rank, "world_size": count}
 
 
-def runner_config(task: Task) -> dict[str, Any]:
+def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
     """Return the configuration of rsl-rl's runner."""
     policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
     symmetry = algorithm.pop("symmetry")
+    if symmetry == "auto":
+        symmetry = "loss" if is_symmetric else "none"
     symmetry_cfg = {
         "data_augmentation_func": "terrainkit_robots.rl.symmetry:augment",
         "use_data_augmentation": symmetry == "augmentation",

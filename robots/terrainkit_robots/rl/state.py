@@ -58,10 +58,6 @@ class State:
     """Velocity of the feet, world frame [m/s], shape (n, f, 3)."""
     foot_force: FloatArray
     """Contact force on the feet, world frame [N], shape (n, f, 3)."""
-    first_contact: NDArray[np.bool_]
-    """Feet that touched down in this step, shape (n, f)."""
-    air_time: FloatArray
-    """Time since each foot left the ground, up to this step [s], shape (n, f)."""
     penalized_force: FloatArray
     """Magnitude of the force on each penalized body [N], shape (n, p)."""
     height_scan: FloatArray
@@ -72,10 +68,12 @@ class State:
     """Actions of this step, shape (n, j)."""
     last_actions: FloatArray
     """Actions of the previous step, shape (n, j)."""
-    last_last_actions: FloatArray
-    """Actions of the step before that, shape (n, j)."""
     commands: FloatArray
     """Forward and left velocity [m/s], yaw rate [rad/s], shape (n, 3)."""
+    gait_phase: FloatArray
+    """Sine and cosine of the phase of the gait, shape (n, 2); 0 when commanded to stand."""
+    swing_phase: FloatArray
+    """Completed fraction of the swing that each foot should be in, shape (n, f); 0 in stance."""
     push_vel: FloatArray
     """Velocity that a push added in this step, world frame [m/s], shape (n, 3)."""
     friction: FloatArray
@@ -97,8 +95,7 @@ class Sensors:
     """Measure n robots; keep the values that the next measurement is compared with."""
 
     def __init__(self, sim: Simulation, terrain: Terrain, task: Task, *, scan: bool) -> None:
-        n, feet, joints = len(sim.qpos), len(sim.scene.sole_depth), len(sim.scene.joint_qvel)
-        self.air_time = np.zeros((n, feet), np.float32)  # [s], 0 in contact
+        n, joints = len(sim.qpos), len(sim.scene.joint_qvel)
         self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
         self._sim, self._terrain, self._cfg = sim, terrain, task.termination
         self._dt = np.float32(task.dt)
@@ -107,9 +104,8 @@ class Sensors:
         self._scan_points = points[:, : None if scan else 0].astype(np.float32)
 
     def reset(self, env_ids: Any) -> None:
-        """Start new episodes: joints at rest, feet in contact."""
+        """Start new episodes, with joints at rest."""
         self.last_dof_vel[env_ids] = 0
-        self.air_time[env_ids] = 0
 
     def read(self, rows: Any, *, after_reset: bool) -> dict[str, Any]:
         """Return the measured fields of `State`; after a reset there are no contacts yet."""
@@ -124,10 +120,6 @@ class Sensors:
         terminating = sim.sensor("termination_force", rows)
         if after_reset:
             foot_force[:] = penalized[:] = terminating[:] = 0
-        contact = foot_force[..., 2] > CONTACT_FORCE
-        air_time = self.air_time[rows] + (np.float32(0) if after_reset else self._dt)
-        first_contact = contact & (self.air_time[rows] > 0)
-        self.air_time[rows] = np.where(contact, 0, air_time)
         dof_acc = (dof_vel - self.last_dof_vel[rows]) / self._dt
         self.last_dof_vel[rows] = dof_vel
         # The scan points turn with the yaw.
@@ -150,8 +142,6 @@ class Sensors:
             "foot_height": foot_pos[..., 2] - ground_height - scene.sole_depth,
             "foot_vel": sim.sensor("foot_velocity", rows),
             "foot_force": foot_force,
-            "first_contact": first_contact,
-            "air_time": air_time,
             "penalized_force": np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
             "height_scan": pos[:, 2:3] - scan,
             "fallen": illegal_contact(terminating, self._cfg)

@@ -59,6 +59,7 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
         "vector": _map(range(3), [1, -1, 1]),
         "axial": _map(range(3), [-1, 1, -1]),
         "command": _map(range(3), [1, -1, -1]),
+        "phase": _map(range(2), [-1, -1]),  # left and right are half a period apart
         "joints": joints,
         "feet": _foot_map(env),
     }
@@ -78,6 +79,14 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
             start += width
         groups[name] = _map(*map(np.concatenate, zip(*parts, strict=True)))
     return MirrorMaps(groups, joints)
+
+
+def has_symmetry(env: "LeggedEnv") -> bool:
+    """Return whether left and right of the robot and its height scan are mirror images."""
+    try:
+        return bool(env.mirror_maps)
+    except (ConfigError, ValueError):
+        return False
 
 
 def augment(

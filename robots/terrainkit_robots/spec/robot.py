@@ -39,6 +39,11 @@ class Robot:
     upper: FloatArray
     """Upper soft limits [rad], shape (j,)."""
 
+    @property
+    def leg_length(self) -> float:
+        """Length of the legs [m], or the height of the base if it is unknown."""
+        return self.spec.leg_length or self.spec.base_height_target or 1.0
+
     @classmethod
     def from_spec(cls, spec: RobotSpec, folder: Path) -> "Robot":
         """Return the robot that a spec in `folder` describes; raise ConfigError if incomplete."""

@@ -87,7 +87,7 @@ def test_export_unknown_suffix_lists_formats(level_map, tmp_path, name):
     ],
 )
 def test_export_unknown_option_lists_options(level_map, tmp_path, name, option, known):
-    with pytest.raises(ExportError, match=f"has no option '{option}'; it has: {known}"):
+    with pytest.raises(ExportError, match=f"got '{option}'; expected {known}"):
         export(level_map, tmp_path / name, **{option: True})
     assert names(tmp_path) == []
 

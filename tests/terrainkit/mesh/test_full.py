@@ -11,7 +11,7 @@ def mesh_of(rows, threshold):
 
 
 def test_full_mesh_has_two_faces_per_quad():
-    # 3 x 2 samples and the rim neighborhood them are 5 x 4 nodes, with 4 * 3 quads in between.
+    # 3 x 2 samples and the rim around them are 5 x 4 nodes, with 4 * 3 quads in between.
     mesh = mesh_of(np.zeros((3, 2)), threshold=0.1)
     assert len(mesh.vertices) == 5 * 4
     assert len(mesh.triangles) == 2 * 4 * 3

@@ -13,7 +13,7 @@ def build(grid, seed, **parameters):
 
 
 def extent(heights):
-    """Return the rectangle neighborhood everything that is not level, in cells: (x, y, nx, ny)."""
+    """Return the rectangle around everything that is not level, in cells: (x, y, nx, ny)."""
     x, y = (np.flatnonzero(heights.any(axis=axis)) for axis in (1, 0))
     return x[0], y[0], x[-1] - x[0] + 1, y[-1] - y[0] + 1
 

@@ -37,7 +37,7 @@ def test_rough_platform_is_level_and_centered(shape, asked, sides):
 
 def test_rough_noise_fades_over_one_spacing(grid):
     near, far = (build(grid, platform=2.0, spacing=spacing) for spacing in (0.1, 0.2))
-    # The first ring neighborhood the platform has full noise at a spacing of one cell, half at two.
+    # The first ring around the platform has full noise at a spacing of one cell, half at two.
     assert np.abs(near[29, 30:50]).max() > 0.03
     assert np.abs(far[29, 30:50]).max() <= 0.05
 

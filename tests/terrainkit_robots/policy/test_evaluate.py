@@ -48,7 +48,7 @@ def test_evaluation_env_is_not_randomized(make_run):
     default_pose = np.tile(env.robot.default_pose, (3, 1))
     np.testing.assert_allclose(env.state.dof_pos, default_pose, atol=1e-6)
     obs = env.get_observations()
-    torch.testing.assert_close(obs["policy"], obs["privileged"][:, :45])
+    torch.testing.assert_close(obs["policy"], obs["privileged"][:, :47])
 
 
 def test_command_grid_covers_the_ranges():
@@ -95,10 +95,10 @@ def test_map_patches_get_equal_numbers_of_robots(
 
 def test_policy_keeps_its_observations_on_another_terrain(make_run, map_file):
     cases = [
-        (make_run("plane"), str(map_file), 45),
-        (make_run(map_file), "plane", 45 + 187),
-        (make_run(map_file, terrain=Terrain(collision="plane")), str(map_file), 45),
-        (make_run("plane", terrain=Terrain(measure_heights=True)), None, 45 + 187),
+        (make_run("plane"), str(map_file), 47),
+        (make_run(map_file), "plane", 47 + 187),
+        (make_run(map_file, terrain=Terrain(collision="plane")), str(map_file), 47),
+        (make_run("plane", terrain=Terrain(measure_heights=True)), None, 47 + 187),
     ]
     for run, terrain, width in cases:
         env, _ = make_eval_env(run, EvaluationConfig(num_envs=1, terrain=terrain))

@@ -25,7 +25,7 @@ from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 
 DOCS = Path(__file__).parents[3] / "docs" / "exported_policy.md"
-FILES = ["policy.json", "policy.onnx", "policy.pt"]
+FILES = ["policy.json", "policy.onnx", "policy.pt", "robot.xml"]
 SMALL = Task(env=Env(num_envs=4, num_threads=1))
 
 
@@ -88,11 +88,12 @@ def test_json_describes_the_policy(exported):
     assert config["timing"] == {"physics_dt": 0.005, "decimation": 4, "policy_dt": 0.02}
     assert config["action"] == {"size": 12, "clip": 0.3}
     parts = config["observation"]["parts"]
-    names = "commands", "projected_gravity", "base_ang_vel", "dof_pos", "dof_vel", "actions"
-    assert tuple(part["name"] for part in parts) == names
+    names = "commands projected_gravity base_ang_vel dof_pos dof_vel actions gait_phase"
+    assert [part["name"] for part in parts] == names.split()
+    assert config["gait"] == {"period": 0.49151, "min_yaw_rate": 0.1}
     assert parts[0]["scale"] == [2, 2, 0.25]
     assert parts[4]["unit"] == ["rad/s"] * 12
-    assert parts[-1]["stop"] == config["observation"]["size"] == 45
+    assert parts[-1]["stop"] == config["observation"]["size"] == 47
     assert config["height_scan"] is None
 
 
@@ -111,6 +112,11 @@ def measure_terms(env, config):
         "dof_vel": qvel[:, env.scene.joint_qvel],
         "actions": env.actions[0],
     }
+    if config["gait"]:
+        angle = 2 * np.pi * env.steps_since_reset * env.cfg.dt / config["gait"]["period"]
+        moving = (env.commands[:, :2] != 0).any(axis=1)
+        moving |= np.abs(env.commands[:, 2]) >= config["gait"]["min_yaw_rate"]
+        terms["gait_phase"] = np.column_stack([np.sin(angle), np.cos(angle)]) * moving[:, None]
     if config["height_scan"]:
         yaw = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0])[:, None]
         x, y = np.array(config["height_scan"]["points"]).T
@@ -121,7 +127,7 @@ def measure_terms(env, config):
     return terms
 
 
-@pytest.mark.parametrize(("on_map", "size"), [(False, 45), (True, 232)])
+@pytest.mark.parametrize(("on_map", "size"), [(False, 47), (True, 234)])
 def test_json_reproduces_the_observations(quadruped, map_terrain, on_map, size):
     task = replace(SMALL, noise=Noise(noise_level=0.0), domain_rand=DomainRand(joint_offset=0.0))
     env = LeggedEnv(task, quadruped, map_terrain if on_map else Plane())
@@ -179,7 +185,6 @@ def test_json_reproduces_the_torques(quadruped, wheels, control_type, drive):
 def run_example(folder, robot, tmp_path, monkeypatch):
     """Run the program of the docs for 5 s, and return its data."""
     shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
-    shutil.copy(robot.mjcf, tmp_path / "robot.xml")
     monkeypatch.chdir(tmp_path)
     names = {}
     with quiet_mujoco():
@@ -205,6 +210,21 @@ def test_docs_example_walks_with_bundled_policies(name, tmp_path, monkeypatch):
     assert data.qpos[0] > 1.5  # of 2.5 m at 0.5 m/s
 
 
+def test_model_files_are_complete(onboarded, robot_file, tmp_path):
+    """The copy of an MJCF with meshes loads from another folder, with the same masses."""
+    source = onboarded(robot_file("a1/urdf/a1.urdf")).folder / "scene.xml"
+    for name, data in module.model_files(source).items():
+        (tmp_path / name).write_bytes(data)
+    with quiet_mujoco():
+        before, copy = (
+            mujoco.MjModel.from_xml_path(str(path)) for path in (source, tmp_path / "robot.xml")
+        )
+    assert (copy.nq, copy.nu, copy.nmesh) == (before.nq, before.nu, before.nmesh)
+    assert copy.nmesh > 0
+    np.testing.assert_allclose(copy.body_mass, before.body_mass)
+    np.testing.assert_allclose(copy.geom_size, before.geom_size, atol=1e-6)
+
+
 def test_export_policy_of_a_large_task(trained, tmp_path):
     task = replace(
         trained.task,
@@ -212,7 +232,7 @@ def test_export_policy_of_a_large_task(trained, tmp_path):
         algorithm=replace(trained.task.algorithm, num_mini_batches=512),
     )
     result = export_policy(replace(trained, task=task), tmp_path / "policy")
-    assert (result.num_observations, result.num_actions) == (45, 12)
+    assert (result.num_observations, result.num_actions) == (47, 12)
 
 
 def test_export_policy_overwrites_only_if_told(trained, exported, tmp_path):

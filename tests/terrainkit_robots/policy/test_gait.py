@@ -1,10 +1,8 @@
-import cv2
 import numpy as np
 import pytest
 
 from terrainkit_robots.policy.gait import (
     asymmetry,
-    draw_contacts,
     duty_factors,
     find_swings,
     foot_slip,
@@ -73,10 +71,3 @@ def test_foot_slip_ignores_feet_in_the_air():
 )
 def test_asymmetry_is_relative_to_the_mean(values, expected):
     assert asymmetry(np.array(values, float), np.array([1, 0, 3, 2])) == expected
-
-
-def test_contact_diagram_is_black_in_contact():
-    data = np.frombuffer(draw_contacts({"left": "10", "right": "11"}, 0.02), np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)
-    assert image[12, -16:].tolist() == [0] * 8 + [255] * 8
-    assert image[36, -16:].tolist() == [0] * 16

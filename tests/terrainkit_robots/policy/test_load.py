@@ -62,5 +62,5 @@ def test_load_policy_rejects_another_robot(trained, biped):
 
 def test_load_policy_rejects_other_observations(trained, quadruped, map_terrain):
     env = LeggedEnv(Task(env=Env(num_envs=1, num_threads=1)), quadruped, map_terrain)
-    with pytest.raises(ConfigError, match=r"45 .* 232"):
+    with pytest.raises(ConfigError, match=r"47 .* 234"):
         load_policy(trained, env)

@@ -1,3 +1,4 @@
+import json
 from itertools import repeat
 
 import numpy as np
@@ -175,3 +176,11 @@ def test_gait_of_standing_robots(env):
     assert metrics.swing_height == (None,) * 4
     assert (metrics.step_frequency, metrics.asymmetry) == (0, 0)
     assert metrics.base_pitch == pytest.approx(-0.0204, abs=2e-3)
+
+
+def test_gait_without_contacts_has_no_nan(make_sliding, monkeypatch):
+    monkeypatch.setattr("terrainkit_robots.policy.evaluate.CONTACT_FORCE", np.inf)
+    metrics = run(make_sliding([[0.6, 0, 0]]), 2.2, FORWARD).metrics(select(1))
+    assert metrics.followed == 1
+    assert metrics.foot_slip is None
+    json.dumps(metrics.as_dict(), allow_nan=False)

@@ -11,11 +11,12 @@ from terrainkit_robots.policy import smoke_test as module
 from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.smoke_test import (
     SmokeTestResult,
-    check_memory,
+    check_action_scale,
     check_observations,
     check_rewards,
     check_spawn_height,
     check_stand,
+    check_standing,
     check_training,
     random_state,
     run_checks,
@@ -60,7 +61,8 @@ def test_bundled_robot_can_be_trained(biped):
         "observation privileged",
         "stands for 1 s with zero action",
     ]
-    assert names[-2:] == ["memory is bounded", "trains for 3 iterations"]
+    assert names[5:7] == ["standing is not tracking", "action scale"]
+    assert names[-1] == "trains for 3 iterations"
     assert {f"reward {name}" for name in ("torques", "collision", "stand_still")} < set(names)
     assert len(set(names)) == len(names)
 
@@ -125,7 +127,7 @@ def test_observations_must_be_finite(env):
     policy, privileged = check_observations(env)
     assert privileged.passed
     assert not policy.passed
-    assert policy.measured == "45 numbers, some not finite"
+    assert policy.measured == "47 numbers, some not finite"
 
 
 @pytest.mark.parametrize(
@@ -181,18 +183,20 @@ def test_random_state_triggers_every_reward(quadruped):
         assert reward(state, quadruped, env.cfg.rewards).any(), name
 
 
-def test_kept_states_fail_the_memory_check(env):
-    kept, step = [], env.step
+def test_standing_earns_a_quarter_of_the_tracking(quadruped):
+    env = still_env(quadruped)
+    assert check_standing(env).measured == "25%"
+    wide = Rewards(tracking_ang_vel=0.0)
+    robust = lambda state, *_: np.exp(-np.square(state.commands[:, 0]))  # noqa: E731
+    env.rewards = {"tracking_lin_vel": (robust, wide.tracking_lin_vel)}
+    assert not check_standing(env).passed
 
-    def keep(actions):
-        kept.append((env.state, env.get_observations()))
-        return step(actions)
 
-    assert check_memory(env).passed
-    env.step = keep
-    check = check_memory(env)
+def test_large_action_scale_fails(quadruped):
+    assert check_action_scale(still_env(quadruped)).passed
+    check = check_action_scale(still_env(quadruped, control=Control(action_scale=0.5)))
     assert not check.passed
-    assert 0.5 < float(check.measured.split()[0]) < 5
+    assert check.measured.startswith("1.3 of the effort of FL_hip_joint")  # 60 * 0.5 / 23.7
 
 
 def test_training_fails_with_the_reason(env):

@@ -8,7 +8,7 @@ import numpy as np
 
 from terrainkit_robots.rl.state import State
 
-FLAGS = ("first_contact", "fallen")
+FLAGS = ("fallen",)
 
 Shape = tuple[int, ...]
 
@@ -23,11 +23,11 @@ def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, 
         "projected_gravity": (3,),
         "base_height": (),
         "commands": (3,),
+        "gait_phase": (2,),
+        "swing_phase": (feet,),
         "foot_height": (feet,),
         "foot_vel": (feet, 3),
         "foot_force": (feet, 3),
-        "first_contact": (feet,),
-        "air_time": (feet,),
         "penalized_force": (penalized,),
         "height_scan": (points,),
         "push_vel": (3,),

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.commands import VelocityCommand, sample_commands
+from terrainkit_robots.rl.commands import Gait, VelocityCommand, sample_commands
 from terrainkit_robots.rl.config import Commands, Control, DomainRand, Env, InitState, Rewards, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import REWARDS
@@ -136,6 +136,37 @@ class TestHeadingCommand:
         assert (env.commands[:, 2] != before).any() == expected
 
 
+class TestGait:
+    FEET = np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], np.float32)
+
+    def test_four_legs_trot_and_two_walk(self) -> None:
+        assert Gait(Commands(), 0.5, self.FEET).offset.tolist() == [0.5, 0, 0, 0.5]
+        assert Gait(Commands(), 0.5, self.FEET[:2]).offset.tolist() == [0.5, 0]
+
+    def test_six_legs_walk_in_tripods(self) -> None:
+        feet = np.array([[x, y, 0] for x in (1, 0, -1) for y in (1, -1)], np.float32)
+        assert Gait(Commands(), 0.5, feet).offset.tolist() == [0.5, 0, 0, 0.5, 0.5, 0]
+
+    def test_default_period_grows_with_the_leg(self) -> None:
+        assert Gait(Commands(), 9.81, self.FEET).period == pytest.approx(2.3)
+        assert Gait(Commands(gait_period=0.4), 9.81, self.FEET).period == 0.4
+
+    def test_phases_by_hand(self) -> None:
+        gait = Gait(Commands(gait_period=0.4, swing_fraction=0.5), 0.5, self.FEET)
+        phase, swing = gait.phases(np.array([0.1, 0.3, 0.3]), np.array([True, True, False]))
+        np.testing.assert_allclose(phase, [[1, 0], [-1, 0], [0, 0]], atol=1e-6)
+        # A quarter of the period is half of a swing.
+        expected = [[0, 0.5, 0.5, 0], [0.5, 0, 0, 0.5], [0, 0, 0, 0]]
+        np.testing.assert_allclose(swing, expected, atol=1e-6)
+
+    def test_no_period_is_no_gait(self) -> None:
+        phase, swing = Gait(Commands(gait_period=0), 0.5, self.FEET).phases(
+            np.array([0.1]), np.array([True])
+        )
+        assert not phase.any()
+        assert not swing.any()
+
+
 def make_env(num_envs: int = 4, **changes: Any) -> LeggedEnv:
     """Return an environment without pushes and random velocities."""
     task = Task(
@@ -194,12 +225,15 @@ class TestInEnvironment:
     def test_reward_uses_the_commands_of_the_step(self) -> None:
         """The reward must not use the commands that were just sampled for the next step."""
         only = Rewards(**{**dict.fromkeys(REWARDS, 0.0), "tracking_lin_vel": 1.0})
-        env = make_env(commands=Commands(standing=0, resampling_time=0.02), rewards=only)
+        env = make_env(
+            commands=Commands(standing=0, min_norm=0, resampling_time=0.02), rewards=only
+        )
         for _ in range(3):
             expected = env.commands.copy()
             _, rewards, *_ = env.step(torch.zeros(4, 12))
             off = np.square(expected[:, :2] - env.state.base_lin_vel[:, :2]).sum(axis=1)
-            np.testing.assert_allclose(rewards, 0.02 * np.exp(-off / 0.25), rtol=1e-4)
+            share = off / np.square(expected[:, :2]).sum(axis=1)
+            np.testing.assert_allclose(rewards, 0.02 * 0.25**share, rtol=1e-4)
             assert (env.commands != expected).any()
 
     def test_yaw_rate_follows_the_heading(self) -> None:

@@ -112,7 +112,7 @@ def test_non_finite_numbers_are_rejected(section):
         (Policy, "critic_hidden_dims", (128, 10**12), "critic_hidden_dims: .* from 1 to 65536"),
         (Policy, "activation", "relu6", "got 'relu6'; expected one of: elu, .*mean 'relu'"),
         (Algorithm, "gamma", 1.01, "gamma: got 1.01; expected a number from 0 to 1"),
-        (Algorithm, "symmetry", True, "expected one of: none, augmentation, loss"),
+        (Algorithm, "symmetry", True, "expected one of: auto, none, augmentation, loss"),
         (Runner, "seed", -1, "seed: got -1; expected an integer from 0"),
     ],
 )

@@ -75,21 +75,21 @@ def record(env, actions):
 class TestObservations:
     def test_widths(self, quadruped, biped, nominal_task, map_ground):
         env = LeggedEnv(nominal_task(), quadruped, Plane())
-        assert env.get_observations()["policy"].shape == (4, 45)
+        assert env.get_observations()["policy"].shape == (4, 47)
         # Plus velocity 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
-        assert env.get_observations()["privileged"].shape == (4, 45 + 3 + 1 + 1 + 3 + 12 + 3 + 12)
+        assert env.get_observations()["privileged"].shape == (4, 47 + 3 + 1 + 1 + 3 + 12 + 3 + 12)
         env = LeggedEnv(nominal_task(), quadruped, map_ground)
-        assert env.get_observations()["policy"].shape == (4, 45 + 187)
+        assert env.get_observations()["policy"].shape == (4, 47 + 187)
         env = LeggedEnv(nominal_task(), biped, Plane())
         joints = len(biped.default_pose)
-        assert env.get_observations()["policy"].shape == (4, 9 + 3 * joints)
+        assert env.get_observations()["policy"].shape == (4, 11 + 3 * joints)
 
     def test_height_scan_follows_the_setting(self, quadruped, nominal_task, map_ground):
         seen = nominal_task(terrain=Terrain(measure_heights=True))
-        assert LeggedEnv(seen, quadruped, Plane()).get_observations()["policy"].shape == (4, 232)
+        assert LeggedEnv(seen, quadruped, Plane()).get_observations()["policy"].shape == (4, 234)
         unseen = nominal_task(terrain=Terrain(measure_heights=False))
         env = LeggedEnv(unseen, quadruped, map_ground)
-        assert env.get_observations()["policy"].shape == (4, 45)
+        assert env.get_observations()["policy"].shape == (4, 47)
 
     @pytest.mark.parametrize("on_map", [False, True])
     def test_foot_forces_are_in_units_of_weight(self, quadruped, nominal_task, map_ground, on_map):
@@ -217,12 +217,12 @@ class TestTermination:
         assert np.nansum(env.curriculum.success) == 0
 
     def test_termination_reward_has_the_tasks_scale(self, quadruped, nominal_task):
-        task = nominal_task(2, rewards=Rewards(termination=-100.0, only_positive_rewards=True))
+        task = nominal_task(2, rewards=Rewards(termination=-100.0))
         env = LeggedEnv(task, quadruped, Plane())
         env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
         _, rewards, dones, _ = stand(env)
         assert dones.tolist() == [False, True]
-        assert rewards[0] >= 0
+        assert abs(rewards[0]) < 0.1
         assert rewards[1] == pytest.approx(-2.0, abs=0.1)
 
     def test_fall_in_last_step_is_no_time_out(self, quadruped, nominal_task):
@@ -363,8 +363,8 @@ class TestStateDict:
 
     def test_load_rejects_other_rewards(self, quadruped, random_task):
         saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
-        task = random_task(3, rewards=Rewards(termination=-1.0))
-        with pytest.raises(ConfigError, match="rew_termination belongs to another robot, task"):
+        task = random_task(3, rewards=Rewards(dof_power=-1.0))
+        with pytest.raises(ConfigError, match="rew_dof_power belongs to another robot, task"):
             LeggedEnv(task, quadruped, Plane()).load_state_dict(saved)
 
     def test_load_rejects_other_robot_or_map(self, quadruped, biped, random_task, map_ground):

@@ -10,7 +10,15 @@ import torch
 from made_states import made_state, shapes
 
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.config import Env, Noise, Normalization, ObsScales, Task, Terrain
+from terrainkit_robots.rl.config import (
+    Commands,
+    Env,
+    Noise,
+    Normalization,
+    ObsScales,
+    Task,
+    Terrain,
+)
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import (
     ObservationTerm,
@@ -33,9 +41,10 @@ _TASK_TABLE = [
     ("dof_pos", 12),
     ("dof_vel", 12),
     ("actions", 12),
+    ("gait_phase", 2),
     ("height_scan", 187),
 ]
-"""Terms of the policy group in order: 45 numbers for 12 joints, and the height scan."""
+"""Terms of the policy group in order: 47 numbers for 12 joints, and the height scan."""
 
 _SECRETS = [
     ("base_lin_vel", 3),
@@ -127,6 +136,12 @@ class TestByHand:
         given = state(base_lin_vel=[[1, -0.5, 0.25]])
         assert observed(privileged_of(robot), "base_lin_vel", given) == [2, -1, 0.5]
 
+    def test_gait_phase(self, robot: Robot) -> None:
+        given = state(gait_phase=[[0.6, -0.8]])
+        assert observed(group_of(robot), "gait_phase", given) == pytest.approx([0.6, -0.8])
+        without = policy_group(robot, Task(commands=Commands(gait_period=0)), scan=False)
+        assert "gait_phase" not in {each.name for each in without}
+
     def test_friction(self, robot: Robot) -> None:
         assert observed(privileged_of(robot), "friction", state(friction=0.75)) == [0.75]
 
@@ -169,10 +184,10 @@ class TestGroups:
         group = group_of(robot)
         found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE
-        assert compute_observations(group, state(2), 100.0).shape == (2, 232)
+        assert compute_observations(group, state(2), 100.0).shape == (2, 234)
         assert compute_observations(
             policy_group(robot, Task(), scan=False), state(2), 100.0
-        ).shape == (2, 45)
+        ).shape == (2, 47)
 
     def test_privileged_group_extends_the_policy_group(self, robot: Robot) -> None:
         group = privileged_of(robot)
@@ -253,6 +268,7 @@ class TestNoise:
             "dof_pos": 1,
             "dof_vel": 2,
             "actions": 0,
+            "gait_phase": 0,
             "height_scan": 5,
         }
 
@@ -282,23 +298,23 @@ class TestInEnvironment:
     def test_group_widths(self) -> None:
         obs = self.make().get_observations()
         assert {name: tuple(value.shape) for name, value in obs.items()} == {
-            "policy": (3, 45),
-            "privileged": (3, 45 + 35),
+            "policy": (3, 47),
+            "privileged": (3, 47 + 35),
         }
 
     def test_height_scan_on_request(self) -> None:
         env = self.make(terrain=Terrain(measure_heights=True))
-        assert env.get_observations()["policy"].shape == (3, 232)
+        assert env.get_observations()["policy"].shape == (3, 234)
         # On a plane, every point is at the height of the base.
-        scan = env.get_observations()["privileged"][:, 45:232].numpy()
+        scan = env.get_observations()["privileged"][:, 47:234].numpy()
         height = env.state.base_pos[:, 2:]
         np.testing.assert_allclose(scan, np.tile(5 * (height - 0.5), 187), atol=1e-5)
 
     def test_policy_is_privileged_with_noise(self) -> None:
         obs = self.make().get_observations()
-        policy, known = obs["policy"], obs["privileged"][:, :45]
-        quiet = [*range(3), *range(33, 45)]
-        noisy = [k for k in range(45) if k not in quiet]
+        policy, known = obs["policy"], obs["privileged"][:, :47]
+        quiet = [*range(3), *range(33, 47)]
+        noisy = [k for k in range(47) if k not in quiet]
         assert torch.equal(policy[:, quiet], known[:, quiet])
         assert (policy[:, noisy] != known[:, noisy]).float().mean() > 0.95
         assert (policy - known).abs().max() <= 0.0751
@@ -309,7 +325,7 @@ class TestInEnvironment:
         for _ in range(2):
             env.step(torch.zeros(3, 12))
             obs = env.get_observations()
-            noises.append(obs["policy"] - obs["privileged"][:, :45])
+            noises.append(obs["policy"] - obs["privileged"][:, :47])
         assert not torch.equal(*noises)
 
     def test_observations_of_known_state(self) -> None:
@@ -322,8 +338,9 @@ class TestInEnvironment:
         env.sim.qvel[:] = 0
         env.sim.qvel[:, 6 + 2] = 2.0
         env.actions[0] = 0.25
+        env.steps_since_reset[:] = 0
         env.state = env._compute_state(np.arange(3), after_reset=True)
         env._compute_observations()
         seen = env.get_observations()["policy"][0]
-        expected = [2, 0, 0.125, 0, 0, -1, *[0] * 15, 0, 0, 0.1, *[0] * 9, *[0.25] * 12]
+        expected = [2, 0, 0.125, 0, 0, -1, *[0] * 15, 0, 0, 0.1, *[0] * 9, *[0.25] * 12, 0, 1]
         assert seen.tolist() == pytest.approx(expected, abs=1e-6)

@@ -107,7 +107,6 @@ class TestByHand:
             env.step(torch.full((2, 3), value))
         np.testing.assert_allclose(env.state.actions, 0.3)
         np.testing.assert_allclose(env.state.last_actions, 0.2)
-        np.testing.assert_allclose(env.state.last_last_actions, 0.1)
 
     def test_torques_are_in_spec_order(self, cart, nominal_task):
         env = LeggedEnv(nominal_task(1), cart, Plane())
@@ -115,28 +114,6 @@ class TestByHand:
         env.step(torch.tensor([[50.0, 0.0, 0.0]]))  # the wheel only
         assert env.state.torques[0, 0] == pytest.approx(3.0)
         assert np.abs(env.state.torques[0, 1:]).max() < 1.0
-
-    def test_air_time_counts_until_contact(self, quadruped, nominal_task):
-        env = LeggedEnv(nominal_task(1), quadruped, Plane())
-        env.sim.qpos[:, 2] = 0.6
-        flown = 0
-        while not env.state.first_contact.any():
-            env.step(torch.zeros(1, 12))
-            flown += 1
-            assert flown < 50
-        came = env.state.first_contact[0]
-        # The step of the first contact is included.
-        np.testing.assert_allclose(env.state.air_time[0, came], flown * env.cfg.dt, rtol=1e-4)
-        env.step(torch.zeros(1, 12))
-        assert not (env.state.first_contact[0] & came).any()
-        np.testing.assert_allclose(
-            env.sensors.air_time[0, came & (env.state.foot_force[0, :, 2] > 1)], 0
-        )
-
-    def test_standing_feet_have_no_first_contact(self, standing):
-        for _ in range(5):
-            standing.step(torch.zeros(4, 12))
-            assert not standing.state.first_contact.any()
 
     def test_push_adds_to_world_velocity(self, cart, nominal_task):
         task = nominal_task(
@@ -193,7 +170,7 @@ class TestStateCopies:
         env = LeggedEnv(random_task(3), quadruped, Plane())
         env.step(torch.zeros(3, 12))
         own = [env.sim.batch.state, *vars(env.params).values(), env.commands]
-        own += [env.joint_offset, env.pushes.velocity, env.sensors.air_time, env.actions]
+        own += [env.joint_offset, env.pushes.velocity, env.actions]
         for field in fields(State):
             value = getattr(env.state, field.name)
             assert not any(np.shares_memory(value, other) for other in own), field.name

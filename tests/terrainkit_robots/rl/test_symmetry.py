@@ -11,7 +11,7 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import config as sections
-from terrainkit_robots.rl.config import DomainRand, Env, Noise, Sim, Task
+from terrainkit_robots.rl.config import Commands, DomainRand, Env, Noise, Sim, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.symmetry import MirrorMaps, augment, mirror_maps
 from terrainkit_robots.rl.terrain import Plane, Terrain
@@ -37,6 +37,7 @@ def make_env(name: str, ground: Terrain | None = None, robot: Robot | None = Non
     task = Task(
         env=Env(num_envs=2 * _PAIRS, num_threads=1),
         noise=Noise(noise_level=0.0),
+        commands=Commands(gait_period=0.4),
         domain_rand=DomainRand(push_interval_s=0.0),
         sim=Sim(iterations=100, ls_iterations=50),  # so that both sides converge to the same
     )
@@ -87,7 +88,7 @@ def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
     env.pushes.velocity[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
     env.pushes.velocity[b] = env.pushes.velocity[a] * np.array([1, -1, 1])
     env.joint_offset[b] = mirror.actions(env.joint_offset[a])
-    env.sensors.air_time[:] = 0
+    env.steps_since_reset[a], env.steps_since_reset[b] = 3, 13  # half a period later
     d = env.params
     for same in (d.friction, d.geom_friction, d.added_mass, d.strength):
         same[b] = same[a]
@@ -169,7 +170,7 @@ class TestRobot:
         mirror_physics(env, mirror)
         mirror_memory(env, mirror)
         _recompute(env)
-        mirror.groups["policy"].sign[-1] *= -1
+        mirror.groups["policy"].sign[-3] *= -1
         with pytest.raises(AssertionError, match="actions"):
             assert_images(env, mirror, 3e-5)
 
@@ -199,7 +200,7 @@ class TestAugment:
         both, acted = augment(env, env.get_observations()[:3], None)
         assert acted is None
         assert both is not None
-        assert both["policy"].shape == (6, 45)
+        assert both["policy"].shape == (6, 47)
 
     def test_gradients_flow(self) -> None:
         env = make_env("quadruped")
@@ -257,7 +258,7 @@ class TestNames:
     def test_scan(self) -> None:
         env = make_env("quadruped", Valley())
         image = mirror_maps(env).groups["policy"]
-        rows = (image.index[-187:] - 45).reshape(17, 11)
+        rows = (image.index[-187:] - 47).reshape(17, 11)
         np.testing.assert_array_equal(rows, np.arange(187).reshape(17, 11)[:, ::-1])
         assert (image.sign[-187:] == 1).all()
 

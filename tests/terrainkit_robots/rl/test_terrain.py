@@ -250,5 +250,5 @@ class TestHeightScan:
 
     def test_no_height_scan_on_a_plane(self, quadruped, nominal_task):
         env = LeggedEnv(nominal_task(1), quadruped, Plane())
-        assert env.get_observations()["policy"].shape == (1, 45)
+        assert env.get_observations()["policy"].shape == (1, 47)
         assert env.state.height_scan.shape == (1, 0)

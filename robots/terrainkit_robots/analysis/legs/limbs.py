@@ -48,6 +48,10 @@ _MAX_WHEEL_OFFSET = 0.25
 """Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel on a
 continuous joint."""
 
+_MAX_SHAPE_OFFSET = 0.5
+"""Distance of the center of its shape to the axis over half the diagonal of the shape, at most, of
+a wheel. A shank without a center of mass has 0.7 and more."""
+
 _MAX_JOINTS = 32
 """A chain of more joints is a tail, a snake or a rope."""
 
@@ -174,7 +178,9 @@ def _leaves(
         moving = [i for i in chain if (j := bodies[i].joint) is not None and j.moves]
         joints = [j for i in moving if (j := bodies[i].joint) is not None]
         # A wheel at the end does not bend the limb.
-        bending = joints[:-1] if joints and _is_continuous_wheel(bodies[moving[-1]]) else joints
+        bending = (
+            joints[:-1] if joints and _is_continuous_wheel(bodies[moving[-1]], meshes) else joints
+        )
         driven = sum(id(joint) in actuated_ids for joint in bending)
         if len(joints) <= _MAX_JOINTS and driven >= 2:
             tip = contact_points(body, body.zero_pose, meshes).mean(axis=0)
@@ -185,16 +191,24 @@ def _leaves(
     return sorted(leaves, key=lambda leaf: float(leaf.tip[2]))[:_MAX_LIMBS]
 
 
-def _is_continuous_wheel(body: Body) -> bool:
-    """Return whether a body on a continuous joint is balanced on its axis."""
+def _is_continuous_wheel(body: Body, meshes: Meshes) -> bool:
+    """Return whether a body on a continuous joint is balanced on its axis, and so is its shape."""
     joint = body.joint
     assert joint is not None
     if joint.kind != "continuous":
         return False
-    arm = body.center - joint.anchor
-    offset = float(np.linalg.norm(arm - (arm @ joint.direction) * joint.direction))
+    arms = [body.center - joint.anchor]
+    box = bounds(body.collisions, meshes)
+    if box is not None:
+        arms.append(box.mean(axis=0) - joint.anchor)
+        half_size = float(np.linalg.norm(np.ptp(box, axis=0))) / 2
+    center, *shape = (
+        float(np.linalg.norm(arm - (arm @ joint.direction) * joint.direction)) for arm in arms
+    )
+    if shape and shape[0] > _MAX_SHAPE_OFFSET * half_size:
+        return False
     moment = float(np.clip(np.trace(body.inertia) / 2, 0, None))
-    return body.mass <= 0 or offset <= _MAX_WHEEL_OFFSET * float(np.sqrt(moment / body.mass))
+    return body.mass <= 0 or center <= _MAX_WHEEL_OFFSET * float(np.sqrt(moment / body.mass))
 
 
 def _robot_bounds(bodies: Sequence[Body], meshes: Meshes) -> tuple[Matrix, Matrix]:

@@ -1,11 +1,11 @@
-"""Report names in the extensions of a URDF that refer to no link or joint.
+"""Find invalid names and ratios in the tags of a URDF that only other tools read.
 
-Simulators skip these elements, so that only the tool that reads them notices a wrong name.
+Simulators skip these tags, so that a mistake appears only in the tool that reads them.
 """
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from terrainkit.text import closest, truncate
 from terrainkit_robots.description.model import Problem
@@ -16,8 +16,22 @@ from terrainkit_robots.description.xml.numbers import parse_numbers
 if TYPE_CHECKING:
     from lxml import etree
 
-Reference = tuple["etree._Element", str, str, str]
-"""Element, description of the place, kind of the target (a key of the known names), and name."""
+
+class Reference(NamedTuple):
+    """A name in an element that refers to a link, a joint or a group."""
+
+    element: "etree._Element"
+    """The element."""
+
+    place: str
+    """Where the name is, for messages."""
+
+    kind: str
+    """What it names: `link`, `joint`, `link or joint`, or `group`."""
+
+    name: str
+    """The name."""
+
 
 _PLUGIN_TAGS: Mapping[str, str] = {
     **dict.fromkeys(("bodyName", "body_name", "linkName", "link_name"), "link"),
@@ -36,16 +50,23 @@ _MAX_COMPARED = 20_000
 
 
 def invalid_references(doc: XmlDocument) -> Iterator[Problem]:
-    """Yield a problem for each unknown name in <gazebo>, <transmission>, <sensor>, <ros2_control>.
+    """Yield the problems of <gazebo>, <transmission>, <sensor> and <ros2_control>.
 
-    Two transmissions of one joint and a mechanicalReduction of zero are problems as well.
+    They are names of no link or joint, joints with two transmissions, and invalid ratios.
     """
-    root = doc.root
-    assert root is not None
-    links, joints = link_names(root), joint_names(root)
+    assert doc.root is not None
+    joints = joint_names(doc.root)
+    yield from _unknown_names(doc, link_names(doc.root), joints)
+    yield from _repeated_transmissions(doc, joints)
+    yield from _invalid_reductions(doc)
+
+
+def _unknown_names(doc: XmlDocument, links: set[str], joints: set[str]) -> Iterator[Problem]:
+    """Yield a problem for each name that is not in `links` or `joints`."""
     known = {"link": links, "joint": joints, "link or joint": links | joints}
     found: dict[str, Problem] = {}
-    for element, place, kind, name in _references(root):
+    assert doc.root is not None
+    for element, place, kind, name in _references(doc.root):
         if not name or name in known[kind] or name in found or has_variable(name):
             continue
         near = ""
@@ -61,19 +82,6 @@ def invalid_references(doc: XmlDocument) -> Iterator[Problem]:
             subject=name,
         )
     yield from found.values()
-    yield from _repeated_transmissions(doc, joints)
-    for reduction in root.iterfind("transmission//mechanicalReduction"):
-        text = (reduction.text or "").strip()
-        ratio = parse_numbers(text, 1)
-        if (ratio is None or ratio[0] == 0) and not has_variable(text):
-            owner = next(reduction.iterancestors("transmission"))
-            yield Problem(
-                code="JNT024",
-                message=f"mechanicalReduction of transmission {owner.get('name', '')}: got "
-                f"{truncate(text, 40)!r}; expected a ratio other than 0",
-                source=doc.source(reduction),
-                subject=_driven_joint(owner) or owner.get("name", ""),
-            )
 
 
 def link_names(root: "etree._Element") -> set[str]:
@@ -90,18 +98,20 @@ def _references(root: "etree._Element") -> Iterator[Reference]:
     for element in root.iterchildren("gazebo", "transmission", "sensor", "ros2_control"):
         if element.tag == "gazebo":
             name = element.get("reference", "")
-            yield element, "reference of <gazebo>", "link or joint", name
+            yield Reference(element, "reference of <gazebo>", "link or joint", name)
             for plugin in element.iter("plugin"):
                 for child in plugin.iter(*_PLUGIN_TAGS):
                     name = (child.text or "").strip()
-                    yield child, f"{child.tag} of a <plugin>", _PLUGIN_TAGS[child.tag], name
+                    place = f"{child.tag} of a <plugin>"
+                    yield Reference(child, place, _PLUGIN_TAGS[child.tag], name)
         elif element.tag == "sensor":
             for parent in element.iterchildren("parent"):
                 for kind in ("link", "joint"):
-                    yield parent, "parent of a <sensor>", kind, parent.get(kind, "")
+                    yield Reference(parent, "parent of a <sensor>", kind, parent.get(kind, ""))
         else:
             for joint in element.iterchildren("joint"):
-                yield joint, f"joint of a <{element.tag}>", "joint", joint.get("name", "")
+                place = f"joint of a <{element.tag}>"
+                yield Reference(joint, place, "joint", joint.get("name", ""))
 
 
 def _driven_joint(transmission: "etree._Element") -> str:
@@ -127,3 +137,21 @@ def _repeated_transmissions(doc: XmlDocument, joints: set[str]) -> Iterator[Prob
             )
         elif name in joints:
             seen.add(name)
+
+
+def _invalid_reductions(doc: XmlDocument) -> Iterator[Problem]:
+    """Yield a problem for each ratio of a transmission that is 0 or not a number."""
+    assert doc.root is not None
+    for reduction in doc.root.iterfind("transmission//mechanicalReduction"):
+        text = (reduction.text or "").strip()
+        ratio = parse_numbers(text, 1)
+        if (ratio is None or ratio[0] == 0) and not has_variable(text):
+            owner = next(reduction.iterancestors("transmission"))
+            subject = _driven_joint(owner) or owner.get("name", "")
+            yield Problem(
+                code="JNT024",
+                message=f"mechanicalReduction of the transmission of {subject}: got "
+                f"{truncate(text, 40)!r}; expected a ratio other than 0",
+                source=doc.source(reduction),
+                subject=subject,
+            )

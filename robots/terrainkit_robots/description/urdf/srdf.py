@@ -22,8 +22,8 @@ _FOLDERS = (".", "srdf", "config", "../srdf", "../config")
 """Folders of an SRDF, relative to that of the URDF."""
 
 _MIN_KNOWN_SHARE = 0.5
-"""Share of the names of an SRDF that the robot has, below which it belongs to another variant of
-the robot, unless it has the name of the file."""
+"""Smallest share of the names of an SRDF that exist in the robot. Below it, the SRDF belongs to
+another variant of the robot, unless it has the name of the URDF file."""
 
 _FREE_JOINT = "root_joint"
 """Name of the joint that Pinocchio adds above the root link of a floating robot."""
@@ -42,7 +42,7 @@ def invalid_srdf(doc: XmlDocument) -> Iterator[Problem]:
     try:
         semantics = parse_xml(path, read_bytes(path))
     except RobotFileError:
-        return  # it was removed
+        return  # it cannot be read, so it is not compared
     root = semantics.root
     if root is None or semantics.problems:
         problem = next(iter(semantics.problems))
@@ -53,19 +53,19 @@ def invalid_srdf(doc: XmlDocument) -> Iterator[Problem]:
         "joint": {*joint_names(doc.root), _FREE_JOINT, *_names_of(root, "virtual_joint")},
         "group": _names_of(root, "group"),
     }
-    references = [each for each in _references(root) if each[-1]]
-    missing = [each for each in references if each[-1] not in known[each[2]]]
-    unknown = list(dict.fromkeys(name for _, _, _, name in missing))
-    total = len({name for _, _, _, name in references})
+    references = [each for each in _references(root) if each.name]
+    missing = [each for each in references if each.name not in known[each.kind]]
+    unknown = list(dict.fromkeys(each.name for each in missing))
+    total = len({each.name for each in references})
     is_own = doc.file.name.startswith(f"{path.stem}.")
     if missing and (is_own or total - len(unknown) >= _MIN_KNOWN_SHARE * total):
-        element, place, kind, name = missing[0]
+        first = missing[0]
         yield Problem(
             code="TRE010",
             message=f"{count(len(unknown), 'unknown name')} in {path.name}: got {names(unknown)}; "
-            f"expected the names of the robot; the first is {place}, a {kind}",
-            source=semantics.source(element),
-            subject=name,
+            f"expected names of the robot; the first is {first.place}, a {first.kind}",
+            source=semantics.source(first.element),
+            subject=first.name,
         )
 
 
@@ -98,14 +98,17 @@ _LINK_ATTRIBUTES = {
 def _references(root: "etree._Element") -> Iterator[Reference]:
     for group in root.iterchildren("group", "group_state"):
         for child in group.iterchildren("link", "joint", "group"):
-            yield child, f"<{child.tag}> of a <{group.tag}>", child.tag, child.get("name", "")
+            place = f"<{child.tag}> of a <{group.tag}>"
+            yield Reference(child, place, child.tag, child.get("name", ""))
     for element in root.iter(*_LINK_ATTRIBUTES):
         for attribute in _LINK_ATTRIBUTES[element.tag]:
-            yield element, f"{attribute} of <{element.tag}>", "link", element.get(attribute, "")
+            place = f"{attribute} of <{element.tag}>"
+            yield Reference(element, place, "link", element.get(attribute, ""))
     for element in root.iterchildren("end_effector", "group_state"):
         for attribute in ("group", "parent_group"):
-            yield element, f"{attribute} of <{element.tag}>", "group", element.get(attribute, "")
+            place = f"{attribute} of <{element.tag}>"
+            yield Reference(element, place, "group", element.get(attribute, ""))
     for element in root.iterchildren("passive_joint"):
-        yield element, "<passive_joint>", "joint", element.get("name", "")
+        yield Reference(element, "<passive_joint>", "joint", element.get("name", ""))
     for element in root.iter("joint_property"):
-        yield element, "<joint_property>", "joint", element.get("joint_name", "")
+        yield Reference(element, "<joint_property>", "joint", element.get("joint_name", ""))

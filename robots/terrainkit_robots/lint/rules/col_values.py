@@ -31,6 +31,9 @@ _MIN_SHARE_INSIDE = 0.5
 """Share of a collision shape's bounding box that has to be inside of the visible robot around
 it."""
 
+_MAX_ELONGATION = 1.5
+"""Ratio of the two longest sides of a shape that is between its joints however it is turned."""
+
 _VISUAL_MARGIN = 0.01
 """Margin of the visible robot [m]."""
 
@@ -233,7 +236,12 @@ def _needs_check(robot: Facts, body: Body, shape: BodyShape) -> bool:
     joints = np.array([np.min(points, axis=0), np.max(points, axis=0)])
     size = 0.15 * float(np.linalg.norm(joints[1] - joints[0])) + _VISUAL_MARGIN
     joints += np.array([[-size], [size]])
-    return box is not None and _share_inside(box, joints) < _MIN_SHARE_INSIDE
+    if box is None or _share_inside(box, joints) >= _MIN_SHARE_INSIDE:
+        return False
+    center, sides = box.mean(axis=0), np.sort(box[1] - box[0])
+    is_between = bool((joints[0] <= center).all() and (center <= joints[1]).all())
+    is_compact = sides[2] <= _MAX_ELONGATION * sides[1]  # its rotation does not matter
+    return not (is_between and is_compact and sides[2] <= float((joints[1] - joints[0]).max()))
 
 
 def _visible_box(robot: Facts, body: Body) -> Matrix | None:

@@ -18,7 +18,7 @@ _MIN_EXCESS = 1.5
 
 
 def _exchanged_link(body: Body, long: int) -> Link | None:
-    """Return the link with the largest moment about the long axis of a body, if it is exchanged.
+    """Return the link with the largest moment about the long axis, or None if that is plausible.
 
     Args:
         body: The body.

@@ -24,9 +24,9 @@ _MIN_TOP_SPEED, _MIN_LEG_SPEED = 0.4, 3.0
 """Smallest plausible speed at which damping consumes the whole effort, of all joints and of those
 of legs [rad/s]."""
 
-_MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 50.0
-"""The same speed of a leg joint as a share of its velocity limit, if the limit [rad/s] is not a
-placeholder."""
+_MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 60.0
+"""Smallest plausible share of its velocity limit that a leg joint reaches against its damping, and
+the limit above which it is a placeholder [rad/s]."""
 
 _MAX_COMMAND_RATIO = 4.0
 """Allowed ratio of the two ends of the control range of a motor."""
@@ -47,7 +47,7 @@ _MAX_LEG_EFFORT = 5.0
 legged robots have 0.2 to 1.5."""
 
 _MAX_GEARED_EFFORT = 2.0
-"""The same if a gear multiplies a control range in N m, which is rarely right."""
+"""The same if a gear multiplies a control range in N m, which is rarely intended."""
 
 _MIN_LEG_VELOCITY = 0.2
 """Smallest plausible velocity limit of a leg joint [rad/s]. A yaw joint of Romeo has 0.32."""

@@ -182,13 +182,13 @@ def duplicate_material(robot: Facts) -> Iterator[Violation]:
         yield _violation(robot, problem, fix)
 
 
-@rule("XML009", "byte-order-mark", "error", fixes="safe")
+@rule("XML009", "byte-order-mark", "warning", fixes="safe")
 def byte_order_mark(robot: Facts) -> Iterator[Violation]:
     """There are invisible characters before the XML, or the file is UTF-16.
 
     Some editors write a byte order mark or a blank line before <?xml ...?>. Strict readers reject
-    the file, with an error message that points at nothing visible. MuJoCo and urdfdom cannot read
-    UTF-16 and UTF-32 at all.
+    the file, with an error message that points at nothing visible. MuJoCo and urdfdom skip them,
+    but cannot read UTF-16 and UTF-32 at all, which is an error.
 
     Fix:
         Save the file as UTF-8 without a byte order mark, starting with <?xml ...?> or <robot>.
@@ -198,7 +198,8 @@ def byte_order_mark(robot: Facts) -> Iterator[Violation]:
         that start with a byte order mark. MuJoCo 4.0: `XML_ERROR_PARSING`.
     """
     for problem in _problems(robot, "XML009"):
-        yield _violation(robot, problem, leading_bytes_fix(problem))
+        severity: Severity | None = "error" if "text" in problem.details else None
+        yield _violation(robot, problem, leading_bytes_fix(problem), severity)
 
 
 @rule("XML010", "entity-declarations", "error")

@@ -277,6 +277,16 @@ def test_has_leg_names_takes_majority():
     assert chain("shoulder", "foot").has_leg_names
 
 
+def test_shank_without_center_of_mass_is_no_wheel():
+    robot = facts(
+        link("thigh", center="0 0 -0.1"),
+        joint("trunk", "thigh", "0 0 0"),
+        link("shank", "0 0 -0.2"),
+        joint("thigh", "shank", "0 0 -0.2", "continuous"),
+    )
+    assert [len(limb.joints) for limb in robot.limbs] == [2]
+
+
 def test_score_of_fingers_is_lower():
     fingers = [limb(name, root) for name, root in FOUR]
     trunk = link("trunk", mass=10)

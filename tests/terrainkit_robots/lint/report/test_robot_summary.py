@@ -17,8 +17,8 @@ def test_summary_of_a_quadruped():
     assert lines["size"] == "15.02 kg, 17 links in 13 rigid bodies, 12 joints"
     assert lines["legs"] == "4, 0.448 m long; feet: FL_foot, FR_foot, RL_foot, RR_foot"
     assert list(lines) == ["robot", "size", "legs", "standing", "  roll", "  hip", "  knee"]
-    # The calf's 5.1 N m of the 45.43 N m that the motor has behind its lever.
-    assert lines["  knee"].startswith("-1.4")
+    # The calf's 5.2 N m of the 45.43 N m that the motor has behind its lever.
+    assert lines["  knee"].startswith("-1.50 rad, holds 5.2 N m (11%")
 
 
 def test_repeated_roles_are_numbered():
