@@ -63,7 +63,7 @@ def home(model):
 
 
 def inertia(model, body):
-    """Return the inertia of a body about its centre of mass, axes of the body, shape (3, 3)."""
+    """Return the inertia of a body about its center of mass, axes of the body, shape (3, 3)."""
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, model.body(body).iquat)
     turn = turn.reshape(3, 3)
