@@ -15,7 +15,7 @@ def map_file(tmp_path):
     return tk.generate(config).save(tmp_path / "map.npz")
 
 
-def test_view_serves_until_interrupted(map_file):
+def test_view_serves_until_it_is_ended(map_file):
     command = [sys.executable, "-m", "terrainkit_cli.main", "view", map_file]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -25,10 +25,10 @@ def test_view_serves_until_interrupted(map_file):
         assert address, line
         with urlopen(address.group(), timeout=10) as response:
             assert response.status == 200
-        run.send_signal(signal.SIGINT)
+        run.terminate()
         _, errors = run.communicate(timeout=30)
-    assert run.returncode == 128 + signal.SIGINT
-    assert errors == "terrainkit: error: interrupted\n"
+    assert run.returncode == 128 + signal.SIGTERM
+    assert errors == "terrainkit: error: ended by SIGTERM\n"
 
 
 @pytest.mark.parametrize(

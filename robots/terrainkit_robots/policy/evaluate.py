@@ -15,13 +15,7 @@ from tensordict import TensorDict
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import PositiveInt
-from terrainkit_robots.policy.gait import (
-    asymmetry,
-    duty_factors,
-    foot_slip,
-    step_frequency,
-    swing_heights,
-)
+from terrainkit_robots.policy import gait
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -428,13 +422,14 @@ class EvaluationRollout:
         measured, contact, height, foot_speed = (
             np.array([step[k][mask] for step in self.gait]) for k in range(4)
         )
-        heights, duty = swing_heights(contact, height, measured), duty_factors(contact, measured)
+        heights = gait.swing_heights(contact, height, measured)
+        duty = gait.duty_factors(contact, measured)
         mirror = mirror_feet(scene.foot_pos)
         work = 9.81 * scene.model.body_subtreemass[scene.base] * speed.sum()
         return result | {
-            "step_frequency": _number(step_frequency(contact, measured, self.env.cfg.dt)),
-            "foot_slip": _number(foot_slip(contact, foot_speed, measured)),
-            "asymmetry": max(asymmetry(each, mirror) for each in (heights, duty)),
+            "step_frequency": _number(gait.step_frequency(contact, measured, self.env.cfg.dt)),
+            "foot_slip": _number(gait.foot_slip(contact, foot_speed, measured)),
+            "asymmetry": max(gait.asymmetry(each, mirror) for each in (heights, duty)),
             "base_pitch": float(pitch.sum() / count.sum()),
             "cost_of_transport": float(power.sum() / work) if work else None,
             "swing_height": tuple(map(_number, heights)),

@@ -17,9 +17,9 @@ from tensordict import TensorDict
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
+from terrainkit_robots.export.model_copy import ROBOT_FILE, copy_model
 from terrainkit_robots.policy.evaluate import FloatArray, eval_task
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
-from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
@@ -27,7 +27,6 @@ from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.terrain import load_terrain
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
-ROBOT_FILE = "robot.xml"
 
 FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
 """Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots know."""
@@ -74,7 +73,7 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
     task = eval_task(run.task, num_envs=8)
     env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
-    robot_files = model_files(run.robot.mjcf)
+    robot_files = copy_model(run.robot.mjcf)
     iteration = read_checkpoint(last_checkpoint(run))["iteration"]
     text = json.dumps(describe_policy(env) | {"iteration": iteration}, indent=2) + "\n"
     limits = task.normalization.clip_observations, task.normalization.clip_actions
@@ -106,22 +105,6 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
             path.with_name(name).write_bytes(data)
     sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
     return ExportResult(files=files, errors=errors, **sizes)
-
-
-def model_files(mjcf: Path) -> dict[str, bytes]:
-    """Return the MJCF of a robot, in one file, and its meshes and textures, by file name."""
-    with quiet_mujoco():
-        spec = mujoco.MjSpec.from_file(str(mjcf))
-        names: dict[Path, str] = {}
-        for folder, assets in ((spec.meshdir, spec.meshes), (spec.texturedir, spec.textures)):
-            for asset in assets:
-                if asset.file:
-                    source = mjcf.parent / folder / asset.file
-                    asset.file = names.setdefault(source, f"{len(names)}_{source.name}")
-        spec.meshdir = spec.texturedir = ""
-        spec.assets = files = {name: source.read_bytes() for source, name in names.items()}
-        spec.compile()
-        return files | {ROBOT_FILE: spec.to_xml().encode()}
 
 
 def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> bytes:

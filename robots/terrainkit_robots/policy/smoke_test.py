@@ -191,9 +191,11 @@ def check_rewards(env: LeggedEnv) -> Iterator[Check]:
     commands[::4] = 0  # for the rewards of standing robots
     env.set_commands(commands)
     values: dict[str, list[Any]] = {name: [] for name in env.rewards}
-    for state in random_steps(env, RANDOM_STEPS):
+    generator = torch.Generator().manual_seed(env.cfg.runner.seed)
+    for _ in range(RANDOM_STEPS):
+        env.step(torch.randn(env.num_envs, env.num_actions, generator=generator))
         for name, (reward, _) in env.rewards.items():
-            values[name].append(reward(state, env.robot, env.cfg.rewards))
+            values[name].append(reward(env.state, env.robot, env.cfg.rewards))
     env.set_commands(None)
     state = random_state(env.state, env.cfg.runner.seed)
     for name, (reward, _) in env.rewards.items():
@@ -206,14 +208,6 @@ def check_rewards(env: LeggedEnv) -> Iterator[Check]:
             measured = "0: the rewarded event did not happen" if passed else "0 in every state"
         expected = f"finite, and not 0 in every state; rewards.{name} 0 disables it"
         yield Check(f"reward {name}", passed, measured, expected)
-
-
-def random_steps(env: LeggedEnv, steps: int) -> Iterator[State]:
-    """Step the environment with random actions, and yield the states."""
-    generator = torch.Generator().manual_seed(env.cfg.runner.seed)
-    for _ in range(steps):
-        env.step(torch.randn(env.num_envs, env.num_actions, generator=generator))
-        yield env.state
 
 
 def random_state(state: State, seed: int) -> State:

@@ -210,21 +210,6 @@ def test_docs_example_walks_with_bundled_policies(name, tmp_path, monkeypatch):
     assert data.qpos[0] > 1.5  # of 2.5 m at 0.5 m/s
 
 
-def test_model_files_are_complete(onboarded, robot_file, tmp_path):
-    """The copy of an MJCF with meshes loads from another folder, with the same masses."""
-    source = onboarded(robot_file("a1/urdf/a1.urdf")).folder / "scene.xml"
-    for name, data in module.model_files(source).items():
-        (tmp_path / name).write_bytes(data)
-    with quiet_mujoco():
-        before, copy = (
-            mujoco.MjModel.from_xml_path(str(path)) for path in (source, tmp_path / "robot.xml")
-        )
-    assert (copy.nq, copy.nu, copy.nmesh) == (before.nq, before.nu, before.nmesh)
-    assert copy.nmesh > 0
-    np.testing.assert_allclose(copy.body_mass, before.body_mass)
-    np.testing.assert_allclose(copy.geom_size, before.geom_size, atol=1e-6)
-
-
 def test_export_policy_of_a_large_task(trained, tmp_path):
     task = replace(
         trained.task,
