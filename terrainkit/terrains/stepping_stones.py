@@ -39,7 +39,9 @@ class SteppingStones(Terrain):
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the stones; rows are `stone` wide along x, with gaps of `distance`."""
-        stone, distance = grid.cells(self.stone), grid.cells(self.distance)
+        # A stone or gap that covers the patch may as well be the size of the patch.
+        longest = max(grid.shape)
+        stone, distance = (min(grid.cells(v), longest) for v in (self.stone, self.distance))
         pitch, (nx, ny) = stone + distance, grid.shape
         draws = rng.random(nx)
         tops = (2 * rng.random(grid.shape) - 1) * self.variation
