@@ -193,8 +193,8 @@ def test_generate_progress_bar_needs_terminal(tmp_path):
     import pty
 
     command = [sys.executable, "-m", "terrainkit_cli.main", "generate", "-o", "a.npz"]
-    command += ["--rows", "300", "--cols", "100", "--patch-size", "2", "2", "--cell", "0.2"]
-    command += ["--terrain", "rough"]
+    command += ["--rows", "600", "--cols", "100", "--patch-size", "2", "2", "--cell", "0.5"]
+    command += ["--terrain", "flat"]
     ours, theirs = pty.openpty()
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs, text=True)
     os.close(theirs)
