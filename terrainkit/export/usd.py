@@ -98,9 +98,10 @@ def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> No
     """Add a prim for each solid. Those that are not visible are drawn only as guides."""
     from pxr import Gf, UsdGeom
 
-    meshes = solid_meshes(solids)
     shapes = np.concatenate([solids.boxes, solids.cylinders])
-    for k, (mesh, friction) in enumerate(zip(meshes, solids.friction.tolist(), strict=True)):
+    hulls = solid_meshes(solids.select(np.arange(len(solids)) >= len(shapes)))
+    materials: dict[str, Any] = {}
+    for k, friction in enumerate(solids.friction.tolist()):
         path = f"/terrain/solids/solid_{k}"
         if k < len(solids.boxes):
             prim = UsdGeom.Cube.Define(usd_stage, path)
@@ -111,7 +112,7 @@ def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> No
             prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
             prim.CreateHeightAttr(2.0)
         else:
-            prim = _add_mesh(usd_stage, path, mesh)
+            prim = _add_mesh(usd_stage, path, hulls[k - len(shapes)])
         if k < len(shapes):
             pose = shapes[k].tolist()
             prim.AddTranslateOp().Set(Gf.Vec3d(*pose[:3]))
@@ -120,7 +121,10 @@ def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> No
         if not solids.visible[k]:
             prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
         if solids.collides[k]:
-            _set_collider(prim, "convexHull", _solid_material(usd_stage, friction, contact))
+            key = str(friction)  # NaN, the friction of the ground, is not equal to itself
+            if key not in materials:
+                materials[key] = _solid_material(usd_stage, friction, contact)
+            _set_collider(prim, "convexHull", materials[key])
 
 
 def _solid_material(usd_stage: Any, friction: float, contact: dict[str, float]) -> Any:
