@@ -43,7 +43,7 @@ def test_smoke_test_shows_expectation_of_failed_check(here, tmp_path):
     shutil.copytree(get_task("quadruped").folder, tmp_path / "mine")
     spec = tmp_path / "mine" / "robot.toml"
     text = spec.read_text()
-    spec.write_text(text.replace("spawn_height = 0.34626", "spawn_height = 0.64626"))
+    spec.write_text(text.replace("spawn_height = 0.344", "spawn_height = 0.644"))
     run = here("mine", "--samples", 1)
     assert run.returncode == 1, run.stderr
     assert run.stderr == ""

@@ -17,7 +17,7 @@ from tensordict import TensorDict
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
-from terrainkit_robots.export.model_copy import ROBOT_FILE, copy_model
+from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.evaluate import FloatArray, eval_task
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
@@ -27,9 +27,6 @@ from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.terrain import load_terrain
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
-
-EXAMPLE = Path(__file__).with_name("run_policy.py")
-"""A program that runs an exported policy in MuJoCo."""
 
 FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
 """Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots know."""

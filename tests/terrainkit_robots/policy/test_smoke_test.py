@@ -317,7 +317,7 @@ def test_smoke_test_of_a_folder_uses_its_spec(tmp_path):
     folder = tmp_path / "robot"
     shutil.copytree(get_task("quadruped").folder, folder)
     text = (folder / "robot.toml").read_text()
-    edited = text.replace("spawn_height = 0.34626", "spawn_height = 0.64626")
+    edited = text.replace("spawn_height = 0.344", "spawn_height = 0.644")
     assert edited != text
     (folder / "robot.toml").write_text(edited)
     (check,) = smoke_test(str(folder)).checks
