@@ -32,8 +32,8 @@ Activation = Literal[
 class Env(Config):
     """Environments and episodes."""
 
-    num_envs: PositiveInt = 512
-    """Number of parallel environments; 512 to 1024 train fastest on a CPU."""
+    num_envs: PositiveInt = 128
+    """Number of parallel environments; fewer need fewer samples, more use a GPU better."""
     episode_length_s: Annotated[float, Meta(gt=0, le=1e6)] = 20.0
     """Length after which an episode is truncated [s]."""
     num_threads: Annotated[int, Meta(ge=0, le=4096)] = 0
@@ -142,8 +142,8 @@ class DomainRand(Config):
 
     friction: NonNegativeInterval | None = (0.5, 1.25)
     """Friction coefficient of the robot's contacts; none: that of the robot."""
-    added_mass: Interval | None = (-1.0, 1.0)
-    """Mass added to the base [kg]."""
+    added_mass: Interval | None = (-0.07, 0.07)
+    """Mass added to the base, as a fraction of the robot's mass."""
     com_shift: NonNegativeFloat = 0.03
     """Largest offset of the base's center of mass along each axis [m]."""
     gains: NonNegativeInterval | None = (0.9, 1.1)
@@ -280,7 +280,7 @@ class Sim(Config):
 class Policy(Config):
     """Actor and critic networks."""
 
-    init_noise_std: PositiveFloat = 1.0
+    init_noise_std: PositiveFloat = 0.7
     """Initial standard deviation of the actions."""
     actor_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the actor."""
@@ -319,8 +319,8 @@ class Algorithm(Config):
     max_grad_norm: PositiveFloat = 1.0
     """Largest gradient norm."""
     symmetry: Literal["auto", "none", "augmentation", "loss"] = "auto"
-    """Symmetry: add mirrored samples to each batch, or add a mirror loss; auto: a loss if left and
-    right of the robot are mirror images."""
+    """Symmetry: add mirrored samples to each batch, or add a mirror loss; auto: mirrored samples
+    if left and right of the robot are mirror images."""
     mirror_loss_coeff: NonNegativeFloat = 0.5
     """Weight of the mirror loss."""
 
