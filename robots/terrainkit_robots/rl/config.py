@@ -205,7 +205,7 @@ class Rewards(Config):
     tracking_sigma: PositiveFloat = 0.06
     """Width of the tracking rewards, exp(-error^2 / sigma), at zero command [m2/s2]; otherwise it
     is proportional to the squared command."""
-    swing_height: PositiveFloat = 0.2
+    swing_height: PositiveFloat = 0.18
     """Height of a swinging foot above the ground, as a fraction of the leg length."""
 
 
@@ -286,8 +286,8 @@ class Policy(Config):
     """Widths of the hidden layers of the actor."""
     critic_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the critic."""
-    activation: Activation = "elu"
-    """Activation of the hidden layers, as rsl-rl names it."""
+    activation: Activation = "swish"
+    """Activation of the hidden layers, as rsl-rl names it; elu is slow on a CPU."""
     obs_normalization: bool = True
     """Whether observations are normalized by their running mean and standard deviation."""
 
