@@ -73,6 +73,9 @@ class Gait:
         in_front = ((x > x[:, None]) & (left == left[:, None])).sum(axis=1)  # on the same side
         self.offset = 0.5 * ((in_front + left) % 2)
         self._swing_fraction = cfg.swing_fraction
+        # Time constant of the mean velocity that is to track the command [s]. The sway of two legs
+        # exceeds small commands, so that stepping in place would track them less than standing.
+        self.averaging_time = self.period * (1.0 if len(x) == 2 else 0.25)
 
     def phases(self, time: FloatArray, moving: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
         """Return the `gait_phase` and `swing_phase` of a state, from times (n,) [s]."""

@@ -231,7 +231,7 @@ class TestInEnvironment:
         for _ in range(3):
             expected = env.commands.copy()
             _, rewards, *_ = env.step(torch.zeros(4, 12))
-            off = np.square(expected[:, :2] - env.state.base_lin_vel[:, :2]).sum(axis=1)
+            off = np.square(expected - env.state.mean_vel)[:, :2].sum(axis=1)
             share = off / np.square(expected[:, :2]).sum(axis=1)
             np.testing.assert_allclose(rewards, 0.02 * 0.25**share, rtol=1e-4)
             assert (env.commands != expected).any()
