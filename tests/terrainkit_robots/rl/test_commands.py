@@ -149,6 +149,7 @@ class TestGait:
 
     def test_default_period_grows_with_the_leg(self) -> None:
         assert Gait(Commands(), 9.81, self.FEET).period == pytest.approx(2.3)
+        assert Gait(Commands(), 9.81, self.FEET[:2]).period == pytest.approx(3.0)
         assert Gait(Commands(gait_period=0.4), 9.81, self.FEET).period == 0.4
 
     def test_phases_by_hand(self) -> None:
