@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Literal
 
 import tyro
 
 from terrainkit.errors import ConfigError
+from terrainkit.export import export_files
 from terrainkit.terrain_map import TerrainMap
 from terrainkit.text import expected_names, truncate
 from terrainkit_cli import render
@@ -19,9 +21,10 @@ from terrainkit_cli.terrain_commands import written
 class Export(Command):
     """Export a map to other formats, or a policy to ONNX.
 
-    A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png:
-    the suffix of --output selects the format. A .sdf has its meshes in .stl files beside it, and a
-    .png its scale in a .json file.
+    A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .yaml (ROS), .stl, .ply, .obj,
+    .glb or .png: the suffix of --output selects the format. A .sdf has its meshes in .stl files
+    beside it, a .png its scale in a .json file, and a .yaml an occupancy image and an image of the
+    heights.
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt
@@ -57,8 +60,17 @@ class Export(Command):
     y_up: Flag = False
     """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
 
+    max_step: Annotated[
+        float | None, tyro.conf.arg(metavar="M", help_behavior_hint="(default: 0.2)")
+    ] = None
+    """For .yaml: height of the largest step that a robot takes [m]; cells at the top of higher ones
+    are occupied."""
+
     checkpoint: Checkpoint = UNSET
     """For a run: the checkpoint to export."""
+
+    example: Flag = False
+    """For a run: also write run_policy.py, a program that runs the policy in plain MuJoCo."""
 
     overwrite: Flag = False
     """Replace existing files."""
@@ -81,18 +93,20 @@ class Export(Command):
             "full": self.full or None,
             "closed": self.closed or None,
             "y_up": self.y_up or None,
+            "max_step": self.max_step,
         }
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        if self.checkpoint != UNSET:
-            raise ConfigError(f"--checkpoint: got the map {self.source}; expected a run")
+        for name, given in (("checkpoint", self.checkpoint != UNSET), ("example", self.example)):
+            if given:
+                raise ConfigError(f"--{name}: got the map {self.source}; expected a run")
         terrain_map = TerrainMap.load(self.source)
         if not self.output:
             raise ConfigError("--output: missing; expected a file, whose suffix selects the format")
         output = Path(self.output)
-        terrain_map.save(output, overwrite=self.overwrite, **self._map_options())
-        render.result(written(terrain_map, output))
+        files = export_files(terrain_map, output, overwrite=self.overwrite, **self._map_options())
+        render.result(written(terrain_map, *files))
         is_auto = self.collision in (None, "auto")
         if output.suffix == ".xml" and is_auto and "<hfield" in output.read_text():
             render.result(
@@ -117,7 +131,7 @@ class Export(Command):
             # The folder of a bundled policy is part of an installed package.
             default = Path(f"{run.folder.name}_policy")
         folder = Path(self.output) if self.output else default
-        result = export_policy(run, folder, overwrite=self.overwrite)
+        result = export_policy(run, folder, example=self.example, overwrite=self.overwrite)
         checkpoint = run.checkpoint.name if run.checkpoint else ""
         render.result(
             f"wrote {', '.join(map(str, result.files))}: {result.num_observations} observations "
@@ -126,6 +140,8 @@ class Export(Command):
         errors = zip(result.files, result.errors, strict=False)
         differences = ", ".join(f"{file.name} {error:.1e}" for file, error in errors)
         render.result(f"verified: largest difference from the checkpoint: {differences}")
+        if self.example:
+            render.result(f"next: python {quote(str(result.files[-1]))} --vx 0.5 --viewer")
 
 
 def is_run(source: str) -> bool:

@@ -47,11 +47,11 @@ class LeggedEnv(VecEnv):
         check_env_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
         self.sim = Simulation(self.scene, n, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
-        self.sensors = Sensors(self.sim, terrain, task, scan=scan)
         heading = task.commands.heading_command
         heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
+        self.sensors = Sensors(self.sim, terrain, task, self.gait.averaging_time, scan=scan)
         self.pushes = Pushes(task.domain_rand, n, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.obs_groups = {
@@ -308,6 +308,7 @@ class LeggedEnv(VecEnv):
             "heading": self.velocity_command.heading,
             "actions": self.actions,
             "last_dof_vel": self.sensors.last_dof_vel,
+            "mean_vel": self.sensors.mean_vel,
             "joint_offset": self.joint_offset,
             "push_vel": self.pushes.velocity,
             "steps_until_push": self.pushes.steps_until_push,

@@ -44,6 +44,7 @@ def sample_params(
     """Sample the physical parameters of `num_envs` robots."""
     joints, scene = sim.scene.model.nu, sim.scene
     nominal = scene.model.geom_friction[scene.geoms, 0].astype(np.float32)
+    mass = scene.model.body_subtreemass[scene.base].astype(np.float32)
 
     def uniform(limits: tuple[float, float] | None, width: int, default: float) -> FloatArray:
         low, high = limits or (default, default)
@@ -54,7 +55,7 @@ def sample_params(
     return RandomizedParams(
         friction=friction,
         geom_friction=np.broadcast_to(geom_friction, (num_envs, len(nominal))).copy(),
-        added_mass=uniform(cfg.added_mass, 1, 0.0),
+        added_mass=mass * uniform(cfg.added_mass, 1, 0.0),
         com_shift=rng.uniform(-cfg.com_shift, cfg.com_shift, (num_envs, 3)).astype(np.float32),
         stiffness=uniform(cfg.gains, joints, 1.0),
         damping=uniform(cfg.gains, joints, 1.0),

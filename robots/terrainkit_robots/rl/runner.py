@@ -313,7 +313,7 @@ def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
     policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
     symmetry = algorithm.pop("symmetry")
     if symmetry == "auto":
-        symmetry = "loss" if is_symmetric else "none"
+        symmetry = "augmentation" if is_symmetric else "none"
     symmetry_cfg = {
         "data_augmentation_func": "terrainkit_robots.rl.symmetry:augment",
         "use_data_augmentation": symmetry == "augmentation",
