@@ -77,7 +77,10 @@ class TestObservations:
         env = LeggedEnv(nominal_task(), quadruped, Plane())
         assert env.get_observations()["policy"].shape == (4, 47)
         # Plus velocity 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
-        assert env.get_observations()["privileged"].shape == (4, 47 + 3 + 3 + 1 + 1 + 3 + 12 + 3 + 12)
+        assert env.get_observations()["privileged"].shape == (
+            4,
+            47 + 3 + 3 + 1 + 1 + 3 + 12 + 3 + 12,
+        )
         env = LeggedEnv(nominal_task(), quadruped, map_ground)
         assert env.get_observations()["policy"].shape == (4, 47 + 187)
         env = LeggedEnv(nominal_task(), biped, Plane())
