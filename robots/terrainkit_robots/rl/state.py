@@ -41,8 +41,8 @@ class State:
     base_ang_vel: FloatArray
     """Angular velocity of the base, base frame [rad/s], shape (n, 3)."""
     mean_vel: FloatArray
-    """Forward and left velocity [m/s] and yaw rate [rad/s] without the sway of the gait: moving
-    averages over its period, shape (n, 3)."""
+    """Forward and left velocity [m/s] and yaw rate [rad/s], with less of the sway of the gait:
+    exponential moving averages, shape (n, 3)."""
     projected_gravity: FloatArray
     """Direction of gravity, base frame, shape (n, 3); (0, 0, -1) when upright."""
     base_height: FloatArray
@@ -98,12 +98,12 @@ class Sensors:
     """Measure n robots; keep the values that the next measurement is compared with."""
 
     def __init__(
-        self, sim: Simulation, terrain: Terrain, task: Task, period: float, *, scan: bool
+        self, sim: Simulation, terrain: Terrain, task: Task, averaging_time: float, *, scan: bool
     ) -> None:
         n, joints = len(sim.qpos), len(sim.scene.joint_qvel)
         self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
         self.mean_vel = np.zeros((n, 3), np.float32)
-        self._mean_weight = np.float32(task.dt / max(period, task.dt))
+        self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         self._sim, self._terrain, self._cfg = sim, terrain, task.termination
         self._dt = np.float32(task.dt)
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
