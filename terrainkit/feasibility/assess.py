@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility.bottleneck import bottleneck, shortest_path
-from terrainkit.feasibility.columns import Columns, IntArray, sample_columns
+from terrainkit.feasibility.columns import Columns, FloatArray, IntArray, sample_columns
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.gaps import gap_edges
@@ -117,8 +117,8 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
     columns = sample_columns(patch, threshold)
     legs = _legs(patch, columns)
     graph = FootholdGraph.build(columns, limits, _rim(patch, columns, legs))
-    edges, demand = _edges(graph, legs)
-    path = _Path(graph, edges, demand, legs)
+    edges, demand, bottlenecks = _edges(graph, legs)
+    path = _Path(graph, edges, demand, legs, bottlenecks)
     return PatchFeasibility(
         row=0,
         col=0,
@@ -179,8 +179,8 @@ def _rim(patch: Patch, columns: Columns, legs: list[Leg]) -> NDArray[np.bool_]:
     return is_rim
 
 
-def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, np.ndarray]:
-    """Return the edges that the least demanding path may use, and their demands.
+def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, FloatArray, list[float]]:
+    """Return the edges that the least demanding path may use, their demands, and those of the legs.
 
     Gaps are only searched between regions that no smaller demand joins than that of the narrowest
     gap, and only up to the demand of the path without them. Wider ones would not change the result.
@@ -191,14 +191,15 @@ def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, np.ndarray]:
     searched = narrowest
     regions = None
     for reach in _REACHES:
-        most = max(bottleneck(edges, demand, *leg, size) for leg in legs)
+        bottlenecks = [bottleneck(edges, demand, *leg, size) for leg in legs]
+        most = max(bottlenecks)
         if most <= searched:
-            break
+            return edges, demand, bottlenecks
         if regions is None:
             regions = Regions.build(steps, demand, graph.node_demand, narrowest)
         edges = Edges.concatenate([steps, gap_edges(graph, regions, min(most, reach))])
         demand, searched = graph.demand(edges), reach
-    return edges, demand
+    return edges, demand, [bottleneck(edges, demand, *leg, size) for leg in legs]
 
 
 def _narrowest_gap(graph: FootholdGraph) -> float:
@@ -211,16 +212,20 @@ class _Path:
     """The path through all legs, and its blocking place."""
 
     def __init__(
-        self, graph: FootholdGraph, edges: Edges, demand: np.ndarray, legs: list[Leg]
+        self,
+        graph: FootholdGraph,
+        edges: Edges,
+        demand: FloatArray,
+        legs: list[Leg],
+        bottlenecks: list[float],
     ) -> None:
         self.demand, self.limit, self.value = 0.0, "", float("nan")
         self.place = np.full(3, np.nan)
         size, position = graph.columns.floor.size, graph.columns.positions
         nodes = [legs[0][0]]
-        for start, targets in legs:
+        for (start, targets), most in zip(legs, bottlenecks, strict=True):
             if nodes[-1] != start:
                 break
-            most = bottleneck(edges, demand, start, targets, size)
             usable = edges.select(demand <= most)
             ends = position(usable.end) - position(usable.start)
             length = np.linalg.norm(ends, axis=1) * (1.0 + demand[demand <= most])

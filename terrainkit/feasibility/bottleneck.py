@@ -44,15 +44,16 @@ def bottleneck(
     Returns:
         The largest demand of an edge of the path; 0 if `start` is a target, inf without a path.
     """
-    is_target = np.zeros(num_nodes, dtype=bool)
-    is_target[targets] = True
-    if is_target[start]:
+    if (targets == start).any():
         return 0.0
+    order = np.argsort(edges.start, kind="stable")
+    rows = np.searchsorted(edges.start[order], np.arange(num_nodes + 1))
+    ends, demand = edges.end[order], demand[order]
     levels = np.unique(demand[np.isfinite(demand)])
     low, high = 0, len(levels)  # the answer is levels[low] to levels[high]; the last stands for inf
     while low < high:
         middle = (low + high) // 2
-        if _reaches(edges, demand <= levels[middle], start, is_target):
+        if _reaches(rows, ends, demand <= levels[middle], start, targets):
             high = middle
         else:
             low = middle + 1
@@ -92,13 +93,26 @@ def shortest_path(
 
 
 def _reaches(
-    edges: Edges, usable: NDArray[np.bool_], start: int, is_target: NDArray[np.bool_]
+    rows: IntArray, ends: IntArray, usable: NDArray[np.bool_], start: int, targets: IntArray
 ) -> bool:
+    """Return whether usable edges lead from `start` to a target.
+
+    Args:
+        rows: Number of the first edge of each node, and the number of edges, shape (nodes + 1,).
+        ends: Second node of each edge, in the order of the first nodes.
+        usable: Which edges the path may use.
+        start: The first node.
+        targets: Nodes of which the path reaches one.
+    """
+    from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order
 
-    graph = _matrix(edges, usable, len(is_target))
+    # Built without sorting: the edges are in the order of the rows, whatever is left out.
+    before = np.concatenate([[0], np.cumsum(usable)])[rows].astype(np.int32)
+    values, size = np.ones(int(before[-1])), len(rows) - 1
+    graph = csr_matrix((values, ends[usable].astype(np.int32), before), shape=(size, size))
     reached = breadth_first_order(graph, start, return_predecessors=False)
-    return bool(is_target[reached].any())
+    return bool(np.isin(targets, reached).any())
 
 
 def _matrix(edges: Edges, which: Any, num_nodes: int, weight: FloatArray | None = None) -> Any:
