@@ -13,6 +13,7 @@ from msgspec import Meta
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import (
+    SORTED,
     Fraction,
     Interval,
     NonNegativeFloat,
@@ -22,7 +23,9 @@ from terrainkit.type_hint import (
 )
 
 HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
+DelayTime = Annotated[float, Meta(ge=0, le=1)]
 ScanPoints = Annotated[tuple[float, ...], Meta(min_length=1)]
+ActionDelay = Annotated[tuple[DelayTime, DelayTime], SORTED]
 Activation = Literal[
     "elu", "selu", "relu", "crelu", "lrelu", "tanh", "sigmoid", "softplus", "gelu", "swish", "mish"
 ]
@@ -57,6 +60,18 @@ class Terrain(Config):
     """Points of the height scan along the heading of the robot [m]."""
     measured_points_y: ScanPoints = tuple(round(-0.5 + 0.1 * k, 1) for k in range(11))
     """Points of the height scan to the left of the robot [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Observations(Config):
+    """Additional observations of the policy."""
+
+    base_lin_vel: bool = False
+    """Whether the policy observes the base linear velocity, with the noise `noise.lin_vel`."""
+    foot_contact: bool = False
+    """Whether the policy observes which feet are in contact."""
+    history_length: Annotated[int, Meta(ge=1, le=100)] = 1
+    """Number of latest observations, the current one included; height scans have no history."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,6 +167,8 @@ class DomainRand(Config):
     """Factor on all torques of a robot."""
     joint_offset: NonNegativeFloat = 0.02
     """Largest zero offset of each joint, sampled at each reset [rad]."""
+    action_delay: ActionDelay | None = None
+    """Delay of the actions, sampled at each reset, in multiples of `sim.dt` [s]; none: no delay."""
     push_interval_s: NonNegativeFloat = 15.0
     """Time between pushes [s]; 0 for no pushes."""
     max_push_vel_xy: NonNegativeFloat = 1.0
@@ -258,6 +275,8 @@ class Noise(Config):
     """Noise of joint velocities [rad/s]."""
     ang_vel: NonNegativeFloat = 0.2
     """Noise of the base angular velocity [rad/s]."""
+    lin_vel: NonNegativeFloat = 0.5
+    """Noise of the base linear velocity, if it is observed [m/s]."""
     gravity: NonNegativeFloat = 0.05
     """Noise of the gravity direction."""
     height_measurements: NonNegativeFloat = 0.1
@@ -347,6 +366,7 @@ class Task(Config):
 
     env: Env = field(default_factory=Env)
     terrain: Terrain = field(default_factory=Terrain)
+    observations: Observations = field(default_factory=Observations)
     init_state: InitState = field(default_factory=InitState)
     control: Control = field(default_factory=Control)
     asset: Asset = field(default_factory=Asset)
@@ -370,6 +390,9 @@ class Task(Config):
         if self.asset.collisions != "all" and self.rewards.collision:
             got = f"rewards.collision: got {self.rewards.collision:g}"
             raise ConfigError(f"{got}; expected 0 with asset.collisions {self.asset.collisions}")
+        if (delay := self.domain_rand.action_delay) and not self.max_delay_steps:
+            expected = f"expected an end above half of sim.dt {self.sim.dt:g}, or none"
+            raise ConfigError(f"domain_rand.action_delay: got {list(delay)}; {expected}")
         samples = self.env.num_envs * self.runner.num_steps_per_env
         if samples < self.algorithm.num_mini_batches:
             got = f"algorithm.num_mini_batches: got {self.algorithm.num_mini_batches}"
@@ -380,6 +403,11 @@ class Task(Config):
     def dt(self) -> float:
         """Time between policy steps [s]."""
         return self.sim.dt * self.control.decimation
+
+    @property
+    def max_delay_steps(self) -> int:
+        """Simulation steps of the longest action delay; 0 without a delay."""
+        return round((self.domain_rand.action_delay or (0, 0))[1] / self.sim.dt)
 
     @property
     def max_episode_length(self) -> int:

@@ -22,20 +22,13 @@ MAX_RESET_RELIEF = 0.06
 class RandomizedParams:
     """Physical parameters of n robots with g colliding geoms and j joints."""
 
-    friction: FloatArray
-    """Mean contact friction, shape (n, 1)."""
-    geom_friction: FloatArray
-    """Friction of each colliding geom, shape (n, g)."""
-    added_mass: FloatArray
-    """Mass added to the base [kg], shape (n, 1)."""
-    com_shift: FloatArray
-    """Shift of the base's center of mass [m], shape (n, 3)."""
-    stiffness: FloatArray
-    """Factor on the stiffness of each joint, shape (n, j)."""
-    damping: FloatArray
-    """Factor on the damping of each joint, shape (n, j)."""
-    strength: FloatArray
-    """Factor on all torques, shape (n, 1)."""
+    friction: FloatArray  # mean contact friction, shape (n, 1)
+    geom_friction: FloatArray  # friction of each colliding geom, shape (n, g)
+    added_mass: FloatArray  # mass added to the base [kg], shape (n, 1)
+    com_shift: FloatArray  # shift of the base's center of mass [m], shape (n, 3)
+    stiffness: FloatArray  # factor on the stiffness of each joint, shape (n, j)
+    damping: FloatArray  # factor on the damping of each joint, shape (n, j)
+    strength: FloatArray  # factor on all torques, shape (n, 1)
 
 
 def sample_params(

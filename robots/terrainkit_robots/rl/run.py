@@ -54,18 +54,12 @@ class RunInfo(Config):
 class Run:
     """A training run."""
 
-    folder: Path
-    """Folder of the run."""
-    info: RunInfo
-    """What it was made from."""
-    task: Task
-    """Its task."""
-    robot: Robot
-    """The robot, with the spec it was trained with."""
-    terrain: str
-    """The terrain, as `load_terrain` takes it: `plane` or a path."""
-    checkpoint: Path | None
-    """The selected checkpoint, by default the last; None if there is none."""
+    folder: Path  # folder of the run
+    info: RunInfo  # what it was made from
+    task: Task  # its task
+    robot: Robot  # the robot, with the spec it was trained with
+    terrain: str  # the terrain, as `load_terrain` takes it: `plane` or a path
+    checkpoint: Path | None  # the selected checkpoint, by default the last; None if there is none
 
 
 def checkpoints(folder: Path) -> dict[int, Path]:
@@ -101,11 +95,8 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         versions={name: version(name) for name in packages},
         robot_sha256=_robot_digests(robot_folder),
     )
-    files = {
-        RUN_FILE: info.to_toml(),
-        TASK_FILE: task.to_toml(),
-        SPEC_FILE: read_text(robot_folder / SPEC_FILE),
-    }
+    files = {RUN_FILE: info.to_toml(), TASK_FILE: task.to_toml()}
+    files[SPEC_FILE] = read_text(robot_folder / SPEC_FILE)
     if map_config is not None:
         files[MAP_FILE] = map_config.to_toml()
     write_run_folder(folder, {name: text.encode() for name, text in files.items()})
@@ -189,8 +180,7 @@ def changed_robot_files(run: Run) -> tuple[str, ...]:
     if recorded is None:
         return ()
     current = _robot_digests(tasks.get_task(run.info.robot).folder)
-    names = sorted({*recorded, *current})
-    return tuple(name for name in names if recorded.get(name) != current.get(name))
+    return tuple(sorted({name for name, _ in recorded.items() ^ current.items()}))
 
 
 def is_same_terrain(run: Run, terrain: str | Path) -> bool:

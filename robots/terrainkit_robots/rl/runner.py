@@ -321,11 +321,8 @@ def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
         "mirror_loss_coeff": algorithm.pop("mirror_loss_coeff"),
     }
     distribution = {"class_name": "GaussianDistribution", "init_std": policy.init_noise_std}
-    network = {
-        "class_name": "MLPModel",
-        "activation": policy.activation,
-        "obs_normalization": policy.obs_normalization,
-    }
+    network: dict[str, Any] = {"class_name": "MLPModel", "activation": policy.activation}
+    network |= {"obs_normalization": policy.obs_normalization}
     actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
     loggers = {
         "tensorboard": {"class_name": "torch.utils.tensorboard:SummaryWriter", "flush_secs": 10},
