@@ -17,9 +17,10 @@ from terrainkit_robots.policy.evaluate import eval_task, rollout
 from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Task
+from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
@@ -111,6 +112,8 @@ def measure_terms(env, config):
         "dof_pos": qpos[:, env.scene.joint_qpos],
         "dof_vel": qvel[:, env.scene.joint_qvel],
         "actions": env.actions[0],
+        "base_lin_vel": np.einsum("nij,ni->nj", rotations, qvel[:, :3]),
+        "foot_contact": env.state.foot_force[..., 2] > 1,
     }
     if config["gait"]:
         angle = 2 * np.pi * env.steps_since_reset * env.cfg.dt / config["gait"]["period"]
@@ -127,18 +130,38 @@ def measure_terms(env, config):
     return terms
 
 
-@pytest.mark.parametrize(("on_map", "size"), [(False, 47), (True, 234)])
-def test_json_reproduces_the_observations(quadruped, map_terrain, on_map, size):
-    task = replace(SMALL, noise=Noise(noise_level=0.0), domain_rand=DomainRand(joint_offset=0.0))
+ALL = Observations(base_lin_vel=True, foot_contact=True, history_length=3)
+
+
+@pytest.mark.parametrize(
+    ("on_map", "observations", "size"),
+    [
+        (False, Observations(), 47),
+        (True, Observations(), 234),
+        (False, ALL, 3 * 54),
+        (True, ALL, 3 * 54 + 187),
+    ],
+)
+def test_json_reproduces_the_observations(quadruped, map_terrain, on_map, observations, size):
+    domain_rand = DomainRand(joint_offset=0.0, action_delay=(0.0, 0.02))
+    task = replace(SMALL, noise=Noise(noise_level=0.0), domain_rand=domain_rand)
+    task = replace(task, observations=observations)
     env = LeggedEnv(task, quadruped, map_terrain if on_map else Plane())
     config = json.loads(json.dumps(describe_policy(env)))
     assert config["observation"]["size"] == size
     clip = config["observation"]["clip"]
+    assert config["observation"]["history_length"] == observations.history_length
     generator = torch.Generator().manual_seed(0)
     for _ in range(30):
+        previous = env.get_observations()["policy"].numpy()
         env.step(torch.randn(4, 12, generator=generator))
         terms, scaled = measure_terms(env, config), []
         for part in config["observation"]["parts"]:
+            if part["name"] == "history":  # as `formulas` says
+                size = part["stop"] - part["start"]
+                first = np.tile(np.concatenate(scaled, axis=1), (1, 2))
+                is_new = env.steps_since_reset[:, None] == 0
+                terms["history"] = np.where(is_new, first, previous[:, :size])
             value = terms[part["name"]] - part["offset"]
             scaled.append(np.clip(value, *part.get("clip", (-np.inf, np.inf))) * part["scale"])
             assert scaled[-1].shape[1] == part["stop"] - part["start"]
@@ -194,6 +217,18 @@ def run_example(folder, robot, tmp_path, monkeypatch):
     assert names["rotation"].reshape(3, 3)[2, 2] > 0.9
     assert data.time == pytest.approx(5)
     return data
+
+
+def test_exported_policy_with_a_history(make_run, tmp_path, monkeypatch):
+    options = Observations(base_lin_vel=True, history_length=3)
+    run = make_run(observations=options)
+    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(1)
+    result = export_policy(open_run(run.folder), tmp_path / "exported")
+    assert max(result.errors) <= 1e-5
+    assert result.num_observations == 150
+    run_example(tmp_path / "exported", run.robot, tmp_path, monkeypatch)
+    parts = json.loads((tmp_path / "policy.json").read_text())["observation"]["parts"]
+    assert [parts[-1][key] for key in ("name", "start", "stop")] == ["history", 50, 150]
 
 
 def test_docs_example_runs_a_policy(exported, quadruped, tmp_path, monkeypatch):
