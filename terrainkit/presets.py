@@ -23,6 +23,16 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "gap": {},
         "pit": {},
     },
+    # `terrain_proportions` of legged_gym: slopes .1, rough slopes .1, stairs up .35 and down .25,
+    # obstacles .2. With 20 columns, as there, each terrain has whole columns.
+    "legged_gym_rough": {
+        "pyramid_slope_inverted": {"proportion": 0.05},
+        "pyramid_slope": {"proportion": 0.05},
+        "rough_slope": {"proportion": 0.1},
+        "pyramid_stairs_inverted": {"proportion": 0.35},
+        "pyramid_stairs": {"proportion": 0.25},
+        "obstacles": {"proportion": 0.2},
+    },
     # ROUGH_TERRAINS_CFG of Isaac Lab 2.3. Its rough ground is 0.02 to 0.10 m high at every
     # difficulty.
     "isaaclab": {

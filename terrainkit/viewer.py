@@ -47,21 +47,25 @@ def show_map(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
     server.gui.add_markdown(f"`{terrain_map!r}`")
     for name, handles in parts.items():
         if handles:
-            _add_checkbox(server, name, handles)
+            add_checkbox(server, name, handles)
     config, center = terrain_map.config, np.array([*terrain_map.grid.center, 0.0])
     extent = max(config.rows * config.patch_size[0], config.cols * config.patch_size[1])
     server.initial_camera.look_at = center
     server.initial_camera.position = center + 0.55 * extent * np.array([-1.0, 0.0, 0.8])
 
 
-def _add_checkbox(server: "viser.ViserServer", name: str, handles: list[Any]) -> None:
-    checkbox = server.gui.add_checkbox(name, initial_value=True)
+def add_checkbox(
+    server: "viser.ViserServer", name: str, handles: list[Any], *, initial_value: bool = True
+) -> "viser.GuiCheckboxHandle":
+    """Add a checkbox that shows and hides a part of the scene, and return it."""
+    checkbox = server.gui.add_checkbox(name, initial_value=initial_value)
 
     def update(_: object) -> None:
         for handle in handles:
             handle.visible = checkbox.value
 
     checkbox.on_update(update)
+    return checkbox
 
 
 def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:

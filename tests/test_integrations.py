@@ -28,7 +28,7 @@ def m(tmp_path, monkeypatch):
 
 
 def test_integrations_all_blocks_are_tested():
-    assert len(BLOCKS) == 13
+    assert len(BLOCKS) == 14
 
 
 def test_numpy_block_reads_map(m):
@@ -71,3 +71,11 @@ def test_mujoco_adapter_block_adds_map_to_robot():
     names = {}
     exec(block("add_map(spec"), names)
     assert names["model"].ngeom > 0
+
+
+def test_gymnasium_block_runs_map(m):
+    names = {}
+    exec(block("import gymnasium"), names)
+    assert names["env"].env.terrain.terrain_map.grid == m.grid
+    assert names["observations"].shape[0] == 16
+    assert np.isfinite(names["observations"]).all()

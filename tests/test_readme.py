@@ -125,7 +125,8 @@ def test_readme_check_robot_commands_run():
     for words in lines:
         words = [word for part in words for word in (["my_robot.urdf"] if "*" in part else [part])]
         assert words.pop(0) == "terrainkit"
-        codes.append(main(words))
+        if words[0] != "view":  # it runs until it is interrupted
+            codes.append(main(words))
     assert codes == [0, 1, 0, 1, 0]
     assert Path("robots.sarif").exists()
 

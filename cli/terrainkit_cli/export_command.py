@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from terrainkit.errors import ConfigError
+from terrainkit.export import export_files
 from terrainkit.terrain_map import TerrainMap
 from terrainkit.text import expected_names, truncate
 from terrainkit_cli import render
@@ -19,9 +20,10 @@ from terrainkit_cli.terrain_commands import written
 class Export(Command):
     """Export a map to other formats, or a policy to ONNX.
 
-    A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png:
-    the suffix of --output selects the format. A .sdf has its meshes in .stl files beside it, and a
-    .png its scale in a .json file.
+    A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .yaml (ROS), .stl, .ply, .obj,
+    .glb or .png: the suffix of --output selects the format. A .sdf has its meshes in .stl files
+    beside it, a .png its scale in a .json file, and a .yaml an occupancy image and an image of the
+    heights.
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt
@@ -57,6 +59,12 @@ class Export(Command):
     y_up: Flag = False
     """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
 
+    max_step: Annotated[
+        float | None, tyro.conf.arg(metavar="M", help_behavior_hint="(default: 0.2)")
+    ] = None
+    """For .yaml: height of the largest step that a robot takes [m]; cells at the top of higher ones
+    are occupied."""
+
     checkpoint: Checkpoint = UNSET
     """For a run: the checkpoint to export."""
 
@@ -81,6 +89,7 @@ class Export(Command):
             "full": self.full or None,
             "closed": self.closed or None,
             "y_up": self.y_up or None,
+            "max_step": self.max_step,
         }
         return {name: value for name, value in given.items() if value is not None}
 
@@ -91,8 +100,8 @@ class Export(Command):
         if not self.output:
             raise ConfigError("--output: missing; expected a file, whose suffix selects the format")
         output = Path(self.output)
-        terrain_map.save(output, overwrite=self.overwrite, **self._map_options())
-        render.result(written(terrain_map, output))
+        files = export_files(terrain_map, output, overwrite=self.overwrite, **self._map_options())
+        render.result(written(terrain_map, *files))
         is_auto = self.collision in (None, "auto")
         if output.suffix == ".xml" and is_auto and "<hfield" in output.read_text():
             render.result(

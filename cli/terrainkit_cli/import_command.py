@@ -54,8 +54,8 @@ class Import(ConfigCommand):
         options: ImportOptions = self.changed_config()
         export.check_export(self.output, 0, overwrite=self.overwrite)
         imported = import_map(self.file, options)
-        imported.terrain_map.save(self.output, overwrite=self.overwrite)
-        render.result(written(imported.terrain_map, self.output))
+        files = export.export_files(imported.terrain_map, self.output, overwrite=self.overwrite)
+        render.result(written(imported.terrain_map, *files))
         for line in _report_lines(imported.report, has_solids=options.solids):
             render.result(line)
         if self.output.suffix == ".npz":

@@ -12,7 +12,7 @@ import tyro
 
 from terrainkit import presets, registry
 from terrainkit.config import MapConfig
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, listing
 from terrainkit.overlay import Overlay
 from terrainkit.parameter import Parameter, format_value, parameters_of
 from terrainkit.sub_terrain import SubTerrain
@@ -87,8 +87,8 @@ class Generate(ConfigCommand):
         export.check_export(self.output, samples, overwrite=self.overwrite)
         with worker_pool(self.jobs) as executor:
             terrain_map = generate(config, progress=render.progress, executor=executor)
-        terrain_map.save(self.output, overwrite=self.overwrite)
-        render.result(written(terrain_map, self.output))
+        files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
+        render.result(written(terrain_map, *files))
         if self.output.suffix == ".npz":
             path = quote(str(self.output))
             render.result(
@@ -433,11 +433,13 @@ class Diff(Command):
         return 0
 
 
-def written(terrain_map: TerrainMap, path: Path) -> str:
-    """Return the message about a written map."""
+def written(terrain_map: TerrainMap, path: Path, *others: Path) -> str:
+    """Return the message about a written map, and other files that were written beside it."""
     config, grid = terrain_map.config, terrain_map.grid
+    beside = f", with {listing(each.name for each in others)} beside it" if others else ""
     return (
-        f"wrote {path}: {config.rows} x {config.cols} patches of {_size_text(*config.patch_size)}, "
+        f"wrote {path}{beside}: "
+        f"{config.rows} x {config.cols} patches of {_size_text(*config.patch_size)}, "
         f"{grid.shape[0]} x {grid.shape[1]} samples, {_bytes_text(path.stat().st_size)}"
     )
 

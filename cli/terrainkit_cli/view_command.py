@@ -1,28 +1,78 @@
-"""The command that shows a map in the browser."""
+"""The command that shows maps, robots and policies in the browser."""
 
 import socket
 import time
+from collections.abc import Callable
 from contextlib import redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
 
 from terrainkit.errors import ConfigError
 from terrainkit.terrain_map import TerrainMap
+from terrainkit.text import expected_names, truncate
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
-from terrainkit_cli.terrain_commands import MapFile
+from terrainkit_cli.robot_options import (
+    UNSET,
+    Checkpoint,
+    Flag,
+    Packages,
+    XacroArguments,
+    optional_number,
+    parse_settings,
+    text_option,
+)
+
+if TYPE_CHECKING:
+    import viser
+
+Kind = Literal["map", "robot", "run"]
+
+OPTION_KINDS: dict[str, Kind] = {
+    "terrain": "run",
+    "checkpoint": "run",
+    "package": "robot",
+    "xacro_arg": "robot",
+}
+"""Options that apply to only one kind of source."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class View(Command):
-    """Show a map in the browser, in 3D.
+    """Show a map, a robot or a policy in the browser, in 3D.
+
+    A robot has sliders for its joints and a list of the findings of check-robot. A policy walks
+    live in MuJoCo, with sliders for its commands.
 
     The command prints the address and runs until Ctrl+C. It needs no display: with the default
     host, forward the port of a remote machine (ssh -L 8080:localhost:8080) and open the address.
     """
 
-    map: MapFile
-    """The map, a file written by terrainkit generate."""
+    source: Annotated[
+        str, tyro.conf.Positional, tyro.conf.arg(metavar="MAP.npz|ROBOT|RUN", help_behavior_hint="")
+    ] = ""
+    """A map; a URDF, xacro or MJCF file, an onboarded folder, or a bundled robot; or a run of
+    terrainkit train, a checkpoint in one, or a bundled policy."""
+
+    policy: Flag = False
+    """Show the bundled policy of a robot instead of the robot."""
+
+    terrain: Annotated[str, text_option("TERRAIN")] = ""
+    """For a policy: plane, a map (.npz), or a map config (.toml); by default, the terrain of the
+    training."""
+
+    checkpoint: Checkpoint = UNSET
+    """For a policy: the checkpoint to load."""
+
+    package: Packages = field(default_factory=list)
+    """For a robot: folder of a ROS package, for package:// and $(find ...)."""
+
+    xacro_arg: XacroArguments = field(default_factory=list)
+    """For a robot: value of a xacro argument of the file."""
 
     host: str = "localhost"
     """Address that the server listens on; 0.0.0.0 is reachable from other machines."""
@@ -32,14 +82,35 @@ class View(Command):
 
     def run(self) -> int:
         """Serve the view until the command is interrupted."""
+        if not self.source:
+            raise ConfigError("MAP.npz, ROBOT or RUN: missing; expected a map, a robot or a run")
         try:
             import viser
         except ModuleNotFoundError:
             raise ConfigError(
                 "view requires viser; install it with: pip install terrainkit[view]"
             ) from None
-        from terrainkit.viewer import show_map
+        self._check_address()
+        kind = source_kind(self.source, policy=self.policy)
+        for name, expected in OPTION_KINDS.items():
+            if getattr(self, name) not in ("", UNSET, []) and kind != expected:
+                option = name.replace("_", "-")
+                raise ConfigError(
+                    f"--{option}: got the {kind} {self.source}; expected a {expected}"
+                )
+        show = {"map": self._load_map, "robot": self._check_robot, "run": self._open_run}[kind]()
+        with redirect_stdout(StringIO()):  # viser prints a banner
+            server = viser.ViserServer(host=self.host, port=self.port, verbose=False)
+        try:
+            run = show(server)
+            address = f"http://{self.host}:{server.get_port()}"
+            render.result(f"{address} shows {self.source}; Ctrl+C ends it")
+            run()
+        finally:
+            server.stop()
+        return 0
 
+    def _check_address(self) -> None:
         if not 0 < self.port < 1 << 16:
             raise ConfigError(f"--port: got {self.port}; expected 1 to 65535")
         try:  # viser would wait forever for a server that cannot listen
@@ -50,13 +121,94 @@ class View(Command):
                 f"--host: got {self.host}, which is not an address of this machine "
                 f"({error.strerror}); expected localhost or 0.0.0.0"
             ) from None
-        terrain_map = TerrainMap.load(self.map)
-        with redirect_stdout(StringIO()):  # viser prints a banner
-            server = viser.ViserServer(host=self.host, port=self.port, verbose=False)
-        show_map(server, terrain_map)
-        render.result(f"http://{self.host}:{server.get_port()} shows {self.map}; Ctrl+C ends it")
-        try:
-            while True:
-                time.sleep(1.0)
-        finally:
-            server.stop()
+
+    def _load_map(self) -> "Show":
+        from terrainkit.viewer import show_map
+
+        terrain_map = TerrainMap.load(self.source)
+
+        def show(server: "viser.ViserServer") -> Callable[[], None]:
+            show_map(server, terrain_map)
+            return wait
+
+        return show
+
+    def _check_robot(self) -> "Show":
+        from terrainkit_robots.description import bundled
+        from terrainkit_robots.lint.check import check_robot
+        from terrainkit_robots.lint.settings import read_settings
+        from terrainkit_robots.spec.robot import SPEC_FILE
+        from terrainkit_robots.spec.robot_spec import RobotSpec
+        from terrainkit_robots.viewer.show_robot import show_robot
+
+        path, spec = bundled.urdf_path(self.source) or Path(self.source), None
+        if Path(self.source).exists():
+            path = Path(self.source)
+        if path.is_dir():
+            spec = path / SPEC_FILE
+            path = path / RobotSpec.load(spec).urdf
+        given = parse_settings([], self.package, self.xacro_arg)
+        with render.steps() as steps:
+            steps.update("checking the robot")
+            report = check_robot(path, given.over(read_settings(path.parent)), spec=spec)
+        if not report.facts.bodies:
+            raise ConfigError(f"{path} does not describe a robot; see terrainkit check-robot")
+
+        def show(server: "viser.ViserServer") -> Callable[[], None]:
+            show_robot(server, report)
+            return wait
+
+        return show
+
+    def _open_run(self) -> "Show":
+        from terrainkit_cli.training_extra import require_training
+
+        require_training()
+        from terrainkit_robots.rl.run import open_run
+        from terrainkit_robots.viewer.show_policy import PolicyView
+
+        run = open_run(self.source, optional_number(self.checkpoint))
+        return lambda server: PolicyView(server, run, self.terrain or None).run
+
+
+Show = Callable[["viser.ViserServer"], Callable[[], None]]
+"""A function that fills the scene, and returns a function that runs until it is interrupted."""
+
+
+def wait() -> None:
+    """Wait until the command is interrupted."""
+    while True:
+        time.sleep(1.0)
+
+
+def source_kind(source: str, *, policy: bool = False) -> Kind:
+    """Return what a source is: an existing file or folder, or a bundled robot or policy.
+
+    Raises:
+        ConfigError: if it is none of these.
+    """
+    from terrainkit_robots.description import bundled
+    from terrainkit_robots.rl.run import RUN_FILE
+    from terrainkit_robots.rl.tasks import task_names
+    from terrainkit_robots.spec.robot import SPEC_FILE
+
+    path = Path(source)
+    try:
+        if path.suffix == ".npz":
+            return "map"
+        if policy or (path / RUN_FILE).is_file() or path.suffix == ".pt":
+            return "run"
+        if path.is_file() or (path / SPEC_FILE).is_file():
+            return "robot"
+        is_folder = path.is_dir()
+    except OSError as error:
+        raise ConfigError(f"cannot read {truncate(source)}: {error.strerror}") from error
+    if is_folder:
+        raise ConfigError(f"{source}: got no {SPEC_FILE} or {RUN_FILE} in it; expected either")
+    if source in bundled.robot_names():
+        return "robot"
+    if source in task_names():
+        return "run"
+    names = sorted({*bundled.robot_names(), *task_names()})
+    known = expected_names(source, names, "bundled are")
+    raise ConfigError(f"no map, robot or run {truncate(source)}; {known}")

@@ -24,7 +24,14 @@ if TYPE_CHECKING:
 def export(
     terrain_map: "TerrainMap", path: str | Path, *, overwrite: bool = False, **options: Any
 ) -> Path:
-    """Write `terrain_map` to `path`, and return `path`.
+    """Write `terrain_map` to `path`, and return `path`; see :func:`export_files`."""
+    return export_files(terrain_map, path, overwrite=overwrite, **options)[0]
+
+
+def export_files(
+    terrain_map: "TerrainMap", path: str | Path, *, overwrite: bool = False, **options: Any
+) -> tuple[Path, ...]:
+    """Write `terrain_map` to `path`, and return `path` and the files that were written beside it.
 
     Args:
         terrain_map: The map.
@@ -45,7 +52,8 @@ def export(
     terrain_map.require_finite()
     with atomic_write(path, overwrite=overwrite) as temporary:
         write(terrain_map, temporary, **options)
-    return path
+        names = sorted({file.name for file in temporary.parent.iterdir()} - {path.name})
+    return (path, *(path.with_name(name) for name in names))
 
 
 def check_export(path: str | Path, samples: int, *, overwrite: bool = False) -> None:

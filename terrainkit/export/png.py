@@ -34,14 +34,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     terrain_map.require_no_solids("an image of heights")
     terrain_map.warn_about_friction("an image of heights")
     heights, config = terrain_map.heights, terrain_map.config
-    low = float(heights.min())
-    scale = (float(heights.max()) - low) / np.iinfo(np.uint16).max
-    if scale > MAX_HEIGHT_PER_LEVEL:
-        raise ExportError(
-            f"height range: got {heights.max() - low:g} m; expected at most "
-            f"{MAX_HEIGHT_PER_LEVEL * np.iinfo(np.uint16).max:g} m, so that a .png is accurate to "
-            "a millimeter"
-        )
+    scale, low = scale_and_offset(terrain_map)
     # Image rows go down, y goes up.
     levels = np.rint((heights.T[::-1] - low) / (scale or 1.0)).astype(np.uint16)
     _, data = cv2.imencode(".png", levels)
@@ -56,3 +49,20 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         **config.contact,
     }
     path.with_suffix(".json").write_text(json.dumps(sidecar, indent=2) + "\n")
+
+
+def scale_and_offset(terrain_map: "TerrainMap") -> tuple[float, float]:
+    """Return the height of a gray level, and the height of level 0 [m].
+
+    Raises:
+        ExportError: if the height range is too large for millimeter accuracy in 16 bits.
+    """
+    low, high = float(terrain_map.heights.min()), float(terrain_map.heights.max())
+    scale = (high - low) / np.iinfo(np.uint16).max
+    if scale > MAX_HEIGHT_PER_LEVEL:
+        raise ExportError(
+            f"height range: got {high - low:g} m; expected at most "
+            f"{MAX_HEIGHT_PER_LEVEL * np.iinfo(np.uint16).max:g} m, so that a .png is accurate to "
+            "a millimeter"
+        )
+    return scale, low

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from terrainkit.integrations import missing
+from terrainkit.integrations import missing, pad_points
 from terrainkit.terrain_map import TerrainMap
 
 try:
@@ -76,7 +76,7 @@ class MapGenerator:
         points = {"init_pos": terrain_map.spawns, "target": terrain_map.goals}
         self.flat_patches = {
             name: torch.tensor(
-                _filled(each[..., :3], terrain_map.env_origins) - center,
+                pad_points(each[..., :3], terrain_map.env_origins) - center,
                 dtype=torch.float,
                 device=device,
             )
@@ -94,9 +94,3 @@ class MapGeneratorCfg(TerrainGeneratorCfg):
 
     path: str = MISSING  # type: ignore[assignment]
     """Path of the map."""
-
-
-def _filled(points: np.ndarray, origins: np.ndarray) -> np.ndarray:
-    """Replace NaN by the first point of the patch, or by its origin if it has no points."""
-    first = np.where(np.isnan(points[:, :, :1]), origins[:, :, None], points[:, :, :1])
-    return np.where(np.isnan(points), first, points)

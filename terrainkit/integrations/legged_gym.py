@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d
 
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
-from terrainkit.integrations import load_map
+from terrainkit.integrations import load_map, pad_points
 from terrainkit.terrain_map import TerrainMap, int16_heights
 
 _EDGE_WIDTH = 0.05
@@ -102,14 +102,13 @@ def padded_goals(terrain_map: TerrainMap) -> NDArray[np.float64]:
     Raises:
         ConfigError: if a patch has no goals.
     """
-    goals = terrain_map.goals[..., :3].astype(np.float64)
-    count = (~np.isnan(goals[..., 0])).sum(axis=-1)
-    if (count == 0).any():
-        row, col = np.argwhere(count == 0)[0]
+    goals = terrain_map.goals[..., :3]
+    has_none = np.isnan(goals[..., 0]).all(axis=-1)
+    if has_none.any():
+        row, col = np.argwhere(has_none)[0]
         name = terrain_map.patch_names[row, col]
         raise ConfigError(
             f"goals: got none in patch ({row}, {col}), {name}; expected goals in every patch, as "
             "in preset parkour"
         )
-    index = np.minimum(np.arange(goals.shape[2]), count[..., None] - 1)
-    return np.take_along_axis(goals, index[..., None], axis=2)
+    return pad_points(goals, terrain_map.env_origins)

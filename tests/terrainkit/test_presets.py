@@ -8,7 +8,7 @@ from terrainkit.parameter import parameters_of
 def test_get_preset_unknown_name_lists_presets():
     with pytest.raises(
         ConfigError,
-        match=r"'leggedgym'; did you mean 'legged_gym'\? There are: legged_gym, isaaclab",
+        match=r"'leggedgym'; did you mean 'legged_gym'\? There are: legged_gym, legged_gym_rough",
     ):
         presets.get_preset("leggedgym")
 

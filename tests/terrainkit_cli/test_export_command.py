@@ -121,6 +121,10 @@ def test_export_map(here, tmp_path):
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("wrote map.stl: 1 x 1 patches")
     assert (tmp_path / "map.stl").stat().st_size > 1000
+    run = here("export", "map.npz", "-o", "ros.yaml", "--max-step", 0.1)
+    assert run.stdout.startswith("wrote ros.yaml, with ros.json, ros.pgm, ros.png beside it: 1 x 1")
+    run = here("export", "map.npz", "-o", "model.sdf")
+    assert run.stdout.startswith("wrote model.sdf, with model.stl beside it: 1 x 1")
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,10 @@ import sys
 from urllib.request import urlopen
 
 import pytest
+import viser
 
 import terrainkit as tk
+from terrainkit_robots.description import bundled
 
 
 @pytest.fixture
@@ -37,10 +39,22 @@ def test_view_serves_until_it_is_ended(map_file):
         (("missing.npz",), "missing.npz"),
         (("map.npz", "--port", 0), "--port: got 0; expected 1 to 65535"),
         (("map.npz", "--host", "no.such.host.invalid"), "no.such.host.invalid"),
+        ((), "MAP.npz, ROBOT or RUN: missing"),
+        (("quadruped_mop",), "did you mean 'quadruped_map'"),
+        (("missing.urdf",), "no map, robot or run missing.urdf; bundled are"),
+        (("empty",), "empty: got no robot.toml or run.toml in it"),
+        (("no_robot.urdf",), "no_robot.urdf does not describe a robot"),
+        (("map.npz", "--terrain", "plane"), "--terrain: got the map map.npz; expected a run"),
+        (("quadruped", "--checkpoint", 3), "--checkpoint: got the robot quadruped; expected a run"),
+        (("quadruped_map", "--package", "a=b"), "--package: got the run quadruped_map"),
+        (("quadruped", "--policy", "--checkpoint", 3), "got checkpoint 3; expected one of"),
+        (("empty", "--policy"), "empty has no run.toml"),
     ],
 )
 @pytest.mark.usefixtures("map_file")
-def test_view_rejects_invalid_input(terrainkit, words, message):
+def test_view_rejects_invalid_input(terrainkit, tmp_path, words, message):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "no_robot.urdf").write_text("<sdf/>")
     run = terrainkit("view", *words)
     assert run.returncode == 2
     assert message in run.stderr
@@ -53,3 +67,47 @@ def test_view_without_viser_names_the_extra(terrainkit, monkeypatch):
     run = terrainkit("view", "map.npz")
     assert run.returncode == 2
     assert "pip install terrainkit[view]" in run.stderr
+
+
+@pytest.fixture
+def served(monkeypatch):
+    """Names of the nodes of the scenes that were served; serving ends at once."""
+    names = []
+    add = viser.SceneApi.add_frame
+
+    def record(scene, name, **options):
+        names.append(name)
+        return add(scene, name, **options)
+
+    monkeypatch.setattr(viser.SceneApi, "add_frame", record)
+    monkeypatch.setattr("terrainkit_cli.view_command.wait", lambda: None)
+    monkeypatch.setattr("terrainkit_robots.viewer.show_policy.PolicyView.run", lambda _: None)
+    return names
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("quadruped",), ("folder",), ("quadruped", "--policy"), ("walk", "--terrain", "plane")],
+)
+def test_view_shows_robots_and_policies(run_beside_walk, served, walking, words):
+    folder = bundled.urdf_path("quadruped").parent
+    (walking.parent / "folder").symlink_to(folder)
+    code, output, errors = run_beside_walk("view", *words)
+    assert code == 0, errors
+    assert re.match(rf"http://localhost:\d+ shows {words[0]}; Ctrl\+C ends it\n", output)
+    assert "/robot/body_12" in served
+
+
+def test_view_reads_options_of_robot_files(run_beside_walk, served, walking):
+    (walking.parent / "robot.urdf.xacro").write_text(XACRO)
+    code, _, errors = run_beside_walk("view", "robot.urdf.xacro", "--xacro-arg", "arms:=2")
+    assert code == 0, errors
+    assert "/robot/body_2" in served
+
+
+XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
+<xacro:arg name="arms" default="1"/>
+<link name="base"/><xacro:macro name="arm" params="k"><link name="arm_${k}"/>
+<joint name="joint_${k}" type="continuous"><parent link="base"/><child link="arm_${k}"/></joint>
+<xacro:if value="${k > 1}"><xacro:arm k="${k - 1}"/></xacro:if></xacro:macro>
+<xacro:arm k="$(arg arms)"/></robot>"""

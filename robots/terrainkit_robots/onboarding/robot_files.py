@@ -85,7 +85,7 @@ def make_robot_files(
         floating: Whether the base is floating; by default as in the overriding spec or the file,
             or as the legs suggest.
         user_spec: Values that replace the derived ones.
-        gain_set: The PD gains and action scales to suggest.
+        gain_set: The PD gains to suggest.
         unknown_effort: Joints whose effort limit in the file is a placeholder.
         cache_dir: Folder that caches convex decompositions between runs.
         progress: Wraps an iterable of collision meshes to display a progress bar.
@@ -155,9 +155,7 @@ def _make_spec(facts: Facts, user_spec: SpecOverride | None, gain_set: "GainSet"
     except CannotCheckError as error:
         raise ExportError(f"{facts.model.file}: cannot derive PD gains: {error}") from None
     floating = bool(facts.model.floating)
-    derived = derive_spec(
-        facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF, gain_set=gain_set
-    )
+    derived = derive_spec(facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF)
     if user_spec is None:
         return derived
     spec = replace(user_spec.spec, floating=floating, urdf=URDF, mjcf=MJCF)

@@ -60,7 +60,7 @@ def play(
     if robots < 1:
         raise ConfigError(f"robots: got {robots}; expected 1 or more")
     config = config or EvaluationConfig(seconds=DEFAULT_SECONDS)
-    env, commands = _make_play_env(run, config)
+    env, commands = make_play_env(run, config)
     recorder = PoseRecorder(env)
 
     def update(fraction: float) -> None:
@@ -86,7 +86,7 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
     import mujoco.viewer
 
     config = replace(config or EvaluationConfig(), num_envs=1)
-    env, commands = _make_play_env(run, config)
+    env, commands = make_play_env(run, config)
     model, data = env.scene.model, mujoco.MjData(env.scene.model)
     schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
     steps = rollout(env, load_policy(run, env), cycle(schedule))
@@ -107,7 +107,7 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
             time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - start)))
 
 
-def _make_play_env(run: Run, config: EvaluationConfig) -> tuple[LeggedEnv, FloatArray | None]:
+def make_play_env(run: Run, config: EvaluationConfig) -> tuple[LeggedEnv, FloatArray | None]:
     """Return the environment, and the commands of its robots for :func:`command_schedule`."""
     if not is_flat(run, config.terrain):
         return make_eval_env(run, config, max_patch_envs=1)

@@ -35,8 +35,8 @@ Activation = Literal[
 class Env(Config):
     """Environments and episodes."""
 
-    num_envs: PositiveInt = 512
-    """Number of parallel environments; 512 to 1024 train fastest on a CPU."""
+    num_envs: PositiveInt = 128
+    """Number of parallel environments; fewer need fewer samples, more use a GPU better."""
     episode_length_s: Annotated[float, Meta(gt=0, le=1e6)] = 20.0
     """Length after which an episode is truncated [s]."""
     num_threads: Annotated[int, Meta(ge=0, le=4096)] = 0
@@ -157,8 +157,8 @@ class DomainRand(Config):
 
     friction: NonNegativeInterval | None = (0.5, 1.25)
     """Friction coefficient of the robot's contacts; none: that of the robot."""
-    added_mass: Interval | None = (-1.0, 1.0)
-    """Mass added to the base [kg]."""
+    added_mass: Interval | None = (-0.07, 0.07)
+    """Mass added to the base, as a fraction of the robot's mass."""
     com_shift: NonNegativeFloat = 0.03
     """Largest offset of the base's center of mass along each axis [m]."""
     gains: NonNegativeInterval | None = (0.9, 1.1)
@@ -222,7 +222,7 @@ class Rewards(Config):
     tracking_sigma: PositiveFloat = 0.06
     """Width of the tracking rewards, exp(-error^2 / sigma), at zero command [m2/s2]; otherwise it
     is proportional to the squared command."""
-    swing_height: PositiveFloat = 0.2
+    swing_height: PositiveFloat = 0.18
     """Height of a swinging foot above the ground, as a fraction of the leg length."""
 
 
@@ -299,14 +299,14 @@ class Sim(Config):
 class Policy(Config):
     """Actor and critic networks."""
 
-    init_noise_std: PositiveFloat = 1.0
+    init_noise_std: PositiveFloat = 0.7
     """Initial standard deviation of the actions."""
     actor_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the actor."""
     critic_hidden_dims: HiddenDims = (128, 128, 128)
     """Widths of the hidden layers of the critic."""
-    activation: Activation = "elu"
-    """Activation of the hidden layers, as rsl-rl names it."""
+    activation: Activation = "swish"
+    """Activation of the hidden layers, as rsl-rl names it; elu is slow on a CPU."""
     obs_normalization: bool = True
     """Whether observations are normalized by their running mean and standard deviation."""
 
@@ -338,8 +338,8 @@ class Algorithm(Config):
     max_grad_norm: PositiveFloat = 1.0
     """Largest gradient norm."""
     symmetry: Literal["auto", "none", "augmentation", "loss"] = "auto"
-    """Symmetry: add mirrored samples to each batch, or add a mirror loss; auto: a loss if left and
-    right of the robot are mirror images."""
+    """Symmetry: add mirrored samples to each batch, or add a mirror loss; auto: mirrored samples
+    if left and right of the robot are mirror images."""
     mirror_loss_coeff: NonNegativeFloat = 0.5
     """Weight of the mirror loss."""
 

@@ -42,11 +42,11 @@ class LeggedEnv(VecEnv):
         check_env_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
         self.sim = Simulation(self.scene, n, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
-        self.sensors = Sensors(self.sim, terrain, task, scan=scan)
         heading = task.commands.heading_command
         heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
+        self.sensors = Sensors(self.sim, terrain, task, self.gait.period, scan=scan)
         self.pushes = Pushes(task.domain_rand, n, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.obs_groups = {
@@ -313,6 +313,7 @@ class LeggedEnv(VecEnv):
             "episode_length": self.episode_length_buf.numpy(),
             "heading": self.velocity_command.heading,
             "last_dof_vel": self.sensors.last_dof_vel,
+            "mean_vel": self.sensors.mean_vel,
             "push_vel": self.pushes.velocity,
             "steps_until_push": self.pushes.steps_until_push,
         }

@@ -37,6 +37,7 @@ def sample_params(
     """Sample the physical parameters of `num_envs` robots."""
     joints, scene = sim.scene.model.nu, sim.scene
     nominal = scene.model.geom_friction[scene.geoms, 0].astype(np.float32)
+    mass = scene.model.body_subtreemass[scene.base].astype(np.float32)
 
     def uniform(limits: tuple[float, float] | None, width: int, default: float) -> FloatArray:
         low, high = limits or (default, default)
@@ -47,7 +48,7 @@ def sample_params(
     return RandomizedParams(
         friction=friction,
         geom_friction=np.broadcast_to(geom_friction, (num_envs, len(nominal))).copy(),
-        added_mass=uniform(cfg.added_mass, 1, 0.0),
+        added_mass=mass * uniform(cfg.added_mass, 1, 0.0),
         com_shift=rng.uniform(-cfg.com_shift, cfg.com_shift, (num_envs, 3)).astype(np.float32),
         stiffness=uniform(cfg.gains, joints, 1.0),
         damping=uniform(cfg.gains, joints, 1.0),
@@ -84,8 +85,7 @@ class Pushes:
     """Velocity pushes at regular intervals; each robot has its own phase."""
 
     def __init__(self, cfg: DomainRand, num_envs: int, dt: float) -> None:
-        # Velocity added in this step, world frame [m/s].
-        self.velocity = np.zeros((num_envs, 3), np.float32)
+        self.velocity = np.zeros((num_envs, 3), np.float32)  # of this step, world frame [m/s]
         self.steps_until_push = np.zeros(num_envs, np.int64)
         self._interval = max(1, round(cfg.push_interval_s / dt))
         self._max_vel = cfg.max_push_vel_xy if cfg.push_interval_s else 0.0

@@ -103,6 +103,7 @@ def privileged_group(
     return (
         *(replace(each, noise=0.0) for each in of_policy if each.name not in known),
         term("base_lin_vel", lambda s: s.base_lin_vel, "vector", lin_vel_scale),
+        term("mean_vel", lambda s: s.mean_vel, "command"),
         term("friction", lambda s: s.friction),
         term("added_mass", lambda s: s.added_mass),
         term("com_shift", lambda s: s.com_shift, "vector", 10),

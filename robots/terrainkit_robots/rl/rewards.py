@@ -68,14 +68,13 @@ def is_moving(commands: FloatArray) -> NDArray[np.bool_]:
 def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     """Return how well linear and yaw velocity are tracked, 0 to 1.
 
+    Velocities are averaged over the gait, since the sway of a biped is larger than small commands.
     The width of each kernel is proportional to the command. Where one of the two is not commanded,
     it counts only as far as the other one is tracked: standing is never worth more.
     """
     commands = state.commands
-    errors = (
-        _sum_squares(commands[:, :2] - state.base_lin_vel[:, :2]),
-        np.square(commands[:, 2] - state.base_ang_vel[:, 2]),
-    )
+    squared = np.square(commands - state.mean_vel)
+    errors = squared[:, :2].sum(axis=1), squared[:, 2]
     squares = _sum_squares(commands[:, :2]), np.square(commands[:, 2])
     log, rest = np.float32(np.log(STANDING_TRACKING)), np.float32(cfg.tracking_sigma)
     widths = (np.where(square > 0, -square / log, rest) for square in squares)
@@ -100,10 +99,9 @@ def tracking_ang_vel(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def progress(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Reward velocity along the command, as a fraction of it, -1 to 1; the mean of both parts."""
-    lin, yaw = state.commands[:, :2], state.commands[:, 2]
-    along = np.einsum("ij,ij->i", state.base_lin_vel[:, :2], lin), state.base_ang_vel[:, 2] * yaw
-    squares = np.array([_sum_squares(lin), np.square(yaw)])
-    fractions = np.array(along) / np.where(squares > 0, squares, np.inf)
+    along, squares = state.mean_vel * state.commands, np.square(state.commands)
+    along, squares = (np.array([a[:, :2].sum(axis=1), a[:, 2]]) for a in (along, squares))
+    fractions = along / np.where(squares > 0, squares, np.inf)
     total = np.clip(fractions, -1, 1).sum(axis=0) / np.maximum((squares > 0).sum(axis=0), 1)
     return total.astype(np.float32)
 

@@ -86,13 +86,12 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
     """
     robot, source = _sources(robot_name, terrain)
     robot_folder, map_config = tasks.get_task(robot_name).folder, _map_config(source)
-    packages = ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
     info = RunInfo(
         robot=robot,
         terrain=source,
         seed=task.runner.seed,
         started=datetime.now().astimezone().isoformat(timespec="seconds"),
-        versions={name: version(name) for name in packages},
+        versions={name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")},
         robot_sha256=_robot_digests(robot_folder),
     )
     files = {RUN_FILE: info.to_toml(), TASK_FILE: task.to_toml()}
@@ -252,10 +251,8 @@ def _robot_digests(folder: Path) -> dict[str, str]:
 def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:
     """Return the robot and the terrain as a run records them: names, or absolute paths."""
     folder = tasks.get_task(robot).folder
-    return (
-        str(robot) if str(robot) in tasks.task_names() else str(folder.resolve()),
-        "plane" if str(terrain) == "plane" else str(Path(terrain).resolve()),
-    )
+    name = str(robot) if str(robot) in tasks.task_names() else str(folder.resolve())
+    return name, "plane" if str(terrain) == "plane" else str(Path(terrain).resolve())
 
 
 def _map_config(terrain: str | Path) -> MapConfig | None:

@@ -206,9 +206,8 @@ class LeggedRunner(OnPolicyRunner):
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
         """
         parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
-        with open_checkpoint(
-            Path(path), self.env.robot.spec.joint_order, self.env.num_obs
-        ) as state:
+        joints = self.env.robot.spec.joint_order
+        with open_checkpoint(Path(path), joints, self.env.num_obs) as state:
             if "processes" not in state:
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
@@ -313,7 +312,7 @@ def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
     policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
     symmetry = algorithm.pop("symmetry")
     if symmetry == "auto":
-        symmetry = "loss" if is_symmetric else "none"
+        symmetry = "augmentation" if is_symmetric else "none"
     symmetry_cfg = {
         "data_augmentation_func": "terrainkit_robots.rl.symmetry:augment",
         "use_data_augmentation": symmetry == "augmentation",
@@ -366,8 +365,5 @@ def process_share(task: Task) -> Task:
     available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
     threads = task.env.num_threads or max(1, len(available) // local_count)
     num_envs = num_envs // count + (rank < num_envs % count)
-    return replace(
-        task,
-        env=replace(task.env, num_envs=num_envs, num_threads=threads),
-        runner=replace(task.runner, seed=task.runner.seed + rank),
-    )
+    env = replace(task.env, num_envs=num_envs, num_threads=threads)
+    return replace(task, env=env, runner=replace(task.runner, seed=task.runner.seed + rank))

@@ -150,11 +150,9 @@ def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
     default, joint = mujoco.MjSpec().default.actuator, mujoco.mjtTrn.mjTRN_JOINT
     stiffness, damping = spec.per_joint("stiffness"), spec.per_joint("damping")
     for name, effort in spec.per_joint("effort").items():
-        kp, kd = stiffness[name], damping[name]
+        kp, kd = stiffness[name], damping[name] if control.damping is None else control.damping
         if control.stiffness is not None and kp > 0:
             kp = control.stiffness
-        if control.damping is not None:
-            kd = control.damping
         motor = scene.add_actuator(name=name, target=name, trntype=joint, forcelimited=True)
         # A new motor inherits from the defaults in the robot's file.
         for attribute in ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange", "interp"):

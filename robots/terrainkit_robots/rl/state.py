@@ -32,6 +32,7 @@ class State:
     base_quat: FloatArray  # orientation of the base (w, x, y, z), shape (n, 4)
     base_lin_vel: FloatArray  # linear velocity of the base, base frame [m/s], shape (n, 3)
     base_ang_vel: FloatArray  # angular velocity of the base, base frame [rad/s], shape (n, 3)
+    mean_vel: FloatArray  # forward, left [m/s], yaw rate [rad/s], mean over the gait, shape (n, 3)
     projected_gravity: FloatArray  # direction of gravity, base frame, shape (n, 3)
     base_height: FloatArray  # height of the base above the ground under it [m], shape (n,)
     dof_pos: FloatArray  # joint positions [rad], shape (n, j)
@@ -70,9 +71,13 @@ class State:
 class Sensors:
     """Measure n robots; keep the values that the next measurement is compared with."""
 
-    def __init__(self, sim: Simulation, terrain: Terrain, task: Task, *, scan: bool) -> None:
+    def __init__(
+        self, sim: Simulation, terrain: Terrain, task: Task, period: float, *, scan: bool
+    ) -> None:
         n, joints = len(sim.qpos), len(sim.scene.joint_qvel)
         self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
+        self.mean_vel = np.zeros((n, 3), np.float32)
+        self._mean_weight = np.float32(task.dt / max(period, task.dt))
         self._sim, self._terrain, self._cfg = sim, terrain, task.termination
         self._dt = np.float32(task.dt)
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
@@ -81,7 +86,7 @@ class Sensors:
 
     def reset(self, env_ids: Any) -> None:
         """Start new episodes, with joints at rest."""
-        self.last_dof_vel[env_ids] = 0
+        self.last_dof_vel[env_ids] = self.mean_vel[env_ids] = 0
 
     def read(self, rows: Any, *, after_reset: bool) -> dict[str, Any]:
         """Return the measured fields of `State`; after a reset there are no contacts yet."""
@@ -98,6 +103,9 @@ class Sensors:
             foot_force[:] = penalized[:] = terminating[:] = 0
         dof_acc = (dof_vel - self.last_dof_vel[rows]) / self._dt
         self.last_dof_vel[rows] = dof_vel
+        lin_vel, ang_vel = quat_rotate_inverse(quat, qvel[:, :3]), qvel[:, 3:6]
+        vel = np.concatenate([lin_vel[:, :2], ang_vel[:, 2:]], axis=1)
+        self.mean_vel[rows] += self._mean_weight * (vel - self.mean_vel[rows])
         # The scan points turn with the yaw.
         (x, y), yaw = self._scan_points, quat_to_yaw(quat)[:, None]
         c, s = np.cos(yaw), np.sin(yaw)
@@ -107,8 +115,9 @@ class Sensors:
         return {
             "base_pos": pos,
             "base_quat": quat,
-            "base_lin_vel": quat_rotate_inverse(quat, qvel[:, :3]),
-            "base_ang_vel": qvel[:, 3:6],
+            "base_lin_vel": lin_vel,
+            "base_ang_vel": ang_vel,
+            "mean_vel": self.mean_vel[rows].copy(),
             "projected_gravity": gravity,
             "base_height": pos[:, 2] - self._terrain.height(*pos.T),
             "dof_pos": qpos[:, scene.joint_qpos],

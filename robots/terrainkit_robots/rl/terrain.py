@@ -69,13 +69,13 @@ class MapTerrain(Terrain):
         self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
         self.patch_length = terrain_map.config.patch_size[0]
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
-        self._map, self._collision = terrain_map, collision
+        self.terrain_map, self._collision = terrain_map, collision
         self.surface = collision_surface(terrain_map, collision)
 
     def spec(self) -> Any:
         """Return the map as terrainkit exports it for MuJoCo."""
         with tempfile.TemporaryDirectory() as folder:
-            path = self._map.save(Path(folder) / "ground.xml", collision=self._collision)
+            path = self.terrain_map.save(Path(folder) / "ground.xml", collision=self._collision)
             spec = mujoco.MjSpec.from_file(str(path))
         _add_material(spec)
         for geom in spec.geoms:

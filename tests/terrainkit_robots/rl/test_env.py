@@ -80,8 +80,9 @@ class TestObservations:
     def test_widths(self, quadruped, biped, nominal_task, map_ground):
         env = LeggedEnv(nominal_task(), quadruped, Plane())
         assert env.get_observations()["policy"].shape == (4, 47)
-        # Plus velocity 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
-        assert env.get_observations()["privileged"].shape == (4, 47 + 3 + 1 + 1 + 3 + 12 + 3 + 12)
+        # Plus velocity 3, its mean 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
+        privileged = 3 + 3 + 1 + 1 + 3 + 12 + 3 + 12
+        assert env.get_observations()["privileged"].shape == (4, 47 + privileged)
         env = LeggedEnv(nominal_task(), quadruped, map_ground)
         assert env.get_observations()["policy"].shape == (4, 47 + 187)
         env = LeggedEnv(nominal_task(), biped, Plane())
@@ -134,7 +135,7 @@ class TestHistory:
         task = random_task(env=SHORT, observations=self.OPTIONS)
         env = LeggedEnv(task, quadruped, map_ground if on_map else Plane())
         assert env.num_obs["policy"] == 3 * self.WIDTH + 187 * on_map
-        assert env.num_obs["privileged"] == 86 - 4 + 4 + 187 * on_map
+        assert env.num_obs["privileged"] == 89 + 4 + 187 * on_map
         seen, length = [env.get_observations()["policy"]], np.ones(5, int)
         for action in acts(env, 30):
             observed, _, dones, _ = env.step(action)

@@ -50,6 +50,7 @@ _TASK_TABLE = [
 
 _SECRETS = [
     ("base_lin_vel", 3),
+    ("mean_vel", 3),
     ("friction", 1),
     ("added_mass", 1),
     ("com_shift", 3),
@@ -137,6 +138,10 @@ class TestByHand:
     def test_base_lin_vel(self, robot: Robot) -> None:
         given = state(base_lin_vel=[[1, -0.5, 0.25]])
         assert observed(privileged_of(robot), "base_lin_vel", given) == [2, -1, 0.5]
+
+    def test_mean_vel(self, robot: Robot) -> None:
+        given = state(mean_vel=[[1, -0.5, 0.25]])
+        assert observed(privileged_of(robot), "mean_vel", given) == [1, -0.5, 0.25]
 
     def test_gait_phase(self, robot: Robot) -> None:
         given = state(gait_phase=[[0.6, -0.8]])
@@ -328,7 +333,7 @@ class TestInEnvironment:
         obs = self.make().get_observations()
         assert {name: tuple(value.shape) for name, value in obs.items()} == {
             "policy": (3, 47),
-            "privileged": (3, 47 + 35),
+            "privileged": (3, 47 + 38),
         }
 
     def test_height_scan_on_request(self) -> None:

@@ -73,7 +73,7 @@ class TestByHand:
         given = state(
             4,
             commands=[[1, 0, 9], [1, 0, 0], [0, 0.5, 0], [0, 0, 0]],
-            base_lin_vel=[[1, 0, 7], [0, 0, 0], [0, 0.25, 9], [0.3, 0.4, 0]],
+            mean_vel=[[1, 0, 7], [0, 0, 0], [0, 0.25, 9], [0.3, 0.4, 0]],
         )
         # 0.25^(error^2 / command^2): 0.25^0, 0.25^1, 0.25^(1 / 4); exp(-0.25 / 0.25) for standing.
         expected = [1, 0.25, 0.70711, 0.36788]
@@ -84,8 +84,7 @@ class TestByHand:
         given = state(
             3,
             commands=[[9, 9, -1], [0, 0, 1], [1, 0, 0]],
-            base_lin_vel=[[8, 8, 0], [0, 0, 0], [0, 0, 0]],
-            base_ang_vel=[[8, 8, -1], [0, 0, 0], [0, 0, 0]],
+            mean_vel=[[8, 8, -1], [0, 0, 0], [0, 0, 0]],
         )
         # 0.25^0 and 0.25^1. Where no yaw rate is commanded, standing earns only 0.25 as well.
         assert paid("tracking_ang_vel", robot, given) == pytest.approx([1, 0.25, 0.25])
@@ -94,8 +93,7 @@ class TestByHand:
         given = state(
             5,
             commands=[[0.5, 0, 0], [0, -0.5, 0], [1, 0, 1], [0, 0, 0.5], [0, 0, 0]],
-            base_lin_vel=[[0.25, 9, 9], [0, 3, 0], [2, 0, 0], [9, 9, 9], [9, 9, 9]],
-            base_ang_vel=[[9, 9, 9], [9, 9, 9], [9, 9, 0.5], [0, 0, 0.25], [9, 9, 9]],
+            mean_vel=[[0.25, 9, 9], [0, 3, 9], [2, 0, 0.5], [9, 9, 0.25], [9, 9, 9]],
         )
         # Half of the command; against it; (1 + 0.5) / 2; half of the yaw rate; nothing to do.
         assert paid("progress", robot, given) == pytest.approx([0.5, -1, 0.75, 0.5, 0])
@@ -161,15 +159,15 @@ class TestByHand:
         assert paid("feet_gait", robot, given) == [1, 0.5, 0]
 
     def test_foot_swing_height(self, robot: Robot) -> None:
-        # The arc is 0.2 * 0.5 m high. Errors of half of it and all of it; feet in stance count 0.
+        # The arc is 0.18 * 0.5 m high. Errors of half of it and all of it; feet in stance count 0.
         given = state(
             4,
             swing_phase=[[0.5, 0], [0.5, 0.5], [0.5, 0.5], [0, 0]],
-            foot_height=[[0.1, 9], [0.05, 0.1], [0, 9], [9, 9]],
+            foot_height=[[0.09, 9], [0.045, 0.09], [0, 9], [9, 9]],
         )
         expected = [0, 0.25 / 2, (1 + 1) / 2, 0]
         assert paid("foot_swing_height", robot, given) == pytest.approx(expected, abs=1e-6)
-        lower = paid("foot_swing_height", robot, given, swing_height=0.1)
+        lower = paid("foot_swing_height", robot, given, swing_height=0.09)
         assert lower == pytest.approx([1 / 2, 1 / 2, 1, 0], abs=1e-6)
 
     def test_foot_slip(self, robot: Robot) -> None:

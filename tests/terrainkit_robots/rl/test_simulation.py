@@ -143,7 +143,7 @@ class TestApplyParamsToEnv:
                 5,
                 domain_rand=DomainRand(
                     friction=(0.2, 1.5),
-                    added_mass=(-1.0, 2.0),
+                    added_mass=(-0.07, 0.14),
                     com_shift=0.05,
                     gains=(0.5, 1.5),
                     motor_strength=(0.7, 1.3),
@@ -235,7 +235,7 @@ class TestApplyParamsToEnv:
 
     def test_added_mass_changes_contact_forces(self, quadruped, nominal_task):
         task = nominal_task(3, domain_rand=DomainRand(
-            friction=None, added_mass=(-2.0, 3.0), com_shift=0.0, gains=None,
+            friction=None, added_mass=(-0.13, 0.2), com_shift=0.0, gains=None,
             motor_strength=None, joint_offset=0.0, push_interval_s=0.0,
         ))  # fmt: skip
         env = LeggedEnv(task, quadruped, Plane())

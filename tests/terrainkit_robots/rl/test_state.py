@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.config import DomainRand, InitState
+from terrainkit_robots.rl.config import Commands, DomainRand, InitState
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
@@ -79,6 +79,21 @@ class TestStateAgainstMujoco:
 
 
 class TestByHand:
+    def test_mean_vel_is_averaged_over_the_gait(self, quadruped, nominal_task):
+        # 0.5 s at 50 Hz: each step moves the mean by 1 / 25 of its distance to the velocity.
+        env = LeggedEnv(nominal_task(2, commands=Commands(gait_period=0.5)), quadruped, Plane())
+        expected = env.state.mean_vel
+        assert not expected.any()
+        for _ in range(5):
+            env.step(torch.ones(2, 12))
+            now = env.state
+            vel = np.stack([*now.base_lin_vel[:, :2].T, now.base_ang_vel[:, 2]], axis=1)
+            expected = expected + (vel - expected) / 25
+            np.testing.assert_allclose(now.mean_vel, expected, rtol=1e-5)
+        assert np.abs(expected).min() > 0
+        env.reset()
+        assert not env.state.mean_vel.any()
+
     def test_state_at_rest(self, cart, nominal_task):
         state = LeggedEnv(nominal_task(2), cart, Plane()).state
         np.testing.assert_allclose(state.base_pos, [[0, 0, 0.24]] * 2, atol=1e-6)

@@ -91,6 +91,7 @@ def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
     env.pushes.velocity[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
     env.pushes.velocity[b] = env.pushes.velocity[a] * np.array([1, -1, 1])
     env.joint_offset[b] = mirror.actions(env.joint_offset[a])
+    env.sensors.mean_vel[b] = env.sensors.mean_vel[a] * np.array([1, -1, -1])
     env.steps_since_reset[a], env.steps_since_reset[b] = 3, 13  # half a period later
     d = env.params
     for same in (d.friction, d.geom_friction, d.added_mass, d.strength):

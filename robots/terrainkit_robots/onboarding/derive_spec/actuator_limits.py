@@ -11,7 +11,7 @@ from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.gain import Gain, GainSet
+    from terrainkit_robots.simulation.gain import Gain
 
 _DEFAULT_ERROR = {"revolute": 1.0, "prismatic": 0.1}
 """Position error at which a motor of unknown effort saturates [rad] or [m]."""
@@ -27,18 +27,15 @@ _DEFAULT_VELOCITY = {"revolute": 20.0, "prismatic": 1.0}
 """Speed of a motor with unknown limits [rad/s] or [m/s]. Those of Go2 reach 30, of H1 14 to 23, of
 G1 20 to 37."""
 
-_ACTION_FACTOR = 0.25
-"""Share of the effort that an action of 1 commands; mjlab's value for its own robots."""
+_ACTION_FACTOR = 0.75
+"""Share of the effort that an action of 1 commands, at most."""
 
-_MAX_ACTION_SCALE = {"revolute": 0.5, "prismatic": 0.05}
-"""Largest action scale [rad] or [m]; legged_gym uses 0.25 rad."""
+_MAX_ACTION_SCALE = {"revolute": 0.25, "prismatic": 0.025}
+"""Largest action scale [rad] or [m], as in legged_gym. mjlab's 0.25 * effort / stiffness is 0.1 rad
+at the hips of the bundled quadruped; with it, training takes twice as many samples."""
 
-_TRAIN_ACTION_FACTOR = 0.5
-"""Share of the effort that an action of 1 commands with training gains, at most."""
-
-_TRAIN_ACTION_SCALE = {"revolute": 0.25, "prismatic": 0.025}
-"""Action scale for training gains [rad] or [m], as in legged_gym: an action of 3 moves a thigh far
-enough for a step."""
+_WHEEL_ACTION_FACTOR = 0.25
+"""Share of the largest speed of a wheel that an action of 1 commands."""
 
 _MAX_RANGE_FACTOR = 0.25
 """Largest ratio of the action scale to the joint range."""
@@ -119,31 +116,28 @@ def action_scale_column(
     gains: "Mapping[str, Gain]",
     effort: Column,
     velocity: Column,
-    gain_set: "GainSet" = "stand",
 ) -> Column:
     """Return the change of each joint target for an action of 1 [rad] or [m].
 
-    The same angle for all joints, as in legged_gym, is too large for a soft ankle with a weak
-    motor, too small for a hip, and meaningless for a prismatic joint. A share of the effort is
-    suitable for all joints. The target of a wheel, which has no stiffness, is a speed [rad/s].
+    It is the same for all joints, but less where it would exceed a share of the effort or of the
+    joint range. The target of a wheel, which has no stiffness, is a speed [rad/s].
 
     Args:
         robot: The robot.
         gains: PD gains of each joint.
         effort: Effort limits.
         velocity: Velocity limits.
-        gain_set: The set that the gains belong to.
     """
     column = Column()
-    share = _ACTION_FACTOR if gain_set == "stand" else _TRAIN_ACTION_FACTOR
-    max_scale = _MAX_ACTION_SCALE if gain_set == "stand" else _TRAIN_ACTION_SCALE
     for joint in robot.actuated:
         stiffness = gains[joint.name].stiffness
         if stiffness > 0:
-            largest = _by_kind(max_scale, joint)
+            largest = _by_kind(_MAX_ACTION_SCALE, joint)
             scales = {
                 largest: f"{largest:g} {joint.unit}, the largest suggested scale",
-                share * effort.values[joint.name] / stiffness: (f"{share:g} * effort / stiffness"),
+                _ACTION_FACTOR * effort.values[joint.name] / stiffness: (
+                    f"{_ACTION_FACTOR:g} * effort / stiffness"
+                ),
             }
             lower, upper = joint.range or (-math.inf, math.inf)
             if math.isfinite(upper - lower):
@@ -151,8 +145,8 @@ def action_scale_column(
                 scales[scale] = f"{_MAX_RANGE_FACTOR:g} of the joint range"
             value, reason = min(scales), scales[min(scales)]
         else:
-            value = _ACTION_FACTOR * velocity.values[joint.name]
-            reason = f"{_ACTION_FACTOR:g} * velocity; the target is a speed without stiffness"
+            value = _WHEEL_ACTION_FACTOR * velocity.values[joint.name]
+            reason = f"{_WHEEL_ACTION_FACTOR:g} * velocity; the target is a speed without stiffness"
         column.add(joint.name, rounded(value, 3), _suggested(reason))
     return column
 

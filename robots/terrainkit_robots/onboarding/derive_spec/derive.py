@@ -24,7 +24,7 @@ from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
-    from terrainkit_robots.simulation.gain import Gain, GainSet
+    from terrainkit_robots.simulation.gain import Gain
 
 _SOFT_LIMIT_FACTOR = 0.9
 """Share of the joint range within the soft limits, as in legged_gym and Isaac Lab."""
@@ -40,7 +40,6 @@ def derive_spec(
     floating: bool,
     urdf: str = "robot.urdf",
     mjcf: str = "robot.xml",
-    gain_set: "GainSet" = "stand",
 ) -> RobotSpec:
     """Return the spec of a robot.
 
@@ -50,7 +49,6 @@ def derive_spec(
         floating: Whether the base is floating.
         urdf: Name of the URDF file in the folder of the spec.
         mjcf: Name of the MJCF file in the folder of the spec.
-        gain_set: The set that the gains belong to.
 
     Raises:
         ConfigError: if the robot has no bodies, or gains are missing.
@@ -67,7 +65,7 @@ def derive_spec(
     columns["velocity"] = velocity_column(facts, mirror)
     columns["armature"] = armature_column(facts, gains)
     columns["action_scale"] = action_scale_column(
-        facts, gains, columns["effort"], columns["velocity"], gain_set
+        facts, gains, columns["effort"], columns["velocity"]
     )
     pose = columns["default_pose"].values
     reset, reset_reason = _reset_range(facts, pose)

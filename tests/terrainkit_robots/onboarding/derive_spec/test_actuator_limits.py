@@ -78,22 +78,11 @@ def test_derive_effort_from_stiffness(gains, tmp_path):
     assert "the stiffness at an error of 1 rad" in column.origins["shoulder"].reason
 
 
-def test_derive_action_scale_for_training(bundled, gains):
-    facts = bundled("quadruped.urdf")
-    gain, twins = gains(facts, stiffness=25.0), facts.mirror_map
-    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
-    column = action_scale_column(facts, gain, effort, velocity, "train")
-    assert set(column.values.values()) == {0.25}
-    stiff = gains(facts, stiffness=100.0)
-    column = action_scale_column(facts, stiff, effort, velocity, "train")
-    assert column.values["FL_hip_joint"] == pytest.approx(0.5 * 23.7 / 100, rel=0.01)
-
-
 @pytest.mark.parametrize(
     ("stiffness", "scale", "reason"),
     [
-        (40.0, 0.25 * 23.7 / 40, "0.25 * effort / stiffness"),
-        (1.0, 0.5, "0.5 rad, the largest suggested scale"),
+        (100.0, 0.75 * 23.7 / 100, "0.75 * effort / stiffness"),
+        (60.0, 0.25, "0.25 rad, the largest suggested scale"),
         (0.0, 0.25 * 30.1, "0.25 * velocity; the target is a speed without stiffness"),
     ],
 )

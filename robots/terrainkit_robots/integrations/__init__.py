@@ -1,0 +1,1 @@
+"""Use robots and their tasks in other frameworks."""

@@ -1,0 +1,192 @@
+"""Tasks as environments of Gymnasium."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from terrainkit.integrations import missing
+from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.curriculum import TerrainCurriculum
+from terrainkit_robots.rl.env import BoolArray, LeggedEnv
+from terrainkit_robots.rl.simulation import Ids
+from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.tasks import get_task, task_names
+from terrainkit_robots.rl.terrain import load_terrain
+from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.transforms import FloatArray
+
+try:
+    import gymnasium
+    from gymnasium.vector import AutoresetMode
+    from gymnasium.vector.utils import batch_space
+except ModuleNotFoundError as error:
+    raise missing("Gymnasium", "pip install terrainkit[gymnasium]") from error
+
+
+class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
+    """A robot that tracks velocity commands on a terrain, as in the training of its task.
+
+    Observations and rewards are those of the task; an episode is truncated when its time is over.
+    The observations are those of the policy, without the privileged ones of the critic. The action
+    space is as large as `normalization.clip_actions` of the task, 100 by default; set it to a few
+    units for algorithms that scale their actions to the space, such as SAC.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+
+    def __init__(
+        self,
+        robot: str | Path,
+        *,
+        terrain: str | Path = "plane",
+        task: Task | None = None,
+        render_mode: None = None,
+    ) -> None:
+        """Build the simulation.
+
+        Args:
+            robot: Name of a registered task, or folder of an onboarded robot.
+            terrain: `plane`, a map (.npz), or a map config (.toml).
+            task: The task; by default, the registered task of the robot.
+            render_mode: Only None is supported.
+
+        Raises:
+            ConfigError: If there is no such robot or terrain, or they do not fit together.
+        """
+        self.render_mode = render_mode
+        self.env = EpisodeEnv(robot, terrain, task, 1)
+        self.observation_space, self.action_space = spaces(self.env)
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start an episode; with a seed, equal actions lead to equal episodes."""
+        super().reset(seed=seed)
+        del options
+        if seed is not None:
+            self.env.seed(self.np_random, seed)
+        self.env.reset()
+        return self.env.policy_observations()[0], {}
+
+    def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+        """Apply an action of shape (j,) for one control step."""
+        _, reward, done, truncated = self.env.step_arrays(np.asarray(action)[None])
+        terminated = bool(done[0] and not truncated[0])
+        return self.env.final[0], float(reward[0]), terminated, bool(truncated[0]), {}
+
+
+class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArray]):
+    """n robots with the task of :class:`TaskEnv`, simulated together.
+
+    An environment is reset in the step that ends its episode: `infos["final_obs"]` has the last
+    observations of the episodes, and `infos["_final_obs"]` says which episodes ended.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": [],
+        "autoreset_mode": AutoresetMode.SAME_STEP,
+    }
+
+    def __init__(
+        self,
+        robot: str | Path,
+        *,
+        num_envs: int = 1,
+        terrain: str | Path = "plane",
+        task: Task | None = None,
+    ) -> None:
+        """Build the simulations; see :class:`TaskEnv`."""
+        self.env, self.num_envs = EpisodeEnv(robot, terrain, task, num_envs), num_envs
+        self.single_observation_space, self.single_action_space = spaces(self.env)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start an episode in each environment."""
+        super().reset(seed=seed)
+        del options
+        if seed is not None:
+            self.env.seed(self.np_random, seed)
+        self.env.reset()
+        return self.env.policy_observations(), {}
+
+    def step(
+        self, actions: FloatArray
+    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
+        """Apply actions of shape (n, j) for one control step."""
+        observations, rewards, dones, truncated = self.env.step_arrays(actions)
+        infos = {"final_obs": self.env.final, "_final_obs": dones} if dones.any() else {}
+        return observations, rewards, dones & ~truncated, truncated, infos
+
+
+class EpisodeEnv(LeggedEnv):
+    """A `LeggedEnv` that keeps the last observations of episodes."""
+
+    def __init__(
+        self, robot: str | Path, terrain: str | Path, task: Task | None, num_envs: int
+    ) -> None:
+        spec = get_task(robot)
+        task = task or spec.task
+        task = replace(
+            task,
+            env=replace(task.env, num_envs=num_envs),
+            algorithm=replace(task.algorithm, num_mini_batches=1),  # one robot allows no more
+        )
+        ground = load_terrain(terrain, task.terrain.collision)
+        super().__init__(task, Robot.load(spec.folder), ground)
+        self.final = self.policy_observations()
+
+    def seed(self, rng: np.random.Generator, seed: int) -> None:
+        """Seed all random numbers from the next reset on."""
+        self.rng = rng
+        max_level = self.cfg.terrain.max_init_level
+        self.curriculum = TerrainCurriculum(self.terrain, self.num_envs, max_level, seed)
+
+    def policy_observations(self) -> FloatArray:
+        """Return a copy of the observations of the policy, shape (n, k)."""
+        observations: FloatArray = self.get_observations()["policy"].numpy().copy()
+        return observations
+
+    def step_arrays(
+        self, actions: FloatArray
+    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
+        """Return observations (n, k), rewards, ended and truncated episodes (n,) of a step.
+
+        Observations are those after resets; `final` has those before.
+        """
+        self._before_reset: FloatArray | None = None
+        _, rewards, dones, extras = self.step(torch.as_tensor(actions, dtype=torch.float32))
+        observations, ended = self.policy_observations(), dones.numpy()
+        self.final = observations.copy()
+        if self._before_reset is not None:
+            self.final[ended] = self._before_reset[ended]
+        return observations, rewards.numpy(), ended, extras["time_outs"].numpy()
+
+    def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
+        self._compute_observations()
+        self._before_reset = self.policy_observations()
+        return super()._end_episodes(env_ids, state, unstable)
+
+
+def spaces(env: LeggedEnv) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
+    """Return the spaces of the observations and the actions of one robot."""
+    limits = env.cfg.normalization
+    size, clip = env.num_obs["policy"], limits.clip_observations
+    observation = gymnasium.spaces.Box(-clip, clip, (size,), np.float32)
+    clip = limits.clip_actions
+    return observation, gymnasium.spaces.Box(-clip, clip, (env.num_actions,), np.float32)
+
+
+for _name in task_names():
+    gymnasium.register(
+        f"terrainkit/{_name}-v0",
+        entry_point=TaskEnv,
+        vector_entry_point=TaskVectorEnv,
+        kwargs={"robot": _name},
+    )

@@ -1,0 +1,1 @@
+"""Show robots and policies in the browser, with viser."""

@@ -1,0 +1,139 @@
+"""Show a policy that walks live in MuJoCo, with sliders for its commands, in the browser."""
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from terrainkit.viewer import show_map
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.policy.evaluate import EvaluationConfig, rollout
+from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.play import demo_commands, make_play_env
+from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.terrain import MapTerrain
+from terrainkit_robots.viewer.robot_scene import RobotScene
+
+if TYPE_CHECKING:
+    import viser
+
+_MAX_SECONDS = 3600.0
+"""Time after which the robot is reset [s]."""
+
+_FRAME_TIME = 0.04
+"""Least time between two poses that are sent to the browser [s]."""
+
+_CAMERA_OFFSET = np.array([2.0, -2.0, 1.0])
+"""Position of the camera relative to the robot [m]."""
+
+
+class PolicyView:
+    """A robot that a policy walks on the terrain of its training, in the scene of a server."""
+
+    def __init__(self, server: "viser.ViserServer", run: Run, terrain: str | None = None) -> None:
+        """Load the policy, and add the terrain, the robot and the controls.
+
+        Args:
+            server: The server.
+            run: Run of the policy.
+            terrain: Terrain as `load_terrain` takes it; None for that of the training.
+
+        Raises:
+            ConfigError: If the run has no policy, or one of another robot; if the terrain cannot be
+                read, or changed after the training.
+        """
+        config = EvaluationConfig(
+            seconds=_MAX_SECONDS, terrain=terrain, num_envs=1, command=(0.0, 0.0, 0.0)
+        )
+        self.env, _ = make_play_env(run, config)
+        self._policy = load_policy(run, self.env)
+        self._server = server
+        ground = self.env.terrain
+        if isinstance(ground, MapTerrain):
+            show_map(server, ground.terrain_map)
+        else:
+            server.scene.set_up_direction("+z")
+            server.scene.add_grid("/ground", infinite_grid=True, cell_size=0.5, section_size=5.0)
+        self.robot = RobotScene(server, Facts(load_robot(run.robot.mjcf)))
+        model = self.env.scene.model
+        self._addresses = {
+            joint.name: int(model.joint(joint.name).qposadr[0]) for joint in self.robot.facts.joints
+        }
+        self._add_controls(server.gui)
+        self.update_robot()
+        server.initial_camera.look_at = self.robot.base.position
+        server.initial_camera.position = self.robot.base.position + _CAMERA_OFFSET
+
+    def _add_controls(self, gui: Any) -> None:
+        commands, terrain = self.env.cfg.commands, self.env.terrain
+        ranges = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
+        names = ("forward [m/s]", "left [m/s]", "yaw [rad/s]")
+        self.commands = [
+            gui.add_slider(name, min(low, 0.0), max(high, 0.0), 0.01, float(initial))
+            for name, (low, high), initial in zip(
+                names, ranges, demo_commands(commands)[0], strict=True
+            )
+        ]
+        """Sliders of the forward and left velocity [m/s] and the yaw velocity [rad/s]."""
+
+        self.paused = gui.add_checkbox("pause", initial_value=False)
+        self.follow = gui.add_checkbox("follow the robot", initial_value=True)
+        levels, columns = terrain.terrain_names.shape
+        self.level = gui.add_slider("level", 0, max(levels - 1, 1), 1, 0, visible=levels > 1)
+        options = [f"{k}: {name}" for k, name in enumerate(terrain.terrain_names[0].tolist())]
+        self.column = gui.add_dropdown("terrain", options, visible=columns > 1)
+        self.reset_button = gui.add_button("reset")
+        self.falls = gui.add_text("falls", "0", disabled=True)
+        # Callbacks run in other threads, so they only leave a request for the next step.
+        self._reset_requested = True
+        for handle in (self.level, self.column):
+            handle.on_update(lambda _: self.request_reset())
+        self.reset_button.on_click(lambda _: self.request_reset())
+
+    def request_reset(self) -> None:
+        """Reset the robot before its next step, to the selected patch."""
+        self._reset_requested = True
+
+    def run(self) -> None:
+        """Step in real time, and never return."""
+        dt = self.env.cfg.dt
+        stride = max(1, round(_FRAME_TIME / dt))
+        with single_torch_thread():
+            next_time = time.monotonic()
+            while True:
+                for _ in range(stride):
+                    self.step()
+                self.update_robot()
+                # A machine that is too slow shows slow motion, and does not catch up later.
+                next_time = max(next_time + stride * dt, time.monotonic())
+                time.sleep(max(0.0, next_time - time.monotonic()))
+
+    def step(self) -> None:
+        """Simulate one control step, unless the view is paused; reset first if requested."""
+        env = self.env
+        if self._reset_requested:
+            self._reset_requested = False
+            column = self.column.value.partition(":")[0]
+            env.curriculum.levels[:] = min(self.level.value, len(env.terrain.terrain_names) - 1)
+            env.curriculum.columns[:] = int(column)
+            env.reset()
+            self.falls.value = "0"
+        if self.paused.value:
+            return
+        command = np.array([[slider.value for slider in self.commands]], np.float32)
+        for _, fell in rollout(env, self._policy, [command]):
+            if fell.any():
+                self.falls.value = str(int(self.falls.value) + 1)
+
+    def update_robot(self) -> None:
+        """Send the pose of the robot to the browser, and move the cameras with it."""
+        qpos = self.env.sim.qpos[0]
+        moved = qpos[:3] - self.robot.base.position
+        with self._server.atomic():
+            self.robot.set_base(qpos[:3].copy(), qpos[3:7].copy())
+            self.robot.set_positions({name: qpos[k] for name, k in self._addresses.items()})
+        if self.follow.value and moved.any():
+            for client in self._server.get_clients().values():
+                # Moving the position moves the point that the camera looks at, too.
+                client.camera.position = client.camera.position + moved
