@@ -80,7 +80,7 @@ class TestObservations:
     def test_widths(self, quadruped, biped, nominal_task, map_ground):
         env = LeggedEnv(nominal_task(), quadruped, Plane())
         assert env.get_observations()["policy"].shape == (4, 47)
-        # Plus velocity 3, its mean 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
+        # Velocity 3, mean 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
         privileged = 3 + 3 + 1 + 1 + 3 + 12 + 3 + 12
         assert env.get_observations()["privileged"].shape == (4, 47 + privileged)
         env = LeggedEnv(nominal_task(), quadruped, map_ground)
