@@ -7,8 +7,9 @@ from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 
-GAIT_PERIOD = 2.3
-"""Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m."""
+GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
+"""Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m, and 0.8 s
+for two legs of 0.7 m, as in unitree_rl_gym."""
 
 
 def sample_commands(
@@ -67,12 +68,16 @@ class Gait:
     """The gait to follow while commanded to move: neighboring feet swing in turn."""
 
     def __init__(self, cfg: Commands, leg_length: float, foot_pos: FloatArray) -> None:
-        default = GAIT_PERIOD * np.sqrt(leg_length / 9.81)
+        is_biped = len(foot_pos) == 2
+        default = np.sqrt(leg_length / 9.81) * (BIPED_GAIT_PERIOD if is_biped else GAIT_PERIOD)
         self.period = default if cfg.gait_period is None else cfg.gait_period
         x, left = foot_pos[:, 0], foot_pos[:, 1] > 0
         in_front = ((x > x[:, None]) & (left == left[:, None])).sum(axis=1)  # on the same side
         self.offset = 0.5 * ((in_front + left) % 2)
         self._swing_fraction = cfg.swing_fraction
+        # Time constant of the mean velocity that is to track the command [s]. The sway of two legs
+        # exceeds small commands, so that stepping in place would track them less than standing.
+        self.averaging_time = self.period * (1.0 if is_biped else 0.25)
 
     def phases(self, time: FloatArray, moving: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
         """Return the `gait_phase` and `swing_phase` of a state, from times (n,) [s]."""

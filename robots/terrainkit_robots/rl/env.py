@@ -46,7 +46,7 @@ class LeggedEnv(VecEnv):
         heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
-        self.sensors = Sensors(self.sim, terrain, task, self.gait.period, scan=scan)
+        self.sensors = Sensors(self.sim, terrain, task, self.gait.averaging_time, scan=scan)
         self.pushes = Pushes(task.domain_rand, n, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.obs_groups = {

@@ -39,8 +39,7 @@ class Simulation:
         self.batch.warning[:, self._unstable, 1] = 0
         with quiet_mujoco():
             self.batch.step(nstep=count, stage=self._stage)
-        unstable: NDArray[np.bool_] = (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
-        return unstable
+        return (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
 
     def reset(self, env_ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Reset the simulations `env_ids` (sorted) to positions (k, nq) and velocities (k, nv)."""
@@ -75,13 +74,12 @@ def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> Non
     """Raise MemoryLimitError if training needs more memory than is free, within a factor of two."""
     joints, steps, policy = len(robot.default_pose), task.runner.num_steps_per_env, task.policy
     points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
-    history = task.observations.history_length - 1
+    num_envs, history = task.env.num_envs, task.observations.history_length - 1
     observations = 45 + 7 * joints + 2 * scan * points + history * (20 + 3 * joints)
     hidden = sum(policy.actor_hidden_dims + policy.critic_hidden_dims)
     samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry != "none"))
     learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))
     floats = (12 + steps) * observations + 3 * steps * joints + learning
     per_env = 4 * floats + 8 * (100 + (60 + 2 * task.max_delay_steps) * joints + 3 * ngeom)
-    num_envs = task.env.num_envs
     what = f"training with env.num_envs {num_envs}, {per_env / 1e6:.2g} MB each,"
     check_memory(round(num_envs * per_env), what, ("env.num_envs", num_envs))

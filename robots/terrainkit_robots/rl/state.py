@@ -32,7 +32,7 @@ class State:
     base_quat: FloatArray  # orientation of the base (w, x, y, z), shape (n, 4)
     base_lin_vel: FloatArray  # linear velocity of the base, base frame [m/s], shape (n, 3)
     base_ang_vel: FloatArray  # angular velocity of the base, base frame [rad/s], shape (n, 3)
-    mean_vel: FloatArray  # forward, left [m/s], yaw rate [rad/s], mean over the gait, shape (n, 3)
+    mean_vel: FloatArray  # forward, left [m/s], yaw rate [rad/s]; moving averages, shape (n, 3)
     projected_gravity: FloatArray  # direction of gravity, base frame, shape (n, 3)
     base_height: FloatArray  # height of the base above the ground under it [m], shape (n,)
     dof_pos: FloatArray  # joint positions [rad], shape (n, j)
@@ -72,14 +72,13 @@ class Sensors:
     """Measure n robots; keep the values that the next measurement is compared with."""
 
     def __init__(
-        self, sim: Simulation, terrain: Terrain, task: Task, period: float, *, scan: bool
+        self, sim: Simulation, terrain: Terrain, task: Task, averaging_time: float, *, scan: bool
     ) -> None:
         n, joints = len(sim.qpos), len(sim.scene.joint_qvel)
         self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
         self.mean_vel = np.zeros((n, 3), np.float32)
-        self._mean_weight = np.float32(task.dt / max(period, task.dt))
         self._sim, self._terrain, self._cfg = sim, terrain, task.termination
-        self._dt = np.float32(task.dt)
+        self._dt, self._mean_weight = np.float32([task.dt, task.dt / max(averaging_time, task.dt)])
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
         points = np.stack([each.ravel() for each in np.meshgrid(x, y, indexing="ij")])
         self._scan_points = points[:, : None if scan else 0].astype(np.float32)

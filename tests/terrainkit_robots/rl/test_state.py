@@ -80,8 +80,8 @@ class TestStateAgainstMujoco:
 
 class TestByHand:
     def test_mean_vel_is_averaged_over_the_gait(self, quadruped, nominal_task):
-        # 0.5 s at 50 Hz: each step moves the mean by 1 / 25 of its distance to the velocity.
-        env = LeggedEnv(nominal_task(2, commands=Commands(gait_period=0.5)), quadruped, Plane())
+        # 2 s / 4 at 50 Hz: each step moves the mean by 1 / 25 of its distance to the velocity.
+        env = LeggedEnv(nominal_task(2, commands=Commands(gait_period=2.0)), quadruped, Plane())
         expected = env.state.mean_vel
         assert not expected.any()
         for _ in range(5):
