@@ -146,7 +146,7 @@ class Commands(Config):
     """Fraction of the commands that are zero."""
     gait_period: NonNegativeFloat | None = None
     """Period of the gait, whose phase the policy observes [s]; none: 2.3, on two legs 3, times
-    sqrt(leg length / g); 0 for no gait. Neighboring feet swing in turn: two legs walk, four trot."""
+    sqrt(leg length / g); 0 for no gait. Neighboring feet swing in turn: a walk or a trot."""
     swing_fraction: Fraction = 0.45
     """Fraction of the period that a foot is in the air."""
 

@@ -78,7 +78,8 @@ class Sensors:
         self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
         self.mean_vel = np.zeros((n, 3), np.float32)
         self._sim, self._terrain, self._cfg = sim, terrain, task.termination
-        self._dt, self._mean_weight = np.float32([task.dt, task.dt / max(averaging_time, task.dt)])
+        self._dt = np.float32(task.dt)
+        self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
         points = np.stack([each.ravel() for each in np.meshgrid(x, y, indexing="ij")])
         self._scan_points = points[:, : None if scan else 0].astype(np.float32)
