@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Literal
 
 import tyro
@@ -68,6 +69,9 @@ class Export(Command):
     checkpoint: Checkpoint = UNSET
     """For a run: the checkpoint to export."""
 
+    example: Flag = False
+    """For a run: also write run_policy.py, a program that runs the policy in plain MuJoCo."""
+
     overwrite: Flag = False
     """Replace existing files."""
 
@@ -94,8 +98,9 @@ class Export(Command):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        if self.checkpoint != UNSET:
-            raise ConfigError(f"--checkpoint: got the map {self.source}; expected a run")
+        for name, given in (("checkpoint", self.checkpoint != UNSET), ("example", self.example)):
+            if given:
+                raise ConfigError(f"--{name}: got the map {self.source}; expected a run")
         terrain_map = TerrainMap.load(self.source)
         if not self.output:
             raise ConfigError("--output: missing; expected a file, whose suffix selects the format")
@@ -126,7 +131,7 @@ class Export(Command):
             # The folder of a bundled policy is part of an installed package.
             default = Path(f"{run.folder.name}_policy")
         folder = Path(self.output) if self.output else default
-        result = export_policy(run, folder, overwrite=self.overwrite)
+        result = export_policy(run, folder, example=self.example, overwrite=self.overwrite)
         checkpoint = run.checkpoint.name if run.checkpoint else ""
         render.result(
             f"wrote {', '.join(map(str, result.files))}: {result.num_observations} observations "
@@ -135,6 +140,8 @@ class Export(Command):
         errors = zip(result.files, result.errors, strict=False)
         differences = ", ".join(f"{file.name} {error:.1e}" for file, error in errors)
         render.result(f"verified: largest difference from the checkpoint: {differences}")
+        if self.example:
+            render.result(f"next: python {quote(str(result.files[-1]))} --vx 0.5 --viewer")
 
 
 def is_run(source: str) -> bool:

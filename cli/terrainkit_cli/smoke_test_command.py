@@ -1,7 +1,9 @@
 """The command that checks whether robots can be trained."""
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -30,10 +32,11 @@ SCHEMA_VERSION = 2
 
 @dataclass(frozen=True, kw_only=True)
 class SmokeTest(Command):
-    """Check in seconds whether a robot can be trained.
+    """Check in a minute whether a robot can be trained.
 
-    The robot must stand, get rewards, and learn. Robot files are onboarded into a temporary folder
-    first.
+    The robot must stand and get rewards. In a short training, the reward must not drop, the
+    falls must not increase, and no penalty may be far larger than the positive rewards. Robot files
+    are onboarded into a temporary folder first.
 
     Exit code 0: every robot can be trained. 1: a check failed. 2: a robot cannot be read, or an
     option is invalid.
@@ -45,6 +48,10 @@ class SmokeTest(Command):
         tyro.conf.arg(metavar="ROBOT [ROBOT ...]", help_behavior_hint=""),
     ] = field(default_factory=list)
     """Names of robots, folders written by terrainkit onboard, or URDF, xacro or MJCF files."""
+
+    samples: int = 100_000
+    """Samples of the short training; 0 for none. With fewer than 50,000, only its losses are
+    checked."""
 
     format: Literal["text", "json"] = "text"
     """Format of the report. For several robots, json writes one document per line."""
@@ -71,9 +78,10 @@ class SmokeTest(Command):
         results: dict[str, SmokeTestResult] = {}
         with render.steps() as steps:
             for name in self.robots:
-                steps.update(f"smoke test of {name}")
+                step = f"smoke test of {name}"
+                steps.update(step)
                 try:
-                    results[name] = self._smoke_test(name)
+                    results[name] = self._smoke_test(name, partial(show_progress, steps, step))
                 except TerrainkitError as error:
                     render.error(str(error))
                 except OSError as error:
@@ -96,6 +104,8 @@ class SmokeTest(Command):
             raise ConfigError("ROBOT: missing; expected a name, a folder, or a robot file")
         if self.spec and len(self.robots) > 1:
             raise ConfigError(f"--spec: got {len(self.robots)} robots; expected one")
+        if self.samples < 0:
+            raise ConfigError(f"--samples: got {self.samples}; expected 0 or more")
         names = "package", "xacro-arg", "ignore", "spec"
         given = [name for name in names if getattr(self, name.replace("-", "_"))]
         if given and not any(Path(name).is_file() for name in self.robots):
@@ -106,13 +116,19 @@ class SmokeTest(Command):
 
             check_target(Path(self.output), overwrite=True)  # before the tests
 
-    def _smoke_test(self, name: str) -> "SmokeTestResult":
+    def _smoke_test(self, name: str, progress: Callable[[float], None]) -> "SmokeTestResult":
         from terrainkit_robots.onboarding.pipeline import OnboardOptions
         from terrainkit_robots.policy.smoke_test import smoke_test
 
         settings = parse_settings(self.ignore, self.package, self.xacro_arg)
         spec = Path(self.spec) if self.spec else None
-        return smoke_test(name, OnboardOptions(settings=settings, spec=spec))
+        options = OnboardOptions(settings=settings, spec=spec)
+        return smoke_test(name, options, samples=self.samples, progress=progress)
+
+
+def show_progress(steps: render.Steps, step: str, fraction: float) -> None:
+    """Show how much of a short training is completed, 0 to 1."""
+    steps.update(f"{step}: training, {fraction:.0%}")
 
 
 def summary(result: "SmokeTestResult") -> str:

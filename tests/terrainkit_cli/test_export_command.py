@@ -86,6 +86,14 @@ def test_export_checkpoint_by_file_or_iteration(here, run_folder, tmp_path):
 
 
 @pytest.mark.usefixtures("run_folder")
+def test_export_example_beside_the_policy(here, tmp_path):
+    run = here("export", "run", "-o", "policy", "--example")
+    assert run.returncode == 0, run.stderr
+    assert names(tmp_path / "policy") == [*FILES, "run_policy.py"]
+    assert run.stdout.splitlines()[2] == "next: python policy/run_policy.py --vx 0.5 --viewer"
+
+
+@pytest.mark.usefixtures("run_folder")
 def test_export_overwrites_with_option_only(here, tmp_path):
     assert here("export", "run", "-o", "policy").returncode == 0
     (tmp_path / "policy" / "policy.pt").write_bytes(b"mine")
@@ -141,6 +149,7 @@ def test_export_map(here, tmp_path):
             ("map.npz", "-o", "a.xml", "--checkpoint", 3),
             "--checkpoint: got the map map.npz",
         ),
+        (("map.npz", "-o", "a.xml", "--example"), "--example: got the map map.npz"),
         (("run", "--collision", "boxes"), "--collision: got the run run; expected a map"),
         (("run", "--y-up"), "--y-up: got the run run; expected a map"),
         (("run", "--checkpoint", 7), "run: got checkpoint 7; expected one of: 1, 2"),

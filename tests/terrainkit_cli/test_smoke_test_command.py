@@ -27,8 +27,9 @@ def calls(monkeypatch):
     """Derive the result of a robot from its name, and return the calls."""
     calls = []
 
-    def smoke_test(name, options):
-        calls.append((name, options))
+    def smoke_test(name, options, *, samples, progress):
+        calls.append((name, options, samples))
+        progress(0.5)
         if name.startswith("none"):
             raise ConfigError(f"there is no {name}")
         checks = (GOOD, BAD) if name.startswith("bad") else (GOOD,)
@@ -42,8 +43,8 @@ def test_smoke_test_shows_expectation_of_failed_check(here, tmp_path):
     shutil.copytree(get_task("quadruped").folder, tmp_path / "mine")
     spec = tmp_path / "mine" / "robot.toml"
     text = spec.read_text()
-    spec.write_text(text.replace("spawn_height = 0.34626", "spawn_height = 0.64626"))
-    run = here("mine")
+    spec.write_text(text.replace("spawn_height = 0.344", "spawn_height = 0.644"))
+    run = here("mine", "--samples", 1)
     assert run.returncode == 1, run.stderr
     assert run.stderr == ""
     lines = run.stdout.splitlines()
@@ -68,7 +69,7 @@ def test_smoke_test_exit_code_is_worst_result(here, calls):
         run = here(*words)
         assert run.returncode == code, words
         assert run.stderr.count("\n") == sum(word == "none" for word in words)
-    assert [name for name, _ in calls[:2]] == ["good", "bad"]
+    assert [name for name, *_ in calls[:2]] == ["good", "bad"]
 
 
 @pytest.mark.usefixtures("calls")
@@ -122,17 +123,24 @@ def test_smoke_test_passes_file_options(here, calls, tmp_path):
     (tmp_path / "a").touch()
     words = ("--package", "my=meshes", "--xacro-arg", "arm:=false", "--ignore", "MSH=no meshes")
     assert here("a", *words, "--spec", "a.toml").returncode == 0
-    (_, options) = calls[0]
+    (_, options, samples) = calls[0]
+    assert samples == 100_000
     assert str(options.spec) == "a.toml"
     assert options.settings.packages["my"].name == "meshes"
     assert options.settings.xacro_arguments == {"arm": "false"}
     assert options.settings.ignore == {"MSH": "no meshes"}
 
 
+def test_smoke_test_passes_samples(here, calls):
+    assert here("a", "--samples", 0).returncode == 0
+    assert calls[0][2] == 0
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (("a", "--format", "sarif"), "sarif"),
+        (("a", "--samples", -3), "--samples: got -3; expected 0 or more"),
         (("a", "b", "--spec", "c.toml"), "--spec: got 2 robots; expected one"),
         ((), "ROBOT: missing"),
         (("a", "--package", "my=."), "--package: got no robot file among a"),

@@ -7,6 +7,9 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 ROBOT_FILE = "robot.xml"
 """Name of the MJCF file of a copy."""
 
+EXAMPLE = Path(__file__).with_name("run_policy.py")
+"""A program that runs an exported policy with a copy, in plain MuJoCo."""
+
 
 def copy_model(mjcf: Path) -> dict[str, bytes]:
     """Return the MJCF of a robot, in one file, and its meshes and textures, by file name."""

@@ -3,7 +3,7 @@
 import io
 import json
 import warnings
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from tensordict import TensorDict
 from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
-from terrainkit_robots.export.model_copy import ROBOT_FILE, copy_model
+from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.evaluate import FloatArray, eval_task
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
@@ -48,35 +48,41 @@ _FORMULAS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ExportResult:
-    """The ONNX, TorchScript, JSON and MJCF files, and the action errors of the first two."""
+    """The ONNX, TorchScript, JSON, MJCF and example files; action errors of the first two."""
 
-    files: tuple[Path, Path, Path, Path]
+    files: tuple[Path, ...]
     errors: tuple[float, float]
     num_observations: int
     num_actions: int
 
 
 @single_torch_thread()
-def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportResult:
+def export_policy(
+    run: Run, folder: Path, *, example: bool = False, overwrite: bool = False
+) -> ExportResult:
     """Export the policy of a run to a folder, which is created if it does not exist.
 
-    The exported policies are verified against the live one before anything is written.
+    The exported policies are verified against the live one before anything is written. With
+    `example`, a program that runs the policy in MuJoCo is written as well.
 
     Raises:
         ConfigError: If the run has no checkpoint.
         ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, or if
             an exported policy does not match the live one.
     """
-    names = ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE
-    files = (folder / names[0], folder / names[1], folder / names[2], folder / names[3])
+    names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE] + [EXAMPLE.name] * example
+    files = tuple(folder / name for name in names)
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
     task = eval_task(run.task, num_envs=8)
     env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
     actor = load_policy(run, env)
-    robot_files = copy_model(run.robot.mjcf)
-    iteration = read_checkpoint(last_checkpoint(run))["iteration"]
-    text = json.dumps(describe_policy(env) | {"iteration": iteration}, indent=2) + "\n"
+    other_files = copy_model(run.robot.mjcf)
+    if example:
+        other_files[EXAMPLE.name] = EXAMPLE.read_bytes()
+    training = {"iteration": read_checkpoint(last_checkpoint(run))["iteration"]}
+    training["domain_rand"] = asdict(run.task.domain_rand)
+    text = json.dumps(describe_policy(env) | training, indent=2) + "\n"
     limits = task.normalization.clip_observations, task.normalization.clip_actions
     clip_obs, clip_actions = (torch.nn.Hardtanh(-limit, limit) for limit in limits)
     policy = torch.nn.Sequential(clip_obs, actor.as_jit(), clip_actions).eval()
@@ -98,11 +104,11 @@ def export_policy(run: Run, folder: Path, *, overwrite: bool = False) -> ExportR
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
-    with atomic_write(files[2], overwrite=overwrite) as path:
+    with atomic_write(folder / JSON_FILE, overwrite=overwrite) as path:
         path.write_text(text, encoding="utf-8")
         path.with_name(ONNX_FILE).write_bytes(onnx_data)
         path.with_name(TORCHSCRIPT_FILE).write_bytes(script_file.getvalue())
-        for name, data in robot_files.items():
+        for name, data in other_files.items():
             path.with_name(name).write_bytes(data)
     sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
     return ExportResult(files=files, errors=errors, **sizes)
@@ -147,6 +153,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     drive = np.where(stiffness > 0, "position", "velocity")
     if task.control.control_type == "T":
         drive[:] = "torque"
+    dofs = env.scene.joint_qvel
     joints = {
         "default_position": robot.default_pose,
         "action_offset": env.action_offset,
@@ -156,7 +163,13 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "damping": damping,
         "effort": model.actuator_forcerange[:, 1],
         "velocity": robot.velocity,
+        "armature": model.dof_armature[dofs],
+        "frictionloss": model.dof_frictionloss[dofs],
+        "passive_damping": model.dof_damping[dofs],
     }
+    feet = [model.body(foot).id for foot in robot.spec.feet]
+    soles = env.scene.geoms[np.isin(model.geom_bodyid[env.scene.geoms], feet)]
+    friction = np.max(model.geom_friction[soles, 0], initial=0)
     scan_x, scan_y = task.terrain.measured_points_x, task.terrain.measured_points_y
     scan = {
         "frame": "at the base's position, turned by its yaw alone; x forward, y left",
@@ -171,7 +184,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "format_version": FORMAT_VERSION,
         "terrainkit": __version__,
         "robot": {name: getattr(robot.spec, name) for name in names},
-        "files": {"onnx": ONNX_FILE, "torchscript": TORCHSCRIPT_FILE},
+        "files": {"onnx": ONNX_FILE, "torchscript": TORCHSCRIPT_FILE, "mjcf": ROBOT_FILE},
         "formulas": _FORMULAS,
         "timing": {"physics_dt": dt, "decimation": decimation, "policy_dt": task.dt},
         "observation": {
@@ -188,6 +201,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "drive": drive.tolist(),
             **{name: _to_list(values) for name, values in joints.items()},
         },
+        "contact": {"friction": float(f"{friction:.7g}")},
         "gait": gait if env.gait.period else None,
         "height_scan": scan if env.state.height_scan.shape[1] else None,
     }

@@ -1,7 +1,7 @@
-"""Smoke-test a robot: check in seconds whether it can be trained."""
+"""Smoke-test a robot: check whether it can be trained, with a short training."""
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,24 +12,32 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
-from terrainkit_robots.policy.evaluate import eval_task
+from terrainkit_robots.policy.evaluate import Progress, eval_task
 from terrainkit_robots.policy.load import single_torch_thread
+from terrainkit_robots.policy.short_training import TrainingRecord, train_briefly
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.rewards import is_moving
-from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.text import count
 
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
 """Limits of a foot above and below the ground [m], and of the base, relative to its target."""
 
-NUM_ENVS, RANDOM_STEPS, ITERATIONS = 16, 100, 3
+NUM_ENVS, RANDOM_STEPS = 16, 100
+
+DEFAULT_SAMPLES, MIN_TREND_SAMPLES = 100_000, 50_000
+"""Samples of the short training, and the fewest that show whether a robot learns."""
+
+MAX_PENALTY, MAX_DROP, MAX_DEVIATIONS = 3.0, 0.1, 3.0
+"""Limits of a penalty at the end of the training and of a drop of the reward, relative to the sum
+of the positive rewards, and of an increase of the falls, in standard deviations."""
 
 MAX_STANDING, MAX_ACTION_TORQUE = 0.26, 1.0
 """Limits of the share of the tracking rewards that standing earns, and of the torque of an action
@@ -59,20 +67,29 @@ class SmokeTestResult:
         return all(check.passed for check in self.checks)
 
 
-def smoke_test(name: str, options: OnboardOptions | None = None) -> SmokeTestResult:
+def smoke_test(
+    name: str,
+    options: OnboardOptions | None = None,
+    *,
+    samples: int = DEFAULT_SAMPLES,
+    progress: Progress = lambda _: None,
+) -> SmokeTestResult:
     """Check whether a robot can be trained for its task on a plane.
 
     Args:
         name: A registered robot, an onboarded folder, or a URDF, xacro or MJCF file, which is
             onboarded into a temporary folder.
         options: Options for onboarding a file.
+        samples: Samples of the short training; 0 for none. With fewer than `MIN_TREND_SAMPLES`,
+            only the losses are checked.
+        progress: Called after each iteration of the training.
 
     Raises:
         TerrainkitError: If the robot does not exist or cannot be read.
     """
     if not Path(name).is_file():
         task_spec = get_task(name)
-        return run_checks(Robot.load(task_spec.folder), task_spec.task)
+        return run_checks(Robot.load(task_spec.folder), task_spec.task, samples, progress)
     options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
         onboarded = onboard(Path(name), Path(folder) / "robot", options)
@@ -82,24 +99,25 @@ def smoke_test(name: str, options: OnboardOptions | None = None) -> SmokeTestRes
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")
         if onboarded.folder is None:
             return SmokeTestResult(onboarded.report.facts.model.title, (check,))
-        result = run_checks(Robot.load(onboarded.folder), Task())
+        result = run_checks(Robot.load(onboarded.folder), Task(), samples, progress)
     return replace(result, checks=(check, *result.checks))
 
 
 @single_torch_thread()
-def run_checks(robot: Robot, task: Task) -> SmokeTestResult:
-    """Check whether a robot can be trained for a task on a plane."""
-    mini_batches = min(task.algorithm.num_mini_batches, NUM_ENVS)
-    algorithm = replace(task.algorithm, num_mini_batches=mini_batches)
-    task = replace(
-        task, env=replace(task.env, num_envs=NUM_ENVS, num_threads=1), algorithm=algorithm
-    )
+def run_checks(
+    robot: Robot, task: Task, samples: int, progress: Progress = lambda _: None
+) -> SmokeTestResult:
+    """Check whether a robot can be trained for a task on a plane; see :func:`smoke_test`."""
     name, expected = "environment initializes", "no error"
+    algorithm = replace(task.algorithm, num_mini_batches=1)  # a few robots allow no more
+    env_cfg = replace(task.env, num_envs=NUM_ENVS, num_threads=1)
     try:
-        env = LeggedEnv(task, robot, Plane())
+        env = LeggedEnv(replace(task, env=env_cfg, algorithm=algorithm), robot, Plane())
         still_env = LeggedEnv(eval_task(task, NUM_ENVS), robot, Plane())
     except TerrainkitError as error:
         return SmokeTestResult(robot.spec.name, (Check(name, False, str(error), expected),))
+    record = train_briefly(robot, task, samples, progress) if samples else None
+    trained = record if record and not record.error and samples >= MIN_TREND_SAMPLES else None
     checks = (
         Check(name, True, f"{NUM_ENVS} robots", expected),
         check_spawn_height(still_env),
@@ -107,8 +125,9 @@ def run_checks(robot: Robot, task: Task) -> SmokeTestResult:
         check_stand(still_env),
         check_standing(still_env),
         check_action_scale(still_env),
-        *check_rewards(env),
-        check_training(env),
+        *check_rewards(env, trained.last_rewards if trained else {}),
+        *([check_training(record)] if record else []),
+        *(check_trends(trained) if trained else []),
     )
     return SmokeTestResult(robot.spec.name, checks)
 
@@ -134,15 +153,12 @@ def check_spawn_height(env: LeggedEnv) -> Check:
 
 
 def check_observations(env: LeggedEnv) -> Iterator[Check]:
-    """Check that each observation group has the size of its terms, and is finite."""
+    """Check that each observation group is finite."""
     for name, obs in env.get_observations().items():
-        terms = env.obs_groups[name]
-        size = sum(term.function(env.state).shape[1] for term in terms)
         finite = bool(torch.isfinite(obs).all())
-        passed = tuple(obs.shape) == (env.num_envs, size) and finite
         measured = f"{obs.shape[1]} numbers{'' if finite else ', some not finite'}"
-        expected = f"{size} finite numbers ({len(terms)} terms, {env.num_actions} joints)"
-        yield Check(f"observation {name}", passed, measured, expected)
+        expected = f"finite numbers ({len(env.obs_groups[name])} terms, {env.num_actions} joints)"
+        yield Check(f"observation {name}", finite, measured, expected)
 
 
 def check_stand(env: LeggedEnv) -> Check:
@@ -185,8 +201,13 @@ def check_action_scale(env: LeggedEnv) -> Check:
     return Check("action scale", bool(torque[worst] <= MAX_ACTION_TORQUE), measured, expected)
 
 
-def check_rewards(env: LeggedEnv) -> Iterator[Check]:
-    """Check that each reward is finite, and not zero in all states of a rollout and random ones."""
+def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Check]:
+    """Check that each reward is finite, and not zero in all states of a rollout and random ones.
+
+    No penalty of `trained`, mean rewards in a training [1/s], may be far larger than the positive
+    rewards, or robots learn to fall. `termination` may: it depends on how often they still fall.
+    """
+    positive = sum(max(value, 0) for value in trained.values())
     commands = env.commands.copy()
     commands[::4] = 0  # for the rewards of standing robots
     env.set_commands(commands)
@@ -207,6 +228,11 @@ def check_rewards(env: LeggedEnv) -> Iterator[Check]:
             passed = bool(reward(state, env.robot, env.cfg.rewards).any())
             measured = "0: the rewarded event did not happen" if passed else "0 in every state"
         expected = f"finite, and not 0 in every state; rewards.{name} 0 disables it"
+        if name in trained:
+            share = trained[name] / (positive or 1.0)
+            measured += f"; trained {trained[name]:+.3f} /s, {share:.0%} of the positive rewards"
+            passed &= name == "termination" or share >= -MAX_PENALTY
+            expected += f"; a penalty of at most {MAX_PENALTY:.0%}"
         yield Check(f"reward {name}", passed, measured, expected)
 
 
@@ -221,21 +247,26 @@ def random_state(state: State, seed: int) -> State:
     return State(**random)
 
 
-def check_training(env: LeggedEnv) -> Check:
-    """Check that a policy can be updated a few times, with finite losses."""
-    history: list[dict[str, float]] = []
-    error = ""
-    with torch.random.fork_rng(devices=()):
-        torch.manual_seed(env.cfg.runner.seed)
-        runner = LeggedRunner(env)
-        update = runner.alg.update
-        runner.alg.update = lambda: history.append(update()) or history[-1]  # type: ignore[func-returns-value]
-        try:
-            runner.learn(ITERATIONS)
-        except (TerrainkitError, RuntimeError, ValueError) as failure:  # not finite
-            error = " ".join(str(failure).split())
-    values = [list(loss.values()) for loss in history]
-    passed = not error and len(history) == ITERATIONS and bool(np.isfinite(values).all())
-    last = ", ".join(f"{name} {value:.3g}" for name, value in (history[-1:] or [{}])[0].items())
-    name = f"trains for {ITERATIONS} iterations"
-    return Check(name, passed, error or f"losses: {last}", "finite losses")
+def check_training(record: TrainingRecord) -> Check:
+    """Check that a training has finite losses."""
+    last = dict(record.losses[-1] if record.losses else {}, noise_std=record.noise_std)
+    values = [list(loss.values()) for loss in record.losses]
+    passed = not record.error and bool(np.isfinite([*np.ravel(values), record.noise_std]).all())
+    measured = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in last.items())
+    expected = "finite losses and noise"
+    name = f"trains for {count(len(record.losses), 'iteration')}"
+    return Check(name, passed, record.error or measured, expected)
+
+
+def check_trends(record: TrainingRecord) -> Iterator[Check]:
+    """Check that from the first to the last quarter of a training, robots do not learn to fall."""
+    first, last = sum(record.first_rewards.values()), sum(record.last_rewards.values())
+    drop = MAX_DROP * sum(max(value, 0) for value in record.first_rewards.values())
+    measured = f"{first:.2f} to {last:.2f} /s"
+    expected = f"at least {first - drop:.2f} /s in the last quarter of the training"
+    yield Check("reward does not drop", last >= first - drop, measured, expected)
+    before, after = record.falls
+    limit = before + MAX_DEVIATIONS * np.sqrt((before + after) / record.robot_seconds)
+    measured = f"{before:.3f} to {after:.3f} falls/s per robot"
+    expected = f"at most {limit:.3f}; penalties that exceed the rewards teach to fall"
+    yield Check("falls do not increase", bool(after <= limit), measured, expected)

@@ -13,7 +13,6 @@ from msgspec import Meta
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import (
-    SORTED,
     Fraction,
     Interval,
     NonNegativeFloat,
@@ -23,9 +22,7 @@ from terrainkit.type_hint import (
 )
 
 HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
-DelayTime = Annotated[float, Meta(ge=0, le=1)]
 ScanPoints = Annotated[tuple[float, ...], Meta(min_length=1)]
-ActionDelay = Annotated[tuple[DelayTime, DelayTime], SORTED]
 Activation = Literal[
     "elu", "selu", "relu", "crelu", "lrelu", "tanh", "sigmoid", "softplus", "gelu", "swish", "mish"
 ]
@@ -167,7 +164,7 @@ class DomainRand(Config):
     """Factor on all torques of a robot."""
     joint_offset: NonNegativeFloat = 0.02
     """Largest zero offset of each joint, sampled at each reset [rad]."""
-    action_delay: ActionDelay | None = None
+    action_delay: NonNegativeInterval | None = None
     """Delay of the actions, sampled at each reset, in multiples of `sim.dt` [s]; none: no delay."""
     push_interval_s: NonNegativeFloat = 15.0
     """Time between pushes [s]; 0 for no pushes."""
@@ -390,8 +387,8 @@ class Task(Config):
         if self.asset.collisions != "all" and self.rewards.collision:
             got = f"rewards.collision: got {self.rewards.collision:g}"
             raise ConfigError(f"{got}; expected 0 with asset.collisions {self.asset.collisions}")
-        if (delay := self.domain_rand.action_delay) and not self.max_delay_steps:
-            expected = f"expected an end above half of sim.dt {self.sim.dt:g}, or none"
+        if (delay := self.domain_rand.action_delay) and not self.sim.dt / 2 < delay[1] <= 1:
+            expected = f"expected an end above half of sim.dt {self.sim.dt:g}, at most 1 s; or none"
             raise ConfigError(f"domain_rand.action_delay: got {list(delay)}; {expected}")
         samples = self.env.num_envs * self.runner.num_steps_per_env
         if samples < self.algorithm.num_mini_batches:

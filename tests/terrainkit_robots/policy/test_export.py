@@ -1,7 +1,8 @@
 import json
+import runpy
 import shutil
+import sys
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -21,19 +22,18 @@ from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Observa
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 
-DOCS = Path(__file__).parents[3] / "docs" / "exported_policy.md"
 FILES = ["policy.json", "policy.onnx", "policy.pt", "robot.xml"]
+EXAMPLE = "run_policy.py"
 SMALL = Task(env=Env(num_envs=4, num_threads=1))
 
 
 @pytest.fixture(scope="module")
 def exported(trained_folder, tmp_path_factory):
     folder = tmp_path_factory.mktemp("exports") / "policy"
-    result = export_policy(open_run(trained_folder), folder)
+    result = export_policy(open_run(trained_folder), folder, example=True)
     assert max(result.errors) <= 1e-5
     return folder
 
@@ -96,6 +96,11 @@ def test_json_describes_the_policy(exported):
     assert parts[4]["unit"] == ["rad/s"] * 12
     assert parts[-1]["stop"] == config["observation"]["size"] == 47
     assert config["height_scan"] is None
+    assert config["joints"]["armature"] == [0.01] * 12
+    assert config["joints"]["frictionloss"] == [0.0] * 12  # asset.joint_friction is off
+    assert config["joints"]["passive_damping"] == [0.1] * 12
+    assert config["contact"] == {"friction": 0.8}
+    assert config["domain_rand"]["friction"] == [0.5, 1.25]
 
 
 def measure_terms(env, config):
@@ -205,44 +210,100 @@ def test_json_reproduces_the_torques(quadruped, wheels, control_type, drive):
     assert num_clipped > 0
 
 
-def run_example(folder, robot, tmp_path, monkeypatch):
-    """Run the program of the docs for 5 s, and return its data."""
-    shutil.copytree(folder, tmp_path, dirs_exist_ok=True)
-    monkeypatch.chdir(tmp_path)
-    names = {}
+def run_example(folder, monkeypatch, *words):
+    """Run the program of an exported folder, and return its variables."""
+    program = str(folder / "run_policy.py")
+    monkeypatch.setattr(sys, "argv", [program, *words])
     with quiet_mujoco():
-        exec(DOCS.read_text().partition("```python\n")[2].partition("```")[0], names)
-    data = names["data"]
-    assert data.qpos[2] > 0.7 * robot.spec.base_height_target
-    assert names["rotation"].reshape(3, 3)[2, 2] > 0.9
-    assert data.time == pytest.approx(5)
-    return data
-
-
-def test_exported_policy_with_a_history(make_run, tmp_path, monkeypatch):
-    options = Observations(base_lin_vel=True, history_length=3)
-    run = make_run(observations=options)
-    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(1)
-    result = export_policy(open_run(run.folder), tmp_path / "exported")
-    assert max(result.errors) <= 1e-5
-    assert result.num_observations == 150
-    run_example(tmp_path / "exported", run.robot, tmp_path, monkeypatch)
-    parts = json.loads((tmp_path / "policy.json").read_text())["observation"]["parts"]
-    assert [parts[-1][key] for key in ("name", "start", "stop")] == ["history", 50, 150]
-
-
-def test_docs_example_runs_a_policy(exported, quadruped, tmp_path, monkeypatch):
-    run_example(exported, quadruped, tmp_path, monkeypatch)
+        return runpy.run_path(program)
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
-def test_docs_example_walks_with_bundled_policies(name, tmp_path, monkeypatch):
-    if not get_task(name).trained_run.is_dir():
-        pytest.skip(f"no bundled policy of {name}")
-    run = open_run(name)
-    export_policy(run, tmp_path / "exported")
-    data = run_example(tmp_path / "exported", run.robot, tmp_path, monkeypatch)
-    assert data.qpos[0] > 1.5  # of 2.5 m at 0.5 m/s
+def test_example_walks_with_bundled_policies(name, tmp_path, monkeypatch, capsys):
+    export_policy(open_run(name), tmp_path / "exported", example=True)
+    names = run_example(tmp_path / "exported", monkeypatch, "--vx", "0.5", "--seconds", "3")
+    data = names["data"]
+    assert data.time == pytest.approx(3)
+    assert data.qpos[0] > 0.9  # of 1.5 m
+    assert abs(data.qpos[1]) < 0.3
+    assert names["rotation"][2, 2] > 0.9
+    distance = np.hypot(*data.qpos[:2])
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"distance: {distance:.2f} m in 3.00 s"
+    assert float(second.split()[2]) == pytest.approx(distance / 3, abs=0.05)
+
+
+def test_example_computes_the_observations(exported, trained, monkeypatch):
+    names = run_example(exported, monkeypatch, "--seconds", "0.02")
+    env = LeggedEnv(eval_task(trained.task, 1), trained.robot, Plane())
+    env.set_commands(np.array([[0.5, -0.2, 0.3]], np.float32))
+    for value in (0.1, -0.3):
+        env.step(torch.full((1, 12), value))
+    model, data = names["model"], names["data"]
+    assert model.nq == env.sim.qpos.shape[1]
+    data.qpos[:], data.qvel[:], data.time = env.sim.qpos[0], env.sim.qvel[0], 2 * env.cfg.dt
+    rotation = names["rotation"]
+    mujoco.mju_quat2Mat(rotation.reshape(9), data.qpos[3:7])
+    obs = names["observe"](env.commands[0], env.actions[0, 0], rotation)
+    np.testing.assert_allclose(obs, env.get_observations()["policy"][0], atol=1e-4)
+
+
+def test_exported_policy_with_a_history(make_run, tmp_path, monkeypatch):
+    run = make_run(observations=Observations(base_lin_vel=True, history_length=3))
+    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(1)
+    result = export_policy(open_run(run.folder), tmp_path / "exported", example=True)
+    assert max(result.errors) <= 1e-5
+    assert result.num_observations == 150
+    names = run_example(tmp_path / "exported", monkeypatch, "--seconds", "0.04")
+    assert [names["config"]["observation"]["parts"][-1][k] for k in ("start", "stop")] == [50, 150]
+    observe, args = names["observe"], (names["command"], names["action"], np.eye(3))
+    first = observe(*args)
+    np.testing.assert_array_equal(first, np.tile(first[:50], 3))
+    previous = np.arange(150, dtype=np.float32)
+    second = observe(*args, previous)
+    np.testing.assert_array_equal(second, np.concatenate([first[:50], previous[:100]]))
+
+
+def test_example_has_the_joints_and_friction_of_the_training(exported, trained, monkeypatch):
+    model = run_example(exported, monkeypatch, "--seconds", "0.02")["model"]
+    env = LeggedEnv(eval_task(trained.task, 1), trained.robot, Plane())
+    scene, joints = env.scene.model, trained.robot.spec.joint_order
+    for name in ("dof_armature", "dof_frictionloss", "dof_damping"):
+        expected = [getattr(scene, name)[scene.joint(joint).dofadr[0]] for joint in joints]
+        values = [getattr(model, name)[model.joint(joint).dofadr[0]] for joint in joints]
+        np.testing.assert_allclose(values, expected)
+    plane = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+    assert model.geom_friction[plane, 0] == pytest.approx(0.8)
+
+
+@pytest.mark.parametrize("changed", [{"name": "camera"}, {"stop": 4}])
+def test_example_rejects_unknown_observations(exported, tmp_path, monkeypatch, changed):
+    shutil.copytree(exported, tmp_path, dirs_exist_ok=True)
+    config = json.loads((tmp_path / "policy.json").read_text())
+    config["observation"]["parts"][0] |= changed
+    (tmp_path / "policy.json").write_text(json.dumps(config))
+    name = changed.get("name", "commands")
+    with pytest.raises(SystemExit, match=f"cannot compute the observation {name}"):
+        run_example(tmp_path, monkeypatch)
+
+
+def test_example_sees_a_plane_in_the_height_scan(exported, tmp_path, monkeypatch):
+    shutil.copytree(exported, tmp_path, dirs_exist_ok=True)
+    config = json.loads((tmp_path / "policy.json").read_text())
+    config["height_scan"] = {"points": [[0, 0], [0.1, 0], [0.2, 0]]}
+    scan = {
+        "name": "height_scan",
+        "start": 0,
+        "stop": 3,
+        "offset": 0.3,
+        "scale": 5,
+        "clip": [-1, 1],
+    }
+    names = run_example(tmp_path, monkeypatch, "--seconds", "0.02")
+    names["config"].update(config)
+    names["config"]["observation"]["parts"] = [scan]
+    names["data"].qpos[2] = 0.4
+    np.testing.assert_allclose(names["observe"](np.zeros(3), 0, np.eye(3)), [0.5] * 3, atol=1e-6)
 
 
 def test_export_policy_of_a_large_task(trained, tmp_path):
@@ -265,9 +326,9 @@ def test_export_policy_overwrites_only_if_told(trained, exported, tmp_path):
         export_policy(trained, folder)
     assert (folder / "policy.onnx").read_bytes() == b"before"
     assert not (folder / "policy.pt").exists()
-    export_policy(trained, folder, overwrite=True)
+    export_policy(trained, folder, example=True, overwrite=True)
     assert (folder / "policy.json").read_bytes() == (exported / "policy.json").read_bytes()
-    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", *FILES]
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", *FILES, EXAMPLE]
 
 
 @pytest.mark.parametrize(("owner", "name"), [(module, "export_onnx"), (torch.jit, "save")])

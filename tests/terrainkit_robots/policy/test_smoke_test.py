@@ -9,6 +9,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.policy import smoke_test as module
 from terrainkit_robots.policy.evaluate import eval_task
+from terrainkit_robots.policy.short_training import TrainingRecord
 from terrainkit_robots.policy.smoke_test import (
     SmokeTestResult,
     check_action_scale,
@@ -18,6 +19,7 @@ from terrainkit_robots.policy.smoke_test import (
     check_stand,
     check_standing,
     check_training,
+    check_trends,
     random_state,
     run_checks,
     smoke_test,
@@ -29,6 +31,15 @@ from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 
+RECORD = TrainingRecord(
+    losses=[{"value": 0.1}],
+    noise_std=0.7,
+    first_rewards={},
+    last_rewards={},
+    falls=(0.0, 0.0),
+    robot_seconds=100.0,
+    error="",
+)
 TASK = Task(env=Env(num_envs=16, num_threads=1))
 
 
@@ -50,7 +61,9 @@ def env(quadruped):
 
 
 def test_bundled_robot_can_be_trained(biped):
-    result = run_checks(biped, Task())
+    fractions = []
+    result = run_checks(biped, Task(), 1, fractions.append)
+    assert fractions == [1.0]
     assert result.passed, failed(result)
     assert result.robot == "biped"
     names = [check.name for check in result.checks]
@@ -62,13 +75,13 @@ def test_bundled_robot_can_be_trained(biped):
         "stands for 1 s with zero action",
     ]
     assert names[5:7] == ["standing is not tracking", "action scale"]
-    assert names[-1] == "trains for 3 iterations"
+    assert names[-1] == "trains for 1 iteration"
     assert {f"reward {name}" for name in ("torques", "collision", "stand_still")} < set(names)
     assert len(set(names)) == len(names)
 
 
 def test_invalid_spec_fails_the_first_check(quadruped):
-    result = run_checks(replace_spec(quadruped, penalized_contacts=("tail",)), Task())
+    result = run_checks(replace_spec(quadruped, penalized_contacts=("tail",)), Task(), 1)
     (check,) = result.checks
     assert not result.passed
     assert check.name == "environment initializes"
@@ -148,7 +161,7 @@ def test_sunken_robot_does_not_stand(quadruped):
 
 
 def test_each_reward_is_checked(env):
-    checks = list(check_rewards(env))
+    checks = list(check_rewards(env, {}))
     assert [check.name for check in checks] == [f"reward {name}" for name in env.rewards]
     assert all(check.passed for check in checks)
 
@@ -164,13 +177,13 @@ def test_each_reward_is_checked(env):
 )
 def test_constant_rewards_fail(env, reward, passed, measured):
     env.rewards["torques"] = (lambda state, *_: reward(state), -0.1)
-    (check,) = (check for check in check_rewards(env) if check.name == "reward torques")
+    (check,) = (check for check in check_rewards(env, {}) if check.name == "reward torques")
     assert (check.passed, check.measured) == (passed, measured)
 
 
 def test_unreachable_reward_fails(quadruped):
     env = still_env(replace_spec(quadruped, penalized_contacts=()))
-    (check,) = (check for check in check_rewards(env) if check.name == "reward collision")
+    (check,) = (check for check in check_rewards(env, {}) if check.name == "reward collision")
     assert not check.passed
     assert check.measured == "0 in every state"
     assert "rewards.collision 0" in check.expected
@@ -199,25 +212,79 @@ def test_large_action_scale_fails(quadruped):
     assert check.measured.startswith("1.3 of the effort of FL_hip_joint")  # 60 * 0.5 / 23.7
 
 
-def test_training_fails_with_the_reason(env):
-    env.rewards["torques"] = (lambda state, *_: np.nan * state.base_pos[:, 0], -1.0)
-    check = check_training(env)
-    assert not check.passed
+def test_training_can_be_skipped(quadruped):
+    names = [check.name for check in run_checks(quadruped, Task(), 0).checks]
+    assert names[-1] == "reward stand_still"
+
+
+def test_excessive_penalties_fail_with_their_names(quadruped, monkeypatch):
+    monkeypatch.setattr(module, "MIN_TREND_SAMPLES", 1)
+    rewards = Rewards(termination=0.0, ang_vel_xy=-100.0, dof_acc=-0.15)
+    result = run_checks(quadruped, Task(rewards=rewards), 1)
+    assert {"reward ang_vel_xy", "reward dof_acc"} <= failed(result)
+    (check,) = (check for check in result.checks if check.name == "reward ang_vel_xy")
+    assert "% of the positive rewards" in check.measured
+    assert "a penalty of at most 300%" in check.expected
+    assert "reward lin_vel_z" not in failed(result)
+    assert [check.name for check in result.checks][-3:] == [
+        "trains for 1 iteration",
+        "reward does not drop",
+        "falls do not increase",
+    ]
+
+
+def test_falls_may_outweigh_the_rewards(env):
+    trained = dict.fromkeys(env.rewards, 0.1) | {"termination": -50.0, "torques": -50.0}
+    checks = {check.name: check for check in check_rewards(env, trained)}
+    assert checks["reward termination"].passed
+    assert not checks["reward torques"].passed
+    assert "trained -50.000 /s" in checks["reward torques"].measured
+
+
+def test_training_fails_with_the_reason(quadruped, monkeypatch):
+    torques = lambda state, *_: np.nan * state.base_pos[:, 0]  # noqa: E731
+    monkeypatch.setitem(REWARDS, "torques", torques)
+    result = run_checks(quadruped, Task(), 100_000)
+    check = result.checks[-1]
+    assert (check.name, check.passed) == ("trains for 0 iterations", False)
     assert "torques" in check.measured
 
 
-def test_training_keeps_the_random_state(env):
-    torch.manual_seed(5)
-    before = torch.get_rng_state()
-    assert check_training(env).passed
-    assert torch.equal(torch.get_rng_state(), before)
+@pytest.mark.parametrize(
+    ("rewards", "falls", "names"),
+    [
+        (({"a": 1.0, "b": -2.0}, {"a": 1.0, "b": -1.5}), (0.1, 0.1), set()),
+        (({"a": 1.0, "b": -2.0}, {"a": 1.0, "b": -2.1}), (0.1, 0.1), set()),  # 0.1 of 1.0
+        (({"a": 1.0, "b": -2.0}, {"a": 0.9, "b": -2.1}), (0.1, 0.1), {"reward does not drop"}),
+        # 100 and 142 falls: sqrt(242) is 15.6, and three times that 46.7
+        (({"a": 1.0}, {"a": 1.0}), (1.0, 1.42), set()),
+        (({"a": 1.0}, {"a": 1.0}), (1.0, 1.6), {"falls do not increase"}),
+        (({"a": 1.0}, {"a": 1.0}), (0.0, 0.09), set()),
+        (({"a": 1.0}, {"a": 1.0}), (0.0, 0.1), {"falls do not increase"}),
+    ],
+)
+def test_trends_compare_quarters(rewards, falls, names):
+    first, last = rewards
+    record = replace(RECORD, first_rewards=first, last_rewards=last, falls=falls)
+    assert {check.name for check in check_trends(record) if not check.passed} == names
+
+
+@pytest.mark.parametrize(
+    "changed", [{"losses": [{"value": np.nan}]}, {"noise_std": np.inf}, {"error": "diverged"}]
+)
+def test_training_must_be_finite(changed):
+    assert check_training(RECORD).passed
+    assert check_training(RECORD).measured == "value 0.1, noise std 0.7"
+    check = check_training(replace(RECORD, **changed))
+    assert not check.passed
+    assert check.measured in ("diverged", "value nan, noise std 0.7", "value 0.1, noise std inf")
 
 
 @pytest.fixture
 def quick(monkeypatch):
     """Run one check instead of all."""
 
-    def check(robot, _):
+    def check(robot, *_):
         return SmokeTestResult(robot.spec.name, (check_spawn_height(still_env(robot)),))
 
     monkeypatch.setattr(module, "run_checks", check)
@@ -250,7 +317,7 @@ def test_smoke_test_of_a_folder_uses_its_spec(tmp_path):
     folder = tmp_path / "robot"
     shutil.copytree(get_task("quadruped").folder, folder)
     text = (folder / "robot.toml").read_text()
-    edited = text.replace("spawn_height = 0.34626", "spawn_height = 0.64626")
+    edited = text.replace("spawn_height = 0.344", "spawn_height = 0.644")
     assert edited != text
     (folder / "robot.toml").write_text(edited)
     (check,) = smoke_test(str(folder)).checks

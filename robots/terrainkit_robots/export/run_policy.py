@@ -1,0 +1,91 @@
+"""Run the policy of this folder in MuJoCo, on a plane: python run_policy.py --vx 0.5 --viewer."""
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import onnxruntime
+
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("--vx", type=float, default=0.5, help="forward velocity [m/s]")
+parser.add_argument("--vy", type=float, default=0.0, help="velocity to the left [m/s]")
+parser.add_argument("--yaw", type=float, default=0.0, help="yaw rate [rad/s]")
+parser.add_argument("--seconds", type=float, default=10.0, help="duration [s]")
+parser.add_argument("--viewer", action="store_true", help="show the robot in a window")
+args = parser.parse_args()
+
+folder = Path(__file__).parent
+config = json.loads((folder / "policy.json").read_text())
+policy = onnxruntime.InferenceSession(folder / config["files"]["onnx"])
+timing, joints = config["timing"], {k: np.array(v) for k, v in config["joints"].items()}
+
+# The robot on a plane, with the joints and the friction of the training.
+spec = mujoco.MjSpec.from_file(str(folder / config["files"]["mjcf"]))
+for actuator in list(spec.actuators):
+    spec.delete(actuator)  # the gains of policy.json replace them
+for k, joint in enumerate(map(spec.joint, joints["name"])):
+    joint.armature, joint.frictionloss = joints["armature"][k], joints["frictionloss"][k]
+plane = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], priority=2)
+plane.friction[0] = config["contact"]["friction"]
+spec.option.timestep = timing["physics_dt"]
+model = spec.compile()
+data = mujoco.MjData(model)
+qpos_index = [model.joint(name).qposadr[0] for name in joints["name"]]
+qvel_index = [model.joint(name).dofadr[0] for name in joints["name"]]
+data.qpos[:7] = 0, 0, config["robot"]["spawn_height"], 1, 0, 0, 0
+data.qpos[qpos_index] = joints["default_position"]
+
+
+def observe(command: Any, action: Any, rotation: Any, previous: Any = None) -> Any:
+    """Return the observation; the columns of `rotation` are the axes of the base."""
+    terms = {"commands": command, "actions": action, "projected_gravity": -rotation[2]}
+    terms |= {"dof_pos": data.qpos[qpos_index], "dof_vel": data.qvel[qvel_index]}
+    terms |= {"base_ang_vel": data.qvel[3:6], "base_lin_vel": rotation.T @ data.qvel[:3]}
+    if gait := config["gait"]:
+        angle = 2 * np.pi * data.time / gait["period"]
+        is_moving = command[:2].any() or abs(command[2]) >= gait["min_yaw_rate"]
+        terms["gait_phase"] = is_moving * np.array([np.sin(angle), np.cos(angle)])
+    if scan := config["height_scan"]:
+        terms["height_scan"] = np.full(len(scan["points"]), data.qpos[2])  # above a plane
+    values: list[Any] = []
+    for part in config["observation"]["parts"]:
+        if part["name"] == "history":  # at first, it repeats the current observation
+            past = np.concatenate(values) if previous is None else previous
+            terms["history"] = np.resize(past, part["stop"] - part["start"])
+        if np.size(terms.get(part["name"], ())) != part["stop"] - part["start"]:
+            sys.exit(f"policy.json: this program cannot compute the observation {part['name']}")
+        value = np.clip(terms[part["name"]] - part["offset"], *part.get("clip", (-np.inf, np.inf)))
+        values.append(value * part["scale"])
+    return np.concatenate(values, dtype=np.float32)
+
+
+if args.viewer:
+    import mujoco.viewer
+
+    viewer = mujoco.viewer.launch_passive(model, data)
+command, action = np.array([args.vx, args.vy, args.yaw]), np.zeros(len(qpos_index))
+rotation, velocity, obs = np.eye(3), np.zeros(3), None
+steps = max(1, round(args.seconds / timing["policy_dt"]))
+for _ in range(steps):
+    obs = observe(command, action, rotation, obs)
+    action = policy.run(None, {"obs": obs[None]})[0][0]
+    target = joints["action_offset"] + joints["action_scale"] * action
+    for _ in range(timing["decimation"]):
+        torque = joints["gain"] * target - joints["stiffness"] * data.qpos[qpos_index]
+        torque -= joints["damping"] * data.qvel[qvel_index]
+        data.qfrc_applied[qvel_index] = np.clip(torque, -joints["effort"], joints["effort"])
+        mujoco.mj_step(model, data)
+    mujoco.mju_quat2Mat(rotation.reshape(9), data.qpos[3:7])  # in place
+    velocity += [*(rotation.T @ data.qvel[:3])[:2], data.qvel[5]]
+    if rotation[2, 2] < 0.5:
+        sys.exit(f"fell after {data.time:.2f} s")
+    if args.viewer:
+        viewer.sync()
+        time.sleep(timing["policy_dt"])
+print(f"distance: {np.hypot(*data.qpos[:2]):.2f} m in {data.time:.2f} s")
+print("mean velocity: {:.2f} m/s forward, {:.2f} m/s left, {:.2f} rad/s".format(*velocity / steps))
