@@ -63,7 +63,7 @@ class LeggedEnv(VecEnv):
         self.path_length = np.zeros(n)  # since the last reset [m]
         self.actions = np.zeros((2, n, joints), np.float32)  # of the last two steps
         self.joint_offset = np.zeros((n, joints), np.float32)
-        self.history = np.zeros((n, observations.history_width(robot, task)), np.float32)
+        self.obs_history = np.zeros((n, observations.history_width(robot, task)), np.float32)
         self.rewards = active_rewards(task.rewards, weight / 9.81, robot.leg_length)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
         self.commands = self.velocity_command.commands  # a view of the current commands
@@ -101,7 +101,7 @@ class LeggedEnv(VecEnv):
         self._apply_actions(actions)
         # The newest observation comes first, and so do its terms.
         observed = self.get_observations()["policy"].numpy(force=True)
-        self.history = observed[:, : self.history.shape[1]]
+        self.obs_history = observed[:, : self.obs_history.shape[1]]
         self.pushes.apply(self.rng, self.sim.qvel)
         unstable = self.sim.step(self.cfg.control.decimation)
         self.episode_length_buf += 1
@@ -180,7 +180,7 @@ class LeggedEnv(VecEnv):
             added_mass=self.params.added_mass[rows].copy(),
             com_shift=self.params.com_shift[rows].copy(),
             joint_offset=self.joint_offset[rows].copy(),
-            history=self.history[rows].copy(),
+            history=self.obs_history[rows].copy(),
         )
 
     def _command_state(self, rows: Any) -> dict[str, Any]:
@@ -221,9 +221,9 @@ class LeggedEnv(VecEnv):
             groups[name] = torch.from_numpy(values)
         if past := self.cfg.observations.history_length - 1:
             # The history of a new episode repeats its first observation.
-            size, new, policy = self.history.shape[1], self.steps_since_reset == 0, groups["policy"]
-            width = size // past
-            policy[new, width : width + size] = policy[new, :width].repeat(1, past)
+            new, policy = self.steps_since_reset == 0, groups["policy"]
+            width = self.obs_history.shape[1] // past
+            policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
         self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
     def _yaw(self) -> FloatArray:
@@ -320,7 +320,7 @@ class LeggedEnv(VecEnv):
         sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
         # Computing the state again would draw noise.
         state = {f"state_{name}": array for name, array in vars(self.state).items()}
-        if not self.history.size:
+        if not self.obs_history.size:
             del state["state_history"]
         if self.cfg.domain_rand.action_delay:
             arrays["action_delay"] = self.sim.batch.expand("actuator_delay")
