@@ -135,7 +135,7 @@ class TestHistory:
         task = random_task(env=SHORT, observations=self.OPTIONS)
         env = LeggedEnv(task, quadruped, map_ground if on_map else Plane())
         assert env.num_obs["policy"] == 3 * self.WIDTH + 187 * on_map
-        assert env.num_obs["privileged"] == 89 + 4 + 187 * on_map
+        assert env.num_obs["privileged"] == 85 + 4 + 187 * on_map
         seen, length = [env.get_observations()["policy"]], np.ones(5, int)
         for action in acts(env, 30):
             observed, _, dones, _ = env.step(action)
