@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
 from terrainkit.errors import ConfigError
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command, value_of
-from terrainkit_cli.robot_options import Flag, parse_pairs, text_option
+from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, parse_pairs, text_option
 from terrainkit_cli.terrain_commands import MapFile
 
 if TYPE_CHECKING:
@@ -21,9 +19,6 @@ if TYPE_CHECKING:
 
 MAX_LISTED = 20
 """Patches that the command lists one by one."""
-
-RobotName = Annotated[str, text_option("ROBOT")]
-LimitWords = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE", help_behavior_hint="")]
 
 
 @dataclass(frozen=True, kw_only=True)

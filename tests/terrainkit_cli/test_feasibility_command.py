@@ -94,3 +94,17 @@ def test_robot_without_limits_is_one_line(terrainkit, tmp_path, stairs, old, new
     assert run.returncode == 2
     assert message in run.stderr
     assert len(run.stderr.splitlines()) == 1
+
+
+def test_check_map_with_a_robot(terrainkit, stairs):
+    assert terrainkit("check-map", stairs).returncode == 0
+    run = terrainkit("check-map", stairs, "--robot", "quadruped")
+    assert run.returncode == 1
+    assert "patch (2, 0), stairs: demand 1.28, step_up 0.23 m" in run.stdout
+    words = ("--robot", "quadruped", "--limit", "step_up=0.25", "step_down=0.3")
+    run = terrainkit("check-map", stairs, *words)
+    assert run.returncode == 0
+    assert "quadruped can cross 3 patches" in run.stdout
+    run = terrainkit("check-map", stairs, "--limit", "gap=1")
+    assert (run.returncode, len(run.stderr.splitlines())) == (2, 1)
+    assert "expected --robot" in run.stderr
