@@ -23,11 +23,14 @@ import terrainkit
 from terrainkit import presets, registry
 from terrainkit.config import MapConfig
 from terrainkit.errors import listing
+from terrainkit.feasibility import assess_map
+from terrainkit.feasibility.report import routes
 from terrainkit.field_docs import field_docs
 from terrainkit.preview import write_preview
 from terrainkit.schema import Config, field_keys, field_types, is_required
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.terrain_docs import TerrainDoc, overlay_doc, terrain_doc
+from terrainkit.terrain_map import TerrainMap
 from terrainkit.toml_text import value_text
 from terrainkit.type_hint import NONE, describe, is_table, parse_hint
 from terrainkit_cli.main import COMMANDS
@@ -36,6 +39,7 @@ from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.rendering.robot_images import render_robot
 from terrainkit_robots.rl.config import Task
+from terrainkit_robots.simulation.robot_limits import derive_limits
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 DOCS = Path(__file__).parent
@@ -221,6 +225,7 @@ def draw_pictures() -> None:
         draw_terrain(name)
     terrain_map = terrainkit.generate(terrainkit.MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
+    draw_feasibility(terrain_map, "quadruped")
     draw_robot("quadruped")
     draw_walk("quadruped_map")
 
@@ -254,6 +259,14 @@ def draw_robot(name: str) -> None:
     views = render_robot(found.with_suffix(".xml"), size=(400, 340)).values()
     pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in views]
     cv2.imwrite(str(PICTURES / f"{name}.png"), np.hstack(pictures))
+
+
+def draw_feasibility(terrain_map: TerrainMap, name: str) -> None:
+    found = bundled.urdf_path(name)
+    assert found is not None
+    results = assess_map(terrain_map, derive_limits(found.parent).limits)
+    picture = PICTURES / "feasibility.png"
+    write_preview(terrain_map, picture, width=820, overwrite=True, routes=routes(results))
 
 
 def draw_walk(policy: str) -> None:
@@ -300,7 +313,13 @@ def main() -> int:
         stale += ["README.md"] if README.read_text() != readme() else []
         pictures = [
             f"{name}.png"
-            for name in (*registry.terrain_names(), "map", "quadruped", "quadruped_map")
+            for name in (
+                *registry.terrain_names(),
+                "map",
+                "feasibility",
+                "quadruped",
+                "quadruped_map",
+            )
         ]
         stale += [name for name in pictures if not (PICTURES / name).exists()]
         if stale:

@@ -1,6 +1,8 @@
 """Preview: a shaded relief of a map with labels, spawn origins, solids and goals."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,6 +32,7 @@ _COLORS = (
 _TEXT_COLOR = (40, 40, 46)
 _SPAWN_COLOR = (196, 40, 40)
 _GOAL_COLOR = (40, 90, 160)
+_PASSABLE_COLOR, _IMPASSABLE_COLOR = (30, 120, 60), (200, 30, 30)
 _SOLID_OPACITY = 0.75
 _BACKGROUND = (250, 249, 246)
 _MARGIN = (250, 60, 130, 70)
@@ -48,8 +51,30 @@ _LIGHT = np.array([-0.55, 0.45, 0.7])
 """Direction of the light: the upper left, as is usual for shaded maps."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Route:
+    """A path of a robot over a patch."""
+
+    points: NDArray[np.float64]
+    """Points of the path, x and y [m], shape (n, 2)."""
+
+    place: tuple[float, float] | None
+    """Position of the mark, x and y [m]; None for no mark."""
+
+    label: str
+    """Text beside the mark."""
+
+    is_passable: bool
+    """Whether the path is drawn in green, not in red."""
+
+
 def write_preview(
-    terrain_map: "TerrainMap", path: str | Path, *, width: int = 1600, overwrite: bool = False
+    terrain_map: "TerrainMap",
+    path: str | Path,
+    *,
+    width: int = 1600,
+    overwrite: bool = False,
+    routes: Sequence[Route] = (),
 ) -> Path:
     """Write the preview of `terrain_map` to the .png file `path`, and return `path`.
 
@@ -58,6 +83,7 @@ def write_preview(
         path: Target.
         width: Minimum width of the relief [px].
         overwrite: Replace an existing file.
+        routes: Paths to draw.
 
     Raises:
         ExportError: if the suffix is not .png, or the target cannot be written.
@@ -71,14 +97,15 @@ def write_preview(
         raise ExportError(f"width: got {width}; expected 100 to {MAX_PIXELS}")
     terrain_map.require_finite()
     with atomic_write(path, overwrite=overwrite) as temporary:
-        _, data = cv2.imencode(
-            ".png", cv2.cvtColor(render_preview(terrain_map, width), cv2.COLOR_RGB2BGR)
-        )
+        image = render_preview(terrain_map, width, routes)
+        _, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
         temporary.write_bytes(data.tobytes())
     return path
 
 
-def render_preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
+def render_preview(
+    terrain_map: "TerrainMap", width: int = 1600, routes: Sequence[Route] = ()
+) -> Picture:
     """Return the preview as an RGB image, shape (height, width, 3): x to the right, y up."""
     heights, crop = _without_border(terrain_map)
     cell = terrain_map.config.cell
@@ -107,6 +134,8 @@ def render_preview(terrain_map: "TerrainMap", width: int = 1600) -> Picture:
     zero = (left - crop[0] * scale, above + height + crop[1] * scale)
     _draw_solids(image, terrain_map, scale, zero)
     _draw_labels(image, terrain_map, scale, zero)
+    for route in routes:
+        _draw_route(image, route, scale, zero)
     return image
 
 
@@ -246,3 +275,18 @@ def _draw_labels(
     for x, y, _, heading in goals:
         tip = x + 0.4 * math.cos(heading), y + 0.4 * math.sin(heading)
         cv2.arrowedLine(image, pixel(x, y), pixel(*tip), _GOAL_COLOR, 1, cv2.LINE_AA, tipLength=0.4)
+
+
+def _draw_route(image: Picture, route: Route, scale: float, zero: tuple[float, float]) -> None:
+    """Draw a path, and its mark with the label to the right."""
+    import cv2
+
+    color = _PASSABLE_COLOR if route.is_passable else _IMPASSABLE_COLOR
+    pixels = np.rint(np.array(zero) + route.points * (scale, -scale)).astype(np.int32)
+    cv2.polylines(image, [pixels], False, color, 2, cv2.LINE_AA)
+    if route.place is not None:
+        x, y = round(zero[0] + route.place[0] * scale), round(zero[1] - route.place[1] * scale)
+        cv2.drawMarker(image, (x, y), color, cv2.MARKER_TILTED_CROSS, 14, 3, cv2.LINE_AA)
+        at, font = (x + 10, y - 6), cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(image, route.label, at, font, 0.5, _BACKGROUND, 4, cv2.LINE_AA)
+        _write(image, route.label, at)

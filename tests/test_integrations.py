@@ -1,10 +1,12 @@
 import ast
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
+import trimesh
 
 import terrainkit as tk
 
@@ -28,7 +30,7 @@ def m(tmp_path, monkeypatch):
 
 
 def test_integrations_all_blocks_are_tested():
-    assert len(BLOCKS) == 14
+    assert len(BLOCKS) == 16
 
 
 def test_numpy_block_reads_map(m):
@@ -57,7 +59,7 @@ def test_genesis_block(m):
 
 def test_blocks_import_what_the_adapters_define():
     imports = re.findall(r"^from (terrainkit\.integrations\.\w+) import (.+)$", PAGE, re.MULTILINE)
-    assert len(imports) == 6
+    assert len(imports) == 7
     for module, names in imports:
         path = ROOT / f"{module.replace('.', '/')}.py"
         defined = {getattr(node, "name", "") for node in ast.parse(path.read_text()).body}
@@ -71,6 +73,17 @@ def test_mujoco_adapter_block_adds_map_to_robot():
     names = {}
     exec(block("add_map(spec"), names)
     assert names["model"].ngeom > 0
+
+
+def test_import_block_restores_map(m):
+    corner = np.array([*m.grid.center, 0.0])
+    mesh = trimesh.Trimesh(m.mesh().vertices - corner, m.mesh().triangles, process=False)
+    generator = SimpleNamespace(terrain_mesh=mesh, terrain_origins=m.env_origins - corner)
+    cfg = SimpleNamespace(size=m.config.patch_size, border_width=m.config.border)
+    exec(block("generator.terrain_mesh"), {"generator": generator, "cfg": cfg})
+    found = tk.TerrainMap.load("isaaclab.npz")
+    np.testing.assert_allclose(found.heights, m.heights, atol=1e-4)
+    assert np.abs(found.env_origins - (m.env_origins - corner)).max() < 0.1
 
 
 def test_gymnasium_block_runs_map(m):

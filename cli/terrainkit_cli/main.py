@@ -19,6 +19,7 @@ COMMAND_GROUPS = {
         "preview": "terrain_commands",
         "view": "view_command",
         "check-map": "terrain_commands",
+        "feasibility": "feasibility_command",
         "diff": "terrain_commands",
         "export": "export_command",
     },
@@ -116,7 +117,7 @@ def _print_overview() -> None:
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
         rows += [(f"{group}:", ""), *zip((f"  {name}" for name in names), summaries, strict=True)]
     render.table(rows)
-    render.result("\nterrainkit COMMAND --help lists its options; --version prints the version.")
+    render.result("terrainkit COMMAND --help lists its options; --version prints the version.")
 
 
 def command(name: str) -> type[parse.Command]:

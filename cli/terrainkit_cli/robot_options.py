@@ -38,6 +38,10 @@ Output = Annotated[str, text_option("PATH", "-o")]
 Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint=lambda text: f"(default: {text.lower()})")]
 """An option --x or --no-x."""
 
+RobotName = Annotated[str, text_option("ROBOT")]
+LimitWords = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE", help_behavior_hint="")]
+"""Limits of a robot for feasibility."""
+
 UNSET = -1
 """Default of optional numbers; with None, tyro would print the types of a union in errors."""
 

@@ -20,7 +20,7 @@ from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.parse import Command, check_options, value_of, word_after
-from terrainkit_cli.robot_options import Flag
+from terrainkit_cli.robot_options import Flag, LimitWords, RobotName
 
 if TYPE_CHECKING:
     from typing import Self
@@ -377,13 +377,25 @@ class CheckMap(Command):
     map: MapFile
     """The map, a file written by terrainkit generate."""
 
+    robot: RobotName = ""
+    """Also check that this robot can cross every patch: name of a bundled robot, or a folder
+    written by terrainkit onboard."""
+
+    limit: LimitWords = ()
+    """With --robot: limits that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
+
     def run(self) -> int:
         """Print the issues and the largest seam, and return 1 if there are issues."""
         from terrainkit.export.npz import read_mesh
+        from terrainkit.feasibility import assess_map
         from terrainkit.seams import Seams, cliffs_text, seam_text
         from terrainkit.validate import validate
+        from terrainkit_cli.feasibility_command import print_impassable, robot_limits
         from terrainkit_robots.text import count
 
+        if self.limit and not self.robot:
+            raise ConfigError("--limit: got limits without a robot; expected --robot")
+        derived = robot_limits(self.robot, self.limit) if self.robot else None
         terrain_map = TerrainMap.load(self.map)
         issues = validate(terrain_map, read_mesh(self.map))
         for issue in issues:
@@ -393,8 +405,15 @@ class CheckMap(Command):
             render.result(f"largest seam: {seam_text(largest, terrain_map.patch_names)}")
         if cliffs := seams.cliffs():
             render.result(f"cliffs: {cliffs_text(cliffs, terrain_map.patch_names)}")
+        # The path over a map with issues would be of no use.
+        blocked = 0
+        if derived and not issues:
+            results = assess_map(terrain_map, derived.limits, render.progress)
+            blocked = print_impassable(results, derived, self.map)
         if issues:
             render.result(f"\n{self.map}: {count(len(issues), 'issue')}")
+            return 1
+        if blocked:
             return 1
         render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no issues")
         return 0

@@ -88,6 +88,36 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     path, options = Path(path), options or ImportOptions()
     source = open_source(path, options)
     config, origin = _make_config(path, source, options)
+    return make_map(path, source, config, origin, options)
+
+
+def make_map(
+    path: Path,
+    source: Source,
+    config: MapConfig,
+    origin: NDArray[np.float64],
+    options: ImportOptions,
+    *,
+    spawn_xy: NDArray[np.float64] | None = None,
+    terrain_types: NDArray[np.int32] | None = None,
+) -> ImportedMap:
+    """Return the map of a source.
+
+    Args:
+        path: The file, for errors.
+        source: The ground.
+        config: Configuration of the map.
+        origin: Point of the source that becomes (0, 0, 0), shape (3,) [m].
+        options: `missing` and `solids` are used.
+        spawn_xy: Preferred spawn position of each patch in the map, shape (rows, cols, 2) [m]; by
+            default the center of the patch.
+        terrain_types: Sub-terrain of each patch, shape (rows, cols); by default the first.
+
+    Raises:
+        HeightFileError: if heights are missing.
+        ConfigError: if a patch has no place to spawn.
+        MemoryLimitError: if the map would not fit in memory.
+    """
     grid = config.grid
     samples = math.prod(grid.shape)
     check_memory(samples * _BYTES_PER_SAMPLE, f"a map of {samples} samples")
@@ -113,7 +143,12 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     heights = (fill_missing(path, found, options.missing, x, y) - origin[2]).astype(np.float32)
     if not (np.abs(heights) <= MAX_VALUE).all():
         raise HeightFileError(f"{path}: got heights beyond {MAX_VALUE:g} m")
-    terrain_map = _make_map(config, heights + np.float32(0), solids)
+    if spawn_xy is None:
+        centers = [config.patch_grid(*k).center for k in np.ndindex(config.rows, config.cols)]
+        spawn_xy = np.array(centers).reshape(config.rows, config.cols, 2)
+    if terrain_types is None:
+        terrain_types = np.zeros((config.rows, config.cols), dtype=np.int32)
+    terrain_map = _make_map(config, heights + np.float32(0), solids, spawn_xy, terrain_types)
     num_missing = int(np.isnan(found).sum())
     if columns is None:
         report = ImportReport(num_missing=num_missing)
@@ -195,15 +230,21 @@ def _moved(columns: Columns, z: float) -> Columns:
     return Columns(top=columns.top - z, floor=columns.floor - z, ceiling=columns.ceiling - z)
 
 
-def _make_map(config: MapConfig, heights: NDArray[np.float32], solids: Solids) -> TerrainMap:
+def _make_map(
+    config: MapConfig,
+    heights: NDArray[np.float32],
+    solids: Solids,
+    spawn_xy: NDArray[np.float64],
+    terrain_types: NDArray[np.int32],
+) -> TerrainMap:
     size = (config.rows, config.cols)
     spawns, parameters = np.empty(size, dtype=object), np.empty(size, dtype=object)
     measured = np.empty(size)
-    record = config.sub_terrains[0].at(0.0).requested()
+    records = [each.at(0.0).requested() for each in config.sub_terrains]
     for row, col in np.ndindex(size):
-        x, y = config.patch_grid(row, col).center
-        center = np.array([[x, y, 0.0, 0.0]], dtype=np.float32)
+        center = np.array([[*spawn_xy[row, col], 0.0, 0.0]], dtype=np.float32)
         spawns[row, col] = place_patch_spawns(config, heights, solids, row, col, center, _NO_GOALS)
+        record = records[terrain_types[row, col]]
         parameters[row, col] = Parameters(requested=record, realized=record)
         (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
         start = float(spawns[row, col][0, 2])
@@ -217,8 +258,8 @@ def _make_map(config: MapConfig, heights: NDArray[np.float32], solids: Solids) -
         heights=heights,
         friction=np.broadcast_to(np.float32(config.static_friction), heights.shape),
         spawns=pad_poses(spawns),
-        terrain_types=np.zeros(size, dtype=np.int32),
-        terrain_names=(config.sub_terrains[0].name,),
+        terrain_types=terrain_types,
+        terrain_names=tuple(each.name for each in config.sub_terrains),
         difficulty=(rank / max(1, rank.max())).astype(np.float32),
         parameters=parameters,
         solids=solids,

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.export.mjcf import Collision
+from terrainkit.importing import ImportedMap, ImportOptions, import_terrain_mesh
 from terrainkit.integrations import missing
-from terrainkit.integrations.mujoco import make_spec
+from terrainkit.integrations.mujoco import make_spec, static_mesh
 from terrainkit.terrain_map import TerrainMap
 
 try:
@@ -20,7 +21,7 @@ try:
         TerrainEntityCfg,
         TerrainGeneratorCfg,
     )
-    from mjlab.terrains.terrain_generator import TerrainOutput
+    from mjlab.terrains.terrain_generator import TerrainGenerator, TerrainOutput
 except ModuleNotFoundError as error:
     raise missing("mjlab", "pip install mjlab") from error
 
@@ -68,6 +69,32 @@ def terrain_entity_cfg(
         terrain_type="generator",
         terrain_generator=generator,
         max_init_terrain_level=max_init_terrain_level,
+    )
+
+
+def import_terrain(
+    cfg: TerrainGeneratorCfg, *, options: ImportOptions | None = None
+) -> ImportedMap:
+    """Return a map of the terrain that mjlab generates; see :func:`import_terrain_mesh`.
+
+    The map has the coordinates of mjlab, and one column for each sub-terrain in curriculum mode.
+
+    Args:
+        cfg: Configuration of the generator; its seed should be set.
+        options: Options of the import.
+    """
+    spec = mujoco.MjSpec()
+    generator = TerrainGenerator(cfg)
+    generator.compile(spec)
+    mesh = static_mesh(spec.compile())
+    return import_terrain_mesh(
+        mesh.vertices,
+        mesh.faces,
+        generator.terrain_origins,
+        cfg.size,
+        border=cfg.border_width,
+        terrain_names=tuple(cfg.sub_terrains) if cfg.curriculum else ("mjlab",),
+        options=options,
     )
 
 

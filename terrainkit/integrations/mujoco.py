@@ -1,8 +1,11 @@
 """Maps in MuJoCo models."""
 
 from io import StringIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from terrainkit.errors import ExportError
 from terrainkit.export.mjcf import Collision, write_model
 from terrainkit.integrations import load_map
 
@@ -10,6 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import mujoco
+    import trimesh
 
     from terrainkit.terrain_map import TerrainMap
 
@@ -42,3 +46,70 @@ def add_map(
     """
     frame = spec.worldbody.add_frame()
     spec.attach(make_spec(source, collision=collision), frame=frame, prefix="terrain/")
+
+
+def static_mesh(model: "mujoco.MjModel") -> "trimesh.Trimesh":
+    """Return the static geoms of a model as one mesh, in world coordinates [m].
+
+    Raises:
+        ExportError: if a static geom is a plane or an SDF.
+    """
+    import mujoco
+    import trimesh
+
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    meshes = []
+    for geom in np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0):
+        mesh = _geom_mesh(model, int(geom))
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = data.geom_xmat[geom].reshape(3, 3), data.geom_xpos[geom]
+        meshes.append(mesh.apply_transform(pose))
+    if not meshes:
+        raise ExportError("static geoms: got none; expected a terrain")
+    return trimesh.util.concatenate(meshes)
+
+
+def _geom_mesh(model: "mujoco.MjModel", geom: int) -> "trimesh.Trimesh":
+    """Return the mesh of a geom in its own frame."""
+    import mujoco
+    import trimesh
+    from trimesh import creation
+
+    size, kind, number = model.geom_size[geom], model.geom_type[geom], model.geom_dataid[geom]
+    match mujoco.mjtGeom(kind):
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return creation.box(extents=2 * size)
+        case mujoco.mjtGeom.mjGEOM_CYLINDER:
+            return creation.cylinder(radius=size[0], height=2 * size[1])
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            return creation.capsule(radius=size[0], height=2 * size[1])
+        case mujoco.mjtGeom.mjGEOM_SPHERE | mujoco.mjtGeom.mjGEOM_ELLIPSOID as shape:
+            is_sphere = shape == mujoco.mjtGeom.mjGEOM_SPHERE
+            return creation.icosphere().apply_scale(size[0] if is_sphere else size)
+        case mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = model.mesh(number)
+            vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]]
+            faces = model.mesh_face[mesh.faceadr[0] :][: mesh.facenum[0]]
+            return trimesh.Trimesh(vertices, faces, process=False)
+        case mujoco.mjtGeom.mjGEOM_HFIELD:
+            return _hfield_mesh(model.hfield(number))
+        case other:
+            name = other.name.removeprefix("mjGEOM_").lower()
+            raise ExportError(f"static geom {geom}: got a {name}; expected a shape with a mesh")
+
+
+def _hfield_mesh(field: Any) -> "trimesh.Trimesh":
+    """Return the upper surface of a heightfield, whose rows are along y."""
+    import trimesh
+
+    rows, columns = int(field.nrow[0]), int(field.ncol[0])
+    half_x, half_y, height, _ = field.size
+    y, x = np.meshgrid(
+        np.linspace(-half_y, half_y, rows), np.linspace(-half_x, half_x, columns), indexing="ij"
+    )
+    vertices = np.stack([x, y, height * field.data.reshape(rows, columns)], axis=-1)
+    k = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]
+    faces = np.concatenate([np.stack(each, -1).reshape(-1, 3) for each in ((a, b, c), (a, c, d))])
+    return trimesh.Trimesh(vertices.reshape(-1, 3), faces, process=False)

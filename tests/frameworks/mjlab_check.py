@@ -1,6 +1,7 @@
 """Run a map with solids in mjlab's rough task. Needs mjlab; `make integrations` runs it."""
 
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -10,9 +11,12 @@ import torch
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.sensor import RayCastSensor
 from mjlab.tasks.registry import load_env_cfg
+from mjlab.terrains import TerrainGenerator
+from mjlab.terrains.config import ROUGH_TERRAINS_CFG
 
 import terrainkit
-from terrainkit.integrations.mjlab import terrain_entity_cfg
+from terrainkit.integrations.mjlab import import_terrain, terrain_entity_cfg
+from terrainkit.validate import validate
 
 path = Path(sys.argv[1]) / "map.npz"
 config = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
@@ -57,3 +61,28 @@ for name, sensor in env.scene.sensors.items():
         gap = np.abs(terrain_map.scan(starts) - hits[:, 2])
         assert np.median(gap) < 1e-4, (name, np.median(gap))
 print(f"mjlab {version('mjlab')}: {off.sum()} of 200 rays off by more than 1 mm, next to walls")
+
+# The reverse: a terrain of mjlab's generator as a map.
+cfg = replace(ROUGH_TERRAINS_CFG, seed=1, curriculum=True, num_rows=4, border_width=2.0)
+found = import_terrain(cfg).terrain_map
+assert found.patch_names[0].tolist() == list(cfg.sub_terrains)
+assert not (issues := validate(found)), issues
+spec = mujoco.MjSpec()
+generator = TerrainGenerator(cfg)
+generator.compile(spec)
+model = spec.compile()
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+lower, upper = (np.array(each) for each in (found.grid.lower, found.grid.upper))
+errors = []
+for x, y in np.random.default_rng(0).uniform(lower + 0.1, upper - 0.1, (200, 2)):
+    distance = mujoco.mj_ray(model, data, np.array([x, y, 20.0]), np.array(down), None, 1, -1, hit)
+    errors.append(abs(20.0 - distance - found.height([x, y])))
+# Walls of the map are halfway between two samples, and heights between samples are interpolated.
+errors = np.array(errors)
+assert np.quantile(errors, 0.9) < 0.03, errors
+kept = np.linalg.norm(found.env_origins - generator.terrain_origins, axis=-1) < 0.05
+print(
+    f"import: height error median {np.median(errors) * 1e3:.1f} mm, 90 % within "
+    f"{np.quantile(errors, 0.9) * 1e3:.0f} mm; {kept.mean():.0%} of the origins kept"
+)

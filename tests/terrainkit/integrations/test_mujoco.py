@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
-from terrainkit.integrations.mujoco import add_map, make_spec
+from terrainkit.integrations.mujoco import add_map, make_spec, static_mesh
 
 
 @pytest.fixture(scope="module")
@@ -40,3 +40,33 @@ def test_add_map_supports_ball_on_ground_and_solids(parkour, tmp_path):
 def test_make_spec_rejects_unknown_collision(parkour):
     with pytest.raises(tk.TerrainkitError, match="collision: got 'mesh'"):
         make_spec(parkour, collision="mesh")
+
+
+def test_static_mesh_is_hit_by_the_rays_of_mujoco(parkour):
+    spec = make_spec(parkour, collision="hfield")
+    shapes = mujoco.mjtGeom
+    for k, kind in enumerate((shapes.mjGEOM_CYLINDER, shapes.mjGEOM_ELLIPSOID, shapes.mjGEOM_BOX)):
+        quat = [0.9, 0.3, 0.2, 0.1]
+        spec.worldbody.add_geom(type=kind, pos=[4 * k, 2, 1], quat=quat, size=[1, 1.5, 2])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    x, y = np.random.default_rng(0).uniform((0, 0), (16, 40), (300, 2)).T
+    starts = np.column_stack([x, y, np.full(300, 9.0)])
+    down, geom = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
+    expected = [9.0 - mujoco.mj_ray(model, data, each, down, None, 1, -1, geom) for each in starts]
+    mesh = static_mesh(model)
+    hits, rays, _ = mesh.ray.intersects_location(starts, np.tile(down, (300, 1)))
+    highest = np.full(300, -np.inf)
+    np.maximum.at(highest, rays, hits[:, 2])
+    error = np.abs(highest - expected)
+    # The curved surfaces have facets, and a cell of a heightfield can be cut along either diagonal.
+    assert np.median(error) < 1e-6
+    assert np.quantile(error, 0.95) < 0.05
+
+
+def test_static_mesh_rejects_plane():
+    spec = mujoco.MjSpec()
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])
+    with pytest.raises(tk.TerrainkitError, match="static geom 0: got a plane"):
+        static_mesh(spec.compile())

@@ -1,5 +1,6 @@
-"""The pages in a browser; skipped where Chromium is missing."""
+"""The pages in a browser, which takes long without a GPU; `make browser` runs it."""
 
+import os
 import time
 
 import numpy as np
@@ -13,7 +14,10 @@ from terrainkit_robots.viewer.show_policy import PolicyView
 from terrainkit_robots.viewer.show_robot import show_robot
 from tests.browser import CHROMIUM, open_page
 
-pytestmark = pytest.mark.skipif(not CHROMIUM, reason="there is no Chromium")
+pytestmark = pytest.mark.skipif(
+    not (CHROMIUM and "TERRAINKIT_BROWSER" in os.environ),
+    reason="there is no Chromium, or TERRAINKIT_BROWSER is not set",
+)
 
 SCENE = (slice(160, None), slice(None, 450))
 """The part of the page between the notification and the controls."""

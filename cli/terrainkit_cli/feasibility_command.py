@@ -1,0 +1,144 @@
+"""The command that shows whether a robot can cross the patches of a map."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from terrainkit.errors import ConfigError
+from terrainkit.terrain_map import TerrainMap
+from terrainkit_cli import render
+from terrainkit_cli.parse import Command, value_of
+from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, parse_pairs, text_option
+from terrainkit_cli.terrain_commands import MapFile
+
+if TYPE_CHECKING:
+    from terrainkit.feasibility import PatchFeasibility
+    from terrainkit_robots.simulation.robot_limits import DerivedLimits
+
+MAX_LISTED = 20
+"""Patches that the command lists one by one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Feasibility(Command):
+    """Show whether a robot can cross each patch, and what blocks it.
+
+    The demand of a patch is 0 on level ground and 1 at the limit of the robot. It is the largest
+    ratio to a limit on the least demanding path from the spawn origin through the goals, or to the
+    far edge.
+
+    Exit code 0: the robot can cross every patch. 1: a patch demands more than 1. 2: the input is
+    invalid.
+    """
+
+    map: MapFile
+    """The map, a file written by terrainkit generate or import."""
+
+    robot: RobotName = ""
+    """Name of a bundled robot, or a folder written by terrainkit onboard."""
+
+    limit: LimitWords = ()
+    """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
+
+    output: Annotated[str, text_option("PATH", "-o")] = ""
+    """Write PATH.json with all paths, and PATH.png with the paths on the preview."""
+
+    overwrite: Flag = False
+    """Replace existing files."""
+
+    def run(self) -> int:
+        """Print the limits, the demands and the blocking places; write the report."""
+        from terrainkit.feasibility import assess_map
+        from terrainkit.feasibility.report import demand_table
+
+        derived = robot_limits(self.robot, self.limit)
+        terrain_map = TerrainMap.load(self.map)
+        target = Path(self.output).with_suffix("") if self.output else None
+        if target:
+            self._check_targets(target)
+        results = assess_map(terrain_map, derived.limits, render.progress)
+        render.result(f"{derived.robot}:")
+        rows = [(f"  {name}", f"{value:.3g}") for name, value in vars(derived.limits).items()]
+        render.table([(*row, derived.reasons[row[0].strip()]) for row in rows])
+        render.result("\ndemand, the largest of each terrain and level:")
+        render.table(demand_table(results))
+        if target:
+            self._write(target, terrain_map, results, derived)
+        return print_impassable(results, derived, self.map)
+
+    def _check_targets(self, target: Path) -> None:
+        from terrainkit.atomic_write import check_target
+
+        for suffix in (".json", ".png"):
+            check_target(target.with_suffix(suffix), overwrite=self.overwrite)
+
+    def _write(
+        self,
+        target: Path,
+        terrain_map: TerrainMap,
+        results: "Sequence[PatchFeasibility]",
+        derived: "DerivedLimits",
+    ) -> None:
+        from terrainkit import __version__
+        from terrainkit.atomic_write import atomic_write
+        from terrainkit.feasibility.report import routes, to_json
+        from terrainkit.preview import write_preview
+
+        about = {
+            "tool": {"name": "terrainkit", "version": __version__},
+            "map": str(self.map),
+            "robot": derived.robot,
+            "reasons": dict(derived.reasons),
+        }
+        path = target.with_suffix(".json")
+        with atomic_write(path, overwrite=self.overwrite) as temporary:
+            document = json.dumps(to_json(results, derived.limits, **about))
+            temporary.write_text(f"{document}\n", encoding="utf-8")
+            write_preview(terrain_map, temporary.with_suffix(".png"), routes=routes(results))
+        render.result(f"\nwrote {path} and {path.with_suffix('.png')}")
+
+
+def robot_limits(robot: str, limits: Sequence[str]) -> "DerivedLimits":
+    """Return the limits of a robot with those of --limit.
+
+    Raises:
+        ConfigError: if there is no such robot, it has no legs, or a limit is invalid.
+    """
+    from terrainkit.feasibility.limits import limit_overrides
+    from terrainkit_robots.rl.tasks import get_task
+    from terrainkit_robots.simulation.robot_limits import derive_limits
+
+    if not robot:
+        raise ConfigError("--robot: missing; expected a bundled robot, or an onboarded folder")
+    values = parse_pairs("--limit", limits, "=", "NAME=VALUE, such as step_up=0.2")
+    overrides = limit_overrides({name: value_of(text) for name, text in values.items()})
+    return derive_limits(get_task(robot).folder, overrides)
+
+
+def print_impassable(
+    results: "Sequence[PatchFeasibility]", derived: "DerivedLimits", path: Path
+) -> int:
+    """Print the patches that the robot cannot cross, and return 1 if there are any."""
+    from terrainkit.feasibility.report import blocking_text, demand_text
+
+    blocked = [each for each in results if not each.is_passable]
+    if not blocked:
+        render.result(f"\n{path}: {derived.robot} can cross {_patches(len(results))}")
+        return 0
+    render.result("")
+    for each in blocked[:MAX_LISTED]:
+        render.result(
+            f"patch ({each.row}, {each.col}), {each.terrain}: demand {demand_text(each.demand)}, "
+            f"{blocking_text(each, derived.limits)}"
+        )
+    if len(blocked) > MAX_LISTED:
+        render.result(f"and {len(blocked) - MAX_LISTED} more")
+    count = f"{len(blocked)} of {_patches(len(results))}"
+    render.result(f"\n{path}: {derived.robot} cannot cross {count}")
+    return 1
+
+
+def _patches(number: int) -> str:
+    return f"{number} patch" if number == 1 else f"{number} patches"

@@ -1,0 +1,10 @@
+"""Feasibility: whether a robot can cross a patch, and what the patch demands of it.
+
+The footholds of a patch are a graph. Each quantity of a node or an edge is divided by the limit of
+the robot; the demand of a patch is the largest ratio on the path where it is smallest.
+"""
+
+from terrainkit.feasibility.assess import MAX_DEMAND, PatchFeasibility, assess_map, assess_patch
+from terrainkit.feasibility.limits import RobotLimits
+
+__all__ = ["MAX_DEMAND", "PatchFeasibility", "RobotLimits", "assess_map", "assess_patch"]

@@ -1,0 +1,266 @@
+"""Assess the patches of a map: the demand on a robot, its path, and the blocking place."""
+
+import itertools
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit.feasibility.bottleneck import bottleneck, shortest_path
+from terrainkit.feasibility.columns import Columns, IntArray, sample_columns
+from terrainkit.feasibility.edges import Edges
+from terrainkit.feasibility.foothold_graph import FootholdGraph
+from terrainkit.feasibility.gaps import gap_edges
+from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.regions import Regions
+from terrainkit.free_space import free_intervals
+from terrainkit.memory import check_memory
+from terrainkit.patch import Patch
+from terrainkit.solid_index import SolidIndex
+from terrainkit.surface import surface_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from terrainkit.generation import Progress
+    from terrainkit.terrain_map import TerrainMap
+
+MAX_DEMAND = 2.0
+"""Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""
+
+GOAL_TOLERANCE = 1e-3
+"""Largest depth of a goal below a floor that is rounding [m]."""
+
+_REACHES = (0.5, 1.0, MAX_DEMAND)
+"""Demands up to which gaps are searched one after the other: few patches need the widest ones."""
+
+_BYTES_PER_COLUMN = 2000
+"""Memory of a column with its edges [bytes]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PatchFeasibility:
+    """What a patch demands of a robot."""
+
+    row: int
+    """Row of the patch."""
+
+    col: int
+    """Column of the patch."""
+
+    terrain: str
+    """Name of the sub-terrain."""
+
+    difficulty: float
+    """Difficulty of the patch, 0 to 1."""
+
+    demand: float
+    """Largest ratio of a quantity on the path to its limit: 0 on level ground, 1 at the limit of
+    the robot, inf above `MAX_DEMAND` or without a path."""
+
+    limit: str
+    """Name of the limit that determines the demand; empty if that is 0 or there is no path."""
+
+    value: float
+    """Quantity at the blocking place, in the unit of the limit; NaN if there is none."""
+
+    place: NDArray[np.float64]
+    """Blocking place, x, y, z [m], shape (3,); NaN if there is none."""
+
+    path: NDArray[np.float64]
+    """Path from the spawn origin through the goals, or to the far edge [m], shape (n, 3)."""
+
+    @property
+    def is_passable(self) -> bool:
+        """Whether the demand is at most 1."""
+        return self.demand <= 1.0
+
+
+def assess_map(
+    terrain_map: "TerrainMap", limits: RobotLimits, progress: "Progress | None" = None
+) -> list[PatchFeasibility]:
+    """Return what each patch of a map demands of a robot, row by row.
+
+    Args:
+        terrain_map: The map.
+        limits: The limits of the robot.
+        progress: Wraps the iterator over the patches, for a progress bar.
+
+    Raises:
+        ConfigError: if a goal is inside the ground or a solid, or outside of its patch.
+        ExportError: if a height is not finite.
+        MemoryLimitError: if the graph of a patch would not fit in memory.
+    """
+    terrain_map.require_finite()
+    threshold = terrain_map.config.wall_threshold
+    places: Iterator[tuple[int, int]] = iter(list(np.ndindex(terrain_map.difficulty.shape)))
+    wrapped = progress(places, terrain_map.difficulty.size) if progress else places
+    return [
+        replace(assess_patch(terrain_map.patch(row, col), limits, threshold), row=row, col=col)
+        for row, col in wrapped
+    ]
+
+
+def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFeasibility:
+    """Return what a patch demands of a robot, as the patch (0, 0); see :func:`assess_map`.
+
+    Args:
+        patch: The patch.
+        limits: The limits of the robot.
+        threshold: Difference between neighboring samples above which there is a wall [m].
+    """
+    cells = patch.grid.shape[0] * patch.grid.shape[1]
+    check_memory(cells * _BYTES_PER_COLUMN, f"the footholds of a patch of {cells} cells")
+    _check_goals(patch, threshold)
+    columns = sample_columns(patch, threshold)
+    legs = _legs(patch, columns)
+    graph = FootholdGraph.build(columns, limits, _rim(patch, columns, legs))
+    edges, demand = _edges(graph, legs)
+    path = _Path(graph, edges, demand, legs)
+    return PatchFeasibility(
+        row=0,
+        col=0,
+        terrain=patch.terrain,
+        difficulty=patch.difficulty,
+        demand=path.demand if path.demand <= MAX_DEMAND else float("inf"),
+        limit=path.limit,
+        value=path.value,
+        place=path.place,
+        path=path.points,
+    )
+
+
+Leg = tuple[int, IntArray]
+"""A node, and the nodes of which the path from there reaches one."""
+
+
+def _legs(patch: Patch, columns: Columns) -> list[Leg]:
+    """Return the legs of the path: to each goal in turn, or else to the far edge."""
+    start = columns.node_at(patch.origin.astype(np.float64))
+    if not len(patch.goals):
+        return [(start, _far_edge(patch, columns))]
+    nodes = [start] + [columns.node_at(goal[:3].astype(np.float64)) for goal in patch.goals]
+    return [(a, np.array([b])) for a, b in itertools.pairwise(nodes)]
+
+
+def _far_edge(patch: Patch, columns: Columns) -> IntArray:
+    """Return the nodes on the sides of the patch that are farthest from the spawn origin."""
+    lower, upper = np.array(patch.grid.lower), np.array(patch.grid.upper)
+    origin = patch.origin[:2].astype(np.float64)
+    away = np.stack([origin - lower, upper - origin])
+    is_far = away >= away.max() - patch.grid.cell * 1.5
+    node = np.arange(columns.floor.size).reshape(columns.floor.shape)
+    sides = [node[0], node[-1], node[:, 0], node[:, -1]]
+    wanted = [is_far[0, 0], is_far[1, 0], is_far[0, 1], is_far[1, 1]]
+    found = np.concatenate(
+        [side.reshape(-1) for side, far in zip(sides, wanted, strict=True) if far]
+    )
+    return np.unique(found[~np.isnan(columns.floor.reshape(-1)[found])])
+
+
+def _rim(patch: Patch, columns: Columns, legs: list[Leg]) -> NDArray[np.bool_]:
+    """Return which nodes are in the outermost cells of the patch, shape (nx, ny, m).
+
+    Many terrains are level there, to meet the next patch without a cliff; a path on this rim would
+    avoid the terrain. A side on which the path starts or ends is not part of the rim.
+    """
+    n = round(patch.grid.cell / columns.spacing)
+    node = np.concatenate([np.append(targets, start) for start, targets in legs])
+    i, j = columns.column(node)
+    (nx, ny), is_rim = columns.shape, np.zeros(columns.floor.shape, dtype=bool)
+    is_rim[:n] |= not (i < n).any()
+    is_rim[-n:] |= not (i >= nx - n).any()
+    is_rim[:, :n] |= not (j < n).any()
+    is_rim[:, -n:] |= not (j >= ny - n).any()
+    # Corners of a side with a target belong to the other side as well.
+    is_rim.reshape(-1)[node] = False
+    return is_rim
+
+
+def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, np.ndarray]:
+    """Return the edges that the least demanding path may use, and their demands.
+
+    Gaps are only searched between regions that no smaller demand joins than that of the narrowest
+    gap, and only up to the demand of the path without them. Wider ones would not change the result.
+    """
+    size, narrowest = graph.columns.floor.size, _narrowest_gap(graph)
+    steps = graph.steps
+    edges, demand = steps, graph.demand(steps)
+    searched = narrowest
+    regions = None
+    for reach in _REACHES:
+        most = max(bottleneck(edges, demand, *leg, size) for leg in legs)
+        if most <= searched:
+            break
+        if regions is None:
+            regions = Regions.build(steps, demand, graph.node_demand, narrowest)
+        edges = Edges.concatenate([steps, gap_edges(graph, regions, min(most, reach))])
+        demand, searched = graph.demand(edges), reach
+    return edges, demand
+
+
+def _narrowest_gap(graph: FootholdGraph) -> float:
+    """Return a lower bound of the demand of all gaps: that of cells that touch at a corner."""
+    s = graph.columns.spacing
+    return (2**0.5 - 1) * s / graph.limits.gap
+
+
+class _Path:
+    """The path through all legs, and its blocking place."""
+
+    def __init__(
+        self, graph: FootholdGraph, edges: Edges, demand: np.ndarray, legs: list[Leg]
+    ) -> None:
+        self.demand, self.limit, self.value = 0.0, "", float("nan")
+        self.place = np.full(3, np.nan)
+        size, position = graph.columns.floor.size, graph.columns.positions
+        nodes = [legs[0][0]]
+        for start, targets in legs:
+            if nodes[-1] != start:
+                break
+            most = bottleneck(edges, demand, start, targets, size)
+            usable = edges.select(demand <= most)
+            ends = position(usable.end) - position(usable.start)
+            length = np.linalg.norm(ends, axis=1) * (1.0 + demand[demand <= most])
+            way = shortest_path(usable, length, start, targets, size)
+            if way is None:
+                self.demand = float("inf")
+                break
+            if not len(way):
+                continue
+            nodes += usable.end[way].tolist()
+            ratios = demand[demand <= most][way]
+            worst = int(np.argmax(ratios))
+            if ratios[worst] > self.demand:
+                one = np.zeros(len(usable.start), dtype=bool)
+                one[way[worst]] = True
+                edge = usable.select(one)
+                self.limit, self.value, _ = graph.blocking(edge)
+                self.demand = float(ratios[worst])
+                self.place = (position(edge.start)[0] + position(edge.end)[0]) / 2
+        self.points = position(np.array(nodes))
+
+
+def _check_goals(patch: Patch, threshold: float) -> None:
+    """Raise ConfigError if a goal is outside of its patch, or inside the ground or a solid."""
+    if not len(patch.goals):
+        return
+    goals = patch.goals.astype(np.float64)
+    index = (goals[:, :2] - patch.grid.lower) / patch.grid.cell - 0.5
+    outside = (index < -0.5) | (index > np.array(patch.grid.shape) - 0.5)
+    if not np.isfinite(goals[:, :3]).all() or outside.any():
+        raise ConfigError(f"{patch.terrain}: got a goal outside of its patch; expected it inside")
+    ground = surface_at(patch.heights, index, threshold=threshold).height
+    solids = SolidIndex(patch.solids.select(patch.solids.collides))
+    floor, ceiling = np.moveaxis(free_intervals(ground, solids.spans(goals[:, :2])), -1, 0)
+    z = goals[:, 2:3]
+    is_free = ((floor - GOAL_TOLERANCE <= z) & (z <= ceiling + GOAL_TOLERANCE)).any(axis=1)
+    if not is_free.all():
+        k = int(np.flatnonzero(~is_free)[0])
+        x, y, height = goals[k, :3]
+        raise ConfigError(
+            f"{patch.terrain}: got goal {k} at ({x:.2f}, {y:.2f}, {height:.2f}), inside the ground "
+            "or a solid; expected goals that a robot can reach"
+        )

@@ -1,0 +1,102 @@
+"""Columns: the places of a patch where a robot can stand, and the free height above them."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.free_space import free_intervals
+from terrainkit.patch import Patch
+from terrainkit.solid_index import SolidIndex
+from terrainkit.surface import surface_at
+
+MAX_SPACING = 0.035
+"""Largest distance between two columns of a patch with solids [m]. Solids do not snap to the cells
+of the map; the edge of a foothold of 0.1 m has to be found within a third of it."""
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Columns:
+    """The free intervals on nx x ny vertical lines, at most m on each.
+
+    The floor of an interval is a node: a place to stand, on the ground or on a solid. Node
+    (i, j, k) has the index (i * ny + j) * m + k.
+    """
+
+    spacing: float
+    """Distance between two columns [m]."""
+
+    lower: tuple[float, float]
+    """Position of column (0, 0), x and y [m]."""
+
+    floor: FloatArray
+    """Floor of each interval, from low to high [m], shape (nx, ny, m); NaN where there is none."""
+
+    ceiling: FloatArray
+    """Ceiling of each interval [m], shape (nx, ny, m); inf under the open sky."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Columns along x and y."""
+        return self.floor.shape[0], self.floor.shape[1]
+
+    def column(self, node: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the index of the column of each node along x and y."""
+        column = node // self.floor.shape[2]
+        return column // self.shape[1], column % self.shape[1]
+
+    def positions(self, node: IntArray) -> FloatArray:
+        """Return the positions of nodes [m], shape (n, 3)."""
+        i, j = self.column(node)
+        x, y = self.lower
+        z = self.floor.reshape(-1)[node]
+        return np.column_stack([x + i * self.spacing, y + j * self.spacing, z])
+
+    def node_at(self, position: FloatArray) -> int:
+        """Return the node on which a robot at `position` (x, y, z) stands.
+
+        It is the highest floor that is not above the position, or else the lowest, of the nearest
+        column that has a floor.
+        """
+        index = (position[:2] - self.lower) / self.spacing
+        i, j = np.clip(np.rint(index), 0, np.array(self.shape) - 1).astype(int)
+        reach = slice(max(i - 1, 0), i + 2), slice(max(j - 1, 0), j + 2)
+        error = np.abs(self.floor[reach] - position[2])
+        error[np.isnan(error)] = np.inf
+        # Of floors at about the same height, the nearest one.
+        di, dj = np.ogrid[reach]
+        away = np.hypot(di - index[0], dj - index[1])[..., None] * self.spacing
+        a, b, k = np.unravel_index(np.argmin(error + away), error.shape)
+        column = (reach[0].start + int(a)) * self.shape[1] + reach[1].start + int(b)
+        return int(column * self.floor.shape[2] + int(k))
+
+
+def sample_columns(patch: Patch, threshold: float) -> Columns:
+    """Return the columns of a patch: its samples, or finer ones if it has solids.
+
+    Args:
+        patch: The patch. Solids that do not collide are ignored.
+        threshold: Difference between neighboring samples above which there is a wall [m].
+    """
+    grid = patch.grid
+    solids = patch.solids.select(patch.solids.collides)
+    n = math.ceil(grid.cell / MAX_SPACING - 1e-9) if len(solids) else 1
+    spacing = grid.cell / n
+    lower = grid.lower[0] + spacing / 2, grid.lower[1] + spacing / 2
+    if n == 1 and not len(solids):
+        floor = patch.heights.astype(np.float64)[..., None]
+        ceiling = np.full_like(floor, np.inf)
+        return Columns(spacing=spacing, lower=lower, floor=floor, ceiling=ceiling)
+    nx, ny = grid.shape[0] * n, grid.shape[1] * n
+    index = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), axis=-1)
+    index = index.reshape(-1, 2)
+    in_cells = (index + 0.5) / n - 0.5
+    xy: FloatArray = index * spacing + np.array(lower)
+    ground = surface_at(patch.heights, in_cells, threshold=threshold).height
+    spans = SolidIndex(solids).spans(xy)
+    intervals = free_intervals(ground, spans).reshape(nx, ny, -1, 2)
+    return Columns(spacing=spacing, lower=lower, floor=intervals[..., 0], ceiling=intervals[..., 1])

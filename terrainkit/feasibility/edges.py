@@ -1,0 +1,100 @@
+"""Edges: moves from one node to another, and the steps between neighboring columns."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.slopes import Slopes, step
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Edges:
+    """n directed edges."""
+
+    start: IntArray
+    """First node of each, shape (n,)."""
+
+    end: IntArray
+    """Second node of each, shape (n,)."""
+
+    rise: FloatArray
+    """Height of the highest point above the first node [m], shape (n,)."""
+
+    drop: FloatArray
+    """Height of the highest point above the second node [m], shape (n,)."""
+
+    gap: FloatArray
+    """Width of the gap [m], shape (n,)."""
+
+    clearance: FloatArray
+    """Clearance below solids [m], shape (n,)."""
+
+    width: FloatArray
+    """Free width between walls over the gap [m], shape (n,)."""
+
+    @classmethod
+    def concatenate(cls, parts: list[Self]) -> Self:
+        """Return the edges of all parts."""
+        names = ("start", "end", "rise", "drop", "gap", "clearance", "width")
+        return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+
+    def select(self, mask: NDArray[np.bool_]) -> Self:
+        """Return the edges where `mask` is True, shape (n,)."""
+        names = ("start", "end", "rise", "drop", "gap", "clearance", "width")
+        return type(self)(**{name: getattr(self, name)[mask] for name in names})
+
+
+def step_edges(columns: Columns, slopes: Slopes) -> Edges:
+    """Return the edges between the nodes of neighboring columns.
+
+    Args:
+        columns: The columns.
+        slopes: Slope at each node.
+
+    Returns:
+        The edges toward x and y, and then their opposites in the same order.
+    """
+    parts = [
+        _steps(columns, slopes, axis, k, other)
+        for axis in (0, 1)
+        for k in range(columns.floor.shape[2])
+        for other in range(columns.floor.shape[2])
+    ]
+    one_way = Edges.concatenate(parts)
+    back = Edges(
+        start=one_way.end,
+        end=one_way.start,
+        rise=one_way.drop,
+        drop=one_way.rise,
+        gap=one_way.gap,
+        clearance=one_way.clearance,
+        width=one_way.width,
+    )
+    return Edges.concatenate([one_way, back])
+
+
+def _steps(columns: Columns, slopes: Slopes, axis: int, k: int, other: int) -> Edges:
+    """Return the edges along an axis from intervals `k` to intervals `other` of the next column."""
+    here = (slice(None, -1), slice(None), k) if axis == 0 else (slice(None), slice(None, -1), k)
+    there = (slice(1, None), slice(None), other)
+    if axis == 1:
+        there = (slice(None), slice(1, None), other)
+    slope = slopes.x if axis == 0 else slopes.y
+    node = np.arange(columns.floor.size).reshape(columns.floor.shape)
+    z, next_z = columns.floor[here], columns.floor[there]
+    clearance = np.minimum(columns.ceiling[here], columns.ceiling[there]) - np.maximum(z, next_z)
+    joined = clearance > 0  # NaN is not
+    rise = step((next_z - z)[joined], slope[here][joined], slope[there][joined])
+    none = np.zeros(len(rise))
+    return Edges(
+        start=node[here][joined],
+        end=node[there][joined],
+        rise=np.maximum(rise, 0.0),
+        drop=np.maximum(-rise, 0.0),
+        gap=none,
+        clearance=clearance[joined],
+        width=np.full(len(rise), np.inf),
+    )

@@ -1,0 +1,139 @@
+"""FootholdGraph: the nodes of a patch and their quantities, and the demand of nodes and edges.
+
+Every quantity of a node or an edge is divided by the limit of the robot. The largest of these
+ratios is its demand: 0 on level ground, 1 at the limit.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.feasibility.columns import Columns, FloatArray
+from terrainkit.feasibility.edges import Edges, step_edges
+from terrainkit.feasibility.footholds import foothold_sizes
+from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.passages import Passages
+from terrainkit.feasibility.slopes import slopes_of
+
+DIGITS = 6
+"""Digits of a demand, so that a step of exactly the limit is not above it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FootholdGraph:
+    """The nodes of a patch with their quantities, for the limits of one robot."""
+
+    columns: Columns
+    """The columns, whose floors are the nodes."""
+
+    limits: RobotLimits
+    """The limits."""
+
+    steps: Edges
+    """Edges between the nodes of neighboring columns, in both directions."""
+
+    passages: Passages
+    """The free width between walls."""
+
+    quantities: dict[str, FloatArray]
+    """Quantity of each node by the name of its limit, shape (nodes,): slope, foothold, body_width
+    and clearance."""
+
+    node_demand: FloatArray
+    """Demand of each node, shape (nodes,)."""
+
+    @classmethod
+    def build(
+        cls, columns: Columns, limits: RobotLimits, excluded: NDArray[np.bool_] | None = None
+    ) -> Self:
+        """Return the graph of the columns of a patch.
+
+        Args:
+            columns: The columns.
+            limits: The limits of the robot.
+            excluded: Nodes that no path may use, shape (nx, ny, m); None for none.
+        """
+        slopes = slopes_of(columns.floor, columns.spacing)
+        steps, passages = step_edges(columns, slopes), Passages.build(columns, limits)
+        quantities = {
+            "slope": slopes.grade(columns.spacing),
+            "foothold": foothold_sizes(columns, steps, limits),
+            "body_width": passages.node_widths(),
+            "crouched_height": columns.ceiling - columns.floor,
+        }
+        flat = {name: values.reshape(-1) for name, values in quantities.items()}
+        demands = [ratio(name, values, limits) for name, values in flat.items()]
+        demand = largest(demands)
+        if excluded is not None:
+            demand[excluded.reshape(-1)] = np.inf
+        return cls(
+            columns=columns,
+            limits=limits,
+            steps=steps,
+            passages=passages,
+            quantities=flat,
+            node_demand=demand,
+        )
+
+    def demand(self, edges: Edges) -> FloatArray:
+        """Return the demand of each edge, those of its nodes included, shape (n,)."""
+        nodes = np.maximum(self.node_demand[edges.start], self.node_demand[edges.end])
+        return largest([nodes, *self.edge_ratios(edges).values()])
+
+    def edge_ratios(self, edges: Edges) -> dict[str, FloatArray]:
+        """Return the ratio of each quantity of the edges by the name of its limit."""
+        quantities = {
+            "step_up": edges.rise,
+            "step_down": edges.drop,
+            "gap": edges.gap,
+            "crouched_height": edges.clearance,
+            "body_width": edges.width,
+        }
+        return {name: ratio(name, values, self.limits) for name, values in quantities.items()}
+
+    def blocking(self, edge: Edges) -> tuple[str, float, float]:
+        """Return limit, measured quantity and ratio of the largest demand of a single edge."""
+        found = [
+            (float(ratio(name, values[node], self.limits)[0]), name, float(values[node][0]))
+            for name, values in self.quantities.items()
+            for node in (edge.start, edge.end)
+        ]
+        raw = {
+            "step_up": edge.rise,
+            "step_down": edge.drop,
+            "gap": edge.gap,
+            "crouched_height": edge.clearance,
+            "body_width": edge.width,
+        }
+        found += [
+            (float(values[0]), name, float(raw[name][0]))
+            for name, values in self.edge_ratios(edge).items()
+        ]
+        largest, name, value = max(found, key=lambda each: each[0])
+        return name, value, largest
+
+
+def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
+    """Return a quantity divided by the limit `name`: 0 on level open ground, 1 at the limit.
+
+    A foothold or a passage demands something if it is less than twice as wide as the limit, and a
+    clearance if it is less than the standing height; in between, the ratio is linear.
+    """
+    limit = getattr(limits, name)
+    result: FloatArray
+    if name in ("foothold", "body_width"):
+        result = np.maximum(2.0 - value / limit, 0.0)
+    elif name == "crouched_height":
+        clearance = np.minimum(value, limits.standing_height)
+        result = (limits.standing_height - clearance) / (limits.standing_height - limit)
+    else:
+        result = np.maximum(value, 0.0) / limit
+    return result
+
+
+def largest(ratios: list[FloatArray]) -> FloatArray:
+    """Return the largest of several ratios of each node or edge, rounded."""
+    demand: FloatArray = np.round(np.stack(ratios).max(axis=0), DIGITS)
+    return demand

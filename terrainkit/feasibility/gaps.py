@@ -1,0 +1,186 @@
+"""Gap edges: from the rim of one region to the rim of another, over ground without a foothold."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.edges import Edges
+from terrainkit.feasibility.foothold_graph import FootholdGraph, ratio
+from terrainkit.feasibility.regions import Regions
+
+_MAX_PAIRS = 200_000
+"""Pairs of nodes that are evaluated at once, to bound the memory."""
+
+_MAX_ENDS = 4
+"""Largest number of gaps from a node to a region, the narrowest ones. Steps of little demand join
+the nodes of a region, so it does not matter where a gap ends, unless there is a wall in between."""
+
+
+def gap_edges(graph: FootholdGraph, regions: Regions, most: float) -> Edges:
+    """Return the edges over gaps with a demand below `most`, in both directions.
+
+    An edge joins two regions. In between, the body passes above the higher one of both nodes, over
+    any hurdle, and below any solid.
+
+    Args:
+        graph: The graph.
+        regions: What the steps join.
+        most: Demand above which an edge is of no use.
+    """
+    from scipy.spatial import cKDTree
+
+    limits, columns, steps = graph.limits, graph.columns, graph.steps
+    nodes = _rim(graph, regions)
+    nodes = nodes[graph.node_demand[nodes] < most]
+    if len(nodes) < 2:
+        return steps.select(np.zeros(len(steps.start), dtype=bool))
+    points = columns.positions(nodes)
+    # The gap is shorter than the distance of the nodes by a column, or by up to sqrt(2) of it.
+    reach = most * limits.gap + 1.5 * columns.spacing
+    height = most * max(limits.step_up, limits.step_down)
+    # A slab of this height, and no cylinder around it, would be exact; the rest is dropped below.
+    pairs = cKDTree(points / (reach, reach, height)).query_pairs(2**0.5, output_type="ndarray")
+    first, second = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
+    start, end = _candidates(
+        graph, regions, np.concatenate([first, second]), np.concatenate([second, first]), most
+    )
+    parts = [
+        _evaluate(graph, start[n : n + _MAX_PAIRS], end[n : n + _MAX_PAIRS], most)
+        for n in range(0, max(len(start), 1), _MAX_PAIRS)
+    ]
+    return Edges.concatenate(parts)
+
+
+def _rim(graph: FootholdGraph, regions: Regions) -> IntArray:
+    """Return the nodes with a neighboring column where no node is joined to them."""
+    columns, steps = graph.columns, graph.steps
+    nx, ny = columns.shape
+    m = columns.floor.shape[2]
+    same = regions.joined(steps.start, steps.end, graph.node_demand[steps.start])
+    start, end = steps.start[same], steps.end[same]
+    has_neighbor = np.zeros((columns.floor.size, 4), dtype=bool)
+    move = end // m - start // m
+    for side, offset in enumerate((ny, -ny, 1, -1)):
+        has_neighbor[start[move == offset], side] = True
+    at = has_neighbor.reshape(nx, ny, m, 4)
+    at[-1, :, :, 0] = at[0, :, :, 1] = at[:, -1, :, 2] = at[:, 0, :, 3] = True  # the patch ends
+    is_node = ~np.isnan(columns.floor.reshape(-1))
+    return np.flatnonzero(is_node & ~has_neighbor.all(axis=1))
+
+
+def _candidates(
+    graph: FootholdGraph, regions: Regions, start: IntArray, end: IntArray, most: float
+) -> tuple[IntArray, IntArray]:
+    """Return the pairs whose gap may be useful: the narrowest from each node to each region."""
+    limits, floor = graph.limits, graph.columns.floor.reshape(-1)
+    gap, is_apart = _gap_widths(graph.columns, start, end)
+    rise = floor[end] - floor[start]
+    demand = np.maximum.reduce(
+        [
+            graph.node_demand[start],
+            graph.node_demand[end],
+            gap / limits.gap,
+            rise / limits.step_up,
+            -rise / limits.step_down,
+        ]
+    )
+    useful = is_apart & (demand < most)
+    start, end, demand = start[useful], end[useful], demand[useful]
+    apart = ~regions.joined(start, end, demand)
+    start, end, demand = start[apart], end[apart], demand[apart]
+    region = regions.labels[0, end]
+    order = np.lexsort((demand, region, start))
+    start, end, region = start[order], end[order], region[order]
+    is_first = np.ones(len(start), dtype=bool)
+    is_first[_MAX_ENDS:] = (start[_MAX_ENDS:] != start[:-_MAX_ENDS]) | (
+        region[_MAX_ENDS:] != region[:-_MAX_ENDS]
+    )
+    return start[is_first], end[is_first]
+
+
+def _gap_widths(
+    columns: Columns, start: IntArray, end: IntArray
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the width of the gap between two nodes [m], and whether they are not neighbors."""
+    (i, j), (i2, j2) = columns.column(start), columns.column(end)
+    dx, dy = np.abs(i2 - i), np.abs(j2 - j)
+    far = np.maximum(dx, dy)
+    # The line leaves the cell of each node after half a column along the longer axis. Cells that
+    # touch at a corner are as far apart as the circles in them.
+    outside = np.where(far > 1, 1.0 - 1.0 / np.maximum(far, 1), 1.0 - 0.5**0.5)
+    return np.hypot(dx, dy) * columns.spacing * outside, (far > 1) | ((dx > 0) & (dy > 0))
+
+
+def _evaluate(graph: FootholdGraph, start: IntArray, end: IntArray, most: float) -> Edges:
+    """Return the edges from `start` to `end` whose demand is below `most`."""
+    floor = graph.columns.floor.reshape(-1)
+    gap, _ = _gap_widths(graph.columns, start, end)
+    top, clearance = _between(graph, start, end)
+    edges = Edges(
+        start=start,
+        end=end,
+        rise=top - floor[start],
+        drop=top - floor[end],
+        gap=gap,
+        clearance=clearance,
+        width=np.full(len(start), np.inf),
+    )
+    edges = edges.select(graph.demand(edges) < most)
+    return _with_width(graph, edges, most)
+
+
+def _between(graph: FootholdGraph, start: IntArray, end: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return the highest point of the way over each gap, and the least clearance there [m]."""
+    columns = graph.columns
+    floor = columns.floor.reshape(-1)
+    level = np.maximum(floor[start], floor[end])
+    top, clearance = level.copy(), np.full(len(start), np.inf)
+    for place, inside in _line(columns, start, end):
+        floors, ceilings = columns.floor[place], columns.ceiling[place]
+        above = np.fmax(floors, level[inside][:, None])
+        free = ceilings - above
+        # Of several intervals, the body takes the one with the least demand.
+        cost = np.maximum(
+            ratio("step_up", above - floor[start[inside]][:, None], graph.limits),
+            ratio("crouched_height", free, graph.limits),
+        )
+        cost[~(free > 0)] = np.inf
+        best = np.argmin(cost, axis=1)
+        row = np.arange(len(best))
+        top[inside] = np.maximum(top[inside], above[row, best])
+        found = np.where(np.isfinite(cost[row, best]), free[row, best], -np.inf)
+        clearance[inside] = np.minimum(clearance[inside], found)
+    return top, clearance
+
+
+def _with_width(graph: FootholdGraph, edges: Edges, most: float) -> Edges:
+    """Return the edges with the free width between walls at the height of the body."""
+    floor = graph.columns.floor.reshape(-1)
+    level = np.maximum(floor[edges.start], floor[edges.end])
+    lines = _line(graph.columns, edges.start, edges.end)
+    if not lines:
+        return edges
+    i, j = (np.concatenate([place[axis] for place, _ in lines]) for axis in (0, 1))
+    inside = np.concatenate([inside for _, inside in lines])
+    width = edges.width.copy()
+    found = graph.passages.widths(i, j, level[inside], edges.clearance[inside])
+    np.minimum.at(width, inside, found)
+    edges = Edges(**{**vars(edges), "width": width})
+    return edges.select(graph.demand(edges) < most)
+
+
+def _line(
+    columns: Columns, start: IntArray, end: IntArray
+) -> list[tuple[tuple[IntArray, IntArray], NDArray[np.int64]]]:
+    """Return the columns between the nodes of each edge: those at each place, and their edges."""
+    (i, j), (i2, j2) = columns.column(start), columns.column(end)
+    count = 2 * np.maximum(np.abs(i2 - i), np.abs(j2 - j))  # points half a column apart
+    lines = []
+    for n in range(1, int(count.max(initial=0))):
+        inside = np.flatnonzero(n < count)
+        t = n / count[inside]
+        a = np.rint(i[inside] + t * (i2 - i)[inside]).astype(np.int64)
+        b = np.rint(j[inside] + t * (j2 - j)[inside]).astype(np.int64)
+        own = ((a == i[inside]) & (b == j[inside])) | ((a == i2[inside]) & (b == j2[inside]))
+        lines.append(((a[~own], b[~own]), inside[~own]))
+    return lines

@@ -1,0 +1,67 @@
+"""RobotLimits: what a robot can cross, one number per quantity."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
+
+from terrainkit.errors import ConfigError
+from terrainkit.parameter import MAX_VALUE, check_names
+from terrainkit.schema import Config, field_types
+from terrainkit.type_hint import convert
+
+Limit = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotLimits(Config):
+    """The limits of a robot. Each quantity of a path is divided by its limit.
+
+    Raises:
+        ConfigError: if a limit is not above 0, or the crouched height is not below the standing
+            height.
+    """
+
+    step_up: Limit
+    """Highest step up [m]; higher ground is a wall."""
+
+    step_down: Limit
+    """Highest step down [m]."""
+
+    gap: Limit
+    """Widest gap between two footholds, from edge to edge [m]."""
+
+    slope: Limit
+    """Steepest slope, as rise over run."""
+
+    foothold: Limit
+    """Diameter of the smallest foothold [m]."""
+
+    body_width: Limit
+    """Width of the narrowest passage [m]."""
+
+    standing_height: Limit
+    """Clearance under which the robot walks upright [m]."""
+
+    crouched_height: Limit
+    """Lowest clearance under which the robot walks [m]."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.crouched_height >= self.standing_height:
+            raise ConfigError(
+                f"crouched_height: got {self.crouched_height:g} m; expected less than the "
+                f"standing_height of {self.standing_height:g} m"
+            )
+
+
+def limit_overrides(values: Mapping[str, object]) -> dict[str, float]:
+    """Return limits by name, converted to numbers.
+
+    Raises:
+        ConfigError: if a name is no limit, or a value is not above 0.
+    """
+    hints = field_types(RobotLimits)
+    check_names("RobotLimits", values, hints)
+    return {name: convert(name, value, hints[name]) for name, value in values.items()}

@@ -1,0 +1,202 @@
+"""Passages: the free width between walls around each node."""
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.slopes import SLOPE_LENGTH
+
+NUM_DIRECTIONS = 8
+"""Number of directions in which a passage is measured."""
+
+_TOLERANCE = 1e-4
+"""Rounding of heights [m]: places whose heights differ by less are measured once."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Passages:
+    """The free width between walls, at any column and height.
+
+    It is the shortest line through the column that ends at a wall on both sides; widths of twice
+    the limit and more are not distinguished. A wall on one side only is no limit.
+    """
+
+    columns: Columns
+    """The columns."""
+
+    limits: RobotLimits
+    """The limits of the robot."""
+
+    highest: FloatArray
+    """Highest floor within the body width of each column [m], shape (nx, ny)."""
+
+    ceilings: tuple[tuple[FloatArray, FloatArray], ...]
+    """For each interval but the last, the lowest and the highest ceiling within the body width of
+    each column [m], shapes (nx, ny)."""
+
+    @classmethod
+    def build(cls, columns: Columns, limits: RobotLimits) -> Self:
+        """Return the passages of the columns of a patch."""
+        import cv2
+
+        reach = math.ceil(limits.body_width / columns.spacing) + 1
+        kernel = np.ones((2 * reach + 1, 2 * reach + 1), dtype=np.uint8)
+        ceilings = []
+        for k in range(columns.floor.shape[2] - 1):
+            ceiling = columns.ceiling[..., k]
+            is_low = np.isfinite(ceiling)
+            lowest = cv2.erode(np.where(is_low, ceiling, np.inf), kernel)
+            ceilings.append((lowest, cv2.dilate(np.where(is_low, ceiling, -np.inf), kernel)))
+        return cls(
+            columns=columns,
+            limits=limits,
+            highest=cv2.dilate(np.nanmax(columns.floor, axis=2), kernel),
+            ceilings=tuple(ceilings),
+        )
+
+    def node_widths(self) -> FloatArray:
+        """Return the free width at each node [m], shape (nx, ny, m)."""
+        floor, ceiling = self.columns.floor, self.columns.ceiling
+        widths = np.full(floor.shape, 2 * self.limits.body_width)
+        node = np.flatnonzero(~np.isnan(floor))
+        z = floor.reshape(-1)[node]
+        clearance = ceiling.reshape(-1)[node] - z
+        widths.reshape(-1)[node] = self.widths(*self.columns.column(node), z, clearance)
+        return widths
+
+    def widths(self, i: IntArray, j: IntArray, z: FloatArray, clearance: FloatArray) -> FloatArray:
+        """Return the free width for robots at columns (i, j), shape (n,).
+
+        Args:
+            i: Index of each column along x, shape (n,).
+            j: Index along y, shape (n,).
+            z: Height at which the robot stands or passes [m], shape (n,).
+            clearance: Clearance there [m], shape (n,). The robot needs no more beside it.
+        """
+        most = 2 * self.limits.body_width
+        width = np.full(len(z), most)
+        need = np.minimum(clearance, self.limits.crouched_height)
+        near = self._near_walls(i, j, z, need)
+        if not near.any():
+            return width
+        # Many edges cross the same columns at the same height.
+        heights, height = np.unique(np.rint(z[near] / _TOLERANCE), return_inverse=True)
+        needs, part = np.unique(np.rint(need[near] / _TOLERANCE), return_inverse=True)
+        shape = *self.columns.shape, len(heights), len(needs)
+        key = np.ravel_multi_index((i[near], j[near], height, part), shape)
+        unique, which = np.unique(key, return_inverse=True)
+        *place, height, part = np.unravel_index(unique, shape)
+        z, need = heights[height] * _TOLERANCE, needs[part] * _TOLERANCE
+        found = np.full(len(unique), most)
+        for angle in np.arange(NUM_DIRECTIONS) * (math.pi / NUM_DIRECTIONS):
+            ahead = self._free_length((place[0], place[1]), z, need, angle)
+            # A line with no wall within `most` on one side is long enough.
+            both = np.flatnonzero(ahead < most)
+            behind = place[0][both], place[1][both]
+            back = self._free_length(behind, z[both], need[both], angle + math.pi)
+            found[both] = np.minimum(found[both], ahead[both] + back)
+        width[near] = found[which]
+        return width
+
+    def _near_walls(
+        self, i: IntArray, j: IntArray, z: FloatArray, need: FloatArray
+    ) -> NDArray[np.bool_]:
+        """Return where there may be a wall within the body width, shape (n,)."""
+        highest = self.highest[i, j]
+        near = highest > z + self.limits.step_up
+        top = np.maximum(z, highest) + need
+        for lowest, highest in self.ceilings:
+            near |= (lowest[i, j] < top) & (highest[i, j] > z)
+        return near
+
+    def _free_length(
+        self, place: tuple[IntArray, IntArray], z: FloatArray, need: FloatArray, angle: float
+    ) -> FloatArray:
+        """Return the distance to the first wall in a direction [m], at most twice the body width.
+
+        The ray follows the ground where it rises, and stays level where it falls. It ends where
+        the ground rises by more than a step, or where the body does not fit under a solid.
+        """
+        columns, most = self.columns, 2 * self.limits.body_width
+        free = np.full(len(z), most)
+        step_up = self.limits.step_up
+        active, levels = np.arange(len(z)), [z]
+        (i, j), (nx, ny) = place, columns.shape
+        for cell in _ray_cells(angle, most, columns.spacing):
+            # Beyond the patch, the ground continues as at its edge.
+            a = np.minimum(np.maximum(i[active] + cell.i, 0), nx - 1)
+            b = np.minimum(np.maximum(j[active] + cell.j, 0), ny - 1)
+            above, is_open = _pass(columns, (a, b), levels[-1], levels[cell.before] + step_up, need)
+            if not is_open.all():
+                free[active[~is_open]] = cell.distance
+                active, above, need = active[is_open], above[is_open], need[is_open]
+                levels = [each[is_open] for each in levels]
+            if not len(active):
+                break
+            levels.append(above)
+        return free
+
+
+class _Cell(NamedTuple):
+    """A cell that a ray from the center of cell (0, 0) enters."""
+
+    i: int
+    """Index along x."""
+    j: int
+    """Index along y."""
+    distance: float
+    """Distance at which the ray enters [m]."""
+    before: int
+    """Number of the cell, counted from the first, where a slope to this one starts."""
+
+
+@cache
+def _ray_cells(angle: float, length: float, spacing: float) -> list[_Cell]:
+    """Return the cells that a ray of some length enters [m], in their order."""
+    x, y = math.cos(angle), math.sin(angle)
+    crossings = [
+        ((n + 0.5) * spacing / abs(along), axis)
+        for axis, along in enumerate((x, y))
+        if abs(along) > 1e-9
+        for n in range(math.ceil(length * abs(along) / spacing + 0.5))
+    ]
+    cells, at, distances = [], [0, 0], [0.0]
+    for distance, axis in sorted((round(d, 9), axis) for d, axis in crossings):
+        if distance >= length:
+            break
+        at[axis] += 1 if (x, y)[axis] > 0 else -1
+        start = max(n for n, d in enumerate(distances) if d <= max(distance - SLOPE_LENGTH, 0.0))
+        cells.append(_Cell(at[0], at[1], distance, start))
+        distances.append(distance)
+    return cells
+
+
+def _pass(
+    columns: Columns,
+    place: tuple[IntArray, IntArray],
+    level: FloatArray,
+    highest: FloatArray,
+    need: FloatArray,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return the height at which the body passes a column, and whether it passes at all.
+
+    Args:
+        columns: The columns.
+        place: Index of each column.
+        level: Height of the ray before the column [m].
+        highest: Highest floor that is not a wall [m].
+        need: Clearance that the body needs [m].
+    """
+    floor, ceiling = columns.floor[place], columns.ceiling[place]
+    above = np.fmax(floor, level[:, None])
+    passes = (floor <= highest[:, None] + _TOLERANCE) & (
+        ceiling - above >= need[:, None] - _TOLERANCE
+    )
+    lowest = np.where(passes, above, np.inf).min(axis=1)
+    return lowest, np.isfinite(lowest)

@@ -1,0 +1,95 @@
+"""Reports of feasibility: a table by terrain and level, JSON, and the routes in the preview."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from terrainkit.feasibility.assess import MAX_DEMAND, PatchFeasibility
+from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.preview import Route
+
+SCHEMA_VERSION = 1
+"""Version of the JSON; it changes when a key changes its meaning or is removed."""
+
+_UNITS = {"slope": ""}
+"""Units of the limits that are not lengths in meters."""
+
+
+def demand_table(results: Sequence[PatchFeasibility]) -> list[tuple[str, ...]]:
+    """Return the largest demand of each terrain in each row, as text, with a header."""
+    rows = sorted({each.row for each in results})
+    table = [("terrain", *(f"level {row}" if row == rows[0] else str(row) for row in rows))]
+    for terrain in dict.fromkeys(each.terrain for each in results):
+        cells = []
+        for row in rows:
+            demands = [r.demand for r in results if r.terrain == terrain and r.row == row]
+            cells.append(demand_text(max(demands)) if demands else "-")
+        table.append((terrain, *cells))
+    return table
+
+
+def demand_text(demand: float) -> str:
+    """Return a demand with two decimals, rounded up above 1, so that 1.00 is passable."""
+    if 1.0 < demand < math.inf:
+        demand = max(demand, 1.01)
+    return f"{demand:.2f}"
+
+
+def blocking_text(result: PatchFeasibility, limits: RobotLimits) -> str:
+    """Return what determines the demand of a patch, and where."""
+    if not result.limit:
+        return "no path" if result.demand == math.inf else "level"
+    unit = _UNITS.get(result.limit, " m")
+    x, y, z = result.place.tolist()
+    return (
+        f"{result.limit} {result.value:.3g}{unit} (limit "
+        f"{getattr(limits, result.limit):.3g}{unit}) at ({x:.2f}, {y:.2f}, {z:.2f})"
+    )
+
+
+def to_json(
+    results: Sequence[PatchFeasibility], limits: RobotLimits, **about: Any
+) -> dict[str, Any]:
+    """Return the report as values of JSON; a demand of inf is null.
+
+    Args:
+        results: The patches.
+        limits: The limits of the robot.
+        **about: Further values, such as the name of the robot.
+    """
+    return {
+        "schema_version": SCHEMA_VERSION,
+        **about,
+        "limits": asdict(limits),
+        "max_demand": MAX_DEMAND,
+        "passable": all(each.is_passable for each in results),
+        "patches": [
+            {
+                "row": each.row,
+                "col": each.col,
+                "terrain": each.terrain,
+                "difficulty": round(each.difficulty, 6),
+                "demand": each.demand if math.isfinite(each.demand) else None,
+                "passable": each.is_passable,
+                "limit": each.limit or None,
+                "value": round(each.value, 6) if math.isfinite(each.value) else None,
+                "place": each.place.round(4).tolist() if each.limit else None,
+                "path": each.path.round(4).tolist(),
+            }
+            for each in results
+        ],
+    }
+
+
+def routes(results: Sequence[PatchFeasibility]) -> list[Route]:
+    """Return the paths and blocking places for :func:`terrainkit.preview.write_preview`."""
+    return [
+        Route(
+            points=each.path[:, :2],
+            place=tuple(each.place[:2].tolist()) if each.limit else None,
+            label=demand_text(each.demand),
+            is_passable=each.is_passable,
+        )
+        for each in results
+    ]

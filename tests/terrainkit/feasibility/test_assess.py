@@ -1,0 +1,230 @@
+"""The demand of a patch, against values worked out by hand."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from terrainkit import MapConfig, SubTerrain, generate, make_patch
+from terrainkit.errors import ConfigError
+from terrainkit.feasibility import RobotLimits, assess_map, assess_patch
+from terrainkit.registry import terrain_names
+from terrainkit.solids import make_boxes
+
+LIMITS = RobotLimits(
+    step_up=0.2,
+    step_down=0.25,
+    gap=0.4,
+    slope=0.5,
+    foothold=0.1,
+    body_width=0.4,
+    standing_height=0.6,
+    crouched_height=0.3,
+)
+
+CASES = {
+    # A step of h: h / step_up, or h / step_down where the robot starts at the top.
+    "stairs": ({"step_height": 0.15}, 0.75, "step_up"),
+    "pyramid_stairs": ({"step_height": 0.15}, 0.6, "step_down"),
+    "stairs_turning": ({"riser": 0.1}, 0.5, "step_up"),
+    "spiral_stairs": ({"riser": 0.1, "tread": 0.4}, 0.5, "step_up"),
+    "open_stairs": ({"riser": 0.1, "tread": 0.5}, 0.5, "step_up"),
+    "pit": ({"depth": 0.1}, 0.5, "step_up"),
+    "rails": ({"height": 0.15, "width": 0.2}, 0.75, "step_up"),
+    "hurdles": ({"height": 0.15}, 0.75, "step_up"),
+    # A gap of w: w / gap.
+    "gap": ({"width": 0.3}, 0.75, "gap"),
+    "gap_track": ({"length": 0.3}, 0.75, "gap"),
+    "rings": ({"gap": 0.2, "width": 0.4, "variation": 0.0}, 0.5, "gap"),
+    "stepping_stones": ({"stone": 0.8}, 0.25, "gap"),  # one cell between two stones
+    "stone_rows": ({"stone": 0.4, "gap": 0.2, "variation": 0.0}, 0.5, "gap"),
+    "stones_everywhere": (
+        {"stone": 0.6, "gap": 0.2, "shift": 0.0, "variation": 0.0},
+        0.5,
+        "gap",
+    ),
+    "stakes": ({"diameter": 0.3, "gap": 0.2, "variation": 0.0}, 0.5, "gap"),
+    "stepping_beams": ({"width": 0.3, "gap": 0.2, "yaw": 0.0}, 0.5, "gap"),
+    "side_ramps": ({"roll": 0.2, "gap": 0.2}, 0.5, "gap"),
+    # A slope of g: g / slope. The edge of a pyramid is less steep by sqrt(2).
+    "slope": ({"grade": 0.3}, 0.6, "slope"),
+    "pyramid_slope": ({"grade": 0.3}, 0.6 / 2**0.5, "slope"),
+    "rough_slope": ({"grade": 0.3, "amplitude": 0.0}, 0.6 / 2**0.5, "slope"),
+    # A clearance of c: (0.6 - c) / (0.6 - 0.3).
+    "crawl": ({"clearance": 0.45}, 0.5, "crouched_height"),
+    "tunnel": ({"clearance": 0.45, "depth": 1.2}, 0.5, "crouched_height"),
+    "ceiling": ({"clearance": 0.45}, 0.5, "crouched_height"),
+    # A passage of w: 2 - w / body_width.
+    "rooms": ({"door": 0.6}, 0.5, "body_width"),
+    "maze": ({"corridor": 0.6}, 0.5, "body_width"),
+    # Ground that the robot can walk around.
+    "flat": ({}, 0.0, ""),
+    "obstacles": ({"height": 0.1}, 0.0, ""),
+    "contour": ({"step_height": 0.1}, 0.0, ""),
+    "poles": ({"gap": 0.9}, 0.0, ""),
+    "gutter": ({"roll": 0.2}, 0.0, ""),
+    "k_rails": ({"height": 0.15}, 0.0, ""),
+    "pallets": ({}, 0.0, ""),
+    "continuous_ramps": ({"grade": 0.2}, 0.0, ""),
+}
+"""Parameters of a terrain, its demand and the limit that determines it."""
+
+BOUNDS = {
+    "beams": ({"width": 0.3, "gap": 0.2, "yaw": 0.0}, 0.5, 0.6),  # the last gap ends at a cell
+    "star": ({"number": 4, "width": 0.15}, 0.33, 0.67),  # 2 - 0.15 / 0.1, up to a column
+    "floating_islands": ({"walkway": 0.15}, 0.33, 0.67),
+    # The opening of 1.5 x 0.35 m is 2 - 0.525 / 0.4, up to a column.
+    "slit": ({"opening": 1.5, "body_width": 0.35}, 0.6, 0.78),
+    "boxes": ({"height": 0.1}, 0.25, 0.5),  # in two layers
+    "crossing_ramps": ({"grade": 0.2}, 0.0, 0.4),
+    "stepfield": ({"unit": 0.05}, 0.25, 1.0),  # at least one unit up
+    "ladder": ({}, np.inf, np.inf),  # rungs are no footholds
+    "random_grid": ({"height": 0.1}, 0.0, 1.0),
+    "rocks": ({}, 0.0, 1.0),
+    "rough": ({"amplitude": 0.05}, 0.0, 0.5),
+    "wave": ({"amplitude": 0.1}, 0.0, 1.0),
+    "perlin": ({}, 0.0, 1.0),
+    "fractal": ({}, 0.0, 1.0),
+    "eroded": ({}, 0.0, 1.0),
+    "imported": ({}, 0.0, 1.0),
+}
+"""Parameters of a terrain, and the lowest and the highest demand."""
+
+
+def config_of(terrain, **parameters):
+    return MapConfig(
+        terrains=(SubTerrain(terrain=terrain, parameters=parameters),),
+        rows=1,
+        cols=1,
+        patch_size=(8.0, 4.0),
+        mode="selected",
+        selected_difficulty=0.5,
+        border=0.0,
+    )
+
+
+def assess(terrain, limits=LIMITS, **parameters):
+    config = config_of(terrain, **parameters)
+    return assess_patch(make_patch(config, 0, 0), limits, config.wall_threshold)
+
+
+def test_every_terrain_has_a_case():
+    assert not set(CASES) & set(BOUNDS)
+    assert set(terrain_names()) == {*CASES, *BOUNDS}
+
+
+@pytest.mark.parametrize("terrain", CASES)
+def test_demand_by_hand(terrain):
+    parameters, demand, limit = CASES[terrain]
+    result = assess(terrain, **parameters)
+    assert (result.demand, result.limit) == (pytest.approx(demand, abs=1e-3), limit)
+
+
+@pytest.mark.parametrize("terrain", sorted(set(BOUNDS) & set(terrain_names())))
+def test_demand_between_bounds(terrain):
+    parameters, low, high = BOUNDS[terrain]
+    assert low - 1e-6 <= assess(terrain, **parameters).demand <= high + 1e-6
+
+
+def test_pyramid_stairs_inverted_are_climbed():
+    result = assess("pyramid_stairs", step_height=0.15, inverted=True)
+    assert (result.demand, result.limit) == (pytest.approx(0.75), "step_up")
+    assert result.value == pytest.approx(0.15)
+
+
+def test_limit_is_exactly_demand_one():
+    assert assess("stairs", step_height=0.2).demand == 1.0
+    assert assess("stairs", step_height=0.2).is_passable
+    assert not assess("stairs", step_height=0.21).is_passable
+    assert assess("pit", depth=1.0).demand == np.inf
+    assert assess("pit", depth=1.0).value == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("terrain", "parameters"),
+    [
+        ("stairs", {"step_height": 0.15}),
+        ("gap", {"width": 0.3}),
+        ("rough_slope", {"grade": 0.3}),
+        ("stepping_stones", {"stone": 0.1}),
+        ("slit", {"opening": 1.5, "body_width": 0.35}),
+        ("tunnel", {"clearance": 0.45}),
+    ],
+)
+@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(RobotLimits)])
+def test_demand_is_monotone_in_every_limit(terrain, parameters, name):
+    demands = []
+    for factor in (0.75, 1.3):
+        limits = dataclasses.replace(LIMITS, **{name: factor * getattr(LIMITS, name)})
+        demands.append(assess(terrain, limits, **parameters).demand)
+    needs_room = name in ("foothold", "body_width", "standing_height", "crouched_height")
+    assert demands == sorted(demands, reverse=not needs_room)
+
+
+@pytest.mark.parametrize("terrain", ["stairs", "pyramid_slope", "gap", "pit", "hurdles"])
+def test_demand_rises_with_difficulty(terrain):
+    config = MapConfig(terrains=(SubTerrain(terrain=terrain),), rows=5, cols=1, border=0.0)
+    demands = [each.demand for each in assess_map(generate(config), LIMITS)]
+    assert demands == sorted(demands)
+    assert demands[0] < demands[-1]
+
+
+def test_path_leads_from_spawn_over_the_blocking_place():
+    result = assess("stairs", step_height=0.15)
+    assert result.path[0] == pytest.approx([1.05, 2.05, 0.0], abs=0.11)
+    assert result.path[-1][0] == pytest.approx(7.95)  # the far edge
+    assert (np.abs(np.diff(result.path[:, 2])) <= 0.15 + 1e-6).all()
+    assert np.linalg.norm(result.path[:, :2] - result.place[:2], axis=1).min() < 0.11
+
+
+def test_path_passes_all_goals():
+    config = config_of("slit", opening=2.0)
+    patch = make_patch(config, 0, 0)
+    path = assess_patch(patch, LIMITS, config.wall_threshold).path
+    for goal in patch.goals:
+        assert np.linalg.norm(path[:, :2] - goal[:2], axis=1).min() < 0.03
+
+
+def test_result_is_deterministic():
+    first, second = assess("rough"), assess("rough")
+    assert (first.demand, first.path.tolist()) == (second.demand, second.path.tolist())
+
+
+def test_robot_goes_under_or_over_a_bar():
+    """A bar at 0.45 m demands a crouch; one on the ground is a hurdle."""
+    flat = generate(config_of("flat"))
+    center, size = np.array([[1.0, 2.0, 0.05], [7.0, 2.0, 0.05]]), [0.1, 4.0, 0.1]
+    for bottom, demand, limit in ((0.45, 0.5, "crouched_height"), (0.0, 0.5, "step_up")):
+        bars = make_boxes(center + np.array([0.0, 0.0, bottom]), size)
+        (result,) = assess_map(flat.edited(solids=bars), LIMITS)
+        assert (result.demand, result.limit) == (pytest.approx(demand, abs=1e-3), limit)
+
+
+def test_solids_that_do_not_collide_are_ignored():
+    flat = generate(config_of("flat"))
+    wall = make_boxes([6.0, 2.0, 0.5], [0.2, 4.0, 1.0], collides=False)
+    (result,) = assess_map(flat.edited(solids=wall), LIMITS)
+    assert result.demand == 0.0
+
+
+def test_gap_edges_do_not_pass_walls():
+    """A ditch before a wall on both sides: the robot cannot step through the wall."""
+    config = config_of("flat")
+    heights = np.zeros((80, 40), dtype=np.float32)
+    away = np.abs(np.arange(80) - 39.5)
+    heights[(away > 20) & (away < 22)] = -1.0
+    heights[(away > 22) & (away < 23)] = 2.0
+    (result,) = assess_map(generate(config).edited(heights=heights), LIMITS)
+    assert result.demand == np.inf
+
+
+def test_goal_in_a_wall_is_rejected():
+    terrain_map = generate(config_of("slit", opening=2.0))
+    goals = terrain_map.goals.copy()
+    goals[0, 0, 0, :2] = terrain_map.solids.boxes[0, :2]
+    wrong = dataclasses.replace(terrain_map, goals=goals)
+    with pytest.raises(ConfigError, match=r"slit: got goal 0 at .* inside the ground or a solid"):
+        assess_map(wrong, LIMITS)
+    goals[0, 0, 0, 0] = -5.0
+    with pytest.raises(ConfigError, match="outside of its patch"):
+        assess_map(wrong, LIMITS)

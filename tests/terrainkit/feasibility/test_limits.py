@@ -1,0 +1,34 @@
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit.feasibility.limits import RobotLimits, limit_overrides
+
+VALUES = {
+    "step_up": 0.2,
+    "step_down": 0.25,
+    "gap": 0.4,
+    "slope": 0.5,
+    "foothold": 0.1,
+    "body_width": 0.4,
+    "standing_height": 0.6,
+    "crouched_height": 0.3,
+}
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), "x", True])
+@pytest.mark.parametrize("name", VALUES)
+def test_limits_reject_values_that_are_not_above_0(name, value):
+    with pytest.raises(ConfigError, match=rf"^{name}: got "):
+        RobotLimits(**VALUES | {name: value})
+    with pytest.raises(ConfigError, match=rf"^{name}: got "):
+        limit_overrides({name: value})
+
+
+def test_crouched_height_is_below_standing_height():
+    with pytest.raises(ConfigError, match=r"crouched_height: got 0\.6 m; expected less than"):
+        RobotLimits(**VALUES | {"crouched_height": 0.6})
+
+
+def test_unknown_limit_lists_the_known_ones():
+    with pytest.raises(ConfigError, match="'stepup'; did you mean 'step_up'"):
+        limit_overrides({"stepup": 0.2})

@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+
+from terrainkit.feasibility.columns import Columns
+from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.passages import Passages
+
+LIMITS = RobotLimits(
+    step_up=0.2,
+    step_down=0.2,
+    gap=0.4,
+    slope=0.5,
+    foothold=0.1,
+    body_width=0.5,
+    standing_height=0.6,
+    crouched_height=0.3,
+)
+
+
+def widths(heights, limits=LIMITS):
+    floor = np.array(heights, float)[..., None]
+    ceiling = np.full_like(floor, np.inf)
+    columns = Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)
+    return Passages.build(columns, limits).node_widths()[..., 0]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("number", [1, 3, 6])
+def test_width_of_a_corridor_at_every_place(number, axis):
+    heights = np.full((30, 30), 1.0)
+    heights[10 : 10 + number] = 0.0
+    found = widths(heights.T if axis else heights)
+    inside = (found.T if axis else found)[10 : 10 + number]
+    assert inside == pytest.approx(0.1 * number)
+
+
+def test_width_of_an_opening_in_a_thin_wall():
+    heights = np.zeros((30, 30))
+    heights[15] = 1.0
+    heights[15, 10:14] = 0.0
+    assert widths(heights)[15, 10:14] == pytest.approx(0.4)
+
+
+def test_one_wall_low_walls_and_slopes_leave_room():
+    most = 2 * LIMITS.body_width
+    wall, low = np.zeros((30, 30)), np.full((30, 30), 0.2)
+    wall[:5] = 1.0
+    assert widths(wall)[5:] == pytest.approx(most)
+    low[10:12] = 0.0  # as high as a step
+    assert widths(low) == pytest.approx(most)
+    gutter = np.abs(np.arange(30) - 14.5)[:, None] * 0.05 + np.zeros(30)
+    assert widths(gutter) == pytest.approx(most)
+
+
+def test_diagonal_corridor():
+    i, j = np.mgrid[:40, :40]
+    heights = np.where(np.abs(i - j) <= 4, 0.0, 1.0)
+    # The corners of the cells are 8 diagonals of 0.1 m / sqrt(2) apart, the lines of centers 10.
+    assert 0.56 <= widths(heights)[20, 20] <= 0.71

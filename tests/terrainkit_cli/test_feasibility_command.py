@@ -1,0 +1,110 @@
+import json
+import shutil
+
+import numpy as np
+import pytest
+import trimesh
+
+from terrainkit_robots.description import bundled
+
+
+@pytest.fixture
+def stairs(terrainkit):
+    words = ("--terrain", "stairs", "--rows", 3, "--cols", 1, "--border", 0)
+    assert terrainkit("generate", "-o", "m.npz", *words).returncode == 0
+    return "m.npz"
+
+
+def test_feasibility_prints_demands_and_writes_report(terrainkit, tmp_path, stairs):
+    run = terrainkit("feasibility", stairs, "--robot", "quadruped", "-o", "report")
+    assert run.returncode == 1
+    # Steps of 0.05, 0.14 and 0.23 m at a limit of 0.4 x 0.448 m.
+    assert "stairs   0.28     0.78  1.28" in run.stdout
+    assert "patch (2, 0), stairs: demand 1.28, step_up 0.23 m (limit 0.179 m) at (" in run.stdout
+    assert "m.npz: quadruped cannot cross 1 of 3 patches" in run.stdout
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["limits"]["step_up"] == pytest.approx(0.1792)
+    assert [each["passable"] for each in report["patches"]] == [True, True, False]
+    assert (tmp_path / "report.png").stat().st_size > 1000
+
+
+def test_limits_on_the_command_line_replace_the_derived_ones(terrainkit, stairs):
+    words = ("--limit", "step_up=0.25", "step_down=0.3")
+    run = terrainkit("feasibility", stairs, "--robot", "quadruped", *words)
+    assert run.returncode == 0
+    assert "quadruped can cross 3 patches" in run.stdout
+    assert "step_up          0.25   given" in run.stdout
+
+
+def test_feasibility_of_imported_ground(terrainkit, tmp_path):
+    """A wall of 0.15 m around the spawn position."""
+    heights = np.zeros((80, 80))
+    heights[:20] = 0.15
+    np.save(tmp_path / "a.npy", heights)
+    assert terrainkit("import", "a.npy", "-o", "a.npz", "--file-cell", 0.1).returncode == 0
+    assert terrainkit("feasibility", "a.npz", "--robot", "quadruped").returncode == 0
+    trimesh.creation.box((8, 8, 1)).export(tmp_path / "a.stl")
+    assert terrainkit("import", "a.stl", "-o", "b.npz").returncode == 0
+    run = terrainkit("feasibility", "b.npz", "--robot", "biped")
+    assert "biped can cross 1 patch" in run.stdout
+
+
+def folder_with(tmp_path, old, new):
+    source = bundled.urdf_path("quadruped").parent
+    folder = tmp_path / "robot"
+    shutil.copytree(source, folder, ignore=shutil.ignore_patterns("trained", "tasks"))
+    text = (folder / "robot.toml").read_text()
+    assert old in text
+    (folder / "robot.toml").write_text(text.replace(old, new))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "--robot: missing; expected a bundled robot"),
+        (("--robot", "nosuch"), "no task or robot folder 'nosuch'"),
+        (("--robot", "."), "has no robot.toml"),
+        (("--robot", "quadruped", "--limit", "gap=0"), "gap: got 0; expected a number > 0"),
+        (("--robot", "quadruped", "--limit", "gap=-1"), "gap: got -1; expected a number > 0"),
+        (("--robot", "quadruped", "--limit", "gap"), "--limit: got 'gap'; expected NAME=VALUE"),
+        (("--robot", "quadruped", "--limit", "gaps=1"), "'gaps'; did you mean 'gap'?"),
+        (("--robot", "quadruped", "--limit", "crouched_height=1"), "expected less than the"),
+        (("--robot", "quadruped", "-o", "no/report"), "the folder no does not exist"),
+    ],
+)
+def test_invalid_input_is_one_line(terrainkit, stairs, words, message):
+    run = terrainkit("feasibility", stairs, *words)
+    assert run.returncode == 2
+    assert message in run.stderr
+    assert len(run.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('feet = ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]', "feet = []", "feet of quadruped"),
+        ("leg_length = 0.448", "leg_length = 0.0", "leg_length of quadruped: got 0 m"),
+        ('mjcf = "quadruped.xml"', 'mjcf = "x.xml"', "which does not exist"),
+        ('mjcf = "quadruped.xml"', 'mjcf = "robot.toml"', "cannot be loaded"),
+    ],
+)
+def test_robot_without_limits_is_one_line(terrainkit, tmp_path, stairs, old, new, message):
+    run = terrainkit("feasibility", stairs, "--robot", folder_with(tmp_path, old, new))
+    assert run.returncode == 2
+    assert message in run.stderr
+    assert len(run.stderr.splitlines()) == 1
+
+
+def test_check_map_with_a_robot(terrainkit, stairs):
+    assert terrainkit("check-map", stairs).returncode == 0
+    run = terrainkit("check-map", stairs, "--robot", "quadruped")
+    assert run.returncode == 1
+    assert "patch (2, 0), stairs: demand 1.28, step_up 0.23 m" in run.stdout
+    words = ("--robot", "quadruped", "--limit", "step_up=0.25", "step_down=0.3")
+    run = terrainkit("check-map", stairs, *words)
+    assert run.returncode == 0
+    assert "quadruped can cross 3 patches" in run.stdout
+    run = terrainkit("check-map", stairs, "--limit", "gap=1")
+    assert (run.returncode, len(run.stderr.splitlines())) == (2, 1)
+    assert "expected --robot" in run.stderr
