@@ -1,4 +1,4 @@
-.PHONY: test check format bench docs wheel browser integrations
+.PHONY: test check format bench docs wheel site browser integrations
 
 test:          ## all tests
 	python -m pytest
@@ -18,6 +18,9 @@ docs:          ## rewrite the generated docs and pictures
 
 wheel:         ## the wheel that pip installs
 	python -m pip wheel --no-deps --wheel-dir dist .
+
+site:          ## build the documentation site in .site; broken links are errors
+	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
 
 browser:       ## open the viewer in headless Chromium
 	TERRAINKIT_BROWSER=1 python -m pytest -n 0 tests/terrainkit_robots/viewer/test_browser.py

@@ -98,7 +98,8 @@ def open_checkpoint(
         if (got := state["observed"].get(name)) != width:
             raise ConfigError(
                 f"{path} belongs to another task: got {got} {name} observations; expected "
-                f"{width}. To continue on a map after a plane, set terrain.measure_heights on both"
+                f"{width}. On a map after a plane, set terrain.measure_heights on both, "
+                "and keep the options in observations"
             )
     try:
         yield state

@@ -41,7 +41,7 @@ data.qpos[:7] = 0, 0, config["robot"]["spawn_height"], 1, 0, 0, 0
 data.qpos[qpos_index] = joints["default_position"]
 
 
-def observe(command: Any, action: Any, rotation: Any) -> Any:
+def observe(command: Any, action: Any, rotation: Any, previous: Any = None) -> Any:
     """Return the observation; the columns of `rotation` are the axes of the base."""
     terms = {"commands": command, "actions": action, "projected_gravity": -rotation[2]}
     terms |= {"dof_pos": data.qpos[qpos_index], "dof_vel": data.qvel[qvel_index]}
@@ -52,8 +52,11 @@ def observe(command: Any, action: Any, rotation: Any) -> Any:
         terms["gait_phase"] = is_moving * np.array([np.sin(angle), np.cos(angle)])
     if scan := config["height_scan"]:
         terms["height_scan"] = np.full(len(scan["points"]), data.qpos[2])  # above a plane
-    values = []
+    values: list[Any] = []
     for part in config["observation"]["parts"]:
+        if part["name"] == "history":  # at first, it repeats the current observation
+            past = np.concatenate(values) if previous is None else previous
+            terms["history"] = np.resize(past, part["stop"] - part["start"])
         if np.size(terms.get(part["name"], ())) != part["stop"] - part["start"]:
             sys.exit(f"policy.json: this program cannot compute the observation {part['name']}")
         value = np.clip(terms[part["name"]] - part["offset"], *part.get("clip", (-np.inf, np.inf)))
@@ -66,10 +69,11 @@ if args.viewer:
 
     viewer = mujoco.viewer.launch_passive(model, data)
 command, action = np.array([args.vx, args.vy, args.yaw]), np.zeros(len(qpos_index))
-rotation, velocity = np.eye(3), np.zeros(3)
+rotation, velocity, obs = np.eye(3), np.zeros(3), None
 steps = max(1, round(args.seconds / timing["policy_dt"]))
 for _ in range(steps):
-    action = policy.run(None, {"obs": observe(command, action, rotation)[None]})[0][0]
+    obs = observe(command, action, rotation, obs)
+    action = policy.run(None, {"obs": obs[None]})[0][0]
     target = joints["action_offset"] + joints["action_scale"] * action
     for _ in range(timing["decimation"]):
         torque = joints["gain"] * target - joints["stiffness"] * data.qpos[qpos_index]

@@ -21,7 +21,6 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
-from terrainkit_robots.rl.state import CONTACT_FORCE
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.rl.terrain import load_terrain
 from terrainkit_robots.simulation import gait
@@ -219,7 +218,8 @@ def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
 
 def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
     """Return a task without noise, randomization, pushes, curricula and timeouts in `seconds`."""
-    off: dict[str, Any] = dict.fromkeys(["friction", "added_mass", "gains", "motor_strength"])
+    names = "friction added_mass gains motor_strength action_delay"
+    off: dict[str, Any] = dict.fromkeys(names.split())
     off |= dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)
     return replace(
         task,
@@ -368,9 +368,8 @@ class EvaluationRollout:
         values = (lin, lin_sq, yaw, yaw_sq, pitch, power, speed, np.ones_like(pitch))
         self.sums[:, moving] += np.array(values)[:, moving]
         if len(self.gait) < MAX_GAIT_STEPS and settled.any():
-            contact = state.foot_force[..., 2] > CONTACT_FORCE
             foot_speed = np.hypot(state.foot_vel[..., 0], state.foot_vel[..., 1])
-            self.gait.append((moving, contact, state.foot_height.copy(), foot_speed))
+            self.gait.append((moving, state.foot_contact, state.foot_height.copy(), foot_speed))
 
     def _update_errors(
         self, commands: FloatArray, error: FloatArray, active: BoolArray

@@ -39,6 +39,7 @@ _FORMULAS = {
     "clip of its own is (clip(raw - offset, *clip)) * scale",
     "gait": "gait_phase = (sin, cos)(2 pi time / period); 0 while commanded to stand: no linear "
     "velocity, and a yaw rate below min_yaw_rate",
+    "history": "first numbers of the previous obs; in the first step, copies of those before it",
     "action": "target = action_offset + action_scale * action",
     "torque": "clip(gain * target - stiffness * position - damping * velocity, -effort, effort), "
     "every physics_dt; a new action every policy_dt",
@@ -190,6 +191,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "size": env.get_observations()["policy"].shape[1],
             "clip": task.normalization.clip_observations,
             "parts": _observation_parts(env, units),
+            "history_length": task.observations.history_length,
         },
         "action": {"size": env.num_actions, "clip": task.normalization.clip_actions},
         "control_type": task.control.control_type,
@@ -213,12 +215,12 @@ def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str,
         "dof_vel": [f"{unit}/s" for unit in joint_units],
     }
     units |= {"commands": ["m/s", "m/s", "rad/s"], "base_ang_vel": "rad/s", "height_scan": "m"}
-    units |= {"projected_gravity": "1", "actions": "1", "gait_phase": "1"}
+    units["base_lin_vel"] = "m/s"
     parts, start = [], 0
     for term in env.obs_groups["policy"]:
         size = term.function(env.state).shape[1]
         part: dict[str, Any] = {"name": term.name, "start": start, "stop": start + size}
-        part["unit"] = units.get(term.name, "")
+        part["unit"] = units.get(term.name, "1")
         part["offset"] = _to_list(np.broadcast_to(offsets.get(term.name, 0.0), size))
         part["scale"] = _to_list(np.broadcast_to(term.scale, size))
         if term.name == "height_scan":

@@ -41,14 +41,14 @@ class RecordingEnv(LeggedEnv):
     """An environment that records the falls and the mean of each reward at every step [1/s]."""
 
     def __init__(self, *args: Any) -> None:
-        self.history: list[list[float]] = []
+        self.recorded: list[list[float]] = []
         super().__init__(*args)
 
     def _compute_rewards(self, state: State, unstable: BoolArray) -> FloatArray:
         before = [total.copy() for total in self.episode_sums.values()]
         rewards, after = super()._compute_rewards(state, unstable), self.episode_sums.values()
         terms = [each - last for each, last in zip(after, before, strict=True)]
-        self.history.append([float(each.mean()) / self.cfg.dt for each in (state.fallen, *terms)])
+        self.recorded.append([float(each.mean()) / self.cfg.dt for each in (state.fallen, *terms)])
         return rewards
 
 
@@ -73,7 +73,7 @@ def train_briefly(robot: Robot, task: Task, samples: int, progress: Progress) ->
         except (TerrainkitError, RuntimeError, ValueError) as failure:  # not finite
             error = " ".join(str(failure).split())
     steps_of_start = round(START_TIME / task.dt)
-    history = np.array(env.history[steps_of_start:] or env.history or [[np.nan]])
+    history = np.array(env.recorded[steps_of_start:] or env.recorded or [[np.nan]])
     quarter = -(-len(history) // 4)
     first, last = (
         dict(zip(("falls", *env.rewards), part.mean(axis=0).tolist(), strict=False))

@@ -35,7 +35,7 @@ NUM_ENVS, RANDOM_STEPS = 16, 100
 DEFAULT_SAMPLES, MIN_TREND_SAMPLES = 100_000, 50_000
 """Samples of the short training, and the fewest that show whether a robot learns."""
 
-MAX_PENALTY, MAX_DROP, MAX_DEVIATIONS = 3.0, 0.1, 3.0
+MAX_PENALTY, MAX_DROP, MAX_DEVIATIONS = 2.0, 0.1, 3.0
 """Limits of a penalty at the end of the training and of a drop of the reward, relative to the sum
 of the positive rewards, and of an increase of the falls, in standard deviations."""
 

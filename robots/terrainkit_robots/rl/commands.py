@@ -69,8 +69,7 @@ class Gait:
 
     def __init__(self, cfg: Commands, leg_length: float, foot_pos: FloatArray) -> None:
         is_biped = len(foot_pos) == 2
-        default = BIPED_GAIT_PERIOD if is_biped else GAIT_PERIOD
-        default *= np.sqrt(leg_length / 9.81)
+        default = np.sqrt(leg_length / 9.81) * (BIPED_GAIT_PERIOD if is_biped else GAIT_PERIOD)
         self.period = default if cfg.gait_period is None else cfg.gait_period
         x, left = foot_pos[:, 0], foot_pos[:, 1] > 0
         in_front = ((x > x[:, None]) & (left == left[:, None])).sum(axis=1)  # on the same side

@@ -60,6 +60,18 @@ class Terrain(Config):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Observations(Config):
+    """Additional observations of the policy."""
+
+    base_lin_vel: bool = False
+    """Whether the policy observes the base linear velocity, with the noise `noise.lin_vel`."""
+    foot_contact: bool = False
+    """Whether the policy observes which feet are in contact."""
+    history_length: Annotated[int, Meta(ge=1, le=100)] = 1
+    """Number of latest observations, the current one included; height scans have no history."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class InitState(Config):
     """Random initial state of an episode. Heights and default pose are in the robot's spec."""
 
@@ -130,9 +142,8 @@ class Commands(Config):
     standing: Fraction = 0.1
     """Fraction of the commands that are zero."""
     gait_period: NonNegativeFloat | None = None
-    """Period of the gait, whose phase the policy observes [s]; none: 2.3 sqrt(leg length / g), or
-    3 sqrt(leg length / g) on two legs; 0 for no gait. Feet that are neighbors swing in turn: two
-    legs walk, four trot."""
+    """Period of the gait, whose phase the policy observes [s]; none: 2.3, on two legs 3, times
+    sqrt(leg length / g); 0 for no gait. Neighboring feet swing in turn: a walk or a trot."""
     swing_fraction: Fraction = 0.45
     """Fraction of the period that a foot is in the air."""
 
@@ -153,6 +164,8 @@ class DomainRand(Config):
     """Factor on all torques of a robot."""
     joint_offset: NonNegativeFloat = 0.02
     """Largest zero offset of each joint, sampled at each reset [rad]."""
+    action_delay: NonNegativeInterval | None = None
+    """Delay of the actions, sampled at each reset, in multiples of `sim.dt` [s]; none: no delay."""
     push_interval_s: NonNegativeFloat = 15.0
     """Time between pushes [s]; 0 for no pushes."""
     max_push_vel_xy: NonNegativeFloat = 1.0
@@ -259,6 +272,8 @@ class Noise(Config):
     """Noise of joint velocities [rad/s]."""
     ang_vel: NonNegativeFloat = 0.2
     """Noise of the base angular velocity [rad/s]."""
+    lin_vel: NonNegativeFloat = 0.5
+    """Noise of the base linear velocity, if it is observed [m/s]."""
     gravity: NonNegativeFloat = 0.05
     """Noise of the gravity direction."""
     height_measurements: NonNegativeFloat = 0.1
@@ -348,6 +363,7 @@ class Task(Config):
 
     env: Env = field(default_factory=Env)
     terrain: Terrain = field(default_factory=Terrain)
+    observations: Observations = field(default_factory=Observations)
     init_state: InitState = field(default_factory=InitState)
     control: Control = field(default_factory=Control)
     asset: Asset = field(default_factory=Asset)
@@ -371,6 +387,9 @@ class Task(Config):
         if self.asset.collisions != "all" and self.rewards.collision:
             got = f"rewards.collision: got {self.rewards.collision:g}"
             raise ConfigError(f"{got}; expected 0 with asset.collisions {self.asset.collisions}")
+        if (delay := self.domain_rand.action_delay) and not self.sim.dt / 2 < delay[1] <= 1:
+            expected = f"expected an end above half of sim.dt {self.sim.dt:g}, at most 1 s; or none"
+            raise ConfigError(f"domain_rand.action_delay: got {list(delay)}; {expected}")
         samples = self.env.num_envs * self.runner.num_steps_per_env
         if samples < self.algorithm.num_mini_batches:
             got = f"algorithm.num_mini_batches: got {self.algorithm.num_mini_batches}"
@@ -381,6 +400,11 @@ class Task(Config):
     def dt(self) -> float:
         """Time between policy steps [s]."""
         return self.sim.dt * self.control.decimation
+
+    @property
+    def max_delay_steps(self) -> int:
+        """Simulation steps of the longest action delay; 0 without a delay."""
+        return round((self.domain_rand.action_delay or (0, 0))[1] / self.sim.dt)
 
     @property
     def max_episode_length(self) -> int:

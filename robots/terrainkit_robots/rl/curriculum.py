@@ -30,10 +30,8 @@ class TerrainCurriculum:
         rows, cols = terrain.env_origins.shape[:2]
         max_level = min(max_init_level, rows - 1)
         self.levels, self.columns = assign_levels(num_envs, rows, cols, max_level, seed)
-        # Displacement that the commands of the episode integrate to [m].
-        self.commanded = np.zeros((num_envs, 2))
-        # Running success rate of each patch, NaN without episodes.
-        self.success = np.full((rows, cols), np.nan)
+        self.commanded = np.zeros((num_envs, 2))  # integral of the commands of the episode [m]
+        self.success = np.full((rows, cols), np.nan)  # running rate of each patch; NaN at first
         self._terrain, self._seed, self._updates = terrain, seed, 0
 
     @property

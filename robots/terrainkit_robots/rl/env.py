@@ -11,16 +11,11 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.rl import observations
 from terrainkit_robots.rl.commands import Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
-from terrainkit_robots.rl.observations import (
-    compute_observations,
-    policy_group,
-    privileged_group,
-    uses_height_scan,
-)
 from terrainkit_robots.rl.rewards import active_rewards, is_moving
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
@@ -43,7 +38,7 @@ class LeggedEnv(VecEnv):
         self.num_envs, self.num_actions = n, joints = task.env.num_envs, len(robot.default_pose)
         self.max_episode_length = task.max_episode_length
         self.scene = build_scene(robot, terrain, task)
-        scan = uses_height_scan(task, is_flat=terrain.is_flat)
+        scan = observations.uses_height_scan(task, is_flat=terrain.is_flat)
         check_env_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
         self.sim = Simulation(self.scene, n, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
@@ -55,8 +50,8 @@ class LeggedEnv(VecEnv):
         self.pushes = Pushes(task.domain_rand, n, task.dt)
         weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
         self.obs_groups = {
-            "policy": policy_group(robot, task, scan=scan),
-            "privileged": privileged_group(robot, task, scan=scan, weight=weight),
+            "policy": observations.policy_group(robot, task, scan=scan),
+            "privileged": observations.privileged_group(robot, task, scan=scan, weight=weight),
         }
         self.params = sample_params(self.rng, n, self.sim, task.domain_rand)
         apply_params(self.sim, self.params)
@@ -68,6 +63,7 @@ class LeggedEnv(VecEnv):
         self.path_length = np.zeros(n)  # since the last reset [m]
         self.actions = np.zeros((2, n, joints), np.float32)  # of the last two steps
         self.joint_offset = np.zeros((n, joints), np.float32)
+        self.obs_history = np.zeros((n, observations.history_width(robot, task)), np.float32)
         self.rewards = active_rewards(task.rewards, weight / 9.81, robot.leg_length)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
         self.commands = self.velocity_command.commands  # a view of the current commands
@@ -88,7 +84,7 @@ class LeggedEnv(VecEnv):
     @property
     def num_obs(self) -> dict[str, int]:
         """Number of observations in each group."""
-        return {name: group.shape[1] for name, group in self._observations.items()}
+        return {name: group.shape[1] for name, group in self.get_observations().items()}
 
     def get_observations(self) -> TensorDict:
         """Return the current observations; later steps do not modify these tensors."""
@@ -103,6 +99,9 @@ class LeggedEnv(VecEnv):
             Observations, rewards (n,), dones (n,), and extras with `time_outs` and `log`.
         """
         self._apply_actions(actions)
+        # The newest observation comes first, and so do its terms.
+        observed = self.get_observations()["policy"].numpy(force=True)
+        self.obs_history = observed[:, : self.obs_history.shape[1]]
         self.pushes.apply(self.rng, self.sim.qvel)
         unstable = self.sim.step(self.cfg.control.decimation)
         self.episode_length_buf += 1
@@ -181,6 +180,7 @@ class LeggedEnv(VecEnv):
             added_mass=self.params.added_mass[rows].copy(),
             com_shift=self.params.com_shift[rows].copy(),
             joint_offset=self.joint_offset[rows].copy(),
+            history=self.obs_history[rows].copy(),
         )
 
     def _command_state(self, rows: Any) -> dict[str, Any]:
@@ -217,7 +217,13 @@ class LeggedEnv(VecEnv):
         clip, groups = self.cfg.normalization.clip_observations, {}
         for name, terms in self.obs_groups.items():
             rng = self.rng if name == "policy" else None  # noise for the policy only
-            groups[name] = torch.from_numpy(compute_observations(terms, self.state, clip, rng))
+            values = observations.compute_observations(terms, self.state, clip, rng)
+            groups[name] = torch.from_numpy(values)
+        if past := self.cfg.observations.history_length - 1:
+            # The history of a new episode repeats its first observation.
+            new, policy = self.steps_since_reset == 0, groups["policy"]
+            width = self.obs_history.shape[1] // past
+            policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
         self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
     def _yaw(self) -> FloatArray:
@@ -239,10 +245,8 @@ class LeggedEnv(VecEnv):
         # A robot that left the map crossed its patch, even if the patch is wider than long.
         distance[terrain_out_of_bounds(base_pos, self.terrain)] = self.terrain.patch_length
         distance[unstable[env_ids]] = 0  # MuJoCo moved these to the world's origin
-        update, ended = self.cfg.terrain.curriculum, env_ids[complete]
-        self.curriculum.on_episode_end(
-            ended, distance[complete], fallen[complete], update_levels=update
-        )
+        ended = env_ids[complete], distance[complete], fallen[complete]
+        self.curriculum.on_episode_end(*ended, update_levels=self.cfg.terrain.curriculum)
         return log if self.terrain.is_flat else log | self.curriculum.log()
 
     def _reset_idx(self, env_ids: Ids) -> None:
@@ -261,12 +265,14 @@ class LeggedEnv(VecEnv):
         self.start_pos[env_ids] = qpos[:, :2]
         self.curriculum.reset(env_ids)
         self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
-        self.path_length[env_ids] = 0
-        self.actions[:, env_ids] = 0
+        self.path_length[env_ids] = self.actions[:, env_ids] = 0
         self.pushes.reset(self.rng, env_ids)
         self.sensors.reset(env_ids)
         limit, shape = self.cfg.domain_rand.joint_offset, (len(env_ids), self.num_actions)
         self.joint_offset[env_ids] = self.rng.uniform(-limit, limit, shape)
+        if limits := self.cfg.domain_rand.action_delay:
+            delay = self.rng.uniform(*limits, len(env_ids))
+            self.sim.reset_action_delay(env_ids, delay, self.to_ctrl(self.actions[0])[env_ids])
         for total in self.episode_sums.values():
             total[env_ids] = 0
         self.velocity_command.resample(self.rng, env_ids)
@@ -301,22 +307,21 @@ class LeggedEnv(VecEnv):
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""
-        arrays = {
+        names = "commands actions joint_offset steps_since_reset start_pos path_length"
+        arrays = {name: getattr(self, name) for name in names.split()} | {
             "physics": self.sim.batch.state,
             "episode_length": self.episode_length_buf.numpy(),
-            "commands": self.commands,
             "heading": self.velocity_command.heading,
-            "actions": self.actions,
             "last_dof_vel": self.sensors.last_dof_vel,
             "mean_vel": self.sensors.mean_vel,
-            "joint_offset": self.joint_offset,
             "push_vel": self.pushes.velocity,
             "steps_until_push": self.pushes.steps_until_push,
-            "steps_since_reset": self.steps_since_reset,
-            "start_pos": self.start_pos,
-            "path_length": self.path_length,
         }
         sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
         # Computing the state again would draw noise.
         state = {f"state_{name}": array for name, array in vars(self.state).items()}
+        if not self.obs_history.size:
+            del state["state_history"]
+        if self.cfg.domain_rand.action_delay:
+            arrays["action_delay"] = self.sim.batch.expand("actuator_delay")
         return arrays | sums | state | vars(self.params)

@@ -22,20 +22,13 @@ MAX_RESET_RELIEF = 0.06
 class RandomizedParams:
     """Physical parameters of n robots with g colliding geoms and j joints."""
 
-    friction: FloatArray
-    """Mean contact friction, shape (n, 1)."""
-    geom_friction: FloatArray
-    """Friction of each colliding geom, shape (n, g)."""
-    added_mass: FloatArray
-    """Mass added to the base [kg], shape (n, 1)."""
-    com_shift: FloatArray
-    """Shift of the base's center of mass [m], shape (n, 3)."""
-    stiffness: FloatArray
-    """Factor on the stiffness of each joint, shape (n, j)."""
-    damping: FloatArray
-    """Factor on the damping of each joint, shape (n, j)."""
-    strength: FloatArray
-    """Factor on all torques, shape (n, 1)."""
+    friction: FloatArray  # mean contact friction, shape (n, 1)
+    geom_friction: FloatArray  # friction of each colliding geom, shape (n, g)
+    added_mass: FloatArray  # mass added to the base [kg], shape (n, 1)
+    com_shift: FloatArray  # shift of the base's center of mass [m], shape (n, 3)
+    stiffness: FloatArray  # factor on the stiffness of each joint, shape (n, j)
+    damping: FloatArray  # factor on the damping of each joint, shape (n, j)
+    strength: FloatArray  # factor on all torques, shape (n, 1)
 
 
 def sample_params(
@@ -92,8 +85,7 @@ class Pushes:
     """Velocity pushes at regular intervals; each robot has its own phase."""
 
     def __init__(self, cfg: DomainRand, num_envs: int, dt: float) -> None:
-        # Velocity added in this step, world frame [m/s].
-        self.velocity = np.zeros((num_envs, 3), np.float32)
+        self.velocity = np.zeros((num_envs, 3), np.float32)  # of this step, world frame [m/s]
         self.steps_until_push = np.zeros(num_envs, np.int64)
         self._interval = max(1, round(cfg.push_interval_s / dt))
         self._max_vel = cfg.max_push_vel_xy if cfg.push_interval_s else 0.0

@@ -19,22 +19,20 @@ HEIGHT_SCAN_OFFSET = 0.5
 """Base height above the ground that is observed as 0 [m], as in legged_gym."""
 
 
+Symmetry = Literal[
+    "scalar", "vector", "axial", "command", "joints", "feet", "contacts", "scan", "phase", "history"
+]
+
+
 @dataclass(frozen=True)
 class ObservationTerm:
     """One term of an observation group."""
 
-    name: str
-    """Name in logs and exports."""
-    function: Callable[[State], FloatArray]
-    """Computes the term, shape (n, width)."""
-    symmetry: Literal["scalar", "vector", "axial", "command", "joints", "feet", "scan", "phase"] = (
-        "scalar"
-    )
-    """How the term transforms when left and right are swapped; see :mod:`.symmetry`."""
-    scale: tuple[float, ...] | float = 1.0
-    """Scale factor, or one per number."""
-    noise: float = 0.0
-    """Half range of the uniform noise, added before scaling."""
+    name: str  # in logs and exports
+    function: Callable[[State], FloatArray]  # computes the term, shape (n, width)
+    symmetry: Symmetry = "scalar"  # how it transforms when left and right are swapped
+    scale: tuple[float, ...] | float = 1.0  # scale factor, or one per number
+    noise: float = 0.0  # half range of the uniform noise, added before scaling
 
 
 def uses_height_scan(task: Task, *, is_flat: bool) -> bool:
@@ -67,9 +65,23 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
     )
     if task.commands.gait_period != 0:
         group += (term("gait_phase", lambda s: s.gait_phase, "phase"),)
+    if task.observations.base_lin_vel:
+        scale, uniform = scales.lin_vel, noise["lin_vel"]
+        group += (term("base_lin_vel", lambda s: s.base_lin_vel, "vector", scale, uniform),)
+    if task.observations.foot_contact:
+        group += (term("foot_contact", lambda s: s.foot_contact.astype("f4"), "contacts"),)
+    if task.observations.history_length > 1:
+        group += (term("history", lambda s: s.history, "history"),)
     scan_scale, scan_noise = scales.height_measurements, noise["height_measurements"]
     scan_term = term("height_scan", height_scan, "scan", scan_scale, scan_noise)
     return (*group, scan_term) if scan else group
+
+
+def history_width(robot: Robot, task: Task) -> int:
+    """Return the size of the history: the previous observations, without the height scan."""
+    cfg, width = task.observations, 9 + 3 * len(robot.default_pose)
+    width += 2 * (task.commands.gait_period != 0) + 3 * cfg.base_lin_vel
+    return (cfg.history_length - 1) * (width + len(robot.spec.feet) * cfg.foot_contact)
 
 
 def privileged_group(
@@ -86,8 +98,10 @@ def privileged_group(
         return quat_rotate_inverse(quat, state.foot_force.reshape(-1, 3)).reshape(n, -1)
 
     term, lin_vel_scale = ObservationTerm, task.normalization.obs_scales.lin_vel
+    of_policy = policy_group(robot, task, scan=scan)
+    known = "base_lin_vel", "history"  # the former is below
     return (
-        *(replace(each, noise=0.0) for each in policy_group(robot, task, scan=scan)),
+        *(replace(each, noise=0.0) for each in of_policy if each.name not in known),
         term("base_lin_vel", lambda s: s.base_lin_vel, "vector", lin_vel_scale),
         term("mean_vel", lambda s: s.mean_vel, "command"),
         term("friction", lambda s: s.friction),

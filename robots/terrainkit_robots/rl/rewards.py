@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Rewards
-from terrainkit_robots.rl.state import CONTACT_FORCE, State
+from terrainkit_robots.rl.state import State
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
 
@@ -176,8 +176,7 @@ def dof_pos_limits(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def feet_gait(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Reward the fraction of feet that are in contact exactly when the gait says so."""
-    contact = state.foot_force[..., 2] > CONTACT_FORCE
-    return (contact == (state.swing_phase == 0)).mean(axis=1, dtype=np.float32)
+    return (state.foot_contact == (state.swing_phase == 0)).mean(axis=1, dtype=np.float32)
 
 
 @reward
@@ -191,8 +190,7 @@ def foot_swing_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def foot_slip(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize the horizontal velocity of feet in contact, mean square [m2/s2]."""
-    contact = state.foot_force[..., 2] > CONTACT_FORCE
-    return (np.square(state.foot_vel[..., :2]).sum(axis=2) * contact).mean(axis=1)
+    return (np.square(state.foot_vel[..., :2]).sum(axis=2) * state.foot_contact).mean(axis=1)
 
 
 @reward

@@ -54,18 +54,12 @@ class RunInfo(Config):
 class Run:
     """A training run."""
 
-    folder: Path
-    """Folder of the run."""
-    info: RunInfo
-    """What it was made from."""
-    task: Task
-    """Its task."""
-    robot: Robot
-    """The robot, with the spec it was trained with."""
-    terrain: str
-    """The terrain, as `load_terrain` takes it: `plane` or a path."""
-    checkpoint: Path | None
-    """The selected checkpoint, by default the last; None if there is none."""
+    folder: Path  # folder of the run
+    info: RunInfo  # what it was made from
+    task: Task  # its task
+    robot: Robot  # the robot, with the spec it was trained with
+    terrain: str  # the terrain, as `load_terrain` takes it: `plane` or a path
+    checkpoint: Path | None  # the selected checkpoint, by default the last; None if there is none
 
 
 def checkpoints(folder: Path) -> dict[int, Path]:
@@ -92,20 +86,16 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
     """
     robot, source = _sources(robot_name, terrain)
     robot_folder, map_config = tasks.get_task(robot_name).folder, _map_config(source)
-    packages = ("terrainkit", "mujoco", "rsl-rl-lib", "torch")
     info = RunInfo(
         robot=robot,
         terrain=source,
         seed=task.runner.seed,
         started=datetime.now().astimezone().isoformat(timespec="seconds"),
-        versions={name: version(name) for name in packages},
+        versions={name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")},
         robot_sha256=_robot_digests(robot_folder),
     )
-    files = {
-        RUN_FILE: info.to_toml(),
-        TASK_FILE: task.to_toml(),
-        SPEC_FILE: read_text(robot_folder / SPEC_FILE),
-    }
+    files = {RUN_FILE: info.to_toml(), TASK_FILE: task.to_toml()}
+    files[SPEC_FILE] = read_text(robot_folder / SPEC_FILE)
     if map_config is not None:
         files[MAP_FILE] = map_config.to_toml()
     write_run_folder(folder, {name: text.encode() for name, text in files.items()})
@@ -189,8 +179,7 @@ def changed_robot_files(run: Run) -> tuple[str, ...]:
     if recorded is None:
         return ()
     current = _robot_digests(tasks.get_task(run.info.robot).folder)
-    names = sorted({*recorded, *current})
-    return tuple(name for name in names if recorded.get(name) != current.get(name))
+    return tuple(sorted({name for name, _ in recorded.items() ^ current.items()}))
 
 
 def is_same_terrain(run: Run, terrain: str | Path) -> bool:
@@ -262,10 +251,8 @@ def _robot_digests(folder: Path) -> dict[str, str]:
 def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:
     """Return the robot and the terrain as a run records them: names, or absolute paths."""
     folder = tasks.get_task(robot).folder
-    return (
-        str(robot) if str(robot) in tasks.task_names() else str(folder.resolve()),
-        "plane" if str(terrain) == "plane" else str(Path(terrain).resolve()),
-    )
+    name = str(robot) if str(robot) in tasks.task_names() else str(folder.resolve())
+    return name, "plane" if str(terrain) == "plane" else str(Path(terrain).resolve())
 
 
 def _map_config(terrain: str | Path) -> MapConfig | None:

@@ -206,9 +206,8 @@ class LeggedRunner(OnPolicyRunner):
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
         """
         parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
-        with open_checkpoint(
-            Path(path), self.env.robot.spec.joint_order, self.env.num_obs
-        ) as state:
+        joints = self.env.robot.spec.joint_order
+        with open_checkpoint(Path(path), joints, self.env.num_obs) as state:
             if "processes" not in state:
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
@@ -321,11 +320,8 @@ def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
         "mirror_loss_coeff": algorithm.pop("mirror_loss_coeff"),
     }
     distribution = {"class_name": "GaussianDistribution", "init_std": policy.init_noise_std}
-    network = {
-        "class_name": "MLPModel",
-        "activation": policy.activation,
-        "obs_normalization": policy.obs_normalization,
-    }
+    network: dict[str, Any] = {"class_name": "MLPModel", "activation": policy.activation}
+    network |= {"obs_normalization": policy.obs_normalization}
     actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
     loggers = {
         "tensorboard": {"class_name": "torch.utils.tensorboard:SummaryWriter", "flush_secs": 10},
@@ -369,8 +365,5 @@ def process_share(task: Task) -> Task:
     available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
     threads = task.env.num_threads or max(1, len(available) // local_count)
     num_envs = num_envs // count + (rank < num_envs % count)
-    return replace(
-        task,
-        env=replace(task.env, num_envs=num_envs, num_threads=threads),
-        runner=replace(task.runner, seed=task.runner.seed + rank),
-    )
+    env = replace(task.env, num_envs=num_envs, num_threads=threads)
+    return replace(task, env=env, runner=replace(task.runner, seed=task.runner.seed + rank))

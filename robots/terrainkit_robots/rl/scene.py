@@ -31,27 +31,21 @@ ALL_BITS = 0x7FFFFFFF
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """A compiled model, and indices into it. In qpos and qvel, the base comes first."""
+    """A compiled model, and indices into it. In qpos and qvel, the base comes first.
 
-    model: Any
-    """The `mujoco.MjModel`."""
-    joint_qpos: Any
-    """qpos index of each joint, in the robot's order, shape (j,)."""
-    joint_qvel: Any
-    """qvel index of each joint, shape (j,)."""
-    base: int
-    """Body id of the base."""
-    geoms: Any
-    """Ids of the robot's colliding geoms, shape (g,)."""
-    default_qpos: Any
-    """qpos of the default pose with the base at height 0, shape (nq,)."""
-    foot_pos: Any
-    """Position of each foot's site at `default_qpos` [m], shape (f, 3)."""
-    sole_depth: Any
-    """Distance from each foot's site down to its lowest point at `default_qpos` [m], shape (f,)."""
-    sensors: dict[str, slice]
-    """Range in sensordata of `foot_position`, `foot_velocity`, `foot_force`, `penalized_force` and
-    `termination_force`, three numbers per body. Forces act on what the robot touches [N]."""
+    The sensors are `foot_position`, `foot_velocity`, `foot_force`, `penalized_force` and
+    `termination_force`, with three numbers per body. Forces act on what the robot touches [N].
+    """
+
+    model: Any  # the `mujoco.MjModel`
+    joint_qpos: Any  # qpos index of each joint, in the robot's order, shape (j,)
+    joint_qvel: Any  # qvel index of each joint, shape (j,)
+    base: int  # body id of the base
+    geoms: Any  # ids of the robot's colliding geoms, shape (g,)
+    default_qpos: Any  # qpos of the default pose with the base at height 0, shape (nq,)
+    foot_pos: Any  # position of each foot's site at `default_qpos` [m], shape (f, 3)
+    sole_depth: Any  # distance from each foot's site down to its lowest point [m], shape (f,)
+    sensors: dict[str, slice]  # range of each kind in sensordata
 
 
 def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
@@ -156,15 +150,15 @@ def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
     default, joint = mujoco.MjSpec().default.actuator, mujoco.mjtTrn.mjTRN_JOINT
     stiffness, damping = spec.per_joint("stiffness"), spec.per_joint("damping")
     for name, effort in spec.per_joint("effort").items():
-        kp, kd = stiffness[name], damping[name]
+        kp, kd = stiffness[name], damping[name] if control.damping is None else control.damping
         if control.stiffness is not None and kp > 0:
             kp = control.stiffness
-        if control.damping is not None:
-            kd = control.damping
         motor = scene.add_actuator(name=name, target=name, trntype=joint, forcelimited=True)
         # A new motor inherits from the defaults in the robot's file.
-        for attribute in ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange"):
+        for attribute in ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange", "interp"):
             setattr(motor, attribute, getattr(default, attribute))
+        # Each simulation has its own delay; this is the longest.
+        motor.nsample, motor.delay = task.max_delay_steps, task.max_delay_steps * task.sim.dt
         motor.forcerange = [-effort, effort]
         if control.control_type == "T":
             motor.set_to_motor()
@@ -192,13 +186,10 @@ def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     ranges, start = {}, 0
     for kind, (type_, objtype, names) in kinds.items():
         for name in names:
-            made = scene.add_sensor(
-                name=f"{kind}_{name}", type=type_, objtype=objtype, objname=name
-            )
+            made = scene.add_sensor(type=type_, objtype=objtype, objname=name)
             if type_ == sensor.mjSENS_CONTACT:
                 made.intprm[:3] = [CONTACT_FORCE_BIT, NET_FORCE, 1]
-        ranges[kind] = slice(start, start + 3 * len(names))
-        start += 3 * len(names)
+        ranges[kind] = slice(start, start := start + 3 * len(names))
     return ranges
 
 

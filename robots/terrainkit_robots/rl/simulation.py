@@ -39,8 +39,7 @@ class Simulation:
         self.batch.warning[:, self._unstable, 1] = 0
         with quiet_mujoco():
             self.batch.step(nstep=count, stage=self._stage)
-        unstable: NDArray[np.bool_] = (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
-        return unstable
+        return (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
 
     def reset(self, env_ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
         """Reset the simulations `env_ids` (sorted) to positions (k, nq) and velocities (k, nv)."""
@@ -54,6 +53,17 @@ class Simulation:
         with quiet_mujoco():
             self.batch.forward(env_ids, stage=self._stage)
 
+    def reset_action_delay(self, env_ids: Ids, delay: NDArray[Any], ctrl: NDArray[Any]) -> None:
+        """Set the delays (k,) [s] of simulations whose motors received the controls (k, j)."""
+        dt, samples = self.scene.model.opt.timestep, self.scene.model.actuator_history[0, 0]
+        # MuJoCo applies the last control that is old enough. With half a step less than the delay,
+        # the rounding errors of the time do not matter.
+        delay = dt * np.maximum(np.rint(delay / dt) - 0.5, 0)
+        self.batch.expand("actuator_delay")[env_ids] = delay[:, None]
+        # The history of a motor is two counters, the times of the samples, and their controls.
+        history = self.batch.bind("history").reshape(len(self.qpos), ctrl.shape[1], -1)
+        history[env_ids, :, 2 + samples :] = ctrl[:, :, None]
+
     def sensor(self, name: str, env_ids: Any = slice(None)) -> NDArray[np.float32]:
         """Return a copy of the data of the sensors `name`, shape (n, bodies, 3)."""
         values = self._sensordata[env_ids, self.scene.sensors[name]].astype(np.float32)
@@ -64,11 +74,12 @@ def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> Non
     """Raise MemoryLimitError if training needs more memory than is free, within a factor of two."""
     joints, steps, policy = len(robot.default_pose), task.runner.num_steps_per_env, task.policy
     points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
-    observations = 45 + 7 * joints + 2 * scan * points
+    num_envs, history = task.env.num_envs, task.observations.history_length - 1
+    observations = 45 + 7 * joints + 2 * scan * points + history * (20 + 3 * joints)
     hidden = sum(policy.actor_hidden_dims + policy.critic_hidden_dims)
     samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry != "none"))
     learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))
     floats = (12 + steps) * observations + 3 * steps * joints + learning
-    per_env, num_envs = 4 * floats + 8 * (100 + 60 * joints + 3 * ngeom), task.env.num_envs
+    per_env = 4 * floats + 8 * (100 + (60 + 2 * task.max_delay_steps) * joints + 3 * ngeom)
     what = f"training with env.num_envs {num_envs}, {per_env / 1e6:.2g} MB each,"
     check_memory(round(num_envs * per_env), what, ("env.num_envs", num_envs))

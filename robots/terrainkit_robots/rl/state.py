@@ -6,13 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots.rl import terminations
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.terminations import (
-    bad_orientation,
-    illegal_contact,
-    terrain_out_of_bounds,
-)
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.transforms import (
     FloatArray,
@@ -27,66 +23,44 @@ CONTACT_FORCE = 1.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """The state of n robots: j joints, f feet, p penalized bodies, k points of the height scan.
+    """The state of n robots: j joints, f feet, p penalized bodies, k scan points.
 
     The arrays are copies; later steps do not change them.
     """
 
-    base_pos: FloatArray
-    """Position of the base, world frame [m], shape (n, 3)."""
-    base_quat: FloatArray
-    """Orientation of the base (w, x, y, z), shape (n, 4)."""
-    base_lin_vel: FloatArray
-    """Linear velocity of the base, base frame [m/s], shape (n, 3)."""
-    base_ang_vel: FloatArray
-    """Angular velocity of the base, base frame [rad/s], shape (n, 3)."""
-    mean_vel: FloatArray
-    """Forward and left velocity [m/s] and yaw rate [rad/s], with less of the sway of the gait:
-    exponential moving averages, shape (n, 3)."""
-    projected_gravity: FloatArray
-    """Direction of gravity, base frame, shape (n, 3); (0, 0, -1) when upright."""
-    base_height: FloatArray
-    """Height of the base above the ground under it [m], shape (n,)."""
-    dof_pos: FloatArray
-    """Joint positions [rad], shape (n, j)."""
-    dof_vel: FloatArray
-    """Joint velocities [rad/s], shape (n, j)."""
-    dof_acc: FloatArray
-    """Joint accelerations, from the last two velocities [rad/s2], shape (n, j)."""
-    torques: FloatArray
-    """Motor torques [N m], shape (n, j)."""
-    foot_height: FloatArray
-    """Height of the feet above the ground under them [m], shape (n, f)."""
-    foot_vel: FloatArray
-    """Velocity of the feet, world frame [m/s], shape (n, f, 3)."""
-    foot_force: FloatArray
-    """Contact force on the feet, world frame [N], shape (n, f, 3)."""
-    penalized_force: FloatArray
-    """Magnitude of the force on each penalized body [N], shape (n, p)."""
-    height_scan: FloatArray
-    """Height of the base above each scan point [m], shape (n, k); k = 0 without a scan."""
-    fallen: NDArray[np.bool_]
-    """Robots whose episode ends with a fall, shape (n,)."""
-    actions: FloatArray
-    """Actions of this step, shape (n, j)."""
-    last_actions: FloatArray
-    """Actions of the previous step, shape (n, j)."""
-    commands: FloatArray
-    """Forward and left velocity [m/s], yaw rate [rad/s], shape (n, 3)."""
-    gait_phase: FloatArray
-    """Sine and cosine of the phase of the gait, shape (n, 2); 0 when commanded to stand."""
-    swing_phase: FloatArray
-    """Completed fraction of the swing that each foot should be in, shape (n, f); 0 in stance."""
-    push_vel: FloatArray
-    """Velocity that a push added in this step, world frame [m/s], shape (n, 3)."""
-    friction: FloatArray
-    """Contact friction, shape (n, 1)."""
-    added_mass: FloatArray
-    """Mass added to the base [kg], shape (n, 1)."""
-    com_shift: FloatArray
-    """Shift of the base's center of mass, base frame [m], shape (n, 3)."""
-    joint_offset: FloatArray
-    """Measured minus true joint position [rad], shape (n, j)."""
+    base_pos: FloatArray  # position of the base, world frame [m], shape (n, 3)
+    base_quat: FloatArray  # orientation of the base (w, x, y, z), shape (n, 4)
+    base_lin_vel: FloatArray  # linear velocity of the base, base frame [m/s], shape (n, 3)
+    base_ang_vel: FloatArray  # angular velocity of the base, base frame [rad/s], shape (n, 3)
+    mean_vel: FloatArray  # forward, left [m/s], yaw rate [rad/s]; moving averages, shape (n, 3)
+    projected_gravity: FloatArray  # direction of gravity, base frame, shape (n, 3)
+    base_height: FloatArray  # height of the base above the ground under it [m], shape (n,)
+    dof_pos: FloatArray  # joint positions [rad], shape (n, j)
+    dof_vel: FloatArray  # joint velocities [rad/s], shape (n, j)
+    dof_acc: FloatArray  # joint accelerations, from the last two velocities [rad/s2], shape (n, j)
+    torques: FloatArray  # motor torques [N m], shape (n, j)
+    foot_height: FloatArray  # height of the feet above the ground under them [m], shape (n, f)
+    foot_vel: FloatArray  # velocity of the feet, world frame [m/s], shape (n, f, 3)
+    foot_force: FloatArray  # contact force on the feet, world frame [N], shape (n, f, 3)
+    penalized_force: FloatArray  # magnitude of the force on each penalized body [N], shape (n, p)
+    height_scan: FloatArray  # height of the base above each scan point [m], shape (n, k)
+    fallen: NDArray[np.bool_]  # robots whose episode ends with a fall, shape (n,)
+    actions: FloatArray  # actions of this step, shape (n, j)
+    last_actions: FloatArray  # actions of the previous step, shape (n, j)
+    commands: FloatArray  # forward and left velocity [m/s], yaw rate [rad/s], shape (n, 3)
+    gait_phase: FloatArray  # sine and cosine, shape (n, 2); 0 when commanded to stand
+    swing_phase: FloatArray  # completed fraction of each foot's swing, shape (n, f); 0 in stance
+    push_vel: FloatArray  # velocity that a push added in this step, world frame [m/s], shape (n, 3)
+    friction: FloatArray  # contact friction, shape (n, 1)
+    added_mass: FloatArray  # mass added to the base [kg], shape (n, 1)
+    com_shift: FloatArray  # shift of the base's center of mass, base frame [m], shape (n, 3)
+    joint_offset: FloatArray  # measured minus true joint position [rad], shape (n, j)
+    history: FloatArray  # previous observations of the policy, newest first; see `history_width`
+
+    @property
+    def foot_contact(self) -> NDArray[np.bool_]:
+        """Which feet are in contact, shape (n, f)."""
+        return self.foot_force[..., 2] > CONTACT_FORCE
 
     def update(self, env_ids: NDArray[np.int64], other: "State") -> None:
         """Replace the rows `env_ids` with the state `other` of these robots."""
@@ -103,9 +77,9 @@ class Sensors:
         n, joints = len(sim.qpos), len(sim.scene.joint_qvel)
         self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
         self.mean_vel = np.zeros((n, 3), np.float32)
-        self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         self._sim, self._terrain, self._cfg = sim, terrain, task.termination
         self._dt = np.float32(task.dt)
+        self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
         points = np.stack([each.ravel() for each in np.meshgrid(x, y, indexing="ij")])
         self._scan_points = points[:, : None if scan else 0].astype(np.float32)
@@ -155,7 +129,7 @@ class Sensors:
             "foot_force": foot_force,
             "penalized_force": np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
             "height_scan": pos[:, 2:3] - scan,
-            "fallen": illegal_contact(terminating, self._cfg)
-            | bad_orientation(gravity, self._cfg)
-            | terrain_out_of_bounds(pos, self._terrain),
+            "fallen": terminations.illegal_contact(terminating, self._cfg)
+            | terminations.bad_orientation(gravity, self._cfg)
+            | terminations.terrain_out_of_bounds(pos, self._terrain),
         }

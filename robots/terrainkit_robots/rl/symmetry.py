@@ -61,23 +61,25 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
         "command": _map(range(3), [1, -1, -1]),
         "phase": _map(range(2), [-1, -1]),  # left and right are half a period apart
         "joints": joints,
-        "feet": _foot_map(env),
+        **_foot_maps(env),
     }
     groups = {}
     for name, group in env.obs_groups.items():
-        parts, start = [], 0
+        index, sign = np.zeros(0, np.int64), np.zeros(0, np.float32)
         for term in group:
-            width = term.function(env.state).shape[1]
+            width, start = term.function(env.state).shape[1], len(index)
             maps["scalar"] = _map(range(width), np.ones(width))
             if term.symmetry == "scan":
                 maps["scan"] = _scan_map(env.cfg.terrain)
+            if term.symmetry == "history":  # repeats the terms before it
+                repeated = index + np.arange(0, width, start)[:, None]
+                maps["history"] = _map(repeated.ravel(), np.tile(sign, len(repeated)))
             part = maps[term.symmetry]
             if len(part.index) != width:
                 expected = f"the symmetry {term.symmetry!r} expects {len(part.index)}"
                 raise ConfigError(f"observation {term.name}: got {width} numbers; {expected}")
-            parts.append((part.index + start, part.sign))
-            start += width
-        groups[name] = _map(*map(np.concatenate, zip(*parts, strict=True)))
+            index, sign = np.append(index, part.index + start), np.append(sign, part.sign)
+        groups[name] = SignedPermutation(index, sign)
     return MirrorMaps(groups, joints)
 
 
@@ -136,13 +138,14 @@ def mirror_feet(position: FloatArray) -> NDArray[np.int64]:
     return np.linalg.norm(position[:, None] - position * [1, -1, 1], axis=2).argmin(axis=1)
 
 
-def _foot_map(env: "LeggedEnv") -> SignedPermutation:
-    """Return the map of one vector per foot: feet are paired by position in the default pose."""
+def _foot_maps(env: "LeggedEnv") -> dict[str, SignedPermutation]:
+    """Return the maps of a vector and of a number per foot: feet are paired by default position."""
     feet, index = env.robot.spec.feet, mirror_feet(env.scene.foot_pos)
     for k in np.flatnonzero(index[index] != np.arange(len(feet))):
         got = f"the foot {feet[k]} is nearest to the mirror image of {feet[index[k]]}"
         raise ConfigError(f"symmetry: {got}, which is nearest to another; expected pairs of feet")
-    return _map((3 * index[:, None] + range(3)).ravel(), [1, -1, 1] * len(feet))
+    vectors = _map((3 * index[:, None] + range(3)).ravel(), [1, -1, 1] * len(feet))
+    return {"feet": vectors, "contacts": _map(index, np.ones(len(feet)))}
 
 
 def _scan_map(cfg: Terrain) -> SignedPermutation:

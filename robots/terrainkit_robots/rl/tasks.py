@@ -31,12 +31,9 @@ _registered: dict[str, "TaskSpec"] = {}
 class TaskSpec:
     """A robot, and the configuration of its training."""
 
-    name: str
-    """Name of the task; for a folder, the name in its robot.toml, which a task may have too."""
-    folder: Path
-    """Folder with robot.toml."""
-    task: Task
-    """Configuration of training."""
+    name: str  # of the task; for a folder, that in its robot.toml, which a task may have too
+    folder: Path  # with robot.toml
+    task: Task  # configuration of training
 
     @property
     def trained_run(self) -> Path:

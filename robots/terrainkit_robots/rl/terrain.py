@@ -20,22 +20,15 @@ from terrainkit_robots.transforms import FloatArray
 class Terrain(ABC):
     """A terrain to train on."""
 
-    env_origins: FloatArray = np.zeros((1, 1, 3), np.float32)
-    """Spawn origins [m], shape (rows, cols, 3); rows are curriculum levels."""
-    spawns: FloatArray = np.zeros((1, 1, 1, 4), np.float32)
-    """Spawn positions [m] and headings [rad], shape (rows, cols, k, 4), padded with NaN."""
-    terrain_names: NDArray[np.str_]
-    """Name of each patch's terrain, shape (rows, cols)."""
-    patch_length: float = 8.0
-    """Distance to walk to cross a patch [m]."""
-    lower: tuple[float, float]
-    """Lower corner, x and y [m]."""
-    upper: tuple[float, float]
-    """Upper corner, x and y [m]."""
-    surface: HeightfieldSurface | None = None
-    """The collision geometry of the ground and the solids; None for a plane at height 0."""
-    is_flat: bool
-    """Whether the ground is level everywhere, so that a height scan carries no information."""
+    # Shapes are (rows, cols) and more, spawns padded with NaN; rows are levels.
+    env_origins: FloatArray = np.zeros((1, 1, 3), np.float32)  # spawn origins [m]
+    spawns: FloatArray = np.zeros((1, 1, 1, 4), np.float32)  # positions [m], headings [rad]
+    terrain_names: NDArray[np.str_]  # name of each patch's terrain
+    patch_length: float = 8.0  # distance to walk to cross a patch [m]
+    lower: tuple[float, float]  # lower corner, x and y [m]
+    upper: tuple[float, float]  # upper corner, x and y [m]
+    surface: HeightfieldSurface | None = None  # of ground and solids; None for a plane at height 0
+    is_flat: bool  # whether the ground is level everywhere: a height scan carries no information
 
     @abstractmethod
     def spec(self) -> Any:

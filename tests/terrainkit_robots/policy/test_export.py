@@ -18,9 +18,10 @@ from terrainkit_robots.policy.evaluate import eval_task, rollout
 from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Task
+from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 
@@ -116,6 +117,8 @@ def measure_terms(env, config):
         "dof_pos": qpos[:, env.scene.joint_qpos],
         "dof_vel": qvel[:, env.scene.joint_qvel],
         "actions": env.actions[0],
+        "base_lin_vel": np.einsum("nij,ni->nj", rotations, qvel[:, :3]),
+        "foot_contact": env.state.foot_force[..., 2] > 1,
     }
     if config["gait"]:
         angle = 2 * np.pi * env.steps_since_reset * env.cfg.dt / config["gait"]["period"]
@@ -132,18 +135,38 @@ def measure_terms(env, config):
     return terms
 
 
-@pytest.mark.parametrize(("on_map", "size"), [(False, 47), (True, 234)])
-def test_json_reproduces_the_observations(quadruped, map_terrain, on_map, size):
-    task = replace(SMALL, noise=Noise(noise_level=0.0), domain_rand=DomainRand(joint_offset=0.0))
+ALL = Observations(base_lin_vel=True, foot_contact=True, history_length=3)
+
+
+@pytest.mark.parametrize(
+    ("on_map", "observations", "size"),
+    [
+        (False, Observations(), 47),
+        (True, Observations(), 234),
+        (False, ALL, 3 * 54),
+        (True, ALL, 3 * 54 + 187),
+    ],
+)
+def test_json_reproduces_the_observations(quadruped, map_terrain, on_map, observations, size):
+    domain_rand = DomainRand(joint_offset=0.0, action_delay=(0.0, 0.02))
+    task = replace(SMALL, noise=Noise(noise_level=0.0), domain_rand=domain_rand)
+    task = replace(task, observations=observations)
     env = LeggedEnv(task, quadruped, map_terrain if on_map else Plane())
     config = json.loads(json.dumps(describe_policy(env)))
     assert config["observation"]["size"] == size
     clip = config["observation"]["clip"]
+    assert config["observation"]["history_length"] == observations.history_length
     generator = torch.Generator().manual_seed(0)
     for _ in range(30):
+        previous = env.get_observations()["policy"].numpy()
         env.step(torch.randn(4, 12, generator=generator))
         terms, scaled = measure_terms(env, config), []
         for part in config["observation"]["parts"]:
+            if part["name"] == "history":  # as `formulas` says
+                size = part["stop"] - part["start"]
+                first = np.tile(np.concatenate(scaled, axis=1), (1, 2))
+                is_new = env.steps_since_reset[:, None] == 0
+                terms["history"] = np.where(is_new, first, previous[:, :size])
             value = terms[part["name"]] - part["offset"]
             scaled.append(np.clip(value, *part.get("clip", (-np.inf, np.inf))) * part["scale"])
             assert scaled[-1].shape[1] == part["stop"] - part["start"]
@@ -223,6 +246,22 @@ def test_example_computes_the_observations(exported, trained, monkeypatch):
     mujoco.mju_quat2Mat(rotation.reshape(9), data.qpos[3:7])
     obs = names["observe"](env.commands[0], env.actions[0, 0], rotation)
     np.testing.assert_allclose(obs, env.get_observations()["policy"][0], atol=1e-4)
+
+
+def test_exported_policy_with_a_history(make_run, tmp_path, monkeypatch):
+    run = make_run(observations=Observations(base_lin_vel=True, history_length=3))
+    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(1)
+    result = export_policy(open_run(run.folder), tmp_path / "exported", example=True)
+    assert max(result.errors) <= 1e-5
+    assert result.num_observations == 150
+    names = run_example(tmp_path / "exported", monkeypatch, "--seconds", "0.04")
+    assert [names["config"]["observation"]["parts"][-1][k] for k in ("start", "stop")] == [50, 150]
+    observe, args = names["observe"], (names["command"], names["action"], np.eye(3))
+    first = observe(*args)
+    np.testing.assert_array_equal(first, np.tile(first[:50], 3))
+    previous = np.arange(150, dtype=np.float32)
+    second = observe(*args, previous)
+    np.testing.assert_array_equal(second, np.concatenate([first[:50], previous[:100]]))
 
 
 def test_example_has_the_joints_and_friction_of_the_training(exported, trained, monkeypatch):

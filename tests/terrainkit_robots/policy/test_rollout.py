@@ -179,7 +179,7 @@ def test_gait_of_standing_robots(env):
 
 
 def test_gait_without_contacts_has_no_nan(make_sliding, monkeypatch):
-    monkeypatch.setattr("terrainkit_robots.policy.evaluate.CONTACT_FORCE", np.inf)
+    monkeypatch.setattr("terrainkit_robots.rl.state.CONTACT_FORCE", np.inf)
     metrics = run(make_sliding([[0.6, 0, 0]]), 2.2, FORWARD).metrics(select(1))
     assert metrics.followed == 1
     assert metrics.foot_slip is None

@@ -18,9 +18,9 @@ def test_recording_env_adds_up_to_the_rewards(quadruped):
         actions = 8 * torch.randn(8, 12, generator=generator)
         _, rewards, dones, extras = env.step(actions)
         falls.append(float((dones & ~extras["time_outs"]).float().mean()) / TASK.dt)
-        total = sum(env.history[-1][1:])
+        total = sum(env.recorded[-1][1:])
         assert total == pytest.approx(float(rewards.mean()) / TASK.dt, abs=1e-3)
-    assert [step[0] for step in env.history] == pytest.approx(falls)
+    assert [step[0] for step in env.recorded] == pytest.approx(falls)
     assert sum(falls) > 0
 
 

@@ -224,7 +224,7 @@ def test_excessive_penalties_fail_with_their_names(quadruped, monkeypatch):
     assert {"reward ang_vel_xy", "reward dof_acc"} <= failed(result)
     (check,) = (check for check in result.checks if check.name == "reward ang_vel_xy")
     assert "% of the positive rewards" in check.measured
-    assert "a penalty of at most 300%" in check.expected
+    assert "a penalty of at most 200%" in check.expected
     assert "reward lin_vel_z" not in failed(result)
     assert [check.name for check in result.checks][-3:] == [
         "trains for 1 iteration",

@@ -36,6 +36,7 @@ def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, 
         "added_mass": (1,),
         "com_shift": (3,),
         "fallen": (),
+        "history": (0,),
     }
     return {each.name: others.get(each.name, (joints,)) for each in fields(State)}
 

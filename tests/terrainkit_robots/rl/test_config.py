@@ -18,6 +18,7 @@ from terrainkit_robots.rl.config import (
     DomainRand,
     Env,
     InitState,
+    Observations,
     Policy,
     Rewards,
     Runner,
@@ -104,6 +105,12 @@ def test_non_finite_numbers_are_rejected(section):
         (Commands, "resampling_time", 0, "expected a number > 0"),
         (DomainRand, "friction", (-0.1, 1), "friction: got .*each a number >= 0"),
         (DomainRand, "com_shift", -1, "com_shift: got -1; expected a number >= 0"),
+        (DomainRand, "action_delay", (0.02, 0), "action_delay: got .*, the lower one first"),
+        (DomainRand, "action_delay", (-0.01, 0), "action_delay: got .*each a number >= 0"),
+        (DomainRand, "action_delay", 0.02, "action_delay: got 0.02; expected 2 values"),
+        (Observations, "history_length", 0, "got 0; expected an integer from 1 to 100"),
+        (Observations, "history_length", 1.5, "history_length: got 1.5; expected an integer"),
+        (Observations, "foot_contact", 1, "foot_contact: got 1; expected true or false"),
         (Rewards, "tracking_sigma", 0, "tracking_sigma: got 0; expected a number > 0"),
         (Rewards, "tracking_lin_vel", "much", "tracking_lin_vel: got 'much'; expected a number"),
         (Termination, "tilt", 4, "tilt: got 4; expected a number > 0 and <= 3.14159"),
@@ -144,6 +151,18 @@ def test_episode_has_at_least_one_step():
 def test_mini_batches_need_samples():
     with pytest.raises(ConfigError, match=r"num_mini_batches: got 4; .* = 3"):
         Task(env=Env(num_envs=1), runner=Runner(num_steps_per_env=3))
+
+
+def test_action_delay_has_at_least_one_simulation_step():
+    told = r"domain_rand.action_delay: got \[0.0, 0.002\]; expected an end above half of sim.dt"
+    with pytest.raises(ConfigError, match=told):
+        Task(domain_rand=DomainRand(action_delay=(0, 0.002)))
+    for odd in ((0, 0), (0, 1.5)):
+        with pytest.raises(ConfigError, match="at most 1 s; or none"):
+            Task(domain_rand=DomainRand(action_delay=odd))
+    for end, steps in {0.003: 1, 0.005: 1, 0.02: 4, 1: 200}.items():
+        assert Task(domain_rand=DomainRand(action_delay=(0, end))).max_delay_steps == steps
+    assert Task().max_delay_steps == 0
 
 
 def test_collision_reward_needs_collisions():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -10,6 +12,8 @@ from terrainkit_robots.rl.config import (
     Control,
     DomainRand,
     Env,
+    Noise,
+    Observations,
     Rewards,
     Runner,
     Termination,
@@ -76,11 +80,9 @@ class TestObservations:
     def test_widths(self, quadruped, biped, nominal_task, map_ground):
         env = LeggedEnv(nominal_task(), quadruped, Plane())
         assert env.get_observations()["policy"].shape == (4, 47)
-        # Plus velocity 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
-        assert env.get_observations()["privileged"].shape == (
-            4,
-            47 + 3 + 3 + 1 + 1 + 3 + 12 + 3 + 12,
-        )
+        # Velocity 3, mean 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
+        privileged = 3 + 3 + 1 + 1 + 3 + 12 + 3 + 12
+        assert env.get_observations()["privileged"].shape == (4, 47 + privileged)
         env = LeggedEnv(nominal_task(), quadruped, map_ground)
         assert env.get_observations()["policy"].shape == (4, 47 + 187)
         env = LeggedEnv(nominal_task(), biped, Plane())
@@ -120,6 +122,119 @@ class TestObservations:
         stand(env)
         # Robots hardly turn in 20 ms, so the commands hardly change.
         np.testing.assert_allclose(env.commands[:, 2], first, atol=0.05)
+
+
+class TestHistory:
+    OPTIONS = Observations(base_lin_vel=True, foot_contact=True, history_length=3)
+    WIDTH = 47 + 3 + 4
+
+    @pytest.mark.parametrize("on_map", [False, True])
+    def test_previous_observations_follow_the_current_one(
+        self, quadruped, random_task, map_ground, on_map
+    ):
+        task = random_task(env=SHORT, observations=self.OPTIONS)
+        env = LeggedEnv(task, quadruped, map_ground if on_map else Plane())
+        assert env.num_obs["policy"] == 3 * self.WIDTH + 187 * on_map
+        assert env.num_obs["privileged"] == 85 + 4 + 187 * on_map
+        seen, length = [env.get_observations()["policy"]], np.ones(5, int)
+        for action in acts(env, 30):
+            observed, _, dones, _ = env.step(action)
+            seen.append(observed["policy"])
+            length = np.where(dones, 1, length + 1)
+            for k in range(5):
+                for step in range(3):
+                    part = slice(step * self.WIDTH, (step + 1) * self.WIDTH)
+                    # Before its first observation, an episode has copies of it.
+                    source = seen[-1 - min(step, length[k] - 1)]
+                    assert torch.equal(seen[-1][k, part], source[k, : self.WIDTH])
+        assert (length < 30).all()
+
+    def test_values_by_hand(self, quadruped, nominal_task):
+        options = Observations(history_length=2)
+        env = LeggedEnv(nominal_task(2, observations=options), quadruped, Plane())
+        for k in (1, 2, 3):
+            env.step(torch.full((2, 12), 0.1 * k))
+        actions = slice(33, 45)
+        observed = env.get_observations()["policy"]
+        np.testing.assert_allclose(observed[:, :47][:, actions], 0.3)
+        np.testing.assert_allclose(observed[:, 47:][:, actions], 0.2)
+
+    def test_new_commands_do_not_shift_the_history(self, quadruped, random_task):
+        env = LeggedEnv(random_task(2, observations=self.OPTIONS), quadruped, Plane())
+        record(env, acts(env, 2))
+        before = env.get_observations()["policy"]
+        env.set_commands(np.float32([[1, 0, 0]] * 2))
+        after = env.get_observations()["policy"]
+        assert after[:, :3].tolist() == [[2, 0, 0]] * 2
+        assert torch.equal(after[:, self.WIDTH :], before[:, self.WIDTH :])
+
+    def test_base_lin_vel_has_its_noise(self, quadruped, nominal_task):
+        task = nominal_task(400, observations=self.OPTIONS, noise=Noise(lin_vel=0.3))
+        env = LeggedEnv(task, quadruped, Plane())
+        noise = env.get_observations()["policy"][:, 47:50].numpy()  # of robots at rest, scale 2
+        assert 0.55 < noise.max() <= 0.6
+        assert -0.6 <= noise.min() < -0.55
+
+
+class TestActionDelay:
+    def make(self, robot, nominal_task, delay, num_envs=3, **sections):
+        still = nominal_task().domain_rand
+        sections["domain_rand"] = replace(still, action_delay=delay)
+        return LeggedEnv(nominal_task(num_envs, **sections), robot, Plane())
+
+    @pytest.mark.parametrize("steps", [1, 3, 4, 7])
+    def test_step_input_arrives_late(self, quadruped, nominal_task, steps):
+        control = Control(control_type="T", decimation=1)
+        delay = 0.005 * steps
+        env = self.make(quadruped, nominal_task, (delay, delay), control=control)
+        effort = 0.1 * quadruped.effort
+        for step in range(12):
+            env.step(torch.full((3, 12), 0.1))
+            expected = effort if step >= steps else 0 * effort
+            np.testing.assert_allclose(env.sim.torque, [expected] * 3, atol=1e-6)
+
+    def test_delay_ends_within_a_policy_step(self, quadruped, nominal_task):
+        # After 2 of 4 simulation steps; the motors are at rest until then.
+        env = self.make(quadruped, nominal_task, (0.01, 0.01), control=Control(control_type="T"))
+        env._apply_actions(torch.full((3, 12), 0.1))
+        seen = []
+        for _ in range(4):
+            env.sim.step(1)
+            seen.append(env.sim.torque[0, 0] / quadruped.effort[0])
+        np.testing.assert_allclose(seen, [0, 0, 0.1, 0.1], atol=1e-6)
+
+    def test_delay_stays_exact_in_long_episodes(self, quadruped, nominal_task):
+        control = Control(control_type="T", decimation=1)
+        env = self.make(quadruped, nominal_task, (0.015, 0.015), 1, control=control)
+        applied = []
+        for step in range(1500):  # the time accumulates rounding errors
+            env._apply_actions(torch.full((1, 12), 1e-4 * step))
+            env.sim.step(1)
+            applied.append(env.sim.torque[0, 0] / quadruped.effort[0] * 1e4)
+        np.testing.assert_allclose(applied[3:], np.arange(1497), rtol=1e-4, atol=1e-3)
+
+    def test_motors_hold_the_default_pose_first(self, quadruped, nominal_task):
+        still = LeggedEnv(nominal_task(3), quadruped, Plane())
+        late = self.make(quadruped, nominal_task, (0.02, 0.02))
+        stand(still)
+        late.step(torch.ones(3, 12))  # arrives in the next policy step
+        np.testing.assert_array_equal(late.sim.qpos, still.sim.qpos)
+        late.step(torch.ones(3, 12))
+        stand(still)
+        assert not np.array_equal(late.sim.qpos, still.sim.qpos)
+
+    def test_delays_are_sampled_at_reset(self, quadruped, nominal_task):
+        env = self.make(quadruped, nominal_task, (0.0, 0.02), 200)
+        first = env.sim.batch.expand("actuator_delay").copy()
+        assert (first == first[:, :1]).all()  # one delay per robot
+        np.testing.assert_allclose(np.unique(first), [0, 0.0025, 0.0075, 0.0125, 0.0175])
+        env._reset_idx(np.arange(100))
+        second = env.sim.batch.expand("actuator_delay")
+        assert (first[:100] != second[:100]).any()
+        np.testing.assert_array_equal(first[100:], second[100:])
+
+    def test_no_delay_has_no_buffer(self, quadruped, nominal_task):
+        assert LeggedEnv(nominal_task(), quadruped, Plane()).scene.model.nhistory == 0
 
 
 class TestTermination:
@@ -299,14 +414,17 @@ class TestSeeds:
 
 class TestStateDict:
     @pytest.mark.parametrize("on_map", [False, True])
-    def test_resume_is_bit_identical(self, quadruped, random_task, map_ground, on_map):
+    @pytest.mark.parametrize("more", [False, True])
+    def test_resume_is_bit_identical(self, quadruped, random_task, map_ground, on_map, more):
         ground = map_ground if on_map else Plane()
-        domain_rand = DomainRand(push_interval_s=0.3)
+        domain_rand = DomainRand(push_interval_s=0.3, action_delay=(0, 0.03) if more else None)
+        observations = TestHistory.OPTIONS if more else Observations()
         # Short commands and episodes, so that everything random is sampled again.
         task = random_task(
             env=Env(num_envs=6, num_threads=1, episode_length_s=0.7),
             commands=Commands(resampling_time=0.2, heading_command=True),
             domain_rand=domain_rand,
+            observations=observations,
         )
         env = LeggedEnv(task, quadruped, ground)
         actions = acts(env, 80)

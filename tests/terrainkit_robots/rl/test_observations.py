@@ -15,6 +15,7 @@ from terrainkit_robots.rl.config import (
     Env,
     Noise,
     Normalization,
+    Observations,
     ObsScales,
     Task,
     Terrain,
@@ -23,6 +24,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import (
     ObservationTerm,
     compute_observations,
+    history_width,
     policy_group,
     privileged_group,
 )
@@ -198,6 +200,33 @@ class TestGroups:
         group = privileged_of(robot)
         found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE + _SECRETS
+
+    def test_additional_terms_of_the_policy(self, robot: Robot) -> None:
+        options = Observations(base_lin_vel=True, foot_contact=True, history_length=3)
+        force = [[9, 9, 1.5], [9, 9, 0.5], [0, 0, 50], [0, 0, -50]]
+        given = state(base_lin_vel=[[1, -0.5, 0.25]], foot_force=[force])
+        group = group_of(robot, Task(observations=options))
+        assert observed(group, "base_lin_vel", given) == [2, -1, 0.5]
+        assert observed(group, "foot_contact", given) == [1, 0, 1, 0]
+        names = [each.name for each in group]
+        assert names[6:] == ["gait_phase", "base_lin_vel", "foot_contact", "history", "height_scan"]
+        # The critic knows the velocity anyway, and needs no history.
+        names = [each.name for each in privileged_of(robot, Task(observations=options))]
+        assert names.count("base_lin_vel") == names.count("foot_contact") == 1
+        assert "history" not in names
+
+    @pytest.mark.parametrize("gait_period", [0, None])
+    @pytest.mark.parametrize("more", [False, True])
+    def test_history_repeats_the_terms_before_it(
+        self, robot: Robot, gait_period: float | None, more: bool
+    ) -> None:
+        options = Observations(base_lin_vel=more, foot_contact=more, history_length=4)
+        task = Task(observations=options, commands=Commands(gait_period=gait_period))
+        before = [t for t in group_of(robot, task) if t.name not in ("history", "height_scan")]
+        width = sum(term.function(state()).shape[1] for term in before)
+        assert width == 45 + 2 * (gait_period is None) + 7 * more
+        assert history_width(robot, task) == 3 * width
+        assert history_width(robot, Task()) == 0
 
     def test_scales_are_the_tasks(self, robot: Robot) -> None:
         scales = ObsScales(lin_vel=3, ang_vel=5, dof_pos=7, dof_vel=11, height_measurements=13)

@@ -11,7 +11,7 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import config as sections
-from terrainkit_robots.rl.config import Commands, DomainRand, Env, Noise, Sim, Task
+from terrainkit_robots.rl.config import Commands, DomainRand, Env, Noise, Observations, Sim, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.symmetry import MirrorMaps, augment, mirror_maps
 from terrainkit_robots.rl.terrain import Plane, Terrain
@@ -33,8 +33,11 @@ class Valley(Plane):
         return (0.3 * np.abs(y) + 0.1 * np.sin(3 * x)).astype(np.float32)
 
 
-def make_env(name: str, ground: Terrain | None = None, robot: Robot | None = None) -> LeggedEnv:
+def make_env(
+    name: str, ground: Terrain | None = None, robot: Robot | None = None, **options: Any
+) -> LeggedEnv:
     task = Task(
+        observations=Observations(**options),
         env=Env(num_envs=2 * _PAIRS, num_threads=1),
         noise=Noise(noise_level=0.0),
         commands=Commands(gait_period=0.4),
@@ -125,8 +128,10 @@ class TestRobot:
             assert sorted(image.index) == list(range(len(image.index)))
             assert set(image.sign) == {-1, 1}
 
-    def test_mirrored_states_give_mirrored_observations(self, name: str) -> None:
-        env = make_env(name, Valley())
+    @pytest.mark.parametrize("more", [False, True])
+    def test_mirrored_states_give_mirrored_observations(self, name: str, more: bool) -> None:
+        options = {"base_lin_vel": True, "foot_contact": True, "history_length": 3} if more else {}
+        env = make_env(name, Valley(), **options)
         mirror = mirror_maps(env)
         mirror_physics(env, mirror)
         mirror_memory(env, mirror)
@@ -137,6 +142,7 @@ class TestRobot:
         twins = _mirrored_feet(feet)
         force[_PAIRS:] = force[:_PAIRS, twins] * np.array([1, -1, 1], np.float32)
         env.state.foot_force[:] = force
+        env.steps_since_reset[:] = 0  # so that the history repeats the observation
         env._compute_observations()
         assert_images(env, mirror, 3e-5)
         scan = env.state.height_scan
@@ -255,6 +261,19 @@ class TestNames:
             twin = feet.index(foot[0] + {"L": "R", "R": "L"}[foot[1]] + foot[2:])
             assert own[3 * k : 3 * k + 3].tolist() == [3 * twin, 3 * twin + 1, 3 * twin + 2]
         assert image.sign[-12:].tolist() == [1, -1, 1] * 4
+
+    def test_contacts_and_history(self) -> None:
+        env = make_env("quadruped", Valley(), foot_contact=True, history_length=3)
+        image = mirror_maps(env).groups["policy"]
+        feet, width = list(env.robot.spec.feet), 47 + 4
+        twins = [feet.index(f[0] + {"L": "R", "R": "L"}[f[1]] + f[2:]) for f in feet]
+        assert image.index[47:51].tolist() == [47 + k for k in twins]
+        assert image.sign[47:51].tolist() == [1] * 4
+        for step in range(3):  # the same map for each step
+            part = slice(step * width, (step + 1) * width)
+            np.testing.assert_array_equal(image.index[part], image.index[:width] + step * width)
+            np.testing.assert_array_equal(image.sign[part], image.sign[:width])
+        assert image.index[3 * width] == 3 * width + 10  # the first row of the scan, reversed
 
     def test_scan(self) -> None:
         env = make_env("quadruped", Valley())
