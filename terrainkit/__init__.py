@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from terrainkit.patch import Patch, make_patch
     from terrainkit.registry import register_overlay, register_terrain
     from terrainkit.sub_terrain import SubTerrain
+    from terrainkit.suites import generate_suite, get_suite, suite_hash, suite_names
     from terrainkit.terrain_map import TerrainMap
 
 __all__ = [
@@ -26,9 +27,13 @@ __all__ = [
     "TerrainkitError",
     "TerrainkitWarning",
     "generate",
+    "generate_suite",
+    "get_suite",
     "make_patch",
     "register_overlay",
     "register_terrain",
+    "suite_hash",
+    "suite_names",
     "update_levels",
 ]
 __version__ = "0.1.0"
@@ -41,9 +46,13 @@ _MODULES = {
     "TerrainkitError": "errors",
     "TerrainkitWarning": "errors",
     "generate": "generation",
+    "generate_suite": "suites",
+    "get_suite": "suites",
     "make_patch": "patch",
     "register_overlay": "registry",
     "register_terrain": "registry",
+    "suite_hash": "suites",
+    "suite_names": "suites",
     "update_levels": "curriculum",
 }
 """Module of each public name, so that only those in use are imported: a robot needs no terrain."""

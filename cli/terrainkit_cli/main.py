@@ -15,6 +15,7 @@ COMMAND_GROUPS = {
         "generate": "terrain_commands",
         "import": "import_command",
         "list": "terrain_commands",
+        "suite": "suite_command",
         "info": "terrain_commands",
         "preview": "terrain_commands",
         "view": "view_command",
@@ -111,7 +112,7 @@ def _run(arguments: list[str]) -> int:
 
 def _print_overview() -> None:
     render.result("usage: terrainkit COMMAND [OPTIONS]")
-    render.result("Generate terrain for legged robots, check robot files, and train policies.\n")
+    render.result("Generate terrain for legged robots, check robot files, and train policies.")
     rows: list[tuple[str, str]] = []
     for group, names in COMMAND_GROUPS.items():
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
