@@ -49,9 +49,8 @@ def test_validate_generated_map_has_no_issues(config):
 
 @pytest.mark.parametrize("preset", presets.preset_names())
 def test_validate_presets_realize_their_parameters(preset):
-    terrain_map = tk.generate(
-        tk.MapConfig(rows=4, cols=len(presets.get_preset(preset)), border=0.0, preset=preset)
-    )
+    cols = 20 if preset == "legged_gym_rough" else len(presets.get_preset(preset))
+    terrain_map = tk.generate(tk.MapConfig(rows=4, cols=cols, border=0.0, preset=preset))
     assert found(terrain_map) == []
 
 
