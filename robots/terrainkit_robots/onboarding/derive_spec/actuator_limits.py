@@ -32,7 +32,7 @@ _ACTION_FACTOR = 0.75
 
 _MAX_ACTION_SCALE = {"revolute": 0.25, "prismatic": 0.025}
 """Largest action scale [rad] or [m], as in legged_gym. mjlab's 0.25 * effort / stiffness is 0.1 rad
-at the hips of the bundled quadruped; with it, training takes twice as many samples."""
+at the hips of the bundled quadruped, which then learned more slowly (docs/training.md)."""
 
 _WHEEL_ACTION_FACTOR = 0.25
 """Share of the largest speed of a wheel that an action of 1 commands."""
