@@ -226,9 +226,10 @@ class _Path:
         for (start, targets), most in zip(legs, bottlenecks, strict=True):
             if nodes[-1] != start:
                 break
-            usable = edges.select(demand <= most)
+            is_usable = demand <= most
+            usable, ratios = edges.select(is_usable), demand[is_usable]
             ends = position(usable.end) - position(usable.start)
-            length = np.linalg.norm(ends, axis=1) * (1.0 + demand[demand <= most])
+            length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)
             way = shortest_path(usable, length, start, targets, size)
             if way is None:
                 self.demand = float("inf")
@@ -236,13 +237,10 @@ class _Path:
             if not len(way):
                 continue
             nodes += usable.end[way].tolist()
-            ratios = demand[demand <= most][way]
-            worst = int(np.argmax(ratios))
+            worst = way[np.argmax(ratios[way])]
             if ratios[worst] > self.demand:
-                one = np.zeros(len(usable.start), dtype=bool)
-                one[way[worst]] = True
-                edge = usable.select(one)
-                self.limit, self.value, _ = graph.blocking(edge)
+                edge = usable.select(np.arange(len(ratios)) == worst)
+                self.limit, self.value = graph.blocking(edge)
                 self.demand = float(ratios[worst])
                 self.place = (position(edge.start)[0] + position(edge.end)[0]) / 2
         self.points = position(np.array(nodes))

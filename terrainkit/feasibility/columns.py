@@ -87,7 +87,7 @@ def sample_columns(patch: Patch, threshold: float) -> Columns:
     n = math.ceil(grid.cell / MAX_SPACING - 1e-9) if len(solids) else 1
     spacing = grid.cell / n
     lower = grid.lower[0] + spacing / 2, grid.lower[1] + spacing / 2
-    if n == 1 and not len(solids):
+    if not len(solids):
         floor = patch.heights.astype(np.float64)[..., None]
         ceiling = np.full_like(floor, np.inf)
         return Columns(spacing=spacing, lower=lower, floor=floor, ceiling=ceiling)

@@ -1,6 +1,6 @@
 """Edges: moves from one node to another, and the steps between neighboring columns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
@@ -38,13 +38,13 @@ class Edges:
     @classmethod
     def concatenate(cls, parts: list[Self]) -> Self:
         """Return the edges of all parts."""
-        names = ("start", "end", "rise", "drop", "gap", "clearance", "width")
-        return cls(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})
+        return cls(
+            **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)}
+        )
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Return the edges where `mask` is True, shape (n,)."""
-        names = ("start", "end", "rise", "drop", "gap", "clearance", "width")
-        return type(self)(**{name: getattr(self, name)[mask] for name in names})
+        return type(self)(**{name: values[mask] for name, values in vars(self).items()})
 
 
 def step_edges(columns: Columns, slopes: Slopes) -> Edges:
@@ -64,14 +64,12 @@ def step_edges(columns: Columns, slopes: Slopes) -> Edges:
         for other in range(columns.floor.shape[2])
     ]
     one_way = Edges.concatenate(parts)
-    back = Edges(
+    back = replace(
+        one_way,
         start=one_way.end,
         end=one_way.start,
         rise=one_way.drop,
         drop=one_way.rise,
-        gap=one_way.gap,
-        clearance=one_way.clearance,
-        width=one_way.width,
     )
     return Edges.concatenate([one_way, back])
 

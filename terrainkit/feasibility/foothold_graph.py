@@ -84,35 +84,29 @@ class FootholdGraph:
 
     def edge_ratios(self, edges: Edges) -> dict[str, FloatArray]:
         """Return the ratio of each quantity of the edges by the name of its limit."""
-        quantities = {
-            "step_up": edges.rise,
-            "step_down": edges.drop,
-            "gap": edges.gap,
-            "crouched_height": edges.clearance,
-            "body_width": edges.width,
-        }
-        return {name: ratio(name, values, self.limits) for name, values in quantities.items()}
+        return {name: ratio(name, values, self.limits) for name, values in _quantities(edges)}
 
-    def blocking(self, edge: Edges) -> tuple[str, float, float]:
-        """Return limit, measured quantity and ratio of the largest demand of a single edge."""
-        found = [
-            (float(ratio(name, values[node], self.limits)[0]), name, float(values[node][0]))
+    def blocking(self, edge: Edges) -> tuple[str, float]:
+        """Return the limit and the quantity of the largest demand of a single edge."""
+        measured = [
+            (name, values[node])
             for name, values in self.quantities.items()
             for node in (edge.start, edge.end)
         ]
-        raw = {
-            "step_up": edge.rise,
-            "step_down": edge.drop,
-            "gap": edge.gap,
-            "crouched_height": edge.clearance,
-            "body_width": edge.width,
-        }
-        found += [
-            (float(values[0]), name, float(raw[name][0]))
-            for name, values in self.edge_ratios(edge).items()
-        ]
-        largest, name, value = max(found, key=lambda each: each[0])
-        return name, value, largest
+        measured += _quantities(edge)
+        name, value = max(measured, key=lambda each: float(ratio(each[0], each[1], self.limits)[0]))
+        return name, float(value[0])
+
+
+def _quantities(edges: Edges) -> list[tuple[str, FloatArray]]:
+    """Return the quantities of the edges with the names of their limits."""
+    return [
+        ("step_up", edges.rise),
+        ("step_down", edges.drop),
+        ("gap", edges.gap),
+        ("crouched_height", edges.clearance),
+        ("body_width", edges.width),
+    ]
 
 
 def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:

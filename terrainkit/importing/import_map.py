@@ -4,6 +4,7 @@ import hashlib
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -196,13 +197,15 @@ def _make_config(
         border=options.border,
         terrains=(_sub_terrain(path, options),),
         mode="custom",
-        slope_threshold=options.slope_threshold,
-        spawns_per_patch=options.spawns_per_patch,
-        spawn_radius=options.spawn_radius,
-        spawn_tolerance=options.spawn_tolerance,
-        spawn_headroom=options.spawn_headroom,
+        **map_settings(options),
     )
     return config, origin
+
+
+def map_settings(options: ImportOptions) -> dict[str, Any]:
+    """Return the options that are settings of the map as well: walls and spawn positions."""
+    names = ("slope_threshold", "spawns_per_patch", "spawn_radius")
+    return {name: getattr(options, name) for name in (*names, "spawn_tolerance", "spawn_headroom")}
 
 
 def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
-from terrainkit.importing.import_map import DEFAULT_CELL, ImportedMap, make_map
+from terrainkit.importing.import_map import DEFAULT_CELL, ImportedMap, make_map, map_settings
 from terrainkit.importing.mesh_file import MeshSource
 from terrainkit.importing.options import ImportOptions
 from terrainkit.sub_terrain import SubTerrain
@@ -77,11 +77,7 @@ def import_terrain_mesh(
         centered=True,
         terrains=tuple(SubTerrain(terrain="imported", name=name) for name in names),
         mode="custom",
-        slope_threshold=options.slope_threshold,
-        spawns_per_patch=options.spawns_per_patch,
-        spawn_radius=options.spawn_radius,
-        spawn_tolerance=options.spawn_tolerance,
-        spawn_headroom=options.spawn_headroom,
+        **map_settings(options),
     )
     for row, col in np.ndindex(rows, cols):
         grid, (x, y) = config.patch_grid(row, col), starts[row, col, :2]

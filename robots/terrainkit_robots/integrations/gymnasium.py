@@ -67,10 +67,7 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Start an episode; with a seed, equal actions lead to equal episodes."""
         super().reset(seed=seed)
         del options
-        if seed is not None:
-            self.env.seed(self.np_random, seed)
-        self.env.reset()
-        return self.env.policy_observations()[0], {}
+        return self.env.start(self.np_random, seed)[0], {}
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Apply an action of shape (j,) for one control step."""
@@ -111,10 +108,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
         """Start an episode in each environment."""
         super().reset(seed=seed)
         del options
-        if seed is not None:
-            self.env.seed(self.np_random, seed)
-        self.env.reset()
-        return self.env.policy_observations(), {}
+        return self.env.start(self.np_random, seed), {}
 
     def step(
         self, actions: FloatArray
@@ -142,11 +136,14 @@ class EpisodeEnv(LeggedEnv):
         super().__init__(task, Robot.load(spec.folder), ground)
         self.final = self.policy_observations()
 
-    def seed(self, rng: np.random.Generator, seed: int) -> None:
-        """Seed all random numbers from the next reset on."""
-        self.rng = rng
-        max_level = self.cfg.terrain.max_init_level
-        self.curriculum = TerrainCurriculum(self.terrain, self.num_envs, max_level, seed)
+    def start(self, rng: np.random.Generator, seed: int | None) -> FloatArray:
+        """Reset every environment, with new random numbers if there is a seed, and observe."""
+        if seed is not None:
+            self.rng = rng
+            max_level = self.cfg.terrain.max_init_level
+            self.curriculum = TerrainCurriculum(self.terrain, self.num_envs, max_level, seed)
+        self.reset()
+        return self.policy_observations()
 
     def policy_observations(self) -> FloatArray:
         """Return a copy of the observations of the policy, shape (n, k)."""

@@ -15,6 +15,7 @@ from tensordict import TensorDict
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import PositiveInt
+from terrainkit_robots.policy import gait
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -23,7 +24,6 @@ from terrainkit_robots.rl.run import Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.rl.terrain import load_terrain
-from terrainkit_robots.simulation import gait
 
 FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
@@ -82,7 +82,7 @@ class RolloutMetrics:
     `_1s` are of velocities averaged over 1 s, without the sway of a gait. They are None if no robot
     was measured, and `success`, the fraction of successful robots, is None on a plane.
 
-    The gait is that of robots that are commanded to move, None without any; see `simulation.gait`.
+    The gait is that of robots that are commanded to move, None without any; see :mod:`.gait`.
     Tuples have one value per foot. The pitch is positive when the nose is down. `asymmetry` is the
     larger one of swing height and duty factor, `followed` the fraction of robots that reach half of
     their command's linear and yaw velocity, `cost_of_transport` power / (weight * speed).

@@ -99,9 +99,8 @@ class LeggedEnv(VecEnv):
             Observations, rewards (n,), dones (n,), and extras with `time_outs` and `log`.
         """
         self._apply_actions(actions)
-        # The newest observation comes first, and so do its terms.
-        observed = self.get_observations()["policy"].numpy(force=True)
-        self.obs_history = observed[:, : self.obs_history.shape[1]]
+        if size := self.obs_history.shape[1]:  # the newest observation comes first
+            self.obs_history = self.get_observations()["policy"].numpy(force=True)[:, :size]
         self.pushes.apply(self.rng, self.sim.qvel)
         unstable = self.sim.step(self.cfg.control.decimation)
         self.episode_length_buf += 1

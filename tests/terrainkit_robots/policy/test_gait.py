@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit_robots.simulation.gait import (
+from terrainkit_robots.policy.gait import (
     asymmetry,
     duty_factors,
     find_swings,

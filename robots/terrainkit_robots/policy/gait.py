@@ -39,8 +39,7 @@ def swing_heights(contact: BoolArray, height: FloatArray, measured: BoolArray) -
     heights = height.reshape(steps, -1).T.ravel()
     peaks = np.maximum.reduceat(heights, bounds.ravel())[::2] if len(column) else np.zeros(0)
     total, count = np.bincount(column % feet, peaks, feet), np.bincount(column % feet, None, feet)
-    means: FloatArray = np.divide(total, count, out=np.full(feet, np.nan), where=count > 0)
-    return means
+    return np.divide(total, count, out=np.full(feet, np.nan), where=count > 0)
 
 
 def step_frequency(contact: BoolArray, measured: BoolArray, dt: float) -> float:
