@@ -2,10 +2,12 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
@@ -14,6 +16,8 @@ from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, parse_pair
 from terrainkit_cli.terrain_commands import MapFile
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from terrainkit.feasibility import PatchFeasibility
     from terrainkit_robots.simulation.robot_limits import DerivedLimits
 
@@ -115,6 +119,34 @@ def robot_limits(robot: str, limits: Sequence[str]) -> "DerivedLimits":
     values = parse_pairs("--limit", limits, "=", "NAME=VALUE, such as step_up=0.2")
     overrides = limit_overrides({name: value_of(text) for name, text in values.items()})
     return derive_limits(get_task(robot).folder, overrides)
+
+
+def solve_demand(
+    config: MapConfig, robot: str, limits: Sequence[str], demand: str, executor: "Executor | None"
+) -> MapConfig:
+    """Return a map config whose terrains demand LOW:HIGH of a robot, and print the ranges.
+
+    Raises:
+        ConfigError: if the robot, a limit or the demand is invalid.
+    """
+    from terrainkit.feasibility.report import demand_text
+    from terrainkit.feasibility.solve import solve_ranges
+
+    ends = tuple(value_of(text) for text in demand.split(":"))
+    if len(ends) != 2 or not all(isinstance(end, int | float) for end in ends):
+        raise ConfigError(f"--demand: got {demand!r}; expected LOW:HIGH, such as 0.2:0.9")
+    derived = robot_limits(robot, limits)
+    progress = partial(render.progress, of="terrains")
+    solved = solve_ranges(config, derived.limits, ends, progress=progress, executor=executor)
+    rows = [("terrain", "demand", f"ranges for {derived.robot}")]
+    for before, each in zip(config.sub_terrains, solved, strict=True):
+        changed = each.sub_terrain.parameters.items() - before.parameters.items()
+        ranges = [f"{name} {easy:g} to {hard:g}" for name, (easy, hard) in sorted(changed)]
+        span = " to ".join(map(demand_text, each.demand))
+        rows.append((each.sub_terrain.name, span, ", ".join(ranges) or "unchanged"))
+    render.table(rows)
+    render.result("")
+    return replace(config, terrains=tuple(each.sub_terrain for each in solved))
 
 
 def print_impassable(

@@ -20,7 +20,7 @@ from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.parse import Command, check_options, value_of, word_after
-from terrainkit_cli.robot_options import Flag, LimitWords, RobotName
+from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, text_option
 
 if TYPE_CHECKING:
     from typing import Self
@@ -59,6 +59,16 @@ class Generate(ConfigCommand):
     """Overlays on all terrains, in their order, such as `noise:amplitude=0:0.05 side_walls`;
     `terrainkit list` prints the names."""
 
+    robot: RobotName = ""
+    """With --demand: name of a bundled robot, or a folder written by terrainkit onboard."""
+
+    demand: Annotated[str, text_option("LOW:HIGH")] = ""
+    """Replace the ranges of each terrain, so that they demand LOW to HIGH of --robot: 0 is level
+    ground, 1 the limit of the robot; see terrainkit feasibility."""
+
+    limit: LimitWords = ()
+    """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
+
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 1
     """Number of processes that build patches; the map does not depend on it. More than one is
     faster for maps that take several seconds."""
@@ -79,13 +89,18 @@ class Generate(ConfigCommand):
         """Generate the map, write it, and print the next commands."""
         from terrainkit import export
         from terrainkit.generation import generate
+        from terrainkit_cli.feasibility_command import solve_demand
         from terrainkit_cli.worker_pool import worker_pool
 
         config = self.changed_config()
         samples = config.grid.shape[0] * config.grid.shape[1]
         # Fail before generating.
         export.check_export(self.output, samples, overwrite=self.overwrite)
+        if bool(self.robot) != bool(self.demand) or (self.limit and not self.robot):
+            raise ConfigError("--robot, --demand, --limit: expected --robot and --demand together")
         with worker_pool(self.jobs) as executor:
+            if self.demand:
+                config = solve_demand(config, self.robot, self.limit, self.demand, executor)
             terrain_map = generate(config, progress=render.progress, executor=executor)
         files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, *files))

@@ -6,5 +6,14 @@ the robot; the demand of a patch is the largest ratio on the path where it is sm
 
 from terrainkit.feasibility.assess import MAX_DEMAND, PatchFeasibility, assess_map, assess_patch
 from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.solve import SolvedTerrain, solve_ranges
 
-__all__ = ["MAX_DEMAND", "PatchFeasibility", "RobotLimits", "assess_map", "assess_patch"]
+__all__ = [
+    "MAX_DEMAND",
+    "PatchFeasibility",
+    "RobotLimits",
+    "SolvedTerrain",
+    "assess_map",
+    "assess_patch",
+    "solve_ranges",
+]

@@ -108,3 +108,33 @@ def test_check_map_with_a_robot(terrainkit, stairs):
     run = terrainkit("check-map", stairs, "--limit", "gap=1")
     assert (run.returncode, len(run.stderr.splitlines())) == (2, 1)
     assert "expected --robot" in run.stderr
+
+
+def test_generate_with_a_demand_solves_the_ranges(terrainkit):
+    words = ("--terrain", "stairs", "--rows", 3, "--cols", 1, "--border", 0, "--jobs", 2)
+    demand = ("--robot", "quadruped", "--demand", "0.2:0.9", "--limit", "step_up=0.2")
+    run = terrainkit("generate", "-o", "m.npz", *words, *demand)
+    assert run.returncode == 0
+    assert "stairs   0.19 to 0.90  step_height 0.03875 to 0.1794\n" in run.stdout
+    run = terrainkit("feasibility", "m.npz", "--robot", "quadruped", "--limit", "step_up=0.2")
+    assert "stairs   0.19     0.55  0.90" in run.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--demand", "0.2:0.9"), "--robot, --demand, --limit: expected --robot and --demand"),
+        (("--robot", "quadruped"), "--robot, --demand, --limit: expected --robot and --demand"),
+        (("--limit", "gap=1"), "--robot, --demand, --limit: expected --robot and --demand"),
+        (("--robot", "quadruped", "--demand", "0.2"), "got '0.2'; expected LOW:HIGH, such as"),
+        (("--robot", "quadruped", "--demand", "a:b"), "got 'a:b'; expected LOW:HIGH, such as"),
+        (("--robot", "quadruped", "--demand", "0.9:0.2"), "demand: got 0.9:0.2; expected LOW"),
+        (("--robot", "nobody", "--demand", "0.2:0.9"), "nobody"),
+    ],
+)
+def test_invalid_demand_is_one_line(terrainkit, tmp_path, words, message):
+    run = terrainkit("generate", "--terrain", "flat", "-o", "m.npz", *words)
+    assert run.returncode == 2
+    assert message in run.stderr
+    assert len(run.stderr.splitlines()) == 1
+    assert not (tmp_path / "m.npz").exists()

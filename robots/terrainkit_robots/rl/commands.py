@@ -77,7 +77,7 @@ class Gait:
         self._swing_fraction = cfg.swing_fraction
         # Time constant of the mean velocity that is to track the command [s]. The sway of two legs
         # exceeds small commands, so that stepping in place would track them less than standing.
-        self.averaging_time = self.period * (1.0 if is_biped else 0.25)
+        self.averaging_time = self.period if is_biped else 0.0
 
     def phases(self, time: FloatArray, moving: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
         """Return the `gait_phase` and `swing_phase` of a state, from times (n,) [s]."""

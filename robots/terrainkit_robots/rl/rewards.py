@@ -68,7 +68,7 @@ def is_moving(commands: FloatArray) -> NDArray[np.bool_]:
 def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     """Return how well linear and yaw velocity are tracked, 0 to 1.
 
-    Velocities are averaged over the gait, since the sway of a biped is larger than small commands.
+    On two legs, velocities are averaged over the gait: the sway is larger than small commands.
     The width of each kernel is proportional to the command. Where one of the two is not commanded,
     it counts only as far as the other one is tracked: standing is never worth more.
     """

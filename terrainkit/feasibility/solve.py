@@ -1,0 +1,175 @@
+"""Solve the ranges of a map for a robot: each terrain from one demand to another."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from terrainkit.config import MapConfig
+from terrainkit.errors import ConfigError
+from terrainkit.feasibility.assess import MAX_DEMAND, assess_patch
+from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.grid import Grid
+from terrainkit.parameter import Parameter, Range, at_difficulty, parameters_of
+from terrainkit.patch import Patch, build_patch
+from terrainkit.sub_terrain import SubTerrain
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from terrainkit.generation import Progress
+
+_EASIEST, _HARDEST = -1.0, 3.0
+"""Difficulties to search: ranges are extrapolated beyond their ends at 0 and 1."""
+
+_BISECTIONS = 9
+"""Halvings of that interval, to 0.8 % of the range."""
+
+_SAMPLES = 3
+"""Patches of a random terrain; their median demand counts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolvedTerrain:
+    """A sub-terrain with solved ranges."""
+
+    sub_terrain: SubTerrain
+    """The sub-terrain; unchanged if its demand hardly depends on its ranges."""
+
+    demand: Range
+    """Demands at difficulty 0 and 1. They are not those requested if the ranges, extrapolated to
+    the difficulties -1 and 3, do not reach them: then the end of the range is kept."""
+
+
+def solve_ranges(
+    config: MapConfig,
+    limits: RobotLimits,
+    demand: Range,
+    *,
+    progress: "Progress | None" = None,
+    executor: "Executor | None" = None,
+) -> list[SolvedTerrain]:
+    """Return the sub-terrains of `config`, with ranges from one demand to another.
+
+    The ranges of a terrain are interpolated and extrapolated together, as with the difficulty. At
+    difficulty 0 and 1 a patch demands at most `demand`, and a little more difficulty would demand
+    more. Overlays and friction keep their ranges.
+
+    Args:
+        config: The map. Its sub-terrains with parameters that depend on the difficulty are solved.
+        limits: The limits of the robot.
+        demand: Demands at difficulty 0 and 1.
+        progress: Wraps the iterator over the sub-terrains, as (0, index).
+        executor: Solves the sub-terrains; None for this process.
+
+    Raises:
+        ConfigError: if the demands are not increasing from 0 to `MAX_DEMAND`, or a sub-terrain is
+            invalid.
+    """
+    low, high = demand
+    if not 0 <= low < high <= MAX_DEMAND:
+        got = f"demand: got {low:g}:{high:g}"
+        raise ConfigError(f"{got}; expected LOW:HIGH with 0 <= LOW < HIGH <= {MAX_DEMAND:g}")
+    samples = replace(config, rows=1, cols=_SAMPLES)
+    solve = partial(_solve, samples, limits, demand)
+    terrains = config.sub_terrains
+    results = (executor.map if executor else map)(solve, terrains)
+    indices = iter([(0, k) for k in range(len(terrains))])
+    steps = progress(indices, len(terrains)) if progress else indices
+    return [result for _, result in zip(steps, results, strict=True)]
+
+
+def _solve(
+    config: MapConfig, limits: RobotLimits, demand: Range, sub_terrain: SubTerrain
+) -> SolvedTerrain:
+    """Return the sub-terrain with solved ranges."""
+    ranges, grid = _ranges(sub_terrain), config.patch_grid(0, 0)
+    known: dict[float, float] = {}
+
+    def demand_at(difficulty: float) -> float:
+        """Return the demand, which rises with the difficulty; -inf and inf outside of the valid."""
+        if difficulty not in known:
+            try:
+                values = {name: r.at(difficulty, grid) for name, r in ranges.items()}
+                known[difficulty] = _demand(config, limits, _with(sub_terrain, values))
+            except ConfigError:
+                if 0 <= difficulty <= 1:
+                    raise
+                known[difficulty] = -np.inf if difficulty < 0 else np.inf
+        return known[difficulty]
+
+    if not ranges:
+        return SolvedTerrain(sub_terrain=sub_terrain, demand=(demand_at(0.0), demand_at(1.0)))
+    easy, hard = (_largest(demand_at, most) for most in demand)
+    if easy >= hard:
+        return SolvedTerrain(sub_terrain=sub_terrain, demand=(demand_at(0.0), demand_at(1.0)))
+    solved = {name: (r.at(easy, grid), r.at(hard, grid)) for name, r in ranges.items()}
+    ends = demand_at(easy), demand_at(hard)
+    return SolvedTerrain(sub_terrain=_with(sub_terrain, solved), demand=ends)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _ParameterRange:
+    """A parameter that depends on the difficulty."""
+
+    parameter: Parameter
+    ends: Range
+
+    def at(self, difficulty: float, grid: Grid) -> float:
+        """Return the value at a difficulty, which may be outside of 0 to 1.
+
+        Lengths that snap to cells are whole cells; others have 4 digits.
+        """
+        value: float = at_difficulty(self.ends, difficulty)
+        if self.parameter.snap == "cells":
+            return grid.length(grid.cells(value, minimum=0 if self.parameter.allow_zero else 1))
+        return value if isinstance(value, int) else float(f"{value:.4g}")
+
+
+def _ranges(sub_terrain: SubTerrain) -> dict[str, _ParameterRange]:
+    """Return the parameters that depend on the difficulty, by name."""
+    ranges = {}
+    for name, parameter in parameters_of(sub_terrain.terrain_class).items():
+        value: Any = sub_terrain.parameters.get(name, parameter.default)
+        if isinstance(value, tuple) and not parameter.is_vector and value[0] != value[1]:
+            ranges[name] = _ParameterRange(parameter=parameter, ends=value)
+    return ranges
+
+
+def _with(sub_terrain: SubTerrain, values: Mapping[str, Any]) -> SubTerrain:
+    return replace(sub_terrain, parameters={**sub_terrain.parameters, **values})
+
+
+def _demand(config: MapConfig, limits: RobotLimits, sub_terrain: SubTerrain) -> float:
+    """Return the median demand of the patches of a sub-terrain."""
+    patches = [build_patch(config, sub_terrain, 0.5, 0, 0)]
+    for col in range(1, _SAMPLES):
+        other = build_patch(config, sub_terrain, 0.5, 0, col)
+        if _is_same(patches[0], other):
+            break
+        patches.append(other)
+    return float(
+        np.median([assess_patch(each, limits, config.wall_threshold).demand for each in patches])
+    )
+
+
+def _is_same(first: Patch, second: Patch) -> bool:
+    """Return whether two patches differ only in their places, up to rounding."""
+    if len(first.solids) != len(second.solids) or (first.heights != second.heights).any():
+        return False
+    shift = np.subtract(second.grid.lower, first.grid.lower)
+    corners = [each.solids.bounds()[0][:, :2] for each in (first, second)]
+    return bool(np.allclose(corners[0] + shift, corners[1], atol=1e-4))
+
+
+def _largest(demand_at: Callable[[float], float], most: float) -> float:
+    """Return the largest difficulty that demands at most `most`; 0 if none does, 1 if all do."""
+    low, high = _EASIEST, _HARDEST
+    if demand_at(high) <= most:
+        return 1.0
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if demand_at(middle) <= most else (low, middle)
+    return low if -np.inf < demand_at(low) <= most else 0.0

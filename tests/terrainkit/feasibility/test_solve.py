@@ -1,0 +1,98 @@
+"""Ranges that demand what is requested, against values worked out by hand."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from terrainkit import MapConfig, SubTerrain
+from terrainkit.errors import ConfigError
+from terrainkit.feasibility import RobotLimits, assess_map, solve_ranges
+from terrainkit.generation import generate
+
+LIMITS = RobotLimits(
+    step_up=0.2,
+    step_down=0.25,
+    gap=0.4,
+    slope=0.5,
+    foothold=0.1,
+    body_width=0.4,
+    standing_height=0.6,
+    crouched_height=0.3,
+)
+
+
+def solve(terrain, demand=(0.2, 0.9), **parameters):
+    config = MapConfig(terrains=(SubTerrain(terrain=terrain, parameters=parameters),), border=0)
+    (solved,) = solve_ranges(config, LIMITS, demand)
+    return solved
+
+
+@pytest.mark.parametrize(
+    ("terrain", "name", "easy", "hard"),
+    [
+        # The largest steps of at most 0.2 and 0.9 of the limits; the range has 512 values.
+        ("pyramid_stairs_inverted", "step_height", 0.2 * 0.2, 0.9 * 0.2),
+        ("pyramid_stairs", "step_height", 0.2 * 0.25, 0.9 * 0.25),
+        ("pit", "depth", 0.2 * 0.2, 0.9 * 0.2),
+        ("slope", "grade", 0.2 * 0.5, 0.9 * 0.5),
+        ("crawl", "clearance", 0.6 - 0.2 * 0.3, 0.6 - 0.9 * 0.3),
+    ],
+)
+def test_ranges_end_at_the_requested_demands(terrain, name, easy, hard):
+    base, inverted = terrain.removesuffix("_inverted"), terrain.endswith("_inverted")
+    solved = solve(base, **({"inverted": True} if inverted else {}))
+    assert solved.sub_terrain.parameters[name] == pytest.approx((easy, hard), abs=0.008)
+    assert solved.demand == pytest.approx((0.2, 0.9), abs=0.04)
+    assert solved.demand[0] <= 0.2
+    assert solved.demand[1] <= 0.9
+
+
+def test_lengths_are_whole_cells():
+    """Gaps of 0, 0.1, 0.2, 0.3 m demand 0, 0.25, 0.5, 0.75 with a limit of 0.4 m."""
+    solved = solve("gap")
+    assert solved.sub_terrain.parameters["width"] == (0.0, 0.3)
+    assert solved.demand == pytest.approx((0.0, 0.75))
+
+
+def test_ranges_are_extrapolated():
+    solved = solve("stairs", step_height=(0.05, 0.1))
+    assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.04, 0.18), abs=0.001)
+
+
+def test_end_of_a_range_is_kept_where_extrapolation_does_not_reach_the_demand():
+    """Steps of 0.04 m at difficulty -1 to 0.08 m at 3."""
+    solved = solve("stairs", step_height=(0.05, 0.06))
+    assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.04, 0.06), abs=0.001)
+    assert solved.demand == pytest.approx((0.2, 0.3), abs=0.01)
+
+
+def test_terrain_that_robots_walk_around_is_unchanged():
+    solved = solve("obstacles")
+    assert solved.sub_terrain == SubTerrain(terrain="obstacles")
+    assert solved.demand == (0.0, 0.0)
+
+
+def test_terrain_without_ranges_is_unchanged():
+    assert solve("stairs", step_height=0.1).sub_terrain.parameters == {"step_height": 0.1}
+    assert solve("stairs", step_height=0.1).demand == pytest.approx((0.5, 0.5))
+
+
+def test_random_terrains_reach_the_demand_on_the_median_patch():
+    solved = solve("rough_slope", demand=(0.3, 0.8))
+    config = MapConfig(terrains=(solved.sub_terrain,), rows=2, cols=4, border=0)
+    results = assess_map(generate(config), LIMITS)
+    hard = sorted(each.demand for each in results if each.row == 1)
+    assert 0.5 < hard[1] < 1.0
+
+
+def test_an_executor_gives_the_same_result():
+    config = MapConfig(terrains=(SubTerrain(terrain="slope"), SubTerrain(terrain="gap")))
+    with ThreadPoolExecutor(2) as executor:
+        parallel = solve_ranges(config, LIMITS, (0.1, 0.5), executor=executor)
+    assert parallel == solve_ranges(config, LIMITS, (0.1, 0.5))
+
+
+@pytest.mark.parametrize("demand", [(0.5, 0.5), (0.9, 0.2), (-0.1, 1), (0, 2.5), (0, float("nan"))])
+def test_invalid_demands_are_rejected(demand):
+    with pytest.raises(ConfigError, match="expected LOW:HIGH with 0 <= LOW < HIGH <= 2"):
+        solve("slope", demand=demand)
