@@ -1,5 +1,6 @@
 """The command that evaluates a policy."""
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
         RolloutMetrics,
     )
     from terrainkit_robots.rl.run import Run
+
+MAX_REPETITIONS = 100
+"""Largest number of robots on each patch of a suite."""
 
 _NO_COMMAND = (-math.inf, -math.inf, -math.inf)
 """Value of --command if it is not given; with None, tyro's errors name the types of a union."""
@@ -118,8 +122,20 @@ class Evaluate(PolicyCommand):
     format: Literal["table", "json"] = "table"
     """Format of the printed result."""
 
+    suite: Annotated[str, text_option("NAME")] = ""
+    """Measure how often robots cross the patches of this suite (terrainkit suite list), along
+    their goals or to a far side, and print a report card."""
+
+    limits: Flag = False
+    """Measure the highest step, widest gap, steepest slope and narrowest passage that all robots
+    cross."""
+
+    repetitions: Annotated[int, tyro.conf.arg(metavar="N")] = 10
+    """With --suite or --limits: robots on each patch."""
+
     output: Output = ""
-    """Write the result to this file, as JSON."""
+    """Write the result to this file, as JSON. With --suite also as Markdown and as a picture, with
+    the suffixes .json, .md and .png."""
 
     diagram: Annotated[str, text_option("PNG")] = ""
     """Draw the contacts of the feet over 2 s in this picture."""
@@ -131,6 +147,8 @@ class Evaluate(PolicyCommand):
         """Evaluate the policy, and print or write the result."""
         from terrainkit.atomic_write import atomic_write, check_target
 
+        if self.suite or self.limits:
+            return self._report_card()
         output, diagram = (Path(each) if each else None for each in (self.output, self.diagram))
         for target in filter(None, (output, diagram)):
             check_target(target, overwrite=self.overwrite)  # before the rollout
@@ -159,6 +177,39 @@ class Evaluate(PolicyCommand):
         for target in filter(None, (output, diagram)):
             if self.format == "table":
                 render.result(f"wrote {target}")
+        return 0
+
+    def _report_card(self) -> int:
+        """Measure the policy on a suite or up to its limits, and print and write the result."""
+        from terrainkit.atomic_write import check_target
+        from terrainkit.suites import get_suite
+        from terrainkit_cli import report_card
+
+        if self.suite and self.limits:
+            raise ConfigError("--suite, --limits: got both; expected one of them")
+        default = {field.name: field.default for field in dataclasses.fields(self)}
+        unused = "terrain command random_commands num_envs seconds format diagram"
+        for name in unused.split():
+            if getattr(self, name) != default[name]:
+                option = f"--{name}".replace("_", "-")
+                raise ConfigError(f"{option}: got a value; expected none with --suite or --limits")
+        if not 1 <= self.repetitions <= MAX_REPETITIONS:
+            got = f"--repetitions: got {self.repetitions}"
+            raise ConfigError(f"{got}; expected 1 to {MAX_REPETITIONS}")
+        target = Path(self.output) if self.output else None
+        suffixes = report_card.CARD_SUFFIXES if self.suite else (".json",)
+        if target:
+            for suffix in suffixes:
+                check_target(target.with_suffix(suffix), overwrite=self.overwrite)
+        if self.suite:
+            get_suite(self.suite)  # an unknown name is reported before the run is loaded
+        run, config = self.load_run(), self.eval_config(self.seconds)
+        if self.suite:
+            contents = report_card.report_suite(run, self.suite, config, self.repetitions)
+        else:
+            contents = report_card.report_limits(run, config, self.repetitions)
+        if target:
+            report_card.write_files(target, suffixes, contents)
         return 0
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
@@ -132,7 +132,7 @@ def solve_demand(
     from terrainkit.feasibility.report import demand_text
     from terrainkit.feasibility.solve import solve_ranges
 
-    ends = tuple(value_of(text) for text in demand.split(":"))
+    ends: Any = tuple(value_of(text) for text in demand.split(":"))
     if len(ends) != 2 or not all(isinstance(end, int | float) for end in ends):
         raise ConfigError(f"--demand: got {demand!r}; expected LOW:HIGH, such as 0.2:0.9")
     derived = robot_limits(robot, limits)

@@ -6,9 +6,12 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
+from terrainkit import MapConfig, SubTerrain, generate, suites
 from terrainkit_cli import training_extra
 from terrainkit_cli.evaluate_command import result_rows, summary_line
 from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
+from terrainkit_robots.report_card import limits
+from terrainkit_robots.report_card.limits import LimitResult
 from terrainkit_robots.rl import run as run_module
 
 QUICK = ("--seconds", "0.04", "--num-envs", "1")
@@ -121,6 +124,12 @@ def test_evaluate_bundled_policy_by_name(here):
         (("walk", "--command", "nan", "0", "0"), "command: got [nan, 0.0, 0.0]; expected 3 values"),
         (("walk", "--command", "1", "0", "0", "--random-commands"), "expected one of them"),
         (("walk", "-o", "nowhere/result.json"), "the folder nowhere does not exist"),
+        (("walk", "--suite", "basics-2"), "no suite 'basics-2'; did you mean 'basics-1'?"),
+        (("walk", "--suite", "basics-1", "--limits"), "--suite, --limits: got both"),
+        (("walk", "--limits", "--terrain", "plane"), "--terrain: got a value; expected none with"),
+        (("walk", "--limits", "--num-envs", "3"), "--num-envs: got a value; expected none with"),
+        (("walk", "--limits", "--repetitions", "0"), "--repetitions: got 0; expected 1 to 100"),
+        (("gone", "--limits"), "gone"),
     ],
 )
 def test_evaluate_rejects_invalid_input(here, words, message):
@@ -176,3 +185,48 @@ def test_result_rows_show_success_by_level():
     head, row = result_rows(make_result(make_metrics(), **groups))
     assert head == ("terrain", "robots", "fell", "m/s", "rad/s", "success", "level 0", "1")
     assert row == ("flat", "4", "4", "-", "-", "25%", "-", "100%")
+
+
+def test_suite_prints_and_writes_a_report_card(here, tmp_path, monkeypatch):
+    slope = SubTerrain(terrain="slope", parameters={"grade": (0.0, 0.1), "landing": 1.4})
+    config = MapConfig(rows=2, cols=1, patch_size=(5.0, 4.0), border=2.0, terrains=(slope,))
+    monkeypatch.setattr(suites, "generate_suite", lambda _: generate(config))
+    words = ("walk", "--suite", "basics-1", "--repetitions", 2, "-o", "card.json")
+    code, out, err = here(*words)
+    assert (code, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0].startswith("quadruped, model_7.pt, on basics-1: success ")
+    assert lines[1].split() == ["test", "level", "0", "1", "success", "passed", "level"]
+    assert lines[2].startswith("slope  ")
+    assert (
+        "The table counts the robots, of 2 on each patch, that crossed. A robot crosses a patch if"
+        in out
+    )
+    assert lines[-1] == "wrote card.json, card.md, card.png"
+    document = json.loads((tmp_path / "card.json").read_text())
+    assert document["repetitions"] == 2
+    assert (tmp_path / "card.md").read_text().startswith("# quadruped on basics-1\n")
+    assert (tmp_path / "card.png").read_bytes().startswith(b"\x89PNG")
+    assert "card.json exists" in one_line(here(*words)[2])
+
+
+def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
+    def measure(_run, robot_limits, repetitions, *_):
+        assert repetitions == 10
+        assert robot_limits.step_up == pytest.approx(0.1792)
+        result = LimitResult(
+            test="stairs", unit="m", passed=0.1, failed=0.12, crossed=7, robot_limit=0.1792
+        )
+        return [result]
+
+    monkeypatch.setattr(limits, "measure_limits", measure)
+    code, out, err = here("walk", "--limits", "-o", "limits.json")
+    assert (code, err) == (0, "")
+    assert out.splitlines() == [
+        "test    10 of 10 cross  next value          limit of the robot",
+        "stairs  10.0 cm         7 of 10 at 12.0 cm  17.9 cm",
+        "",
+        "wrote limits.json",
+    ]
+    document = json.loads((tmp_path / "limits.json").read_text())
+    assert document["limits"][0]["passed"] == 0.1

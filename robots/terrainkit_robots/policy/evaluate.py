@@ -23,7 +23,7 @@ from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
 from terrainkit_robots.rl.symmetry import mirror_feet
-from terrainkit_robots.rl.terrain import load_terrain
+from terrainkit_robots.rl.terrain import Terrain, load_terrain
 
 FloatArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
@@ -168,12 +168,10 @@ def make_eval_env(
     Commands are None for the task's random ones. By default there are at most `max_patch_envs`
     robots on a patch of a map.
     """
-    device, task = resolve_device(config.device), run.task
+    task = run.task
     if config.terrain is None and not (is_flat(run) or is_same_terrain(run, run.terrain)):
         changed = f"{run.terrain} changed after {run.folder} was trained"
         raise ConfigError(f"terrain: {changed}; expected --terrain")
-    # The policy keeps the observations of its training, whatever terrain it walks on.
-    scan = uses_height_scan(task, is_flat=is_flat(run))
     collision = task.terrain.collision
     if config.terrain is not None and collision == "plane":
         collision = "auto"
@@ -191,9 +189,7 @@ def make_eval_env(
     elif n is None:
         per_patch = max(1, min(max_patch_envs, MAX_MAP_ENVS // patches))
         n = SINGLE_PATCH_ENVS if patches == 1 else min(MAX_MAP_ENVS, patches * per_patch)
-    task = eval_task(task, n, seconds=config.seconds, seed=config.seed)
-    task = replace(task, terrain=replace(task.terrain, collision=collision, measure_heights=scan))
-    env = LeggedEnv(task, run.robot, terrain, device)
+    env = build_eval_env(run, terrain, n, config)
     levels_and_columns = np.divmod(_assign(patches, n, config.seed), cols)
     env.curriculum.levels[:], env.curriculum.columns[:] = levels_and_columns
     env.reset()
@@ -202,6 +198,17 @@ def make_eval_env(
     if not terrain.is_flat:  # every direction on every patch
         return env, commands[np.arange(n) // patches % len(commands)]
     return env, commands[_assign(len(commands), n, config.seed)]
+
+
+def build_eval_env(
+    run: Run, terrain: Terrain, num_envs: int, config: EvaluationConfig
+) -> LeggedEnv:
+    """Return an environment on a terrain, for a policy with the observations of its training."""
+    device = resolve_device(config.device)
+    scan = uses_height_scan(run.task, is_flat=is_flat(run))
+    task = eval_task(run.task, num_envs, seconds=config.seconds, seed=config.seed)
+    task = replace(task, terrain=replace(task.terrain, measure_heights=scan))
+    return LeggedEnv(task, run.robot, terrain, device)
 
 
 def is_flat(run: Run, terrain: str | None = None) -> bool:

@@ -1,0 +1,74 @@
+"""The report card of a policy on a suite, and its limits."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terrainkit_cli import render
+
+if TYPE_CHECKING:
+    from terrainkit_robots.policy.evaluate import EvaluationConfig
+    from terrainkit_robots.rl.run import Run
+
+CARD_SUFFIXES = (".json", ".md", ".png")
+"""Files of a report card."""
+
+
+def report_suite(
+    run: "Run", suite: str, config: "EvaluationConfig", repetitions: int
+) -> list[bytes]:
+    """Measure a policy on a suite, print the card, and return it as the files of a report card."""
+    from terrainkit.suites import generate_suite
+    from terrainkit_robots.report_card.card import CRITERION, measure, summary
+    from terrainkit_robots.report_card.picture import draw_card
+
+    terrain_map = generate_suite(suite)
+    with render.steps() as steps:
+        card = measure(
+            run,
+            terrain_map,
+            suite,
+            repetitions,
+            config,
+            lambda fraction: steps.update(f"{suite}: {fraction:.0%} of the tests"),
+        )
+    render.result(summary(card))
+    render.table(card.rows())
+    render.result(
+        f"\nThe table counts the robots, of {repetitions} on each patch, that crossed. {CRITERION}"
+    )
+    document = json.dumps(card.as_json(), indent=1)
+    return [f"{document}\n".encode(), card.as_markdown().encode(), draw_card(card)]
+
+
+def report_limits(run: "Run", config: "EvaluationConfig", repetitions: int) -> list[bytes]:
+    """Measure the limits of a policy, print them, and return them as JSON."""
+    from terrainkit_cli.feasibility_command import robot_limits
+    from terrainkit_robots.report_card.limits import limit_rows, measure_limits
+
+    limits = robot_limits(run.info.robot, ()).limits
+    with render.steps() as steps:
+        results = measure_limits(
+            run,
+            limits,
+            repetitions,
+            config,
+            lambda fraction: steps.update(f"limits: {fraction:.0%} of the rounds"),
+        )
+    render.table(limit_rows(results, repetitions))
+    values = [asdict(each) for each in results]
+    checkpoint = run.checkpoint.name if run.checkpoint is not None else ""
+    about = {"schema_version": 1, "robot": run.robot.spec.name, "checkpoint": checkpoint}
+    about |= {"repetitions": repetitions, "seed": config.seed}
+    return [f"{json.dumps(about | {'limits': values}, indent=1)}\n".encode()]
+
+
+def write_files(target: Path, suffixes: tuple[str, ...], contents: list[bytes]) -> None:
+    """Write files that replace existing ones."""
+    from terrainkit.atomic_write import atomic_write
+
+    for suffix, content in zip(suffixes, contents, strict=True):
+        with atomic_write(target.with_suffix(suffix), overwrite=True) as path:
+            path.write_bytes(content)
+    render.result("\nwrote " + ", ".join(str(target.with_suffix(each)) for each in suffixes))

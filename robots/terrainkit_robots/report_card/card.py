@@ -1,0 +1,269 @@
+"""The report card: success with confidence intervals by test and level, as JSON and Markdown."""
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from terrainkit import TerrainMap
+from terrainkit.parameter import format_value
+from terrainkit.suites import suite_hash
+from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
+from terrainkit_robots.report_card.crossing import (
+    CROSSED,
+    EXTRA_TIME,
+    OUTCOMES,
+    TIME_FACTOR,
+    Attempts,
+    Crossing,
+)
+from terrainkit_robots.report_card.route import GOAL_RADIUS
+from terrainkit_robots.rl.run import Run
+
+SCHEMA_VERSION = 1
+"""Version of the JSON; it changes when a key changes its meaning or is removed."""
+
+CONFIDENCE = 0.95
+"""Confidence level of the intervals, which are Wilson's."""
+
+CRITERION = (
+    f"A robot crosses a patch if it comes within {GOAL_RADIUS:g} m of each goal in turn, or of the "
+    "middle of a far side of a patch without goals. It must not fall or leave the patch, and may "
+    f"take {TIME_FACTOR:g} times the time of the route at the commanded speed, and {EXTRA_TIME:g} "
+    "s. A level is passed if all robots cross it and every easier level."
+)
+"""What counts as a success."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LevelResult:
+    """The attempts on one patch."""
+
+    level: int
+    """Row of the patch."""
+
+    parameters: dict[str, Any]
+    """Realized parameters that differ between the levels of the test."""
+
+    outcomes: dict[str, int]
+    """Number of attempts with each outcome."""
+
+    success: float
+    """Fraction of the attempts that crossed."""
+
+    interval: tuple[float, float]
+    """Confidence interval of the success."""
+
+    seconds: float | None
+    """Mean time of the attempts that crossed [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TestResult:
+    """The attempts on one column of the map."""
+
+    __test__ = False  # pytest would collect it
+
+    name: str
+    """Name of the sub-terrain."""
+
+    passed: int | None
+    """Hardest level that is passed with every easier one; None if there is none."""
+
+    success: float
+    """Fraction of the attempts that crossed."""
+
+    interval: tuple[float, float]
+    """Confidence interval of the success."""
+
+    levels: tuple[LevelResult, ...]
+    """Results by level."""
+
+    @property
+    def passed_text(self) -> str:
+        """The hardest level that is passed, and its parameters."""
+        if self.passed is None:
+            return "none"
+        values = self.levels[self.passed].parameters.items()
+        text = ", ".join(f"{name} {_value_text(value)}" for name, value in values)
+        return f"{self.passed}: {text}" if text else str(self.passed)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportCard:
+    """How far a policy gets on the tests of a map."""
+
+    robot: str
+    """Name of the robot."""
+
+    checkpoint: str
+    """Name of the checkpoint."""
+
+    map: str
+    """Name of the suite, or path of the map."""
+
+    sha256: str
+    """Hash of the content of the map."""
+
+    repetitions: int
+    """Attempts on each patch."""
+
+    seed: int
+    """Seed of the starts."""
+
+    speed: float
+    """Commanded speed [m/s]."""
+
+    success: float
+    """Fraction of all attempts that crossed."""
+
+    interval: tuple[float, float]
+    """Confidence interval of the success."""
+
+    tests: tuple[TestResult, ...]
+    """Results by test."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the card as values of JSON."""
+        about = {"schema_version": SCHEMA_VERSION, "criterion": CRITERION}
+        return about | {"confidence": CONFIDENCE} | asdict(self)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return the card as rows of text with a header: crossed attempts by test and level."""
+        levels = [str(each.level) for each in self.tests[0].levels]
+        rows = [("test", f"level {levels[0]}", *levels[1:], "success", "passed level")]
+        for test in self.tests:
+            counts = (str(each.outcomes[OUTCOMES[CROSSED]]) for each in test.levels)
+            rows.append((test.name, *counts, _percent(test), test.passed_text))
+        return rows
+
+    def as_markdown(self) -> str:
+        """Return the card as a Markdown document."""
+        header, *rows = self.rows()
+        table = [header, ("---",) * len(header), *rows]
+        lines = (f"| {' | '.join(row)} |" for row in table)
+        return (
+            f"# {self.robot} on {self.map}\n\n"
+            f"Policy {self.checkpoint}, {self.repetitions} attempts on each patch at "
+            f"{self.speed:g} m/s, seed {self.seed}. SHA-256 of the map: `{self.sha256}`.\n\n"
+            f"Success: {_percent(self)}, with the {CONFIDENCE:.0%} confidence interval. The table "
+            "has the number of attempts that crossed.\n\n" + "\n".join(lines) + f"\n\n{CRITERION}\n"
+        )
+
+
+def measure(
+    run: Run,
+    terrain_map: TerrainMap,
+    name: str,
+    repetitions: int,
+    config: EvaluationConfig,
+    progress: Progress = lambda _: None,
+) -> ReportCard:
+    """Let the policy of a run cross every patch of a map, and return the report card.
+
+    Args:
+        run: The run.
+        terrain_map: The map.
+        name: Name of the suite, or path of the map.
+        repetitions: Robots on each patch.
+        config: Seed and device.
+        progress: Called with the completed fraction of the columns, 0 to 1.
+
+    Raises:
+        ConfigError: see :class:`Crossing`.
+        MemoryLimitError: if the simulations would not fit in memory.
+    """
+    rows, cols = terrain_map.difficulty.shape
+    crossing = Crossing(run, terrain_map, rows * repetitions, config)
+    levels, columns = np.repeat(np.arange(rows), repetitions), []
+    for col in range(cols):
+        columns.append(crossing.attempt(levels, np.full_like(levels, col)))
+        progress((col + 1) / cols)
+    names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types[0]].tolist()
+    counts = Counter(names)
+    tests = tuple(
+        _test_result(terrain_map, col, f"{name} {col}" if counts[name] > 1 else name, attempts)
+        for col, (name, attempts) in enumerate(zip(names, columns, strict=True))
+    )
+    success, interval = _success(np.concatenate([each.outcomes for each in columns]))
+    return ReportCard(
+        robot=run.robot.spec.name,
+        checkpoint=run.checkpoint.name if run.checkpoint is not None else "",
+        map=name,
+        sha256=suite_hash(terrain_map),
+        repetitions=repetitions,
+        seed=config.seed,
+        speed=crossing.speed,
+        success=success,
+        interval=interval,
+        tests=tests,
+    )
+
+
+def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempts) -> TestResult:
+    rows = len(terrain_map.difficulty)
+    by_level = attempts.outcomes.reshape(rows, -1), attempts.seconds.reshape(rows, -1)
+    levels = tuple(
+        _level_result(level, values, outcomes, seconds)
+        for level, values, outcomes, seconds in zip(
+            range(rows), changing_parameters(terrain_map, col), *by_level, strict=True
+        )
+    )
+    failed = [each.level for each in levels if each.success < 1]
+    passed = (failed[0] if failed else rows) - 1
+    success, interval = _success(attempts.outcomes)
+    return TestResult(
+        name=name,
+        passed=passed if passed >= 0 else None,
+        success=success,
+        interval=interval,
+        levels=levels,
+    )
+
+
+def changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, Any]]:
+    """Return the realized parameters of a column that differ between levels, for each level."""
+    realized = [dict(each.realized) for each in terrain_map.parameters[:, col].tolist()]
+    names = [name for name in realized[0] if len({str(each[name]) for each in realized}) > 1]
+    return [{name: each[name] for name in names} for each in realized]
+
+
+def _level_result(
+    level: int,
+    parameters: dict[str, Any],
+    outcomes: NDArray[np.int8],
+    seconds: NDArray[np.float64],
+) -> LevelResult:
+    success, interval = _success(outcomes)
+    return LevelResult(
+        level=level,
+        parameters=parameters,
+        outcomes={name: int((outcomes == k).sum()) for k, name in enumerate(OUTCOMES)},
+        success=success,
+        interval=interval,
+        seconds=float(np.nanmean(seconds)) if success else None,
+    )
+
+
+def _success(outcomes: NDArray[np.int8]) -> tuple[float, tuple[float, float]]:
+    """Return the fraction of attempts that crossed, and its confidence interval."""
+    crossed, number = int((outcomes == CROSSED).sum()), outcomes.size
+    low, high = binomtest(crossed, number).proportion_ci(CONFIDENCE, method="wilson")
+    return crossed / number, (float(low), float(high))
+
+
+def _value_text(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else format_value(value)
+
+
+def _percent(result: TestResult | ReportCard) -> str:
+    low, high = result.interval
+    return f"{result.success:.0%} ({low:.0%} to {high:.0%})"
+
+
+def summary(card: ReportCard) -> str:
+    """Return the card as one line."""
+    return f"{card.robot}, {card.checkpoint}, on {card.map}: success {_percent(card)}"

@@ -1,0 +1,131 @@
+"""Let a policy cross the patches of a map."""
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit import TerrainMap
+from terrainkit.errors import ConfigError
+from terrainkit.patch import Patch
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, rollout
+from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.report_card.route import SPEED, Routes, patch_routes
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.terrain import MapTerrain
+from terrainkit_robots.transforms import quat_to_yaw
+
+OUTCOMES = ("crossed", "fell", "left", "timed out")
+"""Outcomes of an attempt: it crossed the patch, fell, left the patch, or took too long."""
+
+CROSSED, FELL, LEFT, TIMED_OUT = range(4)
+
+START_OFFSET, START_YAW = 0.1, 0.3
+"""Largest random offset from the spawn origin along x and y [m], and heading to either side [rad].
+"""
+
+TIME_FACTOR, EXTRA_TIME = 1.5, 5.0
+"""Time limit: a multiple of the time for the route at the commanded speed, and a constant [s]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Attempts:
+    """The attempts of n robots to cross a patch."""
+
+    outcomes: NDArray[np.int8]
+    """Index into `OUTCOMES`, shape (n,)."""
+
+    seconds: NDArray[np.float64]
+    """Time of the attempts that crossed [s], else NaN, shape (n,)."""
+
+
+class Crossing:
+    """A policy that crosses the patches of a map.
+
+    Each robot follows the goals of its patch, or walks to a far side of it, at 75 % of the largest
+    forward command. There is no noise and no randomization; only the starts differ. The same seed
+    gives the same result.
+    """
+
+    def __init__(
+        self, run: Run, terrain_map: TerrainMap, num_envs: int, config: EvaluationConfig
+    ) -> None:
+        """Load the policy of a run onto a map.
+
+        Raises:
+            ConfigError: if the run has no policy, or one of another robot, or its task does not
+                command to walk ahead.
+            MemoryLimitError: if the simulations would not fit in memory.
+        """
+        self.speed = SPEED * run.task.commands.lin_vel_x[1]
+        if self.speed <= 0:
+            got = f"commands.lin_vel_x: got {list(run.task.commands.lin_vel_x)}"
+            raise ConfigError(f"{got}; expected a task that commands to walk ahead")
+        start = replace(run.task.init_state, position=START_OFFSET, yaw=START_YAW)
+        run = replace(run, task=replace(run.task, init_state=start))
+        collision = run.task.terrain.collision
+        terrain = MapTerrain(terrain_map, "auto" if collision == "plane" else collision)
+        config = replace(config, seconds=3600.0)  # episodes have no time-out; attempts do
+        self._map, self._env = terrain_map, build_eval_env(run, terrain, num_envs, config)
+        self._policy = load_policy(run, self._env)
+
+    @single_torch_thread()
+    def attempt(self, levels: NDArray[np.int64], columns: NDArray[np.int64]) -> Attempts:
+        """Return the attempts on the patches (levels, columns), each of shape (num_envs,)."""
+        env = self._env
+        env.curriculum.levels[:], env.curriculum.columns[:] = levels, columns
+        env.set_commands(None)
+        env.reset()
+        patches = [self._map.patch(*place) for place in zip(levels, columns, strict=True)]
+        progress = _Progress(env, patches, self.speed)
+        for _, fell in rollout(env, self._policy, progress.schedule()):
+            progress.update(fell)
+        return Attempts(outcomes=progress.outcomes, seconds=progress.seconds)
+
+
+class _Progress:
+    """The progress of the robots on their patches."""
+
+    def __init__(self, env: LeggedEnv, patches: list[Patch], speed: float) -> None:
+        n = len(patches)
+        self.outcomes, self.seconds = np.full(n, TIMED_OUT, np.int8), np.full(n, np.nan)
+        self._env, self._active, self._steps = env, np.ones(n, bool), 0
+        # Robots on the same patch take its routes in turn.
+        turn = Counter[tuple[float, float]]()
+        routes = []
+        for patch in patches:
+            every = patch_routes(patch)
+            routes.append(every[turn[patch.grid.lower] % len(every)])
+            turn[patch.grid.lower] += 1
+        goals = np.full((n, max(map(len, routes)), 2), np.nan)
+        for robot, route in enumerate(routes):
+            goals[robot, : len(route)] = route
+        self._routes = Routes(goals=goals, index=np.zeros(n, np.int64))
+        self._lower = np.array([patch.grid.lower for patch in patches])
+        self._upper = np.array([patch.grid.upper for patch in patches])
+        seconds = TIME_FACTOR * self._routes.lengths(env.start_pos) / speed + EXTRA_TIME
+        self._max_steps = np.rint(seconds / env.cfg.dt)
+
+    def schedule(self) -> Iterator[NDArray[np.float32]]:
+        """Yield the commands of each step until every attempt has ended."""
+        while self._active.any():
+            state = self._env.state
+            yaw = quat_to_yaw(state.base_quat)
+            yield self._routes.commands(state.base_pos[:, :2], yaw, self._env.cfg.commands)
+
+    def update(self, fell: NDArray[np.bool_]) -> None:
+        """Record the attempts that a step ended."""
+        self._steps += 1
+        position = self._env.state.base_pos[:, :2]
+        crossed = self._routes.update(position)
+        left = ((position < self._lower) | (position > self._upper)).any(axis=1)
+        late = self._steps >= self._max_steps
+        for outcome, mask in ((FELL, fell), (CROSSED, crossed), (LEFT, left), (TIMED_OUT, late)):
+            ended = self._active & mask
+            self.outcomes[ended] = outcome
+            self._active &= ~ended
+            if outcome == CROSSED:
+                self.seconds[ended] = self._steps * self._env.cfg.dt

@@ -1,0 +1,237 @@
+"""The limits of a policy: the hardest step, gap, slope and passage that all robots cross."""
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.errors import TerrainkitWarning
+from terrainkit.feasibility import RobotLimits
+from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
+from terrainkit_robots.report_card.card import changing_parameters
+from terrainkit_robots.report_card.crossing import CROSSED, Crossing
+from terrainkit_robots.rl.run import Run
+
+LEVELS = 20
+"""Values of each quantity, from 10 % to 200 % of the limit of the robot."""
+
+PATCH_SIZE, CELL = (8.0, 4.0), 0.05
+"""Size of the patches and distance between two height samples [m]."""
+
+SLOPE_THRESHOLD = 1.25
+"""Steepest slope that is not a wall: twice the default limit of 30 degrees is 49 degrees."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitTest:
+    """A quantity, and the terrain on which it is changed."""
+
+    name: str
+    """Name of the test, and of its sub-terrain."""
+
+    limit: str
+    """Limit of the robot in whose units the quantity is."""
+
+    sub_terrain: SubTerrain
+    """The terrain; its parameters are ranges."""
+
+    parameter: str
+    """Parameter that is the quantity."""
+
+    @property
+    def unit(self) -> str:
+        """The unit of the results: m or degrees."""
+        return "degrees" if self.limit == "slope" else "m"
+
+    def value(self, parameters: Mapping[str, Any]) -> float:
+        """Return the quantity on a patch with these parameters, in the unit of the results."""
+        value = float(parameters[self.parameter])
+        return math.degrees(value) if self.parameter == "roll" else self.in_unit(value)
+
+    def in_unit(self, value: float) -> float:
+        """Return a length [m] or a rise over run in the unit of the results."""
+        return math.degrees(math.atan(value)) if self.unit == "degrees" else value
+
+
+def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
+    """Return the tests for a robot. The first level is easy for it, the last one twice its limit.
+
+    Passages and footholds shrink to half of the limit of the robot, and ceilings to its crouched
+    height minus a tenth of the standing height.
+    """
+    steps = (0.1 * limits.step_up, 2 * limits.step_up)
+    drops = (0.1 * limits.step_down, 2 * limits.step_down)
+    slopes = (0.1 * limits.slope, 2 * limits.slope)
+    rolls = (math.atan(slopes[0]), math.atan(slopes[1]))
+    lowest = max(limits.crouched_height - 0.1 * limits.standing_height, 0.02)
+    ceilings = (1.2 * limits.standing_height, lowest)
+    corridors = (min(3 * limits.body_width, 1.5), 0.5 * limits.body_width)
+    stones = (max(8 * limits.foothold, 0.1), 0.5 * limits.foothold)
+    tests = (
+        ("step up", "step_up", "pit", "depth", steps, {"side": 2.0}),
+        # A platform with one tread around it.
+        (
+            "step down",
+            "step_down",
+            "pyramid_stairs",
+            "step_height",
+            drops,
+            {"platform": 2.0, "step_width": 1.0},
+        ),
+        ("stairs", "step_up", "stairs", "step_height", steps, {"landing": 1.5}),
+        ("gap", "gap", "gap", "width", (0.1 * limits.gap, 2 * limits.gap), {"platform": 2.0}),
+        ("slope up and down", "slope", "slope", "grade", slopes, {"landing": 1.5}),
+        (
+            "slope across",
+            "slope",
+            "side_ramps",
+            "roll",
+            rolls,
+            {"start": 1.5, "gap": 0.0, "offset": 0.0, "width": 1.2, "spacing": 2.0, "depth": 1.0},
+        ),
+        (
+            "clearance",
+            "crouched_height",
+            "crawl",
+            "clearance",
+            ceilings,
+            {"start": 1.5, "max_depth": 0.4, "spacing": 2.0},
+        ),
+        (
+            "stone",
+            "foothold",
+            "stones_everywhere",
+            "stone",
+            stones,
+            {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0},
+        ),
+        ("corridor", "body_width", "maze", "corridor", corridors, {"clearing": 1.5}),
+    )
+    return tuple(
+        LimitTest(
+            name=name,
+            limit=limit,
+            parameter=parameter,
+            sub_terrain=SubTerrain(
+                terrain=terrain, name=name, parameters={**fixed, parameter: values}
+            ),
+        )
+        for name, limit, terrain, parameter, values, fixed in tests
+    )
+
+
+def limits_config(limits: RobotLimits, seed: int) -> MapConfig:
+    """Return the map of the tests: a column for each, and a row for each value."""
+    tests = limit_tests(limits)
+    return MapConfig(
+        terrains=tuple(test.sub_terrain for test in tests),
+        rows=LEVELS,
+        cols=len(tests),
+        patch_size=PATCH_SIZE,
+        cell=CELL,
+        border=2.0,
+        slope_threshold=SLOPE_THRESHOLD,
+        seed=seed,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitResult:
+    """The limit of a policy in a test."""
+
+    test: str
+    """Name of the test."""
+
+    unit: str
+    """Unit of the values: m or degrees."""
+
+    passed: float | None
+    """Hardest value that all robots cross; None if they do not cross the easiest one."""
+
+    failed: float | None
+    """Next value, which some robots do not cross; None if they cross the hardest one."""
+
+    crossed: int | None
+    """Number of robots that cross the next value."""
+
+    robot_limit: float
+    """Limit of the robot for feasibility."""
+
+
+def measure_limits(
+    run: Run,
+    limits: RobotLimits,
+    repetitions: int,
+    config: EvaluationConfig,
+    progress: Progress = lambda _: None,
+) -> list[LimitResult]:
+    """Return the limits of a policy, by bisection: what is easier than a passed value, is passed.
+
+    Args:
+        run: The run.
+        limits: The limits of its robot, which determine the values.
+        repetitions: Robots on each patch.
+        config: Seed and device.
+        progress: Called with the completed fraction of the rounds, 0 to 1.
+
+    Raises:
+        ConfigError: see :class:`Crossing`.
+        MemoryLimitError: if the simulations would not fit in memory.
+    """
+    tests = limit_tests(limits)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TerrainkitWarning)  # of cliffs: robots stay on a patch
+        terrain_map = generate(limits_config(limits, config.seed))
+    crossing = Crossing(run, terrain_map, len(tests) * repetitions, config)
+    columns = np.repeat(np.arange(len(tests)), repetitions)
+    passed, failed = np.full(len(tests), -1), np.full(len(tests), LEVELS)
+    crossed = np.zeros(len(tests), int)
+    rounds = math.ceil(math.log2(LEVELS + 1))
+    for number in range(rounds):
+        level = np.clip((passed + failed) // 2, 0, LEVELS - 1)
+        attempts = crossing.attempt(np.repeat(level, repetitions), columns)
+        counts = (attempts.outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
+        is_open, all_cross = failed - passed > 1, counts == repetitions
+        passed = np.where(is_open & all_cross, level, passed)
+        failed, crossed = (
+            np.where(is_open & ~all_cross, new, old)
+            for new, old in ((level, failed), (counts, crossed))
+        )
+        progress((number + 1) / rounds)
+    results = []
+    for col, test in enumerate(tests):
+        values = [test.value(each) for each in changing_parameters(terrain_map, col)]
+        low, high = int(passed[col]), int(failed[col])
+        results.append(
+            LimitResult(
+                test=test.name,
+                unit=test.unit,
+                passed=values[low] if low >= 0 else None,
+                failed=values[high] if high < LEVELS else None,
+                crossed=int(crossed[col]) if high < LEVELS else None,
+                robot_limit=test.in_unit(getattr(limits, test.limit)),
+            )
+        )
+    return results
+
+
+def limit_rows(results: Sequence[LimitResult], repetitions: int) -> list[tuple[str, ...]]:
+    """Return the limits of a policy as rows of text with a header."""
+    rows: list[tuple[str, ...]] = [
+        ("test", f"{repetitions} of {repetitions} cross", "next value", "limit of the robot")
+    ]
+    for each in results:
+        following = "-"
+        if each.failed is not None:
+            following = f"{each.crossed} of {repetitions} at {_text(each.failed, each.unit)}"
+        passed = "none" if each.passed is None else _text(each.passed, each.unit)
+        rows.append((each.test, passed, following, _text(each.robot_limit, each.unit)))
+    return rows
+
+
+def _text(value: float, unit: str) -> str:
+    return f"{value:.0f} degrees" if unit == "degrees" else f"{100 * value:.1f} cm"
