@@ -209,7 +209,7 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
     levels = tuple(
         _level_result(level, values, outcomes, seconds)
         for level, values, outcomes, seconds in zip(
-            range(rows), changing_parameters(terrain_map, col), *by_level, strict=True
+            range(rows), _changing_parameters(terrain_map, col), *by_level, strict=True
         )
     )
     failed = [each.level for each in levels if each.success < 1]
@@ -224,7 +224,7 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
     )
 
 
-def changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, Any]]:
+def _changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, Any]]:
     """Return the realized parameters of a column that differ between levels, for each level."""
     realized = [dict(each.realized) for each in terrain_map.parameters[:, col].tolist()]
     names = [name for name in realized[0] if len({str(each[name]) for each in realized}) > 1]

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import TerrainkitWarning
 from terrainkit.feasibility import RobotLimits
+from terrainkit.grid import Grid
+from terrainkit.parameter import at_difficulty
 from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
-from terrainkit_robots.report_card.card import changing_parameters
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
 from terrainkit_robots.rl.run import Run
 
@@ -36,20 +37,36 @@ class LimitTest:
     limit: str
     """Limit of the robot in whose units the quantity is."""
 
-    sub_terrain: SubTerrain
-    """The terrain; its parameters are ranges."""
+    terrain: str
+    """Name of the terrain."""
 
     parameter: str
     """Parameter that is the quantity."""
+
+    easy: float
+    """Value of the parameter at the first level."""
+
+    hard: float
+    """Value of the parameter at the last level."""
+
+    fixed: Mapping[str, float]
+    """Other parameters."""
+
+    def sub_terrain(self, level: int) -> SubTerrain:
+        """Return the terrain at a level, 0 to `LEVELS` - 1."""
+        value = at_difficulty((self.easy, self.hard), level / (LEVELS - 1))
+        parameters = {**self.fixed, self.parameter: value}
+        return SubTerrain(terrain=self.terrain, name=self.name, parameters=parameters)
 
     @property
     def unit(self) -> str:
         """The unit of the results: m or degrees."""
         return "degrees" if self.limit == "slope" else "m"
 
-    def value(self, parameters: Mapping[str, Any]) -> float:
-        """Return the quantity on a patch with these parameters, in the unit of the results."""
-        value = float(parameters[self.parameter])
+    def value(self, level: int, grid: Grid) -> float:
+        """Return the realized quantity at a level, in the unit of the results."""
+        realized: Any = self.sub_terrain(level).at(0.0).realized(grid)[self.parameter]
+        value = float(realized)
         return math.degrees(value) if self.parameter == "roll" else self.in_unit(value)
 
     def in_unit(self, value: float) -> float:
@@ -115,21 +132,21 @@ def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
         LimitTest(
             name=name,
             limit=limit,
+            terrain=terrain,
             parameter=parameter,
-            sub_terrain=SubTerrain(
-                terrain=terrain, name=name, parameters={**fixed, parameter: values}
-            ),
+            easy=values[0],
+            hard=values[1],
+            fixed=fixed,
         )
         for name, limit, terrain, parameter, values, fixed in tests
     )
 
 
-def limits_config(limits: RobotLimits, seed: int) -> MapConfig:
-    """Return the map of the tests: a column for each, and a row for each value."""
-    tests = limit_tests(limits)
+def limits_config(tests: Sequence[LimitTest], levels: Sequence[int], seed: int) -> MapConfig:
+    """Return the map of one patch for each test, at its level."""
     return MapConfig(
-        terrains=tuple(test.sub_terrain for test in tests),
-        rows=LEVELS,
+        terrains=tuple(t.sub_terrain(level) for t, level in zip(tests, levels, strict=True)),
+        rows=1,
         cols=len(tests),
         patch_size=PATCH_SIZE,
         cell=CELL,
@@ -183,40 +200,46 @@ def measure_limits(
         MemoryLimitError: if the simulations would not fit in memory.
     """
     tests = limit_tests(limits)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", TerrainkitWarning)  # of cliffs: robots stay on a patch
-        terrain_map = generate(limits_config(limits, config.seed))
-    crossing = Crossing(run, terrain_map, len(tests) * repetitions, config)
     columns = np.repeat(np.arange(len(tests)), repetitions)
     passed, failed = np.full(len(tests), -1), np.full(len(tests), LEVELS)
     crossed = np.zeros(len(tests), int)
     rounds = math.ceil(math.log2(LEVELS + 1))
     for number in range(rounds):
-        level = np.clip((passed + failed) // 2, 0, LEVELS - 1)
-        attempts = crossing.attempt(np.repeat(level, repetitions), columns)
-        counts = (attempts.outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
+        levels = np.clip((passed + failed) // 2, 0, LEVELS - 1)
+        # A map of these patches alone: the time of a step grows with the number of solids.
+        terrain_map = _generate(limits_config(tests, levels.tolist(), config.seed))
+        crossing = Crossing(run, terrain_map, len(columns), config)
+        outcomes = crossing.attempt(np.zeros_like(columns), columns).outcomes
+        counts = (outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
         is_open, all_cross = failed - passed > 1, counts == repetitions
-        passed = np.where(is_open & all_cross, level, passed)
+        passed = np.where(is_open & all_cross, levels, passed)
         failed, crossed = (
             np.where(is_open & ~all_cross, new, old)
-            for new, old in ((level, failed), (counts, crossed))
+            for new, old in ((levels, failed), (counts, crossed))
         )
         progress((number + 1) / rounds)
-    results = []
-    for col, test in enumerate(tests):
-        values = [test.value(each) for each in changing_parameters(terrain_map, col)]
-        low, high = int(passed[col]), int(failed[col])
+    grid, results = terrain_map.config.patch_grid(0, 0), []
+    for test, low, high, count in zip(
+        tests, passed.tolist(), failed.tolist(), crossed.tolist(), strict=True
+    ):
+        is_last = high == LEVELS
         results.append(
             LimitResult(
                 test=test.name,
                 unit=test.unit,
-                passed=values[low] if low >= 0 else None,
-                failed=values[high] if high < LEVELS else None,
-                crossed=int(crossed[col]) if high < LEVELS else None,
+                passed=test.value(low, grid) if low >= 0 else None,
+                failed=None if is_last else test.value(high, grid),
+                crossed=None if is_last else count,
                 robot_limit=test.in_unit(getattr(limits, test.limit)),
             )
         )
     return results
+
+
+def _generate(config: MapConfig) -> TerrainMap:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TerrainkitWarning)  # of cliffs: robots stay on a patch
+        return generate(config)
 
 
 def limit_rows(results: Sequence[LimitResult], repetitions: int) -> list[tuple[str, ...]]:

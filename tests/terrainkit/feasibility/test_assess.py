@@ -141,22 +141,24 @@ def test_limit_is_exactly_demand_one():
 
 
 @pytest.mark.parametrize(
-    ("terrain", "parameters"),
+    ("terrain", "size", "parameters"),
     [
-        ("stairs", {"step_height": 0.15}),
-        ("gap", {"width": 0.3}),
-        ("rough_slope", {"grade": 0.3}),
-        ("stepping_stones", {"stone": 0.1}),
-        ("slit", {"opening": 1.5, "body_width": 0.35}),
-        ("tunnel", {"clearance": 0.45}),
+        ("stairs", (8.0, 2.4), {"step_height": 0.15}),
+        ("gap", (8.0, 4.0), {"width": 0.3}),
+        ("rough_slope", (8.0, 4.0), {"grade": 0.3}),
+        ("stepping_stones", (8.0, 4.0), {"stone": 0.1}),
+        ("slit", (6.0, 2.4), {"opening": 1.5, "body_width": 0.35}),
+        ("tunnel", (5.0, 1.2), {"clearance": 0.45}),
     ],
 )
 @pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(RobotLimits)])
-def test_demand_is_monotone_in_every_limit(terrain, parameters, name):
+def test_demand_is_monotone_in_every_limit(terrain, size, parameters, name):
     demands = []
     for factor in (0.75, 1.3):
         limits = dataclasses.replace(LIMITS, **{name: factor * getattr(LIMITS, name)})
-        demands.append(assess(terrain, limits, **parameters).demand)
+        config = dataclasses.replace(config_of(terrain, **parameters), patch_size=size)
+        patch = make_patch(config, 0, 0)
+        demands.append(assess_patch(patch, limits, config.wall_threshold).demand)
     needs_room = name in ("foothold", "body_width", "standing_height", "crouched_height")
     assert demands == sorted(demands, reverse=not needs_room)
 

@@ -21,8 +21,9 @@ LIMITS = RobotLimits(
 )
 
 
-def solve(terrain, demand=(0.2, 0.9), **parameters):
-    config = MapConfig(terrains=(SubTerrain(terrain=terrain, parameters=parameters),), border=0)
+def solve(terrain, demand=(0.2, 0.9), size=(6.0, 6.0), **parameters):
+    terrains = (SubTerrain(terrain=terrain, parameters=parameters),)
+    config = MapConfig(terrains=terrains, border=0, patch_size=size)
     (solved,) = solve_ranges(config, LIMITS, demand)
     return solved
 
@@ -35,7 +36,6 @@ def solve(terrain, demand=(0.2, 0.9), **parameters):
         ("pyramid_stairs", "step_height", 0.2 * 0.25, 0.9 * 0.25),
         ("pit", "depth", 0.2 * 0.2, 0.9 * 0.2),
         ("slope", "grade", 0.2 * 0.5, 0.9 * 0.5),
-        ("crawl", "clearance", 0.6 - 0.2 * 0.3, 0.6 - 0.9 * 0.3),
     ],
 )
 def test_ranges_end_at_the_requested_demands(terrain, name, easy, hard):
@@ -45,6 +45,12 @@ def test_ranges_end_at_the_requested_demands(terrain, name, easy, hard):
     assert solved.demand == pytest.approx((0.2, 0.9), abs=0.04)
     assert solved.demand[0] <= 0.2
     assert solved.demand[1] <= 0.9
+
+
+def test_ranges_may_fall():
+    """The lower the bars, the harder: (0.6 - c) / (0.6 - 0.3)."""
+    solved = solve("crawl", size=(4.0, 1.2))
+    assert solved.sub_terrain.parameters["clearance"] == pytest.approx((0.54, 0.33), abs=0.008)
 
 
 def test_lengths_are_whole_cells():
@@ -79,7 +85,8 @@ def test_terrain_without_ranges_is_unchanged():
 
 def test_random_terrains_reach_the_demand_on_the_median_patch():
     solved = solve("rough_slope", demand=(0.3, 0.8))
-    config = MapConfig(terrains=(solved.sub_terrain,), rows=2, cols=4, border=0)
+    size = (6.0, 6.0)
+    config = MapConfig(terrains=(solved.sub_terrain,), rows=2, cols=4, border=0, patch_size=size)
     results = assess_map(generate(config), LIMITS)
     hard = sorted(each.demand for each in results if each.row == 1)
     assert 0.5 < hard[1] < 1.0

@@ -30,13 +30,21 @@ def measure(monkeypatch):
     def run(highest):
         class Known:
             def __init__(self, _, terrain_map, num_envs, __):
-                assert terrain_map.difficulty.shape == (LEVELS, len(limit_tests(LIMITS)))
-                self.num_envs = num_envs
+                assert terrain_map.difficulty.shape == (1, len(highest))
+                self.num_envs, parameters = num_envs, terrain_map.parameters[0].tolist()
+                self.values = [
+                    each.requested[test.parameter]
+                    for each, test in zip(parameters, limit_tests(LIMITS), strict=True)
+                ]
 
             def attempt(self, levels, columns):
                 assert len(levels) == len(columns) == self.num_envs
-                ok = levels <= np.array(highest)[columns]
-                ok[1::2] &= levels[1::2] != np.array(highest)[columns[1::2]] + 1
+                ok = np.zeros(len(columns), bool)
+                for k, column in enumerate(columns):
+                    test = limit_tests(LIMITS)[column]
+                    step = (test.hard - test.easy) / (LEVELS - 1)
+                    level = (self.values[column] - test.easy) / step
+                    ok[k] = level < highest[column] + 0.5
                 outcomes = np.where(ok, CROSSED, FELL).astype(np.int8)
                 return Attempts(outcomes=outcomes, seconds=np.zeros(len(levels)))
 
