@@ -88,57 +88,40 @@ def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
     ceilings = (1.2 * limits.standing_height, lowest)
     corridors = (min(3 * limits.body_width, 1.5), 0.5 * limits.body_width)
     stones = (max(8 * limits.foothold, 0.1), 0.5 * limits.foothold)
-    tests = (
-        ("step up", "step_up", "pit", "depth", steps, {"side": 2.0}),
-        # A platform with one tread around it.
-        (
-            "step down",
-            "step_down",
-            "pyramid_stairs",
-            "step_height",
-            drops,
-            {"platform": 2.0, "step_width": 1.0},
-        ),
-        ("stairs", "step_up", "stairs", "step_height", steps, {"landing": 1.5}),
-        ("gap", "gap", "gap", "width", (0.1 * limits.gap, 2 * limits.gap), {"platform": 2.0}),
-        ("slope up and down", "slope", "slope", "grade", slopes, {"landing": 1.5}),
-        (
-            "slope across",
-            "slope",
-            "side_ramps",
-            "roll",
-            rolls,
-            {"start": 1.5, "gap": 0.0, "offset": 0.0, "width": 1.2, "spacing": 2.0, "depth": 1.0},
-        ),
-        (
-            "clearance",
-            "crouched_height",
-            "crawl",
-            "clearance",
-            ceilings,
-            {"start": 1.5, "max_depth": 0.4, "spacing": 2.0},
-        ),
-        (
-            "stone",
-            "foothold",
-            "stones_everywhere",
-            "stone",
-            stones,
-            {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0},
-        ),
-        ("corridor", "body_width", "maze", "corridor", corridors, {"clearing": 1.5}),
+    gaps = (0.1 * limits.gap, 2 * limits.gap)
+    ramps = {"start": 1.5, "gap": 0.0, "offset": 0.0, "width": 1.2, "spacing": 2.0, "depth": 1.0}
+    bars = {"start": 1.5, "max_depth": 0.4, "spacing": 2.0}
+    level = {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0}
+    one_tread = {"platform": 2.0, "step_width": 1.0}
+    return (
+        _test("step up", "step_up", "pit", "depth", steps, {"side": 2.0}),
+        _test("step down", "step_down", "pyramid_stairs", "step_height", drops, one_tread),
+        _test("stairs", "step_up", "stairs", "step_height", steps, {"landing": 1.5}),
+        _test("gap", "gap", "gap", "width", gaps, {"platform": 2.0}),
+        _test("slope up and down", "slope", "slope", "grade", slopes, {"landing": 1.5}),
+        _test("slope across", "slope", "side_ramps", "roll", rolls, ramps),
+        _test("clearance", "crouched_height", "crawl", "clearance", ceilings, bars),
+        _test("stone", "foothold", "stones_everywhere", "stone", stones, level),
+        _test("corridor", "body_width", "maze", "corridor", corridors, {"clearing": 1.5}),
     )
-    return tuple(
-        LimitTest(
-            name=name,
-            limit=limit,
-            terrain=terrain,
-            parameter=parameter,
-            easy=values[0],
-            hard=values[1],
-            fixed=fixed,
-        )
-        for name, limit, terrain, parameter, values, fixed in tests
+
+
+def _test(
+    name: str,
+    limit: str,
+    terrain: str,
+    parameter: str,
+    values: tuple[float, float],
+    fixed: Mapping[str, float],
+) -> LimitTest:
+    return LimitTest(
+        name=name,
+        limit=limit,
+        terrain=terrain,
+        parameter=parameter,
+        easy=values[0],
+        hard=values[1],
+        fixed=fixed,
     )
 
 
