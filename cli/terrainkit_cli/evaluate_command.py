@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     )
     from terrainkit_robots.rl.run import Run
 
-MAX_REPETITIONS = 100
-"""Largest number of robots on each patch of a suite."""
+DEFAULT_REPETITIONS, MAX_REPETITIONS = 10, 100
+"""Default and largest number of robots on each patch of a suite."""
 
 _NO_COMMAND = (-math.inf, -math.inf, -math.inf)
 """Value of --command if it is not given; with None, tyro's errors name the types of a union."""
@@ -130,12 +130,12 @@ class Evaluate(PolicyCommand):
     """Measure the highest step, widest gap, steepest slope and narrowest passage that all robots
     cross."""
 
-    repetitions: Annotated[int, tyro.conf.arg(metavar="N")] = 10
+    repetitions: Annotated[int, tyro.conf.arg(metavar="N")] = DEFAULT_REPETITIONS
     """With --suite or --limits: robots on each patch."""
 
     output: Output = ""
-    """Write the result to this file, as JSON. With --suite also as Markdown and as a picture, with
-    the suffixes .json, .md and .png."""
+    """Write the result to this file, as JSON. With --suite also as Markdown and as a picture, to
+    files with the suffixes .json, .md and .png."""
 
     diagram: Annotated[str, text_option("PNG")] = ""
     """Draw the contacts of the feet over 2 s in this picture."""
@@ -149,6 +149,8 @@ class Evaluate(PolicyCommand):
 
         if self.suite or self.limits:
             return self._report_card()
+        if self.repetitions != DEFAULT_REPETITIONS:
+            raise ConfigError("--repetitions: got a value; expected none without --suite, --limits")
         output, diagram = (Path(each) if each else None for each in (self.output, self.diagram))
         for target in filter(None, (output, diagram)):
             check_target(target, overwrite=self.overwrite)  # before the rollout
@@ -196,11 +198,9 @@ class Evaluate(PolicyCommand):
         if not 1 <= self.repetitions <= MAX_REPETITIONS:
             got = f"--repetitions: got {self.repetitions}"
             raise ConfigError(f"{got}; expected 1 to {MAX_REPETITIONS}")
-        target = Path(self.output) if self.output else None
-        suffixes = report_card.CARD_SUFFIXES if self.suite else (".json",)
-        if target:
-            for suffix in suffixes:
-                check_target(target.with_suffix(suffix), overwrite=self.overwrite)
+        targets = report_card.targets(Path(self.output), is_card=bool(self.suite))
+        for target in targets if self.output else ():
+            check_target(target, overwrite=self.overwrite)
         if self.suite:
             get_suite(self.suite)  # an unknown name is reported before the run is loaded
         run, config = self.load_run(), self.eval_config(self.seconds)
@@ -208,8 +208,8 @@ class Evaluate(PolicyCommand):
             contents = report_card.report_suite(run, self.suite, config, self.repetitions)
         else:
             contents = report_card.report_limits(run, config, self.repetitions)
-        if target:
-            report_card.write_files(target, suffixes, contents)
+        if self.output:
+            report_card.write_files(targets, contents)
         return 0
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
+from terrainkit.layout import terrain_columns
 from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command, value_of
@@ -133,9 +134,10 @@ def solve_demand(
     from terrainkit.feasibility.solve import solve_ranges
 
     ends: Any = tuple(value_of(text) for text in demand.split(":"))
-    if len(ends) != 2 or not all(isinstance(end, int | float) for end in ends):
+    if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
         raise ConfigError(f"--demand: got {demand!r}; expected LOW:HIGH, such as 0.2:0.9")
     derived = robot_limits(robot, limits)
+    terrain_columns(replace(config, terrains=config.sub_terrains))  # each needs a column
     progress = partial(render.progress, of="terrains")
     solved = solve_ranges(config, derived.limits, ends, progress=progress, executor=executor)
     rows = [("terrain", "demand", f"ranges for {derived.robot}")]

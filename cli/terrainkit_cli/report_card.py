@@ -64,11 +64,19 @@ def report_limits(run: "Run", config: "EvaluationConfig", repetitions: int) -> l
     return [f"{json.dumps(about | {'limits': values}, indent=1)}\n".encode()]
 
 
-def write_files(target: Path, suffixes: tuple[str, ...], contents: list[bytes]) -> None:
+def targets(output: Path, *, is_card: bool) -> list[Path]:
+    """Return the files to write: `output`, or for a card one with each of its suffixes."""
+    if not is_card:
+        return [output]
+    stem = str(output.with_suffix("")) if output.suffix in CARD_SUFFIXES else str(output)
+    return [Path(f"{stem}{suffix}") for suffix in CARD_SUFFIXES]
+
+
+def write_files(targets: list[Path], contents: list[bytes]) -> None:
     """Write files that replace existing ones."""
     from terrainkit.atomic_write import atomic_write
 
-    for suffix, content in zip(suffixes, contents, strict=True):
-        with atomic_write(target.with_suffix(suffix), overwrite=True) as path:
+    for target, content in zip(targets, contents, strict=True):
+        with atomic_write(target, overwrite=True) as path:
             path.write_bytes(content)
-    render.result("\nwrote " + ", ".join(str(target.with_suffix(each)) for each in suffixes))
+    render.result(f"\nwrote {', '.join(map(str, targets))}")

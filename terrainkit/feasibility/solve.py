@@ -36,11 +36,11 @@ class SolvedTerrain:
     """A sub-terrain with solved ranges."""
 
     sub_terrain: SubTerrain
-    """The sub-terrain; unchanged if its demand hardly depends on its ranges."""
+    """The sub-terrain; unchanged if its demand does not depend on its ranges."""
 
     demand: Range
-    """Demands at difficulty 0 and 1. They are not those requested if the ranges, extrapolated to
-    the difficulties -1 and 3, do not reach them: then the end of the range is kept."""
+    """Demands at difficulty 0 and 1. They are above those requested if no value is easy enough, and
+    below if the demand changes in steps, or no value reaches them."""
 
 
 def solve_ranges(
@@ -53,9 +53,9 @@ def solve_ranges(
 ) -> list[SolvedTerrain]:
     """Return the sub-terrains of `config`, with ranges from one demand to another.
 
-    The ranges of a terrain are interpolated and extrapolated together, as with the difficulty. At
-    difficulty 0 and 1 a patch demands at most `demand`, and a little more difficulty would demand
-    more. Overlays and friction keep their ranges.
+    The ranges of a terrain are interpolated and extrapolated together, as with the difficulty, to
+    the hardest values that demand at most `demand`; if there are none, to the closest. Overlays and
+    friction keep their ranges.
 
     Args:
         config: The map. Its sub-terrains with parameters that depend on the difficulty are solved.
@@ -86,27 +86,31 @@ def _solve(
 ) -> SolvedTerrain:
     """Return the sub-terrain with solved ranges."""
     ranges, grid = _ranges(sub_terrain), config.patch_grid(0, 0)
-    known: dict[float, float] = {}
+    known: dict[tuple[float, float], float] = {}
 
-    def demand_at(difficulty: float) -> float:
-        """Return the demand, which rises with the difficulty; -inf and inf outside of the valid."""
-        if difficulty not in known:
+    def demand_at(end: float, difficulty: float) -> float:
+        """Return the demand with the ranges at a difficulty, and all else at an end of the map.
+
+        Values outside of the ranges may be invalid: their demand is -inf below, and inf above.
+        """
+        if (end, difficulty) not in known:
+            values = {name: r.at(difficulty, grid) for name, r in ranges.items()}
             try:
-                values = {name: r.at(difficulty, grid) for name, r in ranges.items()}
-                known[difficulty] = _demand(config, limits, _with(sub_terrain, values))
+                demand = _demand(config, limits, _with(sub_terrain, values), end)
             except ConfigError:
                 if 0 <= difficulty <= 1:
                     raise
-                known[difficulty] = -np.inf if difficulty < 0 else np.inf
-        return known[difficulty]
+                demand = np.copysign(np.inf, difficulty)
+            known[end, difficulty] = demand
+        return known[end, difficulty]
 
-    if not ranges:
-        return SolvedTerrain(sub_terrain=sub_terrain, demand=(demand_at(0.0), demand_at(1.0)))
-    easy, hard = (_largest(demand_at, most) for most in demand)
-    if easy >= hard:
-        return SolvedTerrain(sub_terrain=sub_terrain, demand=(demand_at(0.0), demand_at(1.0)))
+    easy, hard = (_largest(partial(demand_at, end), demand[int(end)]) for end in (0.0, 1.0))
+    if not ranges or easy >= hard:
+        return SolvedTerrain(
+            sub_terrain=sub_terrain, demand=(demand_at(0.0, 0.0), demand_at(1.0, 1.0))
+        )
     solved = {name: (r.at(easy, grid), r.at(hard, grid)) for name, r in ranges.items()}
-    ends = demand_at(easy), demand_at(hard)
+    ends = demand_at(0.0, easy), demand_at(1.0, hard)
     return SolvedTerrain(sub_terrain=_with(sub_terrain, solved), demand=ends)
 
 
@@ -142,11 +146,13 @@ def _with(sub_terrain: SubTerrain, values: Mapping[str, Any]) -> SubTerrain:
     return replace(sub_terrain, parameters={**sub_terrain.parameters, **values})
 
 
-def _demand(config: MapConfig, limits: RobotLimits, sub_terrain: SubTerrain) -> float:
+def _demand(
+    config: MapConfig, limits: RobotLimits, sub_terrain: SubTerrain, difficulty: float
+) -> float:
     """Return the median demand of the patches of a sub-terrain."""
-    patches = [build_patch(config, sub_terrain, 0.5, 0, 0)]
+    patches = [build_patch(config, sub_terrain, difficulty, 0, 0)]
     for col in range(1, _SAMPLES):
-        other = build_patch(config, sub_terrain, 0.5, 0, col)
+        other = build_patch(config, sub_terrain, difficulty, 0, col)
         if _is_same(patches[0], other):
             break
         patches.append(other)
@@ -157,19 +163,28 @@ def _demand(config: MapConfig, limits: RobotLimits, sub_terrain: SubTerrain) -> 
 
 def _is_same(first: Patch, second: Patch) -> bool:
     """Return whether two patches differ only in their places, up to rounding."""
-    if len(first.solids) != len(second.solids) or (first.heights != second.heights).any():
+    if first.heights.tobytes() != second.heights.tobytes():
         return False
-    shift = np.subtract(second.grid.lower, first.grid.lower)
-    corners = [each.solids.bounds()[0][:, :2] for each in (first, second)]
-    return bool(np.allclose(corners[0] + shift, corners[1], atol=1e-4))
+    shift = np.append(np.subtract(second.grid.lower, first.grid.lower), 0.0)
+    points = [
+        np.concatenate([*each.solids.bounds(), each.goals[:, :3]]) for each in (first, second)
+    ]
+    return len(points[0]) == len(points[1]) and np.allclose(points[0] + shift, points[1], atol=1e-4)
 
 
 def _largest(demand_at: Callable[[float], float], most: float) -> float:
-    """Return the largest difficulty that demands at most `most`; 0 if none does, 1 if all do."""
+    """Return the largest difficulty that demands at most `most`, or else the closest.
+
+    If none is easy enough, it is the easiest valid one; if all are, the hardest. It is 0 or 1 if
+    those demand the same.
+    """
     low, high = _EASIEST, _HARDEST
     if demand_at(high) <= most:
-        return 1.0
-    for _ in range(_BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if demand_at(middle) <= most else (low, middle)
-    return low if -np.inf < demand_at(low) <= most else 0.0
+        low = high
+    else:
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            low, high = (middle, high) if demand_at(middle) <= most else (low, middle)
+    if not -np.inf < demand_at(low) <= most:
+        return high if demand_at(high) < demand_at(0.0) else 0.0
+    return low if low < 1 or demand_at(low) > demand_at(1.0) else 1.0

@@ -130,6 +130,9 @@ def test_evaluate_bundled_policy_by_name(here):
         (("walk", "--limits", "--num-envs", "3"), "--num-envs: got a value; expected none with"),
         (("walk", "--limits", "--repetitions", "0"), "--repetitions: got 0; expected 1 to 100"),
         (("gone", "--limits"), "gone"),
+        (("walk", "--repetitions", "3"), "--repetitions: got a value; expected none without"),
+        (("walk", "--limits", "-o", "."), "."),
+        (("walk", "--suite", "basics-1", "-o", "nowhere/card"), "the folder nowhere does not"),
     ],
 )
 def test_evaluate_rejects_invalid_input(here, words, message):

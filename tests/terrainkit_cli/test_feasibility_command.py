@@ -129,6 +129,7 @@ def test_generate_with_a_demand_solves_the_ranges(terrainkit):
         (("--robot", "quadruped", "--demand", "0.2"), "got '0.2'; expected LOW:HIGH, such as"),
         (("--robot", "quadruped", "--demand", "a:b"), "got 'a:b'; expected LOW:HIGH, such as"),
         (("--robot", "quadruped", "--demand", "0.9:0.2"), "demand: got 0.9:0.2; expected LOW"),
+        (("--robot", "quadruped", "--demand", "true:2"), "got 'true:2'; expected LOW:HIGH"),
         (("--robot", "nobody", "--demand", "0.2:0.9"), "nobody"),
     ],
 )

@@ -32,8 +32,8 @@ CONFIDENCE = 0.95
 CRITERION = (
     f"A robot crosses a patch if it comes within {GOAL_RADIUS:g} m of each goal in turn, or of the "
     "middle of a far side of a patch without goals. It must not fall or leave the patch, and may "
-    f"take {TIME_FACTOR:g} times the time of the route at the commanded speed, and {EXTRA_TIME:g} "
-    "s. A level is passed if all robots cross it and every easier level."
+    f"take {TIME_FACTOR:g} times the time of the route at the commanded speed, the time of half a "
+    f"turn, and {EXTRA_TIME:g} s. A level is passed if all robots cross it and every easier level."
 )
 """What counts as a success."""
 

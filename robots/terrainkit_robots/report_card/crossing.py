@@ -28,7 +28,8 @@ START_OFFSET, START_YAW = 0.1, 0.3
 """
 
 TIME_FACTOR, EXTRA_TIME = 1.5, 5.0
-"""Time limit: a multiple of the time for the route at the commanded speed, and a constant [s]."""
+"""Time limit: a multiple of the time for the route at the commanded speed, half a turn at the
+largest commanded yaw rate, and a constant [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,10 +61,12 @@ class Crossing:
                 command to walk ahead.
             MemoryLimitError: if the simulations would not fit in memory.
         """
-        self.speed = SPEED * run.task.commands.lin_vel_x[1]
-        if self.speed <= 0:
-            got = f"commands.lin_vel_x: got {list(run.task.commands.lin_vel_x)}"
-            raise ConfigError(f"{got}; expected a task that commands to walk ahead")
+        commands = run.task.commands
+        self.speed = SPEED * commands.lin_vel_x[1]
+        if self.speed <= 0 or not commands.ang_vel_yaw[0] < 0 < commands.ang_vel_yaw[1]:
+            got = f"got lin_vel_x {list(commands.lin_vel_x)}, ang_vel_yaw "
+            got += f"{list(commands.ang_vel_yaw)}"
+            raise ConfigError(f"commands: {got}; expected a task to walk ahead and turn both ways")
         start = replace(run.task.init_state, position=START_OFFSET, yaw=START_YAW)
         run = replace(run, task=replace(run.task, init_state=start))
         collision = run.task.terrain.collision
@@ -94,19 +97,20 @@ class _Progress:
         self.outcomes, self.seconds = np.full(n, TIMED_OUT, np.int8), np.full(n, np.nan)
         self._env, self._active, self._steps = env, np.ones(n, bool), 0
         # Robots on the same patch take its routes in turn.
-        turn = Counter[tuple[float, float]]()
+        earlier = Counter[tuple[float, float]]()
         routes = []
         for patch in patches:
             every = patch_routes(patch)
-            routes.append(every[turn[patch.grid.lower] % len(every)])
-            turn[patch.grid.lower] += 1
+            routes.append(every[earlier[patch.grid.lower] % len(every)])
+            earlier[patch.grid.lower] += 1
         goals = np.full((n, max(map(len, routes)), 2), np.nan)
         for robot, route in enumerate(routes):
             goals[robot, : len(route)] = route
         self._routes = Routes(goals=goals, index=np.zeros(n, np.int64))
         self._lower = np.array([patch.grid.lower for patch in patches])
         self._upper = np.array([patch.grid.upper for patch in patches])
-        seconds = TIME_FACTOR * self._routes.lengths(env.start_pos) / speed + EXTRA_TIME
+        turn = np.pi / min(-env.cfg.commands.ang_vel_yaw[0], env.cfg.commands.ang_vel_yaw[1])
+        seconds = TIME_FACTOR * self._routes.lengths(env.start_pos) / speed + turn + EXTRA_TIME
         self._max_steps = np.rint(seconds / env.cfg.dt)
 
     def schedule(self) -> Iterator[NDArray[np.float32]]:

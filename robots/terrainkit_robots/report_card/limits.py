@@ -18,7 +18,7 @@ from terrainkit_robots.report_card.crossing import CROSSED, Crossing
 from terrainkit_robots.rl.run import Run
 
 LEVELS = 20
-"""Values of each quantity, from 10 % to 200 % of the limit of the robot."""
+"""Values of each quantity."""
 
 PATCH_SIZE, CELL = (8.0, 4.0), 0.05
 """Size of the patches and distance between two height samples [m]."""
@@ -66,7 +66,8 @@ class LimitTest:
     def value(self, level: int, grid: Grid) -> float:
         """Return the realized quantity at a level, in the unit of the results."""
         realized: Any = self.sub_terrain(level).at(0.0).realized(grid)[self.parameter]
-        value = float(realized)
+        # A pair differs between x and y; robots walk along x.
+        value = float(realized[0] if isinstance(realized, tuple) else realized)
         return math.degrees(value) if self.parameter == "roll" else self.in_unit(value)
 
     def in_unit(self, value: float) -> float:
@@ -75,10 +76,11 @@ class LimitTest:
 
 
 def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
-    """Return the tests for a robot. The first level is easy for it, the last one twice its limit.
+    """Return the tests for a robot.
 
-    Passages and footholds shrink to half of the limit of the robot, and ceilings to its crouched
-    height minus a tenth of the standing height.
+    Steps, gaps and slopes are 0.1 to 2 times its limit; gaps are whole cells. Corridors are 3 times
+    (at most 1.5 m) to half of its width, and stones 8 times to half of its foothold. Ceilings are
+    at 1.2 times its standing height to a tenth of that below its crouched height.
     """
     steps = (0.1 * limits.step_up, 2 * limits.step_up)
     drops = (0.1 * limits.step_down, 2 * limits.step_down)

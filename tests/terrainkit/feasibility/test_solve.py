@@ -6,8 +6,10 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility import RobotLimits, assess_map, solve_ranges
+from terrainkit.feasibility import RobotLimits, assess_map, assess_patch, solve_ranges
 from terrainkit.generation import generate
+from terrainkit.patch import build_patch
+from terrainkit.registry import make_overlay
 
 LIMITS = RobotLimits(
     step_up=0.2,
@@ -65,11 +67,27 @@ def test_ranges_are_extrapolated():
     assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.04, 0.18), abs=0.001)
 
 
-def test_end_of_a_range_is_kept_where_extrapolation_does_not_reach_the_demand():
-    """Steps of 0.04 m at difficulty -1 to 0.08 m at 3."""
-    solved = solve("stairs", step_height=(0.05, 0.06))
-    assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.04, 0.06), abs=0.001)
-    assert solved.demand == pytest.approx((0.2, 0.3), abs=0.01)
+def test_closest_value_is_used_where_extrapolation_does_not_reach_the_demand():
+    """Steps of 0.04 m at difficulty -1 to 0.08 m at 3, and of 0.1 m to 0.3 m."""
+    solved = solve("stairs", step_height=(0.05, 0.06), demand=(0.35, 0.9))
+    assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.07, 0.08), abs=0.001)
+    assert solved.demand == pytest.approx((0.35, 0.4), abs=0.01)
+    solved = solve("stairs", step_height=(0.15, 0.2))
+    assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.1, 0.18), abs=0.001)
+    assert solved.demand == pytest.approx((0.5, 0.9), abs=0.01)
+
+
+def test_overlays_count_at_the_ends_of_the_map():
+    """The demands are those of patches without noise at level 0, and with noise at level 1."""
+    noise = make_overlay("noise", {"amplitude": (0.0, 0.05)})
+    slope = SubTerrain(terrain="slope", overlays=(noise,))
+    config = MapConfig(terrains=(slope,), rows=2, cols=3, border=0, patch_size=(6.0, 4.0))
+    (solved,) = solve_ranges(config, LIMITS, (0.2, 0.6))
+    for end, demand in enumerate(solved.demand):
+        patches = [build_patch(config, solved.sub_terrain, float(end), 0, col) for col in range(3)]
+        demands = [assess_patch(p, LIMITS, config.wall_threshold).demand for p in patches]
+        assert demand == sorted(demands)[1]
+    assert demands[0] != demands[1]
 
 
 def test_terrain_that_robots_walk_around_is_unchanged():

@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -111,10 +112,9 @@ def test_bundled_policy_crosses_slopes_and_stays_in_deep_pits(quadruped_run, slo
     assert measure(quadruped_run, slopes_and_pits, "test-1", 2, EvaluationConfig()) == card
 
 
-def test_task_without_forward_commands_is_rejected(quadruped_run, slopes_and_pits):
-    from dataclasses import replace
-
-    commands = replace(quadruped_run.task.commands, lin_vel_x=(-1.0, 0.0))
+@pytest.mark.parametrize("part", [{"lin_vel_x": (-1.0, 0.0)}, {"ang_vel_yaw": (0.0, 0.0)}])
+def test_task_that_does_not_walk_ahead_or_turn_is_rejected(quadruped_run, slopes_and_pits, part):
+    commands = replace(quadruped_run.task.commands, **part)
     run = replace(quadruped_run, task=replace(quadruped_run.task, commands=commands))
-    with pytest.raises(ConfigError, match="expected a task that commands to walk ahead"):
+    with pytest.raises(ConfigError, match="expected a task to walk ahead and turn both ways"):
         measure(run, slopes_and_pits, "test-1", 1, EvaluationConfig())

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -25,57 +26,61 @@ LIMITS = RobotLimits(
 
 @pytest.fixture
 def measure(monkeypatch):
-    """Return a function that measures a policy that crosses the levels up to a highest one."""
+    """Return a function that measures a policy that crosses the levels up to a highest one.
 
-    def run(highest):
+    One of two robots crosses the level after it.
+    """
+
+    def run(highest, limits=LIMITS):
         class Known:
             def __init__(self, _, terrain_map, num_envs, __):
                 assert terrain_map.difficulty.shape == (1, len(highest))
                 self.num_envs, parameters = num_envs, terrain_map.parameters[0].tolist()
-                self.values = [
-                    each.requested[test.parameter]
-                    for each, test in zip(parameters, limit_tests(LIMITS), strict=True)
+                self.levels = [
+                    round((each.requested[t.parameter] - t.easy) / (t.hard - t.easy) * (LEVELS - 1))
+                    for each, t in zip(parameters, limit_tests(limits), strict=True)
                 ]
 
             def attempt(self, levels, columns):
                 assert len(levels) == len(columns) == self.num_envs
-                ok = np.zeros(len(columns), bool)
-                for k, column in enumerate(columns):
-                    test = limit_tests(LIMITS)[column]
-                    step = (test.hard - test.easy) / (LEVELS - 1)
-                    level = (self.values[column] - test.easy) / step
-                    ok[k] = level < highest[column] + 0.5
+                above = np.array(self.levels)[columns] - np.array(highest)[columns]
+                ok = above <= np.arange(len(columns)) % 2
                 outcomes = np.where(ok, CROSSED, FELL).astype(np.int8)
                 return Attempts(outcomes=outcomes, seconds=np.zeros(len(levels)))
 
         monkeypatch.setattr(limits_module, "Crossing", Known)
-        return measure_limits(None, LIMITS, 2, EvaluationConfig())
+        return measure_limits(None, limits, 2, EvaluationConfig())
 
     return run
 
 
-@pytest.mark.parametrize("highest", [-1, 0, 1, 9, 10, 18, 19])
-def test_bisection_finds_the_hardest_level(measure, highest):
-    step_up, *_ = measure([highest] * 9)
+def test_bisection_finds_the_hardest_level_of_each_test(measure):
     values = 0.02 + 0.38 * np.arange(LEVELS) / (LEVELS - 1)  # 0.1 to 2 times 0.2 m
-    if highest < 0:
-        assert step_up.passed is None
-    else:
-        assert step_up.passed == pytest.approx(values[highest], abs=1e-6)
-    if highest < LEVELS - 1:
-        assert step_up.failed == pytest.approx(values[highest + 1], abs=1e-6)
-        assert step_up.crossed == 0
-    else:
-        assert step_up.failed is None
+    for highest in ([-1, 0, 1, 2, 9, 10, 17, 18, 19], [19, 18, 17, 10, 9, 2, 1, 0, -1]):
+        results = measure(highest)
+        for result, level in zip(results, highest, strict=True):
+            assert (result.passed is None) == (level < 0)
+            assert (result.failed is None) == (level == LEVELS - 1)
+            assert result.crossed == (None if result.failed is None else 1)
+        step_up, _, stairs = results[:3]
+        assert step_up.failed == (pytest.approx(values[0]) if highest[0] < 0 else None)
+        assert stairs.passed == pytest.approx(values[highest[2]], abs=1e-6)
+        assert stairs.failed == pytest.approx(values[highest[2] + 1], abs=1e-6)
+
+
+def test_limits_of_a_robot_with_long_legs(measure):
+    """The gap of 1.3 m ends at the sides of the patch, but not along x."""
+    results = measure([19] * 9, dataclasses.replace(LIMITS, gap=0.65))
+    assert results[3].passed == pytest.approx(1.3)
 
 
 def test_limits_are_printed_with_units(measure):
     results = measure([9, 9, 9, 9, 9, 9, -1, 19, 9])
     rows = {row[0]: row[1:] for row in limit_rows(results, 2)}
     assert rows["test"] == ("2 of 2 cross", "next value", "limit of the robot")
-    assert rows["step up"] == ("20.0 cm", "0 of 2 at 22.0 cm", "20.0 cm")
+    assert rows["step up"] == ("20.0 cm", "1 of 2 at 22.0 cm", "20.0 cm")
     assert rows["slope up and down"][2] == "30 degrees"
-    assert rows["clearance"] == ("none", "0 of 2 at 72.0 cm", "35.0 cm")
+    assert rows["clearance"] == ("none", "1 of 2 at 72.0 cm", "35.0 cm")
     assert rows["stone"][1] == "-"
 
 

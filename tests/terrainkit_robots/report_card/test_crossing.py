@@ -1,0 +1,79 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch", reason="the extra `train` is not installed")
+
+from terrainkit import MapConfig, SubTerrain, make_patch
+from terrainkit_robots.report_card.crossing import OUTCOMES, _Progress
+from terrainkit_robots.rl.config import Commands
+
+PATCH = make_patch(
+    MapConfig(
+        rows=1, cols=1, patch_size=(5.0, 5.0), border=0.0, terrains=(SubTerrain(terrain="flat"),)
+    ),
+    0,
+    0,
+)
+"""The routes lead from the center to x = 5, y = 5, x = 0 and y = 0."""
+
+
+@pytest.fixture
+def make_progress():
+    """Return a function that makes the progress of robots at the center, and their environment."""
+
+    def make(number):
+        state = SimpleNamespace(
+            base_pos=np.full((number, 3), 2.5), base_quat=np.tile([1.0, 0, 0, 0], (number, 1))
+        )
+        cfg = SimpleNamespace(commands=Commands(), dt=0.5)
+        env = SimpleNamespace(state=state, start_pos=np.full((number, 2), 2.5), cfg=cfg)
+        return _Progress(env, [PATCH] * number, 0.75), env
+
+    return make
+
+
+def outcomes(progress):
+    return [OUTCOMES[each] for each in progress.outcomes]
+
+
+def test_robots_take_the_routes_in_turn(make_progress):
+    progress, env = make_progress(5)
+    env.state.base_pos[:, :2] = [[4.7, 2.5], [2.5, 4.7], [0.3, 2.5], [2.5, 0.3], [2.5, 4.7]]
+    progress.update(np.zeros(5, bool))
+    crossed = [each == "crossed" for each in outcomes(progress)]
+    assert sum(crossed) == 4
+    assert not crossed[4]  # its route is that of the first robot
+    assert progress.seconds[crossed].tolist() == [0.5] * 4
+    assert np.isnan(progress.seconds[4])
+
+
+def test_outcomes(make_progress):
+    """Robots that fall, leave the patch, and stop; the last one crosses later."""
+    progress, env = make_progress(4)
+    next(progress.schedule())
+    fell = np.array([True, False, False, False])
+    env.state.base_pos[1, :2] = 2.5, -0.01
+    progress.update(fell)
+    assert outcomes(progress)[:2] == ["fell", "left"]
+    goal = progress._routes.goals[3, 0]
+    env.state.base_pos[:, :2] = goal  # neither the fallen robot nor the one that left crosses
+    env.state.base_pos[2, :2] = 2.5
+    progress.update(np.zeros(4, bool))
+    assert outcomes(progress) == ["fell", "left", "timed out", "crossed"]
+    assert progress.seconds[3] == 1.0
+    # 1.5 * 2.5 m / 0.75 m/s, pi rad / 1 rad/s and 5 s in steps of 0.5 s.
+    steps = 2
+    for _ in progress.schedule():
+        progress.update(np.zeros(4, bool))
+        steps += 1
+    assert steps == round((5.0 + np.pi + 5.0) / 0.5)
+    assert outcomes(progress) == ["fell", "left", "timed out", "crossed"]
+
+
+def test_a_fall_at_the_goal_is_a_fall(make_progress):
+    progress, env = make_progress(1)
+    env.state.base_pos[:, :2] = progress._routes.goals[0, 0]
+    progress.update(np.ones(1, bool))
+    assert outcomes(progress) == ["fell"]
