@@ -79,16 +79,23 @@ class TestStateAgainstMujoco:
 
 
 class TestByHand:
-    def test_mean_vel_is_averaged_over_the_gait(self, quadruped, nominal_task):
-        # 2 s / 4 at 50 Hz: each step moves the mean by 1 / 25 of its distance to the velocity.
-        env = LeggedEnv(nominal_task(2, commands=Commands(gait_period=2.0)), quadruped, Plane())
+    @pytest.mark.parametrize(("name", "weight"), [("biped", 1 / 100), ("quadruped", 1.0)])
+    def test_mean_vel_is_averaged_over_the_gait_on_two_legs(
+        self, request, nominal_task, name, weight
+    ):
+        # 2 s at 50 Hz: each step moves the mean by 1 / 100 of its distance to the velocity.
+        task, robot = (
+            nominal_task(2, commands=Commands(gait_period=2.0)),
+            request.getfixturevalue(name),
+        )
+        env = LeggedEnv(task, robot, Plane())
         expected = env.state.mean_vel
         assert not expected.any()
         for _ in range(5):
-            env.step(torch.ones(2, 12))
+            env.step(torch.ones(2, env.num_actions))
             now = env.state
             vel = np.stack([*now.base_lin_vel[:, :2].T, now.base_ang_vel[:, 2]], axis=1)
-            expected = expected + (vel - expected) / 25
+            expected = expected + (vel - expected) * weight
             np.testing.assert_allclose(now.mean_vel, expected, rtol=1e-5)
         assert np.abs(expected).min() > 0
         env.reset()
