@@ -76,6 +76,16 @@ class Patch:
         """Spawn origin (x, y, z) [m], shape (3,)."""
         return self.spawns[0, :3]
 
+    @property
+    def far_sides(self) -> NDArray[np.bool_]:
+        """Which sides are farthest from the spawn origin, up to 1.5 cells.
+
+        Shape (2, 2): the lower sides along x and y, then the upper ones.
+        """
+        origin = self.origin[:2].astype(np.float64)
+        away = np.stack([origin - self.grid.lower, self.grid.upper - origin])
+        return np.asarray(away >= away.max() - 1.5 * self.grid.cell)
+
 
 def make_patch(config: MapConfig, row: int, col: int) -> Patch:
     """Build patch (row, col) of the map of `config` without generating the rest.

@@ -147,10 +147,7 @@ def _legs(patch: Patch, columns: Columns) -> list[Leg]:
 
 def _far_edge(patch: Patch, columns: Columns) -> IntArray:
     """Return the nodes on the sides of the patch that are farthest from the spawn origin."""
-    lower, upper = np.array(patch.grid.lower), np.array(patch.grid.upper)
-    origin = patch.origin[:2].astype(np.float64)
-    away = np.stack([origin - lower, upper - origin])
-    is_far = away >= away.max() - patch.grid.cell * 1.5
+    is_far = patch.far_sides
     node = np.arange(columns.floor.size).reshape(columns.floor.shape)
     sides = [node[0], node[-1], node[:, 0], node[:, -1]]
     wanted = [is_far[0, 0], is_far[1, 0], is_far[0, 1], is_far[1, 1]]

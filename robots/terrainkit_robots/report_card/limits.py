@@ -12,7 +12,7 @@ from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import TerrainkitWarning
 from terrainkit.feasibility import RobotLimits
 from terrainkit.grid import Grid
-from terrainkit.parameter import at_difficulty
+from terrainkit.parameter import Range, at_difficulty
 from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
 from terrainkit_robots.rl.run import Run
@@ -27,7 +27,7 @@ SLOPE_THRESHOLD = 1.25
 """Steepest slope that is not a wall: twice the default limit of 30 degrees is 49 degrees."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class LimitTest:
     """A quantity, and the terrain on which it is changed."""
 
@@ -43,18 +43,15 @@ class LimitTest:
     parameter: str
     """Parameter that is the quantity."""
 
-    easy: float
-    """Value of the parameter at the first level."""
-
-    hard: float
-    """Value of the parameter at the last level."""
+    values: Range
+    """Values of the parameter at the first and the last level."""
 
     fixed: Mapping[str, float]
     """Other parameters."""
 
     def sub_terrain(self, level: int) -> SubTerrain:
         """Return the terrain at a level, 0 to `LEVELS` - 1."""
-        value = at_difficulty((self.easy, self.hard), level / (LEVELS - 1))
+        value = at_difficulty(self.values, level / (LEVELS - 1))
         parameters = {**self.fixed, self.parameter: value}
         return SubTerrain(terrain=self.terrain, name=self.name, parameters=parameters)
 
@@ -96,34 +93,15 @@ def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
     level = {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0}
     one_tread = {"platform": 2.0, "step_width": 1.0}
     return (
-        _test("step up", "step_up", "pit", "depth", steps, {"side": 2.0}),
-        _test("step down", "step_down", "pyramid_stairs", "step_height", drops, one_tread),
-        _test("stairs", "step_up", "stairs", "step_height", steps, {"landing": 1.5}),
-        _test("gap", "gap", "gap", "width", gaps, {"platform": 2.0}),
-        _test("slope up and down", "slope", "slope", "grade", slopes, {"landing": 1.5}),
-        _test("slope across", "slope", "side_ramps", "roll", rolls, ramps),
-        _test("clearance", "crouched_height", "crawl", "clearance", ceilings, bars),
-        _test("stone", "foothold", "stones_everywhere", "stone", stones, level),
-        _test("corridor", "body_width", "maze", "corridor", corridors, {"clearing": 1.5}),
-    )
-
-
-def _test(
-    name: str,
-    limit: str,
-    terrain: str,
-    parameter: str,
-    values: tuple[float, float],
-    fixed: Mapping[str, float],
-) -> LimitTest:
-    return LimitTest(
-        name=name,
-        limit=limit,
-        terrain=terrain,
-        parameter=parameter,
-        easy=values[0],
-        hard=values[1],
-        fixed=fixed,
+        LimitTest("step up", "step_up", "pit", "depth", steps, {"side": 2.0}),
+        LimitTest("step down", "step_down", "pyramid_stairs", "step_height", drops, one_tread),
+        LimitTest("stairs", "step_up", "stairs", "step_height", steps, {"landing": 1.5}),
+        LimitTest("gap", "gap", "gap", "width", gaps, {"platform": 2.0}),
+        LimitTest("slope up and down", "slope", "slope", "grade", slopes, {"landing": 1.5}),
+        LimitTest("slope across", "slope", "side_ramps", "roll", rolls, ramps),
+        LimitTest("clearance", "crouched_height", "crawl", "clearance", ceilings, bars),
+        LimitTest("stone", "foothold", "stones_everywhere", "stone", stones, level),
+        LimitTest("corridor", "body_width", "maze", "corridor", corridors, {"clearing": 1.5}),
     )
 
 

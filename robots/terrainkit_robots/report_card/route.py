@@ -22,17 +22,18 @@ HEADING_STIFFNESS = 1.0
 def patch_routes(patch: Patch) -> list[NDArray[np.float64]]:
     """Return the routes across a patch: goals in their order, x and y [m], each of shape (k, 2).
 
-    Without goals, a route leads to the middle of the side that is farthest from the spawn origin;
-    there are several routes if several sides are. Feasibility assesses the same paths.
+    Without goals, a route leads straight to the side that is farthest from the spawn origin; there
+    are several routes if several sides are. Feasibility assesses paths to the same sides.
     """
     if len(patch.goals):
         return [patch.goals[:, :2].astype(np.float64)]
-    origin = patch.origin[:2].astype(np.float64)
-    lower, upper = np.array(patch.grid.lower), np.array(patch.grid.upper)
-    away = np.stack([upper - origin, origin - lower])
-    sides = np.argwhere(away >= away.max() - 1.5 * patch.grid.cell)
-    axes, signs = np.eye(2), (1, -1)
-    return [(origin + signs[i] * away[i, axis] * axes[axis])[None] for i, axis in sides]
+    corners, routes = (patch.grid.lower, patch.grid.upper), []
+    for side, axis in ((1, 0), (1, 1), (0, 0), (0, 1)):
+        if patch.far_sides[side, axis]:
+            goal = patch.origin[:2].astype(np.float64)
+            goal[axis] = corners[side][axis]
+            routes.append(goal[None])
+    return routes
 
 
 @dataclass(eq=False)

@@ -10,17 +10,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.feasibility import RobotLimits, assess_map, assess_patch
 from terrainkit.registry import terrain_names
 from terrainkit.solids import make_boxes
-
-LIMITS = RobotLimits(
-    step_up=0.2,
-    step_down=0.25,
-    gap=0.4,
-    slope=0.5,
-    foothold=0.1,
-    body_width=0.4,
-    standing_height=0.6,
-    crouched_height=0.3,
-)
+from tests.limits import LIMITS
 
 CASES = {
     # A step of h: h / step_up, or h / step_down where the robot starts at the top.

@@ -6,21 +6,11 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility import RobotLimits, assess_map, assess_patch, solve_ranges
+from terrainkit.feasibility import assess_map, assess_patch, solve_ranges
 from terrainkit.generation import generate
 from terrainkit.patch import build_patch
 from terrainkit.registry import make_overlay
-
-LIMITS = RobotLimits(
-    step_up=0.2,
-    step_down=0.25,
-    gap=0.4,
-    slope=0.5,
-    foothold=0.1,
-    body_width=0.4,
-    standing_height=0.6,
-    crouched_height=0.3,
-)
+from tests.limits import LIMITS
 
 
 def solve(terrain, demand=(0.2, 0.9), size=(6.0, 6.0), **parameters):

@@ -36,10 +36,10 @@ def measure(monkeypatch):
             def __init__(self, _, terrain_map, num_envs, __):
                 assert terrain_map.difficulty.shape == (1, len(highest))
                 self.num_envs, parameters = num_envs, terrain_map.parameters[0].tolist()
-                self.levels = [
-                    round((each.requested[t.parameter] - t.easy) / (t.hard - t.easy) * (LEVELS - 1))
-                    for each, t in zip(parameters, limit_tests(limits), strict=True)
-                ]
+                self.levels = []
+                for each, test in zip(parameters, limit_tests(limits), strict=True):
+                    (easy, hard), value = test.values, each.requested[test.parameter]
+                    self.levels.append(round((value - easy) / (hard - easy) * (LEVELS - 1)))
 
             def attempt(self, levels, columns):
                 assert len(levels) == len(columns) == self.num_envs
