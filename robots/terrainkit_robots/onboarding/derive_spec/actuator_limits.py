@@ -119,8 +119,10 @@ def action_scale_column(
 ) -> Column:
     """Return the change of each joint target for an action of 1 [rad] or [m].
 
-    It is the same for all joints, but less where it would exceed a share of the effort or of the
-    joint range. The target of a wheel, which has no stiffness, is a speed [rad/s].
+    It is the same for all joints of the legs, but less where it would exceed a share of the effort
+    or of the joint range. The target of a wheel, which has no stiffness, is a speed [rad/s]. On a
+    robot with legs, it is 0 for the other joints, which hold the default pose: g1 learned to
+    balance only without noise on its arms and waist (docs/training.md).
 
     Args:
         robot: The robot.
@@ -129,9 +131,12 @@ def action_scale_column(
         velocity: Velocity limits.
     """
     column = Column()
+    in_legs = {joint.name for leg in robot.legs for joint in leg.joints}
     for joint in robot.actuated:
         stiffness = gains[joint.name].stiffness
-        if stiffness > 0:
+        if stiffness > 0 and in_legs and joint.name not in in_legs:
+            value, reason = 0.0, "not a joint of a leg: it holds the default pose"
+        elif stiffness > 0:
             largest = _by_kind(_MAX_ACTION_SCALE, joint)
             scales = {
                 largest: f"{largest:g} {joint.unit}, the largest suggested scale",

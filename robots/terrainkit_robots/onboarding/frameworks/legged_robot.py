@@ -101,9 +101,8 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
     if not any(keys.clashes for keys in shared.values()):
         result = Keys(keys=tuple(key for keys in shared.values() for key in keys.keys))
         values = {key: pair for pair, keys in shared.items() for key in keys.keys}
-    scale, difference = robot.shared_value(
-        robot.action_scales(robot.position_joints).values(), "median", depth=2
-    )
+    scales = robot.action_scales(robot.position_joints).values()
+    scale, difference = robot.shared_value([each for each in scales if each], "median", depth=2)
     velocity_note = ""
     if robot.velocity_joints:
         joints = listing(robot.velocity_joints)

@@ -104,3 +104,27 @@ def test_derive_action_scale_of_short_range(bundled, gains, tmp_path):
     column = action_scale_column(facts, gain, effort, velocity)
     assert column.values["FL_hip_joint"] == pytest.approx(0.05)
     assert column.origins["FL_hip_joint"].reason == "0.25 of the joint range"
+
+
+def test_joints_off_the_legs_hold_the_default_pose(bundled, gains, tmp_path):
+    arm = """<link name="arm"><inertial><mass value="0.5"/>
+      <inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="arm_joint" type="revolute"><parent link="base"/><child link="arm"/>
+      <origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>
+      <limit lower="-1" upper="1" effort="20" velocity="20"/></joint></robot>"""
+    facts = bundled("quadruped.urdf", ("</robot>", arm), tmp_path=tmp_path)
+    gain, twins = gains(facts, stiffness=40.0), facts.mirror_map
+    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
+    column = action_scale_column(facts, gain, effort, velocity)
+    assert column.values.pop("arm_joint") == 0.0
+    assert set(column.values.values()) == {0.25}
+    assert "holds the default pose" in column.origins["arm_joint"].reason
+
+
+def test_only_joint_of_an_arm_moves(gains, tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM)
+    facts = Facts(load_robot(path))
+    gain = gains(facts, stiffness=40.0)
+    effort, velocity = effort_column(facts, gain, {}), velocity_column(facts, {})
+    assert action_scale_column(facts, gain, effort, velocity).values == {"shoulder": 0.25}
