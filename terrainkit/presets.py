@@ -63,6 +63,7 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
 _EQUAL_PARTS = {
     "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),
     "stairs": ("stairs", "pyramid_stairs", "pyramid_stairs_inverted"),
+    "hard": ("gap", "stepping_stones", "pit", "boxes", "rails"),
     "parkour": (
         "boxes",
         "hurdles",
