@@ -145,7 +145,9 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     return Run(
         folder=folder,
         info=info,
-        task=Task.load(folder / TASK_FILE, found.task),
+        # A key that an older version did not write has its default, not the value of the task that
+        # is registered today.
+        task=Task.load(folder / TASK_FILE, found.task.with_defaults()),
         robot=robot,
         terrain=terrain,
         checkpoint=selected if checkpoint is None else saved[checkpoint],
