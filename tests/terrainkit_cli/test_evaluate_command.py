@@ -11,7 +11,7 @@ from terrainkit_cli import training_extra
 from terrainkit_cli.evaluate_command import result_rows, summary_line
 from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
 from terrainkit_robots.report_card import limits
-from terrainkit_robots.report_card.limits import LimitResult
+from terrainkit_robots.report_card.limits import LimitResult, PolicyLimits
 from terrainkit_robots.rl import run as run_module
 
 QUICK = ("--seconds", "0.04", "--num-envs", "1")
@@ -220,7 +220,8 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
         result = LimitResult(
             test="stairs", unit="m", passed=0.1, failed=0.12, crossed=7, robot_limit=0.1792
         )
-        return [result]
+        about = {"robot": "hare", "checkpoint": "hare.onnx", "repetitions": 10, "seed": 1}
+        return PolicyLimits(**about, limits=(result,))
 
     monkeypatch.setattr(limits, "measure_limits", measure)
     code, out, err = here("walk", "--limits", "-o", "limits.json")

@@ -19,7 +19,7 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.evaluate import EvaluationConfig, FloatArray, build_eval_env
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load import load_actor, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
@@ -34,6 +34,12 @@ FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
 
 TOLERANCE = 1e-5
 """Largest difference between exported and live actions; relative for actions beyond 1."""
+
+_TASK_SECTIONS = (
+    *("observations", "init_state", "control", "asset", "commands"),
+    *("termination", "normalization", "sim"),
+)
+"""Sections of the task that determine the environment, in addition to `terrain`."""
 
 _FORMULAS = {
     "observation": "obs = clip((raw - offset) * scale, -clip, clip), part by part; a part with a "
@@ -77,12 +83,14 @@ def export_policy(
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
     env = build_eval_env(run, Plane(), 8, EvaluationConfig())
-    actor = load_policy(run, env)
+    actor = load_actor(run, env)
     other_files = copy_model(run.robot.mjcf)
     if example:
         other_files[EXAMPLE.name] = EXAMPLE.read_bytes()
-    training = {"iteration": read_checkpoint(last_checkpoint(run))["iteration"]}
+    training: dict[str, Any] = {"iteration": read_checkpoint(last_checkpoint(run))["iteration"]}
     training["domain_rand"] = asdict(run.task.domain_rand)
+    sections = {name: asdict(getattr(run.task, name)) for name in _TASK_SECTIONS}
+    training["task"] = sections | {"terrain": asdict(env.cfg.terrain)}  # with the height scan
     text = json.dumps(describe_policy(env) | training, indent=2) + "\n"
     normalization = run.task.normalization
     limits = normalization.clip_observations, normalization.clip_actions
