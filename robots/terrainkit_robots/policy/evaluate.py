@@ -169,8 +169,8 @@ def make_eval_env(
     robots on a patch of a map.
     """
     task = spec.task
-    is_default = config.terrain is None and isinstance(spec, Run) and not is_flat(spec)
-    if is_default and not is_same_terrain(spec, spec.terrain):
+    is_run_terrain = config.terrain is None and not is_flat(spec)
+    if is_run_terrain and isinstance(spec, Run) and not is_same_terrain(spec, spec.terrain):
         changed = f"{spec.terrain} changed after {spec.folder} was trained"
         raise ConfigError(f"terrain: {changed}; expected --terrain")
     collision = task.terrain.collision

@@ -15,7 +15,6 @@ from terrainkit_robots.rl.run import PolicySpec, Run, changed_robot_files, last_
 from terrainkit_robots.rl.runner import OBS_GROUPS, runner_config
 from terrainkit_robots.spec.robot import SPEC_FILE
 
-
 Policy = Callable[[TensorDict], torch.Tensor]
 
 

@@ -130,7 +130,8 @@ def _replace_joints(robot: Robot, joints: dict[str, list[Any]], control_type: st
 def _differences(path: str, got: Any, built: Any) -> Iterator[str]:
     """Yield messages about values of the JSON that the environment does not have."""
     if isinstance(got, dict) and isinstance(built, dict):
-        for key in built.keys() & got.keys() - {"frictionloss", "passive_damping"}:  # the robot's
+        of_the_robot = {"frictionloss", "passive_damping"}
+        for key in sorted(built.keys() & got.keys() - of_the_robot):
             yield from _differences(f"{path}.{key}", got[key], built[key])
         return
     if path == "observation.parts" and isinstance(got, list):

@@ -172,7 +172,8 @@ class PolicyLimits:
     def rows(self) -> list[tuple[str, ...]]:
         """Return the limits as rows of text with a header."""
         total = self.repetitions
-        rows = [("test", f"{total} of {total} cross", "next value", "limit of the robot")]
+        rows: list[tuple[str, ...]] = []
+        rows.append(("test", f"{total} of {total} cross", "next value", "limit of the robot"))
         for each in self.limits:
             following = "-"
             if each.failed is not None:
