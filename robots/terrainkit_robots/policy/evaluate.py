@@ -15,6 +15,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import PositiveInt
 from terrainkit_robots.policy import gait
+from terrainkit_robots.policy.gait import BoolArray
 from terrainkit_robots.policy.load import Policy, load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -23,9 +24,8 @@ from terrainkit_robots.rl.run import PolicySpec, Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.rl.terrain import Terrain, load_terrain
+from terrainkit_robots.transforms import FloatArray
 
-FloatArray = NDArray[np.float32]
-BoolArray = NDArray[np.bool_]
 Progress = Callable[[float], object]
 """Called after each step with the completed fraction of the time, 0 to 1."""
 

@@ -3,7 +3,7 @@
 import io
 import json
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
-from terrainkit_robots.policy.evaluate import EvaluationConfig, FloatArray, build_eval_env
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.load import load_actor, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
@@ -26,6 +26,7 @@ from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.state import CONTACT_FORCE
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.transforms import FloatArray
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
 
@@ -34,12 +35,6 @@ FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
 
 TOLERANCE = 1e-5
 """Largest difference between exported and live actions; relative for actions beyond 1."""
-
-_TASK_SECTIONS = (
-    *("observations", "init_state", "control", "asset", "commands"),
-    *("termination", "normalization", "sim"),
-)
-"""Sections of the task that determine the environment, in addition to `terrain`."""
 
 _FORMULAS = {
     "observation": "obs = clip((raw - offset) * scale, -clip, clip), part by part; a part with a "
@@ -87,10 +82,10 @@ def export_policy(
     other_files = copy_model(run.robot.mjcf)
     if example:
         other_files[EXAMPLE.name] = EXAMPLE.read_bytes()
-    training: dict[str, Any] = {"iteration": read_checkpoint(last_checkpoint(run))["iteration"]}
-    training["domain_rand"] = asdict(run.task.domain_rand)
-    sections = {name: asdict(getattr(run.task, name)) for name in _TASK_SECTIONS}
-    training["task"] = sections | {"terrain": asdict(env.cfg.terrain)}  # with the height scan
+    training = {"iteration": read_checkpoint(last_checkpoint(run))["iteration"]}
+    scan = env.cfg.terrain.measure_heights  # also if the terrain of the training decided
+    terrain = replace(run.task.terrain, measure_heights=scan)
+    training["task"] = asdict(replace(run.task, terrain=terrain))
     text = json.dumps(describe_policy(env) | training, indent=2) + "\n"
     normalization = run.task.normalization
     limits = normalization.clip_observations, normalization.clip_actions

@@ -13,12 +13,13 @@ import torch
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.files import open_regular
-from terrainkit_robots.policy.evaluate import EvaluationConfig, FloatArray, build_eval_env
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.export import JSON_FILE, METADATA_KEY, describe_policy
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.transforms import FloatArray
 
 MAX_FILE_SIZE = 1 << 28
 """Largest ONNX or JSON file that is read [bytes]."""
@@ -32,6 +33,10 @@ _TABLES = {
 
 _COMPARED = "format_version timing observation action control_type joints feet gait height_scan"
 """Keys that state what the policy receives and what its actions do."""
+
+
+_OF_THE_ROBOT = ("joints.frictionloss", "joints.passive_damping")
+"""Keys that may differ between the robot and that of the training."""
 
 
 class _Description(msgspec.Struct):
@@ -97,8 +102,11 @@ def open_onnx(path: Path, robot: str | Path) -> PolicySpec:
         env = build_eval_env(spec, Plane(), 1, EvaluationConfig())
         built = describe_policy(env)
         for key in _COMPARED.split():
-            for message in _differences(key, document.get(key, built[key]), built[key]):
-                raise ConfigError(message)
+            expected = dict(_leaves(built[key], key))
+            for at, got in _leaves(document.get(key, {}), key):
+                if not at.startswith(_OF_THE_ROBOT) and not _is_close(got, expected.get(at, ...)):
+                    other = f"expected {expected.get(at, 'other keys')}, as in task and joints"
+                    raise ConfigError(f"{at}: got {str(got)[:80]}; {other}")
     except (msgspec.DecodeError, RecursionError, ConfigError) as error:
         raise ConfigError(f"{source}: {_one_line(error)}") from error
     sizes = built["observation"]["size"], env.num_actions
@@ -127,30 +135,18 @@ def _replace_joints(robot: Robot, joints: dict[str, list[Any]], control_type: st
     return Robot.from_spec(spec, robot.folder)
 
 
-def _differences(path: str, got: Any, built: Any) -> Iterator[str]:
-    """Yield messages about values of the JSON that the environment does not have."""
-    if isinstance(got, dict) and isinstance(built, dict):
-        of_the_robot = {"frictionloss", "passive_damping"}
-        for key in sorted(built.keys() & got.keys() - of_the_robot):
-            yield from _differences(f"{path}.{key}", got[key], built[key])
+def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """Yield the path and the value of each number, text and null in a value of JSON."""
+    if not isinstance(value, dict | list):
+        yield path, value
         return
-    if path == "observation.parts" and isinstance(got, list):
-        names = [each.get("name") if isinstance(each, dict) else each for each in got]
-        known = [each["name"] for each in built]
-        if names != known:
-            unknown = [str(name) for name in names if name not in known]
-            yield f"{path}: got {listing(unknown or map(str, names))}; expected {listing(known)}"
-    if isinstance(got, list) and isinstance(built, list) and len(got) == len(built):
-        for k, pair in enumerate(zip(got, built, strict=True)):
-            yield from _differences(f"{path}[{k}]", *pair)
-        return
-    numbers = (int, float)
-    if isinstance(got, numbers) and isinstance(built, numbers):
-        is_same = isclose(got, built, rel_tol=1e-5, abs_tol=1e-6)
-    else:
-        is_same = got == built
-    if not is_same:
-        yield f"{path}: got {str(got)[:80]}; expected {str(built)[:80]}, as in task and joints"
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        yield from _leaves(item, f"{path}.{key}")
+
+
+def _is_close(got: Any, built: Any) -> bool:
+    numbers = isinstance(got, int | float) and isinstance(built, int | float)
+    return isclose(got, built, rel_tol=1e-5, abs_tol=1e-6) if numbers else bool(got == built)
 
 
 def _read(path: Path) -> bytes:

@@ -13,7 +13,6 @@ from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
     EvaluationResult,
     EvaluationRollout,
-    FloatArray,
     Progress,
     command_schedule,
     is_flat,
@@ -26,6 +25,7 @@ from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec
+from terrainkit_robots.transforms import FloatArray
 
 DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
 """Defaults: duration [s], robots that the video of a map follows, robots on a plane, frame rate."""
