@@ -193,9 +193,9 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "formulas": _FORMULAS,
         "timing": {"physics_dt": dt, "decimation": decimation, "policy_dt": task.dt},
         "observation": {
+            "parts": _observation_parts(env, units),
             "size": env.get_observations()["policy"].shape[1],
             "clip": task.normalization.clip_observations,
-            "parts": _observation_parts(env, units),
             "history_length": task.observations.history_length,
         },
         "action": {"size": env.num_actions, "clip": task.normalization.clip_actions},

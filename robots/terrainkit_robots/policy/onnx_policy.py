@@ -105,7 +105,9 @@ def open_onnx(path: Path, robot: str | Path) -> PolicySpec:
             expected = dict(_leaves(built[key], key))
             for at, got in _leaves(document.get(key, {}), key):
                 if not at.startswith(_OF_THE_ROBOT) and not _is_close(got, expected.get(at, ...)):
-                    other = f"expected {expected.get(at, 'other keys')}, as in task and joints"
+                    other = "the environment of task and joints has no such value"
+                    if at in expected:
+                        other = f"expected {expected[at]}, as in task and joints"
                     raise ConfigError(f"{at}: got {str(got)[:80]}; {other}")
     except (msgspec.DecodeError, RecursionError, ConfigError) as error:
         raise ConfigError(f"{source}: {_one_line(error)}") from error

@@ -129,7 +129,7 @@ def test_json_replaces_gains_and_joint_order(mine):
             {"observation__parts": [{"name": "camera"}]},
             "parts.0.name: got camera; expected commands",
         ),
-        ({"observation__parts": 3}, "observation.parts: got 3; expected other keys"),
+        ({"observation__parts": 3}, "observation.parts: got 3; the environment"),
         ({"format_version": 2}, "format_version: got 2; expected 1"),
     ],
 )
@@ -145,6 +145,14 @@ def test_json_that_does_not_describe_the_environment_is_rejected(mine, keys, mes
 def test_json_that_is_not_an_object_is_rejected(mine, text):
     mine.with_name("policy.json").write_bytes(text.encode("utf-8", "surrogatepass"))
     with pytest.raises(ConfigError, match=r"policy\.json: "):
+        open_onnx(mine, "quadruped")
+
+
+def test_unknown_part_of_the_observation_is_named(mine):
+    observation = json.loads(mine.with_name("policy.json").read_text())["observation"]
+    observation["parts"].append({"name": "camera", "start": 47, "stop": 50})
+    change_json(mine, observation={**observation, "size": 50})
+    with pytest.raises(ConfigError, match=r"observation\.parts\.7\.name: got camera; .* has no"):
         open_onnx(mine, "quadruped")
 
 
