@@ -101,6 +101,18 @@ class Config:
         except ConfigError as error:
             raise ConfigError(f"{path}: {error}") from error
 
+    def with_defaults(self) -> Self:
+        """Return a config with the defaults of its class.
+
+        Nested configs keep their classes, and fields without a default their values.
+        """
+        kept = {
+            field.name: value.with_defaults() if isinstance(value, Config) else value
+            for field in dataclasses.fields(self)
+            if isinstance(value := getattr(self, field.name), Config) or is_required(field)
+        }
+        return type(self)(**kept)
+
     def to_table(self) -> dict[str, Any]:
         """Return the values that a TOML file holds, by key."""
         kind: Any = type(self)

@@ -16,6 +16,7 @@ from terrainkit_cli.robot_options import (
     Checkpoint,
     Flag,
     Output,
+    RobotName,
     optional_number,
     text_option,
 )
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
         EvaluationResult,
         RolloutMetrics,
     )
-    from terrainkit_robots.rl.run import Run
+    from terrainkit_robots.rl.run import PolicySpec
 
 DEFAULT_REPETITIONS, MAX_REPETITIONS = 10, 100
 """Default and largest number of robots on each patch of a suite."""
@@ -37,16 +38,23 @@ _NO_COMMAND = (-math.inf, -math.inf, -math.inf)
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyCommand(Command):
-    """A command that rolls out the policy of a run."""
+    """A command that rolls out a policy."""
 
-    policy: Annotated[
+    source: Annotated[
         str, tyro.conf.Positional, tyro.conf.arg(metavar="RUN", help_behavior_hint="")
     ] = ""
     """A folder written by terrainkit train, a checkpoint in one, or a robot with a bundled
     policy."""
 
+    policy: Annotated[str, text_option("FILE.onnx")] = ""
+    """In place of RUN: an exported policy, with policy.json beside it or in its metadata."""
+
+    robot: RobotName = ""
+    """The robot of --policy: a robot's name, or a folder written by terrainkit onboard."""
+
     terrain: Annotated[str, text_option("TERRAIN")] = ""
-    """plane, a map (.npz), or a map config (.toml); by default, the terrain of the training."""
+    """plane, a map (.npz), or a map config (.toml); by default, the terrain of the training, and
+    plane with --policy."""
 
     command: Annotated[
         tuple[float, float, float],
@@ -71,20 +79,33 @@ class PolicyCommand(Command):
     device: Annotated[str, text_option("DEVICE")] = "cpu"
     """Device of the policy: cpu (the default), cuda, cuda:1."""
 
-    def load_run(self) -> "Run":
-        """Return the run.
+    def load_spec(self) -> "PolicySpec":
+        """Return the run, or the policy of --policy.
 
         Raises:
-            ConfigError: if there is none, or torch is not installed.
+            ConfigError: if there is none or both, or torch is not installed.
         """
         from terrainkit_cli.training_extra import require_training
 
-        if not self.policy:
-            raise ConfigError("RUN: missing; expected a run, a checkpoint, or the name of a robot")
+        if self.source and self.policy:
+            raise ConfigError("RUN, --policy: got both; expected one of them")
+        if not self.source and not self.policy:
+            expected = "expected a run, a checkpoint, or the name of a robot; or --policy"
+            raise ConfigError(f"RUN: missing; {expected}")
+        if self.policy and not self.robot:
+            raise ConfigError("--robot: missing; expected the robot of --policy")
+        if not self.policy and self.robot:
+            raise ConfigError("--robot: got a value; expected none without --policy")
+        if self.policy and self.checkpoint != UNSET:
+            raise ConfigError("--checkpoint: got a value; expected none with --policy")
         require_training()
+        if self.policy:
+            from terrainkit_robots.policy.onnx_policy import open_onnx
+
+            return open_onnx(Path(self.policy), self.robot)
         from terrainkit_robots.rl.run import open_run
 
-        return open_run(self.policy, optional_number(self.checkpoint))
+        return open_run(self.source, optional_number(self.checkpoint))
 
     def eval_config(self, seconds: float) -> "EvaluationConfig":
         """Return the settings of the rollout.
@@ -154,12 +175,12 @@ class Evaluate(PolicyCommand):
         output, diagram = (Path(each) if each else None for each in (self.output, self.diagram))
         for target in filter(None, (output, diagram)):
             check_target(target, overwrite=self.overwrite)  # before the rollout
-        run = self.load_run()
+        spec = self.load_spec()
         from terrainkit_robots.policy.evaluate import evaluate
 
         with render.steps() as steps:
             result = evaluate(
-                run,
+                spec,
                 self.eval_config(self.seconds),
                 lambda fraction: steps.update(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
@@ -203,11 +224,11 @@ class Evaluate(PolicyCommand):
             check_target(target, overwrite=self.overwrite)
         if self.suite:
             get_suite(self.suite)  # an unknown name is reported before the run is loaded
-        run, config = self.load_run(), self.eval_config(self.seconds)
+        spec, config = self.load_spec(), self.eval_config(self.seconds)
         if self.suite:
-            contents = report_card.report_suite(run, self.suite, config, self.repetitions)
+            contents = report_card.report_suite(spec, self.suite, config, self.repetitions)
         else:
-            contents = report_card.report_limits(run, config, self.repetitions)
+            contents = report_card.report_limits(spec, config, self.repetitions)
         if self.output:
             report_card.write_files(targets, contents)
         return 0

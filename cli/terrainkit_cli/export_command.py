@@ -132,10 +132,9 @@ class Export(Command):
             default = Path(f"{run.folder.name}_policy")
         folder = Path(self.output) if self.output else default
         result = export_policy(run, folder, example=self.example, overwrite=self.overwrite)
-        checkpoint = run.checkpoint.name if run.checkpoint else ""
         render.result(
             f"wrote {', '.join(map(str, result.files))}: {result.num_observations} observations "
-            f"to {result.num_actions} actions, from {checkpoint}"
+            f"to {result.num_actions} actions, from {run.policy_name}"
         )
         errors = zip(result.files, result.errors, strict=False)
         differences = ", ".join(f"{file.name} {error:.1e}" for file, error in errors)

@@ -54,21 +54,24 @@ class Play(PolicyCommand):
             raise ConfigError("--viewer: got --output or --no-video too; expected it alone")
         if self.video and not self.viewer:
             require_training("imageio_ffmpeg")  # before the rollout
-        run = self.load_run()
-        target = Path(self.output or f"{run.folder.resolve().name}.mp4")
+        spec = self.load_spec()
+        from terrainkit_robots.rl.run import Run
+
+        named = spec.folder.resolve().name if isinstance(spec, Run) else Path(self.policy).stem
+        target = Path(self.output or f"{named}.mp4")
         config = self.eval_config(self.seconds)
         from terrainkit_robots.policy.play import play, view
         from terrainkit_robots.rendering.video import check_video_path, check_video_size
 
         if self.viewer:
-            view(run, config)
+            view(spec, config)
             return 0
         if self.video:
             check_video_size(self.size)
             check_video_path(target, overwrite=self.overwrite)  # before the rollout
         with render.steps() as steps:
             result = play(
-                run,
+                spec,
                 config,
                 video=self.video,
                 robots=self.robots,

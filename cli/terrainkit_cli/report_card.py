@@ -1,7 +1,6 @@
 """The report card of a policy on a suite, and its limits."""
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,14 +8,14 @@ from terrainkit_cli import render
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import EvaluationConfig
-    from terrainkit_robots.rl.run import Run
+    from terrainkit_robots.rl.run import PolicySpec
 
 CARD_SUFFIXES = (".json", ".md", ".png")
 """Files of a report card."""
 
 
 def report_suite(
-    run: "Run", suite: str, config: "EvaluationConfig", repetitions: int
+    spec: "PolicySpec", suite: str, config: "EvaluationConfig", repetitions: int
 ) -> list[bytes]:
     """Measure a policy on a suite, print the card, and return it as the files of a report card."""
     from terrainkit.suites import generate_suite
@@ -26,7 +25,7 @@ def report_suite(
     terrain_map = generate_suite(suite)
     with render.steps() as steps:
         card = measure(
-            run,
+            spec,
             terrain_map,
             suite,
             repetitions,
@@ -42,26 +41,21 @@ def report_suite(
     return [f"{document}\n".encode(), card.as_markdown().encode(), draw_card(card)]
 
 
-def report_limits(run: "Run", config: "EvaluationConfig", repetitions: int) -> list[bytes]:
+def report_limits(spec: "PolicySpec", config: "EvaluationConfig", repetitions: int) -> list[bytes]:
     """Measure the limits of a policy, print them, and return them as JSON."""
-    from terrainkit_cli.feasibility_command import robot_limits
-    from terrainkit_robots.report_card.limits import limit_rows, measure_limits
+    from terrainkit_robots.report_card.limits import measure_limits
+    from terrainkit_robots.simulation.robot_limits import derive_limits
 
-    limits = robot_limits(run.info.robot, ()).limits
     with render.steps() as steps:
-        results = measure_limits(
-            run,
-            limits,
+        result = measure_limits(
+            spec,
+            derive_limits(spec.robot.folder).limits,
             repetitions,
             config,
             lambda fraction: steps.update(f"limits: {fraction:.0%} of the rounds"),
         )
-    render.table(limit_rows(results, repetitions))
-    values = [asdict(each) for each in results]
-    checkpoint = run.checkpoint.name if run.checkpoint is not None else ""
-    about = {"schema_version": 1, "robot": run.robot.spec.name, "checkpoint": checkpoint}
-    about |= {"repetitions": repetitions, "seed": config.seed}
-    return [f"{json.dumps(about | {'limits': values}, indent=1)}\n".encode()]
+    render.table(result.rows())
+    return [f"{json.dumps(result.as_json(), indent=1)}\n".encode()]
 
 
 def targets(output: Path, *, is_card: bool) -> list[Path]:

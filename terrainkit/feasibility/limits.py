@@ -7,8 +7,9 @@ from typing import Annotated
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import MAX_VALUE, check_names
+from terrainkit.parameter import MAX_VALUE
 from terrainkit.schema import Config, field_types
+from terrainkit.text import expected_names
 from terrainkit.type_hint import convert
 
 Limit = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
@@ -63,5 +64,7 @@ def limit_overrides(values: Mapping[str, object]) -> dict[str, float]:
         ConfigError: if a name is no limit, or a value is not above 0.
     """
     hints = field_types(RobotLimits)
-    check_names("RobotLimits", values, hints)
+    for name in values:
+        if name not in hints:
+            raise ConfigError(f"no limit {name!r}; {expected_names(name, hints, 'limits are')}")
     return {name: convert(name, value, hints[name]) for name, value in values.items()}

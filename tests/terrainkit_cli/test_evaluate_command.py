@@ -10,9 +10,11 @@ from terrainkit import MapConfig, SubTerrain, generate, suites
 from terrainkit_cli import training_extra
 from terrainkit_cli.evaluate_command import result_rows, summary_line
 from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
+from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.report_card import limits
-from terrainkit_robots.report_card.limits import LimitResult
+from terrainkit_robots.report_card.limits import LimitResult, PolicyLimits
 from terrainkit_robots.rl import run as run_module
+from terrainkit_robots.rl.run import open_run
 
 QUICK = ("--seconds", "0.04", "--num-envs", "1")
 
@@ -141,6 +143,35 @@ def test_evaluate_rejects_invalid_input(here, words, message):
     assert message in one_line(err)
 
 
+def test_exported_policy_is_evaluated(here, tmp_path, monkeypatch):
+    export_policy(open_run(tmp_path / "walk"), tmp_path / "out")
+    outside = ("--policy", "out/policy.onnx", "--robot", "quadruped")
+    code, out, err = here(*outside, *QUICK)
+    assert (code, err) == (0, "")
+    assert out.startswith("quadruped, policy.onnx, on plane: 1 robot, 0 fell")
+    seen = []
+    monkeypatch.setattr(limits, "measure_limits", lambda *words: seen.append(words[:2]) or 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        here(*outside, "--limits")
+    ((spec, robot_limits),) = seen
+    assert spec.policy_name == "policy.onnx"
+    assert robot_limits.step_up == pytest.approx(0.1792)
+    (tmp_path / "text.onnx").write_text("text")
+    for words, message in (
+        (("--policy", "out/policy.onnx"), "--robot: missing; expected the robot of --policy"),
+        (("walk", "--robot", "quadruped"), "--robot: got a value; expected none without --policy"),
+        (("walk", *outside), "RUN, --policy: got both; expected one of them"),
+        ((*outside, "--checkpoint", "3"), "--checkpoint: got a value; expected none with --policy"),
+        ((*outside[:3], "biped"), "policy.json: joints.name, the policy belongs to another robot"),
+        ((*outside[:3], "hare"), "no task or robot folder 'hare'"),
+        (("--policy", "gone.onnx", "--robot", "biped"), "cannot read gone.onnx: No such file"),
+        (("--policy", "text.onnx", "--robot", "biped"), "text.onnx is not an ONNX file"),
+    ):
+        code, out, err = here(*words)
+        assert (code, out) == (2, "")
+        assert message in one_line(err)
+
+
 def test_evaluate_names_the_missing_extra(here, monkeypatch):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
     code, _, err = here("walk")
@@ -220,7 +251,8 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
         result = LimitResult(
             test="stairs", unit="m", passed=0.1, failed=0.12, crossed=7, robot_limit=0.1792
         )
-        return [result]
+        about = {"robot": "hare", "checkpoint": "hare.onnx", "repetitions": 10, "seed": 1}
+        return PolicyLimits(**about, limits=(result,))
 
     monkeypatch.setattr(limits, "measure_limits", measure)
     code, out, err = here("walk", "--limits", "-o", "limits.json")

@@ -50,6 +50,9 @@ def observe(command: Any, action: Any, rotation: Any, previous: Any = None) -> A
         angle = 2 * np.pi * data.time / gait["period"]
         is_moving = command[:2].any() or abs(command[2]) >= gait["min_yaw_rate"]
         terms["gait_phase"] = is_moving * np.array([np.sin(angle), np.cos(angle)])
+    mujoco.mj_rnePostConstraint(model, data)  # contact forces on the bodies, in `cfrc_ext`
+    feet = [model.body(name).id for name in config["feet"]["name"]]
+    terms["foot_contact"] = data.cfrc_ext[feet, 5] > config["feet"]["contact_force"]
     if scan := config["height_scan"]:
         terms["height_scan"] = np.full(len(scan["points"]), data.qpos[2])  # above a plane
     values: list[Any] = []

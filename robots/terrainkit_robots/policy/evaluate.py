@@ -10,24 +10,22 @@ import numpy as np
 import torch
 from msgspec import Meta
 from numpy.typing import NDArray
-from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import PositiveInt
 from terrainkit_robots.policy import gait
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.gait import BoolArray
+from terrainkit_robots.policy.load import Policy, load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import uses_height_scan
-from terrainkit_robots.rl.run import Run, is_same_terrain
+from terrainkit_robots.rl.run import PolicySpec, Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.rl.terrain import Terrain, load_terrain
+from terrainkit_robots.transforms import FloatArray
 
-FloatArray = NDArray[np.float32]
-BoolArray = NDArray[np.bool_]
-Policy = Callable[[TensorDict], torch.Tensor]
 Progress = Callable[[float], object]
 """Called after each step with the completed fraction of the time, 0 to 1."""
 
@@ -144,38 +142,41 @@ class EvaluationResult:
 
 @single_torch_thread()
 def evaluate(
-    run: Run, config: EvaluationConfig | None = None, progress: Progress = lambda _: None
+    spec: PolicySpec, config: EvaluationConfig | None = None, progress: Progress = lambda _: None
 ) -> EvaluationResult:
-    """Evaluate the policy of a run. The same seed gives the same result, bit for bit.
+    """Evaluate a policy: of a run, an ONNX file (:func:`.open_onnx`), or any function.
+
+    The same seed gives the same result, bit for bit.
 
     Raises:
         ConfigError: If the run has no policy, or one of another robot; if the terrain cannot be
             read, or changed after the training; if the device does not exist.
     """
     config = config or EvaluationConfig()
-    env, commands = make_eval_env(run, config)
+    env, commands = make_eval_env(spec, config)
     rollout = EvaluationRollout(env)
-    rollout.run(load_policy(run, env), config.seconds, commands, progress)
+    rollout.run(load_policy(spec, env), config.seconds, commands, progress)
     has_grid = env.terrain.is_flat and config.command is None
-    return summarize(run, config, rollout, commands if has_grid else None)
+    return summarize(spec, config, rollout, commands if has_grid else None)
 
 
 def make_eval_env(
-    run: Run, config: EvaluationConfig, *, max_patch_envs: int = MAX_MAP_ENVS
+    spec: PolicySpec, config: EvaluationConfig, *, max_patch_envs: int = MAX_MAP_ENVS
 ) -> tuple[LeggedEnv, FloatArray | None]:
     """Return an environment to evaluate a policy in, and commands of shape (n, 3).
 
     Commands are None for the task's random ones. By default there are at most `max_patch_envs`
     robots on a patch of a map.
     """
-    task = run.task
-    if config.terrain is None and not (is_flat(run) or is_same_terrain(run, run.terrain)):
-        changed = f"{run.terrain} changed after {run.folder} was trained"
+    task = spec.task
+    is_run_terrain = config.terrain is None and not is_flat(spec)
+    if is_run_terrain and isinstance(spec, Run) and not is_same_terrain(spec, spec.terrain):
+        changed = f"{spec.terrain} changed after {spec.folder} was trained"
         raise ConfigError(f"terrain: {changed}; expected --terrain")
     collision = task.terrain.collision
     if config.terrain is not None and collision == "plane":
         collision = "auto"
-    terrain = load_terrain(config.terrain or run.terrain, collision)
+    terrain = load_terrain(config.terrain or spec.terrain, collision)
     commands = None
     if config.command is not None:
         commands = np.array([config.command], np.float32)
@@ -189,7 +190,7 @@ def make_eval_env(
     elif n is None:
         per_patch = max(1, min(max_patch_envs, MAX_MAP_ENVS // patches))
         n = SINGLE_PATCH_ENVS if patches == 1 else min(MAX_MAP_ENVS, patches * per_patch)
-    env = build_eval_env(run, terrain, n, config)
+    env = build_eval_env(spec, terrain, n, config)
     levels_and_columns = np.divmod(_assign(patches, n, config.seed), cols)
     env.curriculum.levels[:], env.curriculum.columns[:] = levels_and_columns
     env.reset()
@@ -201,19 +202,19 @@ def make_eval_env(
 
 
 def build_eval_env(
-    run: Run, terrain: Terrain, num_envs: int, config: EvaluationConfig
+    spec: PolicySpec, terrain: Terrain, num_envs: int, config: EvaluationConfig
 ) -> LeggedEnv:
     """Return an environment on a terrain, for a policy with the observations of its training."""
     device = resolve_device(config.device)
-    scan = uses_height_scan(run.task, is_flat=is_flat(run))
-    task = eval_task(run.task, num_envs, seconds=config.seconds, seed=config.seed)
+    scan = uses_height_scan(spec.task, is_flat=is_flat(spec))
+    task = eval_task(spec.task, num_envs, seconds=config.seconds, seed=config.seed)
     task = replace(task, terrain=replace(task.terrain, measure_heights=scan))
-    return LeggedEnv(task, run.robot, terrain, device)
+    return LeggedEnv(task, spec.robot, terrain, device)
 
 
-def is_flat(run: Run, terrain: str | None = None) -> bool:
+def is_flat(spec: PolicySpec, terrain: str | None = None) -> bool:
     """Return whether a terrain, or else that of the training, is a plane."""
-    return "plane" in ([terrain] if terrain else [run.terrain, run.task.terrain.collision])
+    return "plane" in ([terrain] if terrain else [spec.terrain, spec.task.terrain.collision])
 
 
 def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
@@ -458,7 +459,7 @@ def _number(value: float) -> float | None:
 
 
 def summarize(
-    run: Run,
+    spec: PolicySpec,
     config: EvaluationConfig,
     rollout: EvaluationRollout,
     commands: FloatArray | None = None,
@@ -491,9 +492,9 @@ def summarize(
             mask = (terrains == name) & (levels == level)
             add_group("by_terrain_and_level", mask, terrain=name, level=level)
     return EvaluationResult(
-        robot=run.robot.spec.name,
-        checkpoint=run.checkpoint.name if run.checkpoint is not None else "",
-        config=replace(config, terrain=str(config.terrain or run.terrain)),
+        robot=spec.robot.spec.name,
+        checkpoint=spec.policy_name,
+        config=replace(config, terrain=str(config.terrain or spec.terrain)),
         metrics=rollout.metrics(np.ones(env.num_envs, bool)),
         groups=groups,
         contacts=rollout.contacts(),

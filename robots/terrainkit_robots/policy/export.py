@@ -3,7 +3,7 @@
 import io
 import json
 import warnings
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +18,15 @@ from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
-from terrainkit_robots.policy.evaluate import FloatArray, eval_task
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
+from terrainkit_robots.policy.load import load_actor, single_torch_thread
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
-from terrainkit_robots.rl.terrain import load_terrain
+from terrainkit_robots.rl.state import CONTACT_FORCE
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.transforms import FloatArray
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
 
@@ -40,6 +42,7 @@ _FORMULAS = {
     "gait": "gait_phase = (sin, cos)(2 pi time / period); 0 while commanded to stand: no linear "
     "velocity, and a yaw rate below min_yaw_rate",
     "history": "first numbers of the previous obs; in the first step, copies of those before it",
+    "foot_contact": "1 if the vertical contact force on the foot is above contact_force, else 0",
     "action": "target = action_offset + action_scale * action",
     "torque": "clip(gain * target - stiffness * position - damping * velocity, -effort, effort), "
     "every physics_dt; a new action every policy_dt",
@@ -74,16 +77,18 @@ def export_policy(
     files = tuple(folder / name for name in names)
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
-    task = eval_task(run.task, num_envs=8)
-    env = LeggedEnv(task, run.robot, load_terrain(run.terrain, task.terrain.collision))
-    actor = load_policy(run, env)
+    env = build_eval_env(run, Plane(), 8, EvaluationConfig())
+    actor = load_actor(run, env)
     other_files = copy_model(run.robot.mjcf)
     if example:
         other_files[EXAMPLE.name] = EXAMPLE.read_bytes()
     training = {"iteration": read_checkpoint(last_checkpoint(run))["iteration"]}
-    training["domain_rand"] = asdict(run.task.domain_rand)
+    scan = env.cfg.terrain.measure_heights  # also if the terrain of the training decided
+    terrain = replace(run.task.terrain, measure_heights=scan)
+    training["task"] = asdict(replace(run.task, terrain=terrain))
     text = json.dumps(describe_policy(env) | training, indent=2) + "\n"
-    limits = task.normalization.clip_observations, task.normalization.clip_actions
+    normalization = run.task.normalization
+    limits = normalization.clip_observations, normalization.clip_actions
     clip_obs, clip_actions = (torch.nn.Hardtanh(-limit, limit) for limit in limits)
     policy = torch.nn.Sequential(clip_obs, actor.as_jit(), clip_actions).eval()
     random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
@@ -188,9 +193,9 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "formulas": _FORMULAS,
         "timing": {"physics_dt": dt, "decimation": decimation, "policy_dt": task.dt},
         "observation": {
+            "parts": _observation_parts(env, units),
             "size": env.get_observations()["policy"].shape[1],
             "clip": task.normalization.clip_observations,
-            "parts": _observation_parts(env, units),
             "history_length": task.observations.history_length,
         },
         "action": {"size": env.num_actions, "clip": task.normalization.clip_actions},
@@ -202,6 +207,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             **{name: _to_list(values) for name, values in joints.items()},
         },
         "contact": {"friction": float(f"{friction:.7g}")},
+        "feet": {"name": list(robot.spec.feet), "contact_force": CONTACT_FORCE},
         "gait": gait if env.gait.period else None,
         "height_scan": scan if env.state.height_scan.shape[1] else None,
     }

@@ -1,21 +1,33 @@
-"""Load the policy of a run."""
+"""Load policies: the checkpoint of a run, or a function."""
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import torch
 from rsl_rl.models import MLPModel
+from tensordict import TensorDict
 
-from terrainkit.errors import TerrainkitWarning
+from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit_robots.checkpoint import open_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import Run, changed_robot_files, last_checkpoint
+from terrainkit_robots.rl.run import PolicySpec, Run, changed_robot_files, last_checkpoint
 from terrainkit_robots.rl.runner import OBS_GROUPS, runner_config
 from terrainkit_robots.spec.robot import SPEC_FILE
 
+Policy = Callable[[TensorDict], torch.Tensor]
 
-def load_policy(run: Run, env: LeggedEnv) -> MLPModel:
+
+def load_policy(spec: PolicySpec, env: LeggedEnv) -> Policy:
+    """Return a policy for `env`; see :func:`load_actor` for that of a run."""
+    if (policy := spec.policy) is not None:
+        return lambda obs: torch.as_tensor(policy(obs["policy"]))
+    if not isinstance(spec, Run):
+        raise ConfigError("policy: got none; expected a run, or a function of the observations")
+    return load_actor(spec, env)
+
+
+def load_actor(run: Run, env: LeggedEnv) -> MLPModel:
     """Return the actor network of a run: a deterministic policy for `env`, in evaluation mode.
 
     Warns:

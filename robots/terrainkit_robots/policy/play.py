@@ -13,7 +13,6 @@ from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
     EvaluationResult,
     EvaluationRollout,
-    FloatArray,
     Progress,
     command_schedule,
     is_flat,
@@ -25,7 +24,8 @@ from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.run import PolicySpec
+from terrainkit_robots.transforms import FloatArray
 
 DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
 """Defaults: duration [s], robots that the video of a map follows, robots on a plane, frame rate."""
@@ -41,7 +41,7 @@ class PlayResult:
 
 @single_torch_thread()
 def play(
-    run: Run,
+    spec: PolicySpec,
     config: EvaluationConfig | None = None,
     *,
     video: bool = True,
@@ -49,18 +49,18 @@ def play(
     size: tuple[int, int] = DEFAULT_SIZE,
     progress: Progress = lambda _: None,
 ) -> PlayResult:
-    """Roll out the policy of a run, and record a video.
+    """Roll out a policy, and record a video.
 
     On a plane the robots walk in formation; :func:`demo_commands` are the default commands. On a
     map there is one robot per patch, and the video follows some `robots` in turn.
 
     Raises:
-        ConfigError: If the run has no policy, or one of another robot; if an option is invalid.
+        ConfigError: If a run has no policy, or one of another robot; if an option is invalid.
     """
     if robots < 1:
         raise ConfigError(f"robots: got {robots}; expected 1 or more")
     config = config or EvaluationConfig(seconds=DEFAULT_SECONDS)
-    env, commands = make_play_env(run, config)
+    env, commands = make_play_env(spec, config)
     recorder = PoseRecorder(env)
 
     def update(fraction: float) -> None:
@@ -68,28 +68,28 @@ def play(
         if video:
             recorder.record()
 
-    evaluation, policy = EvaluationRollout(env), load_policy(run, env)
+    evaluation, policy = EvaluationRollout(env), load_policy(spec, env)
     evaluation.run(policy, config.seconds, commands, update, stop_early=not video)
-    spec = recorder.make_video(robots, size) if video else None
-    return PlayResult(evaluation=summarize(run, config, evaluation), video=spec)
+    recorded = recorder.make_video(robots, size) if video else None
+    return PlayResult(evaluation=summarize(spec, config, evaluation), video=recorded)
 
 
 @single_torch_thread()
-def view(run: Run, config: EvaluationConfig | None = None) -> None:
+def view(spec: PolicySpec, config: EvaluationConfig | None = None) -> None:
     """Show one robot in MuJoCo's viewer in real time, until its window is closed.
 
     Raises:
-        ConfigError: If there is no display, or the run has no policy, or one of another robot.
+        ConfigError: If there is no display, or a run has no policy, or one of another robot.
     """
     if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
         raise ConfigError("viewer: got no DISPLAY or WAYLAND_DISPLAY; expected a display")
     import mujoco.viewer
 
     config = replace(config or EvaluationConfig(), num_envs=1)
-    env, commands = make_play_env(run, config)
+    env, commands = make_play_env(spec, config)
     model, data = env.scene.model, mujoco.MjData(env.scene.model)
     schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
-    steps = rollout(env, load_policy(run, env), cycle(schedule))
+    steps = rollout(env, load_policy(spec, env), cycle(schedule))
     try:
         viewer = mujoco.viewer.launch_passive(model, data)
     except RuntimeError as error:  # macOS needs mjpython
@@ -107,17 +107,19 @@ def view(run: Run, config: EvaluationConfig | None = None) -> None:
             time.sleep(max(0.0, env.cfg.dt - (time.monotonic() - start)))
 
 
-def make_play_env(run: Run, config: EvaluationConfig) -> tuple[LeggedEnv, FloatArray | None]:
+def make_play_env(
+    spec: PolicySpec, config: EvaluationConfig
+) -> tuple[LeggedEnv, FloatArray | None]:
     """Return the environment, and the commands of its robots for :func:`command_schedule`."""
-    if not is_flat(run, config.terrain):
-        return make_eval_env(run, config, max_patch_envs=1)
-    start = replace(run.task.init_state, position=0.0, yaw=0.0)  # the formation sets them
-    run = replace(run, task=replace(run.task, init_state=start))
+    if not is_flat(spec, config.terrain):
+        return make_eval_env(spec, config, max_patch_envs=1)
+    start = replace(spec.task.init_state, position=0.0, yaw=0.0)  # the formation sets them
+    spec = replace(spec, task=replace(spec.task, init_state=start))
     config = replace(config, num_envs=config.num_envs or FORMATION_ENVS)
     if config.command is not None or config.random_commands:
-        return make_eval_env(run, config)
-    env, _ = make_eval_env(run, replace(config, command=(0.0, 0.0, 0.0)))
-    return env, np.repeat(demo_commands(run.task.commands)[:, None], env.num_envs, axis=1)
+        return make_eval_env(spec, config)
+    env, _ = make_eval_env(spec, replace(config, command=(0.0, 0.0, 0.0)))
+    return env, np.repeat(demo_commands(spec.task.commands)[:, None], env.num_envs, axis=1)
 
 
 def demo_commands(commands: Commands) -> FloatArray:

@@ -21,7 +21,7 @@ from terrainkit_robots.report_card.crossing import (
     Crossing,
 )
 from terrainkit_robots.report_card.route import GOAL_RADIUS
-from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.run import PolicySpec
 
 SCHEMA_VERSION = 1
 """Version of the JSON; it changes when a key changes its meaning or is removed."""
@@ -155,17 +155,17 @@ class ReportCard:
 
 
 def measure(
-    run: Run,
+    spec: PolicySpec,
     terrain_map: TerrainMap,
     name: str,
     repetitions: int,
     config: EvaluationConfig,
     progress: Progress = lambda _: None,
 ) -> ReportCard:
-    """Let the policy of a run cross every patch of a map, and return the report card.
+    """Let a policy cross every patch of a map, and return the report card.
 
     Args:
-        run: The run.
+        spec: The policy, such as a run.
         terrain_map: The map.
         name: Name of the suite, or path of the map.
         repetitions: Robots on each patch.
@@ -177,7 +177,7 @@ def measure(
         MemoryLimitError: if the simulations would not fit in memory.
     """
     rows, cols = terrain_map.difficulty.shape
-    crossing = Crossing(run, terrain_map, rows * repetitions, config)
+    crossing = Crossing(spec, terrain_map, rows * repetitions, config)
     levels, columns = np.repeat(np.arange(rows), repetitions), []
     for col in range(cols):
         columns.append(crossing.attempt(levels, np.full_like(levels, col)))
@@ -190,8 +190,8 @@ def measure(
     )
     success, interval = _success(np.concatenate([each.outcomes for each in columns]))
     return ReportCard(
-        robot=run.robot.spec.name,
-        checkpoint=run.checkpoint.name if run.checkpoint is not None else "",
+        robot=spec.robot.spec.name,
+        checkpoint=spec.policy_name,
         map=name,
         sha256=suite_hash(terrain_map),
         repetitions=repetitions,

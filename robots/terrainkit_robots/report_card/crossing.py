@@ -14,7 +14,7 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, 
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.report_card.route import SPEED, Routes, patch_routes
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import MapTerrain
 from terrainkit_robots.transforms import quat_to_yaw
 
@@ -52,28 +52,28 @@ class Crossing:
     """
 
     def __init__(
-        self, run: Run, terrain_map: TerrainMap, num_envs: int, config: EvaluationConfig
+        self, spec: PolicySpec, terrain_map: TerrainMap, num_envs: int, config: EvaluationConfig
     ) -> None:
-        """Load the policy of a run onto a map.
+        """Load a policy onto a map.
 
         Raises:
-            ConfigError: if the run has no policy, or one of another robot, or its task does not
+            ConfigError: if a run has no policy, or one of another robot, or its task does not
                 command to walk ahead.
             MemoryLimitError: if the simulations would not fit in memory.
         """
-        commands = run.task.commands
+        commands = spec.task.commands
         self.speed = SPEED * commands.lin_vel_x[1]
         if self.speed <= 0 or not commands.ang_vel_yaw[0] < 0 < commands.ang_vel_yaw[1]:
             got = f"got lin_vel_x {list(commands.lin_vel_x)}, ang_vel_yaw "
             got += f"{list(commands.ang_vel_yaw)}"
             raise ConfigError(f"commands: {got}; expected a task to walk ahead and turn both ways")
-        start = replace(run.task.init_state, position=START_OFFSET, yaw=START_YAW)
-        run = replace(run, task=replace(run.task, init_state=start))
-        collision = run.task.terrain.collision
+        start = replace(spec.task.init_state, position=START_OFFSET, yaw=START_YAW)
+        spec = replace(spec, task=replace(spec.task, init_state=start))
+        collision = spec.task.terrain.collision
         terrain = MapTerrain(terrain_map, "auto" if collision == "plane" else collision)
         config = replace(config, seconds=3600.0)  # episodes have no time-out; attempts do
-        self._map, self._env = terrain_map, build_eval_env(run, terrain, num_envs, config)
-        self._policy = load_policy(run, self._env)
+        self._map, self._env = terrain_map, build_eval_env(spec, terrain, num_envs, config)
+        self._policy = load_policy(spec, self._env)
 
     @single_torch_thread()
     def attempt(self, levels: NDArray[np.int64], columns: NDArray[np.int64]) -> Attempts:

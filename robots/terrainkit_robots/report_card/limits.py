@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from terrainkit.grid import Grid
 from terrainkit.parameter import Range, at_difficulty
 from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
-from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.run import PolicySpec
 
 LEVELS = 20
 """Values of each quantity."""
@@ -119,6 +119,10 @@ def limits_config(tests: Sequence[LimitTest], levels: Sequence[int], seed: int) 
     )
 
 
+SCHEMA_VERSION = 1
+"""Version of the JSON; it changes when a key changes its meaning or is removed."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class LimitResult:
     """The limit of a policy in a test."""
@@ -142,17 +146,54 @@ class LimitResult:
     """Limit of the robot for feasibility."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class PolicyLimits:
+    """The limits of a policy."""
+
+    robot: str
+    """Name of the robot."""
+
+    checkpoint: str
+    """Name of the checkpoint."""
+
+    repetitions: int
+    """Robots on each patch."""
+
+    seed: int
+    """Seed of the starts."""
+
+    limits: tuple[LimitResult, ...]
+    """Limits by test."""
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the limits as values of JSON."""
+        return {"schema_version": SCHEMA_VERSION} | asdict(self)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return the limits as rows of text with a header."""
+        total = self.repetitions
+        rows: list[tuple[str, ...]] = []
+        rows.append(("test", f"{total} of {total} cross", "next value", "limit of the robot"))
+        for each in self.limits:
+            following = "-"
+            if each.failed is not None:
+                following = f"{each.crossed} of {total} at {_text(each.failed, each.unit)}"
+            passed = "none" if each.passed is None else _text(each.passed, each.unit)
+            rows.append((each.test, passed, following, _text(each.robot_limit, each.unit)))
+        return rows
+
+
 def measure_limits(
-    run: Run,
+    spec: PolicySpec,
     limits: RobotLimits,
     repetitions: int,
     config: EvaluationConfig,
     progress: Progress = lambda _: None,
-) -> list[LimitResult]:
+) -> PolicyLimits:
     """Return the limits of a policy, by bisection: what is easier than a passed value, is passed.
 
     Args:
-        run: The run.
+        spec: The policy, such as a run.
         limits: The limits of its robot, which determine the values.
         repetitions: Robots on each patch.
         config: Seed and device.
@@ -171,7 +212,7 @@ def measure_limits(
         levels = np.clip((passed + failed) // 2, 0, LEVELS - 1)
         # A map of these patches alone: the time of a step grows with the number of solids.
         terrain_map = _generate(limits_config(tests, levels.tolist(), config.seed))
-        crossing = Crossing(run, terrain_map, len(columns), config)
+        crossing = Crossing(spec, terrain_map, len(columns), config)
         outcomes = crossing.attempt(np.zeros_like(columns), columns).outcomes
         counts = (outcomes == CROSSED).reshape(-1, repetitions).sum(axis=1)
         is_open, all_cross = failed - passed > 1, counts == repetitions
@@ -196,27 +237,19 @@ def measure_limits(
                 robot_limit=test.in_unit(getattr(limits, test.limit)),
             )
         )
-    return results
+    return PolicyLimits(
+        robot=spec.robot.spec.name,
+        checkpoint=spec.policy_name,
+        repetitions=repetitions,
+        seed=config.seed,
+        limits=tuple(results),
+    )
 
 
 def _generate(config: MapConfig) -> TerrainMap:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TerrainkitWarning)  # of cliffs: robots stay on a patch
         return generate(config)
-
-
-def limit_rows(results: Sequence[LimitResult], repetitions: int) -> list[tuple[str, ...]]:
-    """Return the limits of a policy as rows of text with a header."""
-    rows: list[tuple[str, ...]] = [
-        ("test", f"{repetitions} of {repetitions} cross", "next value", "limit of the robot")
-    ]
-    for each in results:
-        following = "-"
-        if each.failed is not None:
-            following = f"{each.crossed} of {repetitions} at {_text(each.failed, each.unit)}"
-        passed = "none" if each.passed is None else _text(each.passed, each.unit)
-        rows.append((each.test, passed, following, _text(each.robot_limit, each.unit)))
-    return rows
 
 
 def _text(value: float, unit: str) -> str:

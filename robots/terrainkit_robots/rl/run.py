@@ -6,13 +6,13 @@ versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.metadata import version
 from os.path import isdir, isfile
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from terrainkit import MapConfig, TerrainMap
 from terrainkit.atomic_write import atomic_folder, atomic_write
@@ -51,15 +51,36 @@ class RunInfo(Config):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Run:
+class PolicySpec:
+    """A policy, and what it is for: a run, or a policy from outside with a `policy`."""
+
+    task: Task  # the configuration of its environment
+    robot: Robot  # the robot, with the spec it was trained with
+    terrain: str = "plane"  # of the training, as `load_terrain` takes it: `plane` or a path
+    policy: Callable[[Any], Any] | None = None
+    """A function from observations, a tensor of shape (n, k), to actions, a tensor or array of
+    shape (n, j). It replaces the checkpoint of a run."""
+
+    @property
+    def policy_name(self) -> str:
+        """The name of the policy, in results."""
+        return getattr(self.policy, "__name__", type(self.policy).__name__)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run(PolicySpec):
     """A training run."""
 
     folder: Path  # folder of the run
     info: RunInfo  # what it was made from
-    task: Task  # its task
-    robot: Robot  # the robot, with the spec it was trained with
-    terrain: str  # the terrain, as `load_terrain` takes it: `plane` or a path
     checkpoint: Path | None  # the selected checkpoint, by default the last; None if there is none
+
+    @property
+    def policy_name(self) -> str:
+        """The name of the checkpoint, or of the policy that replaces it."""
+        if self.policy is not None:
+            return super().policy_name
+        return self.checkpoint.name if self.checkpoint is not None else ""
 
 
 def checkpoints(folder: Path) -> dict[int, Path]:
@@ -145,7 +166,9 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     return Run(
         folder=folder,
         info=info,
-        task=Task.load(folder / TASK_FILE, found.task),
+        # A key that an older version did not write has its default, not the value of the task that
+        # is registered today.
+        task=Task.load(folder / TASK_FILE, found.task.with_defaults()),
         robot=robot,
         terrain=terrain,
         checkpoint=selected if checkpoint is None else saved[checkpoint],

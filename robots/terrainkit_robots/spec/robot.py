@@ -44,6 +44,11 @@ class Robot:
         """Length of the legs [m], or the height of the base if it is unknown."""
         return self.spec.leg_length or self.spec.base_height_target or 1.0
 
+    @property
+    def folder(self) -> Path:
+        """Folder of its files."""
+        return self.mjcf.parents[len(Path(self.spec.mjcf).parts) - 1]
+
     @classmethod
     def from_spec(cls, spec: RobotSpec, folder: Path) -> "Robot":
         """Return the robot that a spec in `folder` describes; raise ConfigError if incomplete."""

@@ -1,3 +1,5 @@
+import re
+
 import pytest
 
 from terrainkit.errors import ConfigError
@@ -30,5 +32,6 @@ def test_crouched_height_is_below_standing_height():
 
 
 def test_unknown_limit_lists_the_known_ones():
-    with pytest.raises(ConfigError, match="'stepup'; did you mean 'step_up'"):
+    listed = f"no limit 'stepup'; did you mean 'step_up'? Limits are: {', '.join(VALUES)}"
+    with pytest.raises(ConfigError, match=f"^{re.escape(listed)}$"):
         limit_overrides({"stepup": 0.2})

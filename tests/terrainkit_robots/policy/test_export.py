@@ -100,7 +100,7 @@ def test_json_describes_the_policy(exported):
     assert config["joints"]["frictionloss"] == [0.0] * 12  # asset.joint_friction is off
     assert config["joints"]["passive_damping"] == [0.1] * 12
     assert config["contact"] == {"friction": 0.8}
-    assert config["domain_rand"]["friction"] == [0.5, 1.25]
+    assert config["task"]["domain_rand"]["friction"] == [0.5, 1.25]
 
 
 def measure_terms(env, config):
@@ -218,7 +218,7 @@ def run_example(folder, monkeypatch, *words):
         return runpy.run_path(program)
 
 
-@pytest.mark.parametrize("name", ["quadruped", "biped"])
+@pytest.mark.parametrize("name", ["quadruped", "quadruped_map", "biped"])
 def test_example_walks_with_bundled_policies(name, tmp_path, monkeypatch, capsys):
     export_policy(open_run(name), tmp_path / "exported", example=True)
     names = run_example(tmp_path / "exported", monkeypatch, "--vx", "0.5", "--seconds", "3")
@@ -246,6 +246,32 @@ def test_example_computes_the_observations(exported, trained, monkeypatch):
     mujoco.mju_quat2Mat(rotation.reshape(9), data.qpos[3:7])
     obs = names["observe"](env.commands[0], env.actions[0, 0], rotation)
     np.testing.assert_allclose(obs, env.get_observations()["policy"][0], atol=1e-4)
+
+
+def test_example_observes_contacts_as_the_training(quadruped, trained, tmp_path, monkeypatch):
+    """The training reads contact sensors, the example `cfrc_ext`."""
+    task = replace(eval_task(SMALL, 1), observations=Observations(foot_contact=True))
+    env = LeggedEnv(task, quadruped, Plane())
+    config = describe_policy(env)
+    assert config["feet"] == {"name": list(quadruped.spec.feet), "contact_force": 1.0}
+    export_policy(trained, tmp_path / "exported", example=True)
+    names = run_example(tmp_path / "exported", monkeypatch, "--seconds", "0.02")
+    scene, data = env.scene, mujoco.MjData(env.scene.model)
+    contact = {**config["observation"]["parts"][-1], "start": 0, "stop": 4}
+    names["config"] |= {**config, "observation": {"parts": [contact]}}
+    names["observe"].__globals__.update(model=scene.model, data=data)
+    feet, seen = [scene.model.body(name).id for name in config["feet"]["name"]], []
+    generator = torch.Generator().manual_seed(0)
+    for _ in range(40):
+        data.qpos[:], data.qvel[:] = env.sim.qpos[0], env.sim.qvel[0]
+        env.step(0.5 * torch.randn(1, 12, generator=generator))
+        data.ctrl[:] = env.to_ctrl(env.actions[0])[0]
+        mujoco.mj_step(scene.model, data, task.control.decimation)
+        observed = names["observe"](np.zeros(3), np.zeros(12), np.eye(3))
+        np.testing.assert_array_equal(observed, env.state.foot_contact[0])
+        np.testing.assert_allclose(data.cfrc_ext[feet, 3:], env.state.foot_force[0], atol=1e-3)
+        seen += observed.tolist()
+    assert 0.1 < np.mean(seen) < 0.95
 
 
 def test_exported_policy_with_a_history(make_run, tmp_path, monkeypatch):

@@ -1,7 +1,7 @@
 import re
 import shutil
 import tomllib
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import pytest
 from terrainkit import TerrainMap, generate
 from terrainkit.errors import ConfigError, ExportError, MapFileError
 from terrainkit_robots.rl import tasks
-from terrainkit_robots.rl.config import Rewards, Task
+from terrainkit_robots.rl.config import Commands, Observations, Rewards, Task
 from terrainkit_robots.rl.run import (
     MAP_FILE,
     RUN_FILE,
@@ -187,6 +187,32 @@ def test_open_run_finds_bundled_policy_by_name(tmp_path, task, monkeypatch):
     opened = open_run("rover_of_this_test")
     assert opened.folder == shipped == mine / "trained" / "rover_of_this_test"
     assert opened.info.robot == "rover_of_this_test"
+
+
+def test_missing_keys_of_a_run_have_the_defaults_of_the_schema(tmp_path, monkeypatch):
+    """A new option is off in an old run, whatever the registered task says today."""
+
+    @dataclass(frozen=True, kw_only=True)
+    class Jumping(Commands):
+        height: float
+        effort: float = 1.0
+
+    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+    today = Task(
+        observations=Observations(foot_contact=True),
+        rewards=Rewards(torques=-7.0),
+        commands=Jumping(height=0.3, effort=2.0),
+    )
+    tasks.register_task("rover_of_this_test", tasks.get_task("quadruped").folder, today)
+    folder = create_run(tmp_path / "run", today, "rover_of_this_test", "plane").folder
+    assert open_run(folder).task == today
+    lines = (folder / TASK_FILE).read_text().splitlines(keepends=True)
+    keys = ("foot_contact", "torques", "effort")
+    (folder / TASK_FILE).write_text("".join(line for line in lines if not line.startswith(keys)))
+    task = open_run(folder).task
+    assert task.observations == Observations()
+    assert task.rewards == Rewards()
+    assert task.commands == Jumping(height=0.3)
 
 
 def test_local_run_precedes_bundled_policy(tmp_path, task, monkeypatch):

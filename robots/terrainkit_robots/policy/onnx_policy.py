@@ -1,0 +1,167 @@
+"""Open a policy from outside: an ONNX file, and the JSON that describes it as in an export."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import isclose
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import onnxruntime
+import torch
+
+from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.files import open_regular
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
+from terrainkit_robots.policy.export import JSON_FILE, METADATA_KEY, describe_policy
+from terrainkit_robots.rl.run import PolicySpec
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.transforms import FloatArray
+
+MAX_FILE_SIZE = 1 << 28
+"""Largest ONNX or JSON file that is read [bytes]."""
+
+_TABLES = {
+    "P": ("effort", "velocity", "armature", "stiffness", "damping", "action_scale"),
+    "V": ("effort", "velocity", "armature", "damping"),
+    "T": ("effort", "velocity", "armature"),
+}
+"""Tables of a robot's spec that `joints` replaces, by control type."""
+
+_COMPARED = "format_version timing observation action control_type joints feet gait height_scan"
+"""Keys that state what the policy receives and what its actions do."""
+
+
+_OF_THE_ROBOT = ("joints.frictionloss", "joints.passive_damping")
+"""Keys that may differ between the robot and that of the training."""
+
+
+class _Description(msgspec.Struct):
+    joints: dict[str, list[Any]]
+    task: dict[str, Any] = {}
+
+
+class OnnxPolicy:
+    """A policy without memory in an ONNX file, from observations (n, k) to actions (n, j)."""
+
+    def __init__(self, path: Path) -> None:
+        """Load the file and run it once; raise ConfigError if it is not such a policy."""
+        options, self.__name__ = onnxruntime.SessionOptions(), path.name
+        options.intra_op_num_threads, options.log_severity_level = 1, 4
+        data = _read(path)
+        try:
+            self.session = onnxruntime.InferenceSession(data, options)
+        except Exception as error:  # onnxruntime's errors have no common class
+            raise ConfigError(f"{path} is not an ONNX file: {_one_line(error)}") from error
+        inputs = [(each.name, *each.shape) for each in self.session.get_inputs()]
+        try:
+            ((self._input, batch, self.num_obs),) = inputs
+            self._is_single = batch == 1
+            self.num_actions: int = self(torch.zeros(2, self.num_obs)).reshape(2, -1).shape[1]
+        except Exception as error:
+            got = f"{path} is not a policy: got the inputs {listing(map(str, inputs))}"
+            expected = "expected one of shape (n, k) or (1, k), and actions of shape (n, j)"
+            raise ConfigError(f"{got}; {expected}: {_one_line(error)}") from error
+
+    def __call__(self, obs: torch.Tensor) -> FloatArray:
+        """Return actions (n, j) for observations (n, k)."""
+        rows = obs.numpy(force=True)
+        parts = np.split(rows, len(rows)) if self._is_single else [rows]
+        return np.concatenate([self.session.run(None, {self._input: part})[0] for part in parts])
+
+
+def open_onnx(path: Path, robot: str | Path) -> PolicySpec:
+    """Open an exported policy, which is evaluated like a run.
+
+    Args:
+        path: The ONNX file, with `policy.json` beside it, or else in its metadata.
+        robot: Name of a registered task, or folder of an onboarded robot. The JSON replaces the
+            order, pose, gains and limits of its joints, and the settings of its task.
+
+    Raises:
+        ConfigError: If a file cannot be read, the policy is for another robot, or the JSON does not
+            describe the environment that terrainkit builds from it.
+    """
+    policy, found, beside = OnnxPolicy(path), get_task(robot), path.with_name(JSON_FILE)
+    metadata = policy.session.get_modelmeta().custom_metadata_map
+    if not beside.is_file() and METADATA_KEY not in metadata:
+        got = f"got no {JSON_FILE} beside it, nor in its metadata (key {METADATA_KEY})"
+        raise ConfigError(f"{path}: {got}; terrainkit export writes both")
+    text = _read(beside) if beside.is_file() else metadata[METADATA_KEY]
+    source = str(beside) if beside.is_file() else f"{JSON_FILE} in {path}"
+    try:
+        document = msgspec.json.decode(text, type=dict[str, Any])
+        described = msgspec.convert(document, _Description)
+        task = found.task.from_table(described.task, found.task.with_defaults(), "task.")
+        kind = task.control.control_type
+        model = _replace_joints(Robot.load(found.folder), described.joints, kind)
+        spec = PolicySpec(task=task, robot=model, policy=policy)
+        env = build_eval_env(spec, Plane(), 1, EvaluationConfig())
+        built = describe_policy(env)
+        for key in _COMPARED.split():
+            expected = dict(_leaves(built[key], key))
+            for at, got in _leaves(document.get(key, {}), key):
+                if not at.startswith(_OF_THE_ROBOT) and not _is_close(got, expected.get(at, ...)):
+                    other = "the environment of task and joints has no such value"
+                    if at in expected:
+                        other = f"expected {expected[at]}, as in task and joints"
+                    raise ConfigError(f"{at}: got {str(got)[:80]}; {other}")
+    except (msgspec.DecodeError, RecursionError, ConfigError) as error:
+        raise ConfigError(f"{source}: {_one_line(error)}") from error
+    sizes = built["observation"]["size"], env.num_actions
+    if (policy.num_obs, policy.num_actions) != sizes:
+        got = f"got {policy.num_obs} observations and {policy.num_actions} actions"
+        raise ConfigError(f"{path}: {got}; expected {sizes[0]} and {sizes[1]}, as in {source}")
+    return spec
+
+
+def _replace_joints(robot: Robot, joints: dict[str, list[Any]], control_type: str) -> Robot:
+    """Return a robot with the joint order, pose, gains and limits of a policy."""
+    names, spec = joints.get("name", []), robot.spec
+    if sorted(map(str, names)) != sorted(spec.joint_order):
+        other = [listing(a for a in names if a not in spec.joint_order)]
+        other += [listing(a for a in spec.joint_order if a not in names)]
+        got = f"got {other[0]}, which {spec.name} lacks, and not its {other[1]}"
+        raise ConfigError(f"joints.name, the policy belongs to another robot: {got}")
+    keys = {name: name for name in _TABLES[control_type]} | {"default_pose": "default_position"}
+    tables = {name: joints[key] for name, key in keys.items() if key in joints}
+    for name, values in tables.items():
+        if len(values) != len(names):
+            got = f"got {len(values)} values"
+            raise ConfigError(f"joints.{keys[name]}: {got}; expected one for each joint")
+    pairs = {name: dict(zip(names, values, strict=True)) for name, values in tables.items()}
+    spec = replace(spec, joint_order=tuple(names), **pairs)  # type: ignore[arg-type]
+    return Robot.from_spec(spec, robot.folder)
+
+
+def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """Yield the path and the value of each number, text and null in a value of JSON."""
+    if not isinstance(value, dict | list):
+        yield path, value
+        return
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        yield from _leaves(item, f"{path}.{key}")
+
+
+def _is_close(got: Any, built: Any) -> bool:
+    numbers = isinstance(got, int | float) and isinstance(built, int | float)
+    return isclose(got, built, rel_tol=1e-5, abs_tol=1e-6) if numbers else bool(got == built)
+
+
+def _read(path: Path) -> bytes:
+    try:
+        with open_regular(path) as file:
+            data = file.read(MAX_FILE_SIZE + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else None
+        raise ConfigError(f"cannot read {path}: {reason or error}") from error
+    if len(data) > MAX_FILE_SIZE:
+        raise ConfigError(f"{path}: more than {MAX_FILE_SIZE} bytes; expected a smaller file")
+    return data
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:300]
