@@ -85,7 +85,8 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "mixed_course": {**_COURSE, "proportion": 4.0, "elements": list(_OBSTACLES.values())},
     },
 }
-"""Terrain (its name by default), proportion (1 by default) and parameters of each sub-terrain, by preset."""
+"""Terrain (its name by default), proportion (1 by default) and parameters of each sub-terrain, by
+preset."""
 
 _EQUAL_PARTS = {
     "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),
