@@ -1,6 +1,7 @@
 """Waypoints: the goals of patches as velocity commands, and the progress along them."""
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,12 @@ class Waypoints:
 
     radius: float
     """Horizontal distance at which a goal is reached [m]."""
+
+    @classmethod
+    def make(cls, num_envs: int, num_goals: int, radius: float) -> Self:
+        """Return waypoints of robots without goals, with space for a number of goals."""
+        goals = np.full((num_envs, num_goals, 2), np.nan)
+        return cls(goals=goals, index=np.zeros(num_envs, np.int64), radius=radius)
 
     @property
     def numbers(self) -> NDArray[np.int64]:
@@ -51,7 +58,6 @@ class Waypoints:
         self,
         position: NDArray[np.floating],
         yaw: NDArray[np.floating],
-        *,
         speed: ArrayLike,
         stiffness: float,
         max_yaw_rate: tuple[float, float],
@@ -67,13 +73,13 @@ class Waypoints:
 
         Returns:
             Forward and left velocity [m/s] and yaw rate [rad/s], shape (n, 3); NaN for robots
-            without goals.
+            without goals or with a speed of NaN.
         """
         x, y = (self._current() - position).T
         error = (np.arctan2(y, x) - yaw + np.pi) % (2 * np.pi) - np.pi
         forward = speed * np.maximum(np.cos(error), 0)
         yaw_rate = np.clip(stiffness * error, *max_yaw_rate)
-        return np.column_stack([forward, 0 * forward, yaw_rate]).astype(np.float32)
+        return np.column_stack([forward, 0 * forward, yaw_rate + 0 * forward]).astype(np.float32)
 
     def _current(self) -> NDArray[np.floating]:
         """Return the next goals, the last ones after them, shape (n, 2)."""

@@ -21,7 +21,7 @@ def make(*goals, radius=0.4):
 )
 def test_waypoints_commands_turn_to_the_goal_and_walk_ahead(yaw, command):
     got = make([[5.0, 1.0]]).commands(
-        np.array([[2.0, 1.0]]), np.array([yaw]), speed=0.75, stiffness=1, max_yaw_rate=(-0.8, 0.8)
+        np.array([[2.0, 1.0]]), np.array([yaw]), 0.75, 1.0, (-0.8, 0.8)
     )
     np.testing.assert_allclose(got[0], command, atol=1e-6)
 
@@ -41,7 +41,5 @@ def test_waypoints_robot_without_goals_never_arrives():
     waypoints = make([NONE, NONE])
     assert not waypoints.update(np.zeros((1, 2))).any()
     assert np.isnan(waypoints.progress).all()
-    got = waypoints.commands(
-        np.zeros((1, 2)), np.zeros(1), speed=1.0, stiffness=1.0, max_yaw_rate=(-1.0, 1.0)
-    )
+    got = waypoints.commands(np.zeros((1, 2)), np.zeros(1), 1.0, 1.0, (-1.0, 1.0))
     assert np.isnan(got).all()

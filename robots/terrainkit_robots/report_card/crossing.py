@@ -113,7 +113,8 @@ class _Progress:
         goals = np.full((n, max(map(len, routes)), 2), np.nan)
         for robot, route in enumerate(routes):
             goals[robot, : len(route)] = route
-        self._waypoints = Waypoints(goals=goals, index=np.zeros(n, np.int64), radius=GOAL_RADIUS)
+        self._waypoints = Waypoints.make(n, goals.shape[1], GOAL_RADIUS)
+        self._waypoints.reset(np.arange(n), goals)
         self._speed = speed
         self._lower = np.array([patch.grid.lower for patch in patches])
         self._upper = np.array([patch.grid.upper for patch in patches])
@@ -125,14 +126,10 @@ class _Progress:
         """Yield the commands of each step until every attempt has ended."""
         while self._active.any():
             state = self._env.state
-            commands = self._waypoints.commands(
-                state.base_pos[:, :2],
-                quat_to_yaw(state.base_quat),
-                speed=self._speed,
-                stiffness=HEADING_STIFFNESS,
-                max_yaw_rate=self._env.cfg.commands.ang_vel_yaw,
+            yaw, limits = quat_to_yaw(state.base_quat), self._env.cfg.commands.ang_vel_yaw
+            yield self._waypoints.commands(
+                state.base_pos[:, :2], yaw, self._speed, HEADING_STIFFNESS, limits
             )
-            yield np.nan_to_num(commands)
 
     def update(self, fell: NDArray[np.bool_]) -> None:
         """Record the attempts that a step ended."""

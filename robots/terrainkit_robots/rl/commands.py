@@ -1,14 +1,16 @@
 """Velocity commands: sampling, resampling, heading control, waypoints, and the gait."""
 
-from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.waypoints import Waypoints
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
+
+if TYPE_CHECKING:
+    from terrainkit.waypoints import Waypoints
 
 GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
 """Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m, and 0.8 s
@@ -37,25 +39,14 @@ def sample_commands(
 class VelocityCommand:
     """The current commands of n robots."""
 
-    def __init__(
-        self,
-        cfg: Commands,
-        num_envs: int,
-        dt: float,
-        *,
-        heading_command: bool,
-        waypoints: Waypoints | None = None,
-    ) -> None:
-        if waypoints:
-            forward = max(cfg.lin_vel_x[0], 0.0), max(cfg.lin_vel_x[1], 0.0)
-            cfg = replace(cfg, lin_vel_x=forward, lin_vel_y=(0.0, 0.0))
+    def __init__(self, cfg: Commands, num_envs: int, dt: float, *, heading_command: bool) -> None:
         # Forward and left velocity [m/s] and yaw rate [rad/s], and the heading to turn to [rad],
         # NaN for none. With a heading command, the yaw rate is computed from the heading.
         self.commands = np.zeros((num_envs, 3), np.float32)
         self.heading = np.zeros(num_envs, np.float32)
         self.heading_command = heading_command
         self.speed = np.zeros(num_envs, np.float32)  # toward the waypoints [m/s], NaN to stand
-        self.waypoints = waypoints
+        self.waypoints: Waypoints | None = None  # override the commands of robots with goals
         self.fixed: FloatArray | None = None  # overrides the sampled commands, shape (n, 3)
         self._cfg = cfg
         self._interval = max(1, round(cfg.resampling_time / dt))
@@ -64,7 +55,7 @@ class VelocityCommand:
         """Sample new commands for some environments."""
         sample = sample_commands(rng, len(env_ids), self._cfg)
         self.commands[env_ids], self.heading[env_ids] = sample
-        self.speed[env_ids] = sample[0][:, 0] + 0 * sample[1]
+        self.speed[env_ids] = np.abs(sample[0][:, 0]) + 0 * sample[1]
 
     def resample_due(self, rng: np.random.Generator, steps: Ids) -> None:
         """Resample where the resampling time has passed; `steps` since reset, shape (n,)."""
@@ -73,26 +64,19 @@ class VelocityCommand:
             self.resample(rng, env_ids)
 
     def update_heading(self, yaw: FloatArray, position: FloatArray | None = None) -> None:
-        """Apply the fixed commands, or compute those from headings and waypoints.
+        """Apply the fixed commands, or compute those that depend on headings and waypoints.
 
-        Args:
-            yaw: Headings of the robots [rad], shape (n,).
-            position: x and y of the robots [m], shape (n, 2); needed for waypoints.
+        Yaw [rad] has the shape (n,), the position, x and y [m], (n, 2).
         """
-        cfg = self._cfg
+        stiffness, limits = self._cfg.heading_stiffness, self._cfg.ang_vel_yaw
+        if self.heading_command:
+            rate = np.float32(stiffness) * wrap_to_pi(self.heading - yaw)
+            self.commands[:, 2] = np.nan_to_num(np.clip(rate, *limits), nan=0.0)
+        if self.waypoints and position is not None:
+            toward = self.waypoints.commands(position, yaw, self.speed, stiffness, limits)
+            np.copyto(self.commands, toward, where=~np.isnan(toward))
         if self.fixed is not None:
             self.commands[:] = self.fixed
-            return
-        if self.heading_command:
-            rate = np.float32(cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
-            self.commands[:, 2] = np.nan_to_num(np.clip(rate, *cfg.ang_vel_yaw), nan=0.0)
-        if self.waypoints and position is not None:
-            stiffness, limits = cfg.heading_stiffness, cfg.ang_vel_yaw
-            toward = self.waypoints.commands(
-                position, yaw, speed=self.speed, stiffness=stiffness, max_yaw_rate=limits
-            )
-            follows = ~np.isnan(toward[:, 0])  # neither without goals, nor to stand
-            self.commands[follows] = toward[follows]
 
 
 class Gait:

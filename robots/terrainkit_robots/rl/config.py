@@ -136,8 +136,8 @@ class Commands(Config):
     heading_stiffness: NonNegativeFloat = 0.5
     """Yaw velocity per heading error [1/s]."""
     waypoints: bool = False
-    """Whether to command to walk ahead to the goals of the patch in turn, if it has any. The levels
-    then depend on the share of the goals that a robot reaches."""
+    """Whether to command to walk ahead to the goals of the patch in turn, at the magnitude of the
+    forward velocity. The levels then depend on the share of the goals that a robot reaches."""
     waypoint_radius: PositiveFloat = 0.4
     """Horizontal distance at which a goal is reached [m]."""
     resampling_time: PositiveFloat = 10.0

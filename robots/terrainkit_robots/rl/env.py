@@ -45,16 +45,12 @@ class LeggedEnv(VecEnv):
         self.rng = np.random.default_rng(task.runner.seed)
         heading = task.commands.heading_command
         heading = not terrain.is_flat if heading is None else heading
+        self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
         self.waypoints = None
         if task.commands.waypoints and terrain.has_goals:
-            self.waypoints = Waypoints(
-                goals=np.full((n, terrain.goals.shape[2], 2), np.nan),
-                index=np.zeros(n, np.int64),
-                radius=task.commands.waypoint_radius,
-            )
-        self.velocity_command = VelocityCommand(
-            task.commands, n, task.dt, heading_command=heading, waypoints=self.waypoints
-        )
+            num_goals, radius = terrain.goals.shape[2], task.commands.waypoint_radius
+            self.waypoints = Waypoints.make(n, num_goals, radius)
+        self.velocity_command.waypoints = self.waypoints
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
         self.sensors = Sensors(self.sim, terrain, task, self.gait.averaging_time, scan=scan)
         self.pushes = Pushes(task.domain_rand, n, task.dt)
@@ -259,13 +255,14 @@ class LeggedEnv(VecEnv):
         distance[terrain_out_of_bounds(base_pos, self.terrain)] = self.terrain.patch_length
         distance[unstable[env_ids]] = 0  # MuJoCo moved these to the world's origin
         ended = env_ids[complete], distance[complete], fallen[complete]
-        progress = self.waypoints.progress[env_ids] if self.waypoints else None
-        if progress is not None:
-            log["Episode/goals_reached"] = float(np.nanmean(progress))
-            progress = progress[complete]
-        self.curriculum.on_episode_end(
-            *ended, update_levels=self.cfg.terrain.curriculum, progress=progress
-        )
+        progress = None
+        if self.waypoints:
+            reached = self.waypoints.progress[env_ids]
+            progress = reached[complete]
+            if not np.isnan(reached).all():
+                log["Episode/goals_reached"] = float(np.nanmean(reached))
+        update_levels = self.cfg.terrain.curriculum
+        self.curriculum.on_episode_end(*ended, update_levels=update_levels, progress=progress)
         return log if self.terrain.is_flat else log | self.curriculum.log()
 
     def _reset_idx(self, env_ids: Ids) -> None:
