@@ -65,8 +65,8 @@ class SubTerrain(Config):
         if self.friction is not None:
             friction = convert_range(self.terrain, "friction", self.friction, _FRICTION)
             object.__setattr__(self, "friction", friction)
-        reserved = field_keys(type(self)).keys() & parameters_of(self.terrain_class).keys()
-        if reserved:
+        own: Any = type(self)  # mypy does not take it as hashable
+        if reserved := field_keys(own).keys() & parameters_of(self.terrain_class).keys():
             raise ConfigError(
                 f"{self.terrain}: got parameters with the names {', '.join(sorted(reserved))}; "
                 "expected others, since they are keys of [[terrains]]"
@@ -85,7 +85,8 @@ class SubTerrain(Config):
         cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
     ) -> Self:
         """Return the sub-terrain of a `[[terrains]]` table; its other keys are parameters."""
-        keys = field_keys(cls).keys() - {"parameters"}
+        kind: Any = cls
+        keys = field_keys(kind).keys() - {"parameters"}
         own = {key: table[key] for key in table if key in keys}
         parameters = {key: value for key, value in table.items() if key not in own}
         try:

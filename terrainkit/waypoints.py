@@ -41,14 +41,14 @@ class Waypoints:
         numbers = self.numbers
         return np.where(numbers > 0, self.index / np.maximum(numbers, 1), np.nan)
 
-    def update(self, position: ArrayLike) -> NDArray[np.bool_]:
+    def update(self, position: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Advance the robots that are at their goal; return which have reached their last one.
 
         `position` is x and y [m], shape (n, 2).
         """
         reached = np.linalg.norm(self._current() - position, axis=1) <= self.radius
         self.index += reached & (self.index < self.numbers)
-        return self.progress == 1
+        return np.asarray(self.progress == 1)
 
     def reset(self, env_ids: NDArray[np.int64], goals: NDArray[np.floating]) -> None:
         """Start new episodes of some robots, with their goals, shape (m, k, 2)."""

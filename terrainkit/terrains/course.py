@@ -94,9 +94,8 @@ class Course(Lane):
     order: str = parameter.choice("given", "random")
     """Order of the elements: given, or as many as fit, each drawn at random."""
 
-    element_length: float = parameter.length(2.0)
-    """With the order random: length of an element along x, and the longest of one that has its own
-    [m]."""
+    slot_length: float = parameter.length(2.0)
+    """With the order random: length along x of the slots that elements are drawn for [m]."""
 
     platform: float = parameter.length(1.0)
     """Length of the flat platform between two elements along x [m]."""
@@ -180,7 +179,7 @@ class Course(Lane):
         start, platform = grid.cells(self.start), grid.cells(self.platform)
         order, slots = list(range(len(cells))), cells
         if self.order == "random":
-            slot = grid.cells(self.element_length)
+            slot = grid.cells(self.slot_length)
             free = grid.length(grid.shape[0] - 2 * start + platform)
             number = number_that_fits("course", grid.length(slot + platform), free)
             weights = np.array([each.proportion for each in self.elements])
@@ -200,15 +199,15 @@ class Course(Lane):
         is_share, total = cells == 0, int(cells.sum())
         free = grid.shape[0] - 2 * grid.cells(self.start)
         if self.order == "random":
-            cells[is_share] = slot = grid.cells(self.element_length)
+            cells[is_share] = slot = grid.cells(self.slot_length)
             if slot > free or cells.max() > slot:
                 raise ConfigError(
                     f"course: got elements up to {grid.length(int(cells.max())):g} m long, "
-                    f"element_length {self.element_length:g} m and a start of {self.start:g} m at "
-                    "both ends; expected no element longer than element_length, which has to fit "
-                    f"in a patch {grid.size[0]:g} m long"
+                    f"slot_length {self.slot_length:g} m and a start of {self.start:g} m at both "
+                    "ends; expected no element longer than slot_length, which has to fit in a "
+                    f"patch {grid.size[0]:g} m long"
                 )
-            return cells.tolist()
+            return [int(each) for each in cells]
         free -= grid.cells(self.platform) * (len(cells) - 1)
         if is_share.any():
             shares = is_share * np.array([each.proportion for each in self.elements])
@@ -220,7 +219,7 @@ class Course(Lane):
                 f"platforms of {self.platform:g} m and a start of {self.start:g} m at both ends; "
                 f"expected elements that fit in a patch {grid.size[0]:g} m long"
             )
-        return cells.tolist()
+        return [int(each) for each in cells]
 
     def _element_values(self, grid: Grid | None) -> Iterator[tuple[str, Value]]:
         """Yield the parameters of the elements by path, requested or realized on `grid`."""
