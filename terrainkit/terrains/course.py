@@ -45,9 +45,10 @@ class Element(SubTerrain):
         super().__post_init__()
         if any(each.table for each in parameters_of(self.terrain_class).values()):
             raise ConfigError(f"terrain: got {self.terrain}; expected a terrain without elements")
-        if self.overlays or self.friction is not None:
-            got = "overlays" if self.overlays else "friction"
-            raise ConfigError(f"{self.terrain}: got {got} of an element; set {got} of the course")
+        own = {"name": self.name != self.terrain, "overlays": self.overlays}
+        for key, value in {**own, "friction": self.friction is not None}.items():
+            if value:
+                raise ConfigError(f"{self.terrain}: got {key} of an element; only a course has it")
 
     def __str__(self) -> str:
         return str(self.terrain)
