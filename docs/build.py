@@ -76,6 +76,10 @@ def terrains_page() -> str:
         "",
         'legged_gym\'s "stairs up", which a robot climbs from the platform outward, are',
         '`pyramid_stairs_inverted` here. Its "stairs down" are `pyramid_stairs`.',
+        "",
+        "`parkour_course` on patches of 18 m x 4 m; the arrows are goals:",
+        "",
+        "![parkour_course](pictures/parkour_course.png)",
     ]
     return "\n".join(parts) + "\n"
 
@@ -226,6 +230,7 @@ def draw_pictures() -> None:
     terrain_map = terrainkit.generate(terrainkit.MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
     draw_feasibility(terrain_map, "quadruped")
+    draw_courses()
     draw_robot("quadruped")
     draw_walk("quadruped_map")
 
@@ -251,6 +256,12 @@ def draw_terrain(name: str) -> None:
     ]
     picture = cv2.cvtColor(render_patches(patches, width=800), cv2.COLOR_RGB2BGR)
     cv2.imwrite(str(PICTURES / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+
+
+def draw_courses() -> None:
+    courses = MapConfig(preset="parkour_course", rows=4, patch_size=(18, 4), border=1, seed=SEED)
+    picture = PICTURES / "parkour_course.png"
+    write_preview(terrainkit.generate(courses), picture, width=820, overwrite=True)
 
 
 def draw_robot(name: str) -> None:
@@ -317,6 +328,7 @@ def main() -> int:
                 *registry.terrain_names(),
                 "map",
                 "feasibility",
+                "parkour_course",
                 "quadruped",
                 "quadruped_map",
             )

@@ -14,8 +14,9 @@ from msgspec import Meta
 
 from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
+from terrainkit.schema import nested_values
 from terrainkit.text import expected_names
-from terrainkit.type_hint import convert, show
+from terrainkit.type_hint import convert, is_table, show
 
 Snap = Literal["none", "cells", "centered"]
 Value = float | int | bool | str | tuple[float, ...]
@@ -64,6 +65,9 @@ class Parameter:
 
     choices: tuple[str | int, ...] = ()
     """The accepted values; empty if they are not a fixed list."""
+
+    table: Any = None
+    """The config class of the items of a list of tables; None for any other value."""
 
     @cached_property
     def default(self) -> Value | Range:
@@ -211,6 +215,11 @@ def vector(default: tuple[float, ...]) -> Any:
     return _field(tuple(float(each) for each in default), allow_range=False)
 
 
+def tables(*default: Any) -> Any:
+    """Declare a list of configs of one class, which are tables in TOML."""
+    return _field(default, allow_range=False, table=type(default[0]))
+
+
 def _field(easy: Value, hard: Value | None = None, **options: Any) -> Any:
     parameter = Parameter(easy=easy, hard=easy if hard is None else hard, **options)
     return dataclasses.field(default=parameter.default, metadata={"parameter": parameter})
@@ -224,7 +233,7 @@ def parameters_of(owner: type[Any]) -> Mapping[str, Parameter]:
             raise ConfigError(
                 f"{owner.__name__}: {field.name} is a plain field; expected one declared with "
                 "parameter.height, length, size, platform, grade, scalar, count, switch, text, "
-                "choice or vector"
+                "choice, vector or tables"
             )
     return {f.name: f.metadata["parameter"] for f in dataclasses.fields(owner)}
 
@@ -243,6 +252,8 @@ def convert_parameter(owner: str, name: str, value: object, parameter: Parameter
     """
     if parameter.is_plain(value):
         return value  # type: ignore[return-value]
+    if parameter.table and isinstance(value, tuple):
+        value = nested_values(f"{owner}.{name}", list(value), _hint(parameter))
     result: Value = convert(f"{owner}.{name}", value, _hint(parameter))
     return result
 
@@ -282,12 +293,16 @@ def format_value(value: Value) -> str:
         return f"[{', '.join(map(format_value, value))}]"
     if isinstance(value, bool | str):
         return str(value).lower() if isinstance(value, bool) else value
+    if is_table(type(value)):
+        return str(value)
     return f"{value:g}"
 
 
 def _hint(parameter: Parameter) -> Any:
     """Return the type hint of the values of a parameter."""
     kind = type(parameter.easy)
+    if parameter.table:
+        return tuple.__class_getitem__((parameter.table, ...))
     if parameter.choices:
         return Literal[parameter.choices]
     if isinstance(parameter.easy, tuple):

@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from terrainkit.grid import Grid
-from terrainkit.parameter import Realized, Value, parameters_of
+from terrainkit.parameter import Parameter, Realized, Value, parameters_of
 
 _WORD_START = re.compile("(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -19,6 +19,11 @@ class Parameterized:
     def kind(cls) -> str:
         """Return the name of the class in snake_case: `pyramid_stairs` for `PyramidStairs`."""
         return _snake_case(cls.__name__)
+
+    def declarations(self) -> dict[str, Parameter]:
+        """Return the declarations of the values of :meth:`requested`, by name."""
+        kind: Any = type(self)
+        return dict(parameters_of(kind))
 
     def requested(self) -> dict[str, Value]:
         """Return the parameters before snapping, by name."""

@@ -14,7 +14,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.grid import Grid
 from terrainkit.layout import assign_patch, patch_rng, terrain_columns
 from terrainkit.overlay import Overlay
-from terrainkit.parameter import Realized, Value, parameters_of
+from terrainkit.parameter import Realized, Value
 from terrainkit.patch_geometry import PatchGeometry, uniform_friction
 from terrainkit.solids import Solids
 from terrainkit.spawn import find_spawn, sample_spawns
@@ -148,7 +148,8 @@ def _child_rng(
 ) -> "np.random.Generator":
     """Return a child of the generator of a patch, in its initial state.
 
-    Child 0 is for solids and goals, 1 for the spawn positions, and 2 + k for overlay k.
+    Child 0 is for solids and goals, 1 for the spawn positions, and 2 + k for overlay k. The heights
+    of a terrain may use child 0, too, to have the layout of its solids.
     """
     return patch_rng(config, terrain, row, col).spawn(number + 1)[number]
 
@@ -313,8 +314,9 @@ def with_headings(
 
 def _check_slopes(terrain: Terrain, config: MapConfig) -> None:
     """Raise ConfigError if a slope is so steep that the map would turn it into walls."""
-    for name, parameter in parameters_of(type(terrain)).items():
-        grade = getattr(terrain, name)
+    values: Any = terrain.requested()
+    for name, parameter in terrain.declarations().items():
+        grade = values[name]
         if parameter.is_grade and grade * config.cell > config.wall_threshold:
             raise ConfigError(
                 f"{terrain.kind()}.{name}: got {grade:g}; expected at most slope_threshold "

@@ -9,6 +9,25 @@ from terrainkit.parameter import parameters_of
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit.text import expected_names
 
+# The obstacles of Extreme Parkour and Robot Parkour Learning, one on a length of 2 m each. At the
+# hard end, the former climbs 0.5 m and leaps 0.8 m, and the latter crawls under 0.2 m and passes
+# openings of 0.28 m.
+_OBSTACLES: dict[str, dict[str, Any]] = {
+    "hurdle": {"terrain": "hurdles", "height": (0.05, 0.4)},
+    "step": {
+        "terrain": "hurdles",
+        "height": (0.05, 0.5),
+        "min_thickness": 0.6,
+        "max_thickness": 1.0,
+    },
+    "leap": {"terrain": "gap_track", "length": (0.1, 0.8), "min_spacing": 1.5, "max_spacing": 2.0},
+    "tilt": {"terrain": "side_ramps", "gap": (0.0, 0.2), "spacing": 1.2, "end": 0.4},
+    "crawl": {"terrain": "crawl", "spacing": 0.8},
+    "squeeze": {"terrain": "slit", "opening": (1.3, 0.8), "offset": 0.4},
+}
+
+_COURSE = {"terrain": "course", "order": "random", "start": 1.5}
+
 _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
     # The columns of legged_gym in its order. Its "stairs up" are climbed from the platform outward,
     # so they are the inverted pyramid here, and its "stairs down" the upright one.
@@ -57,8 +76,17 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "rough": {"amplitude": 0.04, "step": 0.02, "spacing": 0.1},
         "wave": {},
     },
+    # Courses of one obstacle as in the training of both, and mixed ones as in their distillation.
+    "parkour_course": {
+        **{
+            f"{name}_course": {**_COURSE, "elements": [obstacle]}
+            for name, obstacle in _OBSTACLES.items()
+        },
+        "mixed_course": {**_COURSE, "proportion": 4.0, "elements": list(_OBSTACLES.values())},
+    },
 }
-"""Proportion (1 by default) and parameters of each sub-terrain, by preset."""
+"""Terrain (its name by default), proportion (1 by default) and parameters of each sub-terrain, by
+preset."""
 
 _EQUAL_PARTS = {
     "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),
@@ -98,7 +126,8 @@ def preset_names() -> tuple[str, ...]:
 def get_preset(name: str) -> tuple[SubTerrain, ...]:
     """Return the sub-terrains of a preset.
 
-    The preset "all" has every terrain once, and once more inverted where that exists.
+    The preset "all" has every terrain once, and once more inverted where that exists; but no
+    course, which consists of the others.
 
     Raises:
         ConfigError: if there is no such preset.
@@ -111,16 +140,20 @@ def get_preset(name: str) -> tuple[SubTerrain, ...]:
     return tuple(_sub_terrain(each) for each in names)
 
 
-def _sub_terrain(name: str, proportion: float = 1.0, **parameters: Any) -> SubTerrain:
-    terrain = name.removesuffix(registry.INVERTED)
-    if terrain != name:
+def _sub_terrain(
+    name: str, terrain: str = "", proportion: float = 1.0, **parameters: Any
+) -> SubTerrain:
+    if name.endswith(registry.INVERTED):
         parameters["inverted"] = True
+    terrain = terrain or name.removesuffix(registry.INVERTED)
     return SubTerrain(terrain=terrain, name=name, proportion=proportion, parameters=parameters)
 
 
 def _all_names() -> list[str]:
     names = []
     for name in registry.terrain_names():
+        if name == "course":
+            continue
         names.append(name)
         if "inverted" in parameters_of(registry.get_terrain(name)):
             names.append(name + registry.INVERTED)

@@ -65,7 +65,7 @@ class Config:
                 note = " (a key with a dot needs quotes)" if is_nested else ""
                 raise ConfigError(f"{owner} has no key {truncate(repr(key))}{note}; {known}")
         values = {
-            names[key]: _nested_values(
+            names[key]: nested_values(
                 path + key_text(key), value, hints[names[key]], getattr(default, key, None)
             )
             for key, value in table.items()
@@ -152,7 +152,7 @@ def flatten(config: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield path + name, value
 
 
-def _nested_values(path: str, value: Any, hint: Any, default: Any = None) -> Any:
+def nested_values(path: str, value: Any, hint: Any, default: Any = None) -> Any:
     """Return a value from TOML, with a Config for each table where one is expected."""
     kind, origin, args, _, is_optional = parse_hint(hint)
     if value == NONE and is_optional:
@@ -161,11 +161,11 @@ def _nested_values(path: str, value: Any, hint: Any, default: Any = None) -> Any
         return kind.from_table(value, default, f"{path}.")
     if origin is Mapping and is_table(args[1]) and isinstance(value, Mapping):
         return {
-            key: _nested_values(f"{path}.{key_text(key)}", item, args[1])
+            key: nested_values(f"{path}.{key_text(key)}", item, args[1])
             for key, item in value.items()
         }
     if origin is tuple and is_table(args[0]) and isinstance(value, list):
-        return tuple(_nested_values(f"{path}[{i}]", item, args[0]) for i, item in enumerate(value))
+        return tuple(nested_values(f"{path}[{i}]", item, args[0]) for i, item in enumerate(value))
     return value
 
 

@@ -11,7 +11,7 @@ from terrainkit import registry
 from terrainkit.errors import ConfigError
 from terrainkit.overlay import Overlay
 from terrainkit.parameter import MAX_VALUE, Parameter, convert_range, parameters_of
-from terrainkit.schema import Config
+from terrainkit.schema import Config, field_keys
 from terrainkit.terrain import Terrain
 from terrainkit.type_hint import convert, show
 
@@ -65,11 +65,16 @@ class SubTerrain(Config):
         if self.friction is not None:
             friction = convert_range(self.terrain, "friction", self.friction, _FRICTION)
             object.__setattr__(self, "friction", friction)
-        if reserved := _KEYS & set(parameters_of(self.terrain_class)):
+        own: Any = type(self)  # mypy does not take it as hashable
+        if reserved := field_keys(own).keys() & parameters_of(self.terrain_class).keys():
             raise ConfigError(
                 f"{self.terrain}: got parameters with the names {', '.join(sorted(reserved))}; "
                 "expected others, since they are keys of [[terrains]]"
             )
+        for name, declared in parameters_of(self.terrain_class).items():
+            if declared.table and name in self.parameters:
+                tables = convert_range(self.terrain, name, self.parameters[name], declared)
+                object.__setattr__(self, "parameters", {**self.parameters, name: tables})
         if not self.name:
             object.__setattr__(self, "name", self.terrain)
         for difficulty in (0.0, 1.0):
@@ -80,7 +85,9 @@ class SubTerrain(Config):
         cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
     ) -> Self:
         """Return the sub-terrain of a `[[terrains]]` table; its other keys are parameters."""
-        own = {key: table[key] for key in table if key in _KEYS}
+        kind: Any = cls
+        keys = field_keys(kind).keys() - {"parameters"}
+        own = {key: table[key] for key in table if key in keys}
         parameters = {key: value for key, value in table.items() if key not in own}
         try:
             if "overlays" in own:
@@ -118,15 +125,12 @@ class SubTerrain(Config):
     @cached_property
     def declarations(self) -> dict[str, Parameter]:
         """The parameters of the terrain by name, and those of its overlays by path."""
-        declared = dict(parameters_of(self.terrain_class))
+        declared = self.at(1.0).declarations()
         for k, overlay in enumerate(self.overlays):
             for name, parameter in parameters_of(type(overlay)).items():
                 declared[overlay_path(k, name)] = parameter
         return declared
 
-
-_KEYS = {"terrain", "proportion", "name", "overlays", "friction"}
-"""Keys of a `[[terrains]]` table that are not parameters."""
 
 _FRICTION = Parameter(easy=1.0, hard=1.0)
 

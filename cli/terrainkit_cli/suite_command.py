@@ -10,7 +10,7 @@ import tyro
 from terrainkit import suites
 from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import format_value, parameters_of
+from terrainkit.parameter import format_value
 from terrainkit.sub_terrain import SubTerrain
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
@@ -102,8 +102,8 @@ def _dimensions(sub_terrain: SubTerrain) -> list[str]:
     first, last = sub_terrain.at(0.0), sub_terrain.at(1.0)
     ranges: list[str] = []
     values: list[str] = []
-    for name in parameters_of(sub_terrain.terrain_class):
-        easy, hard = (format_value(getattr(terrain, name)) for terrain in (first, last))
+    for name in first.requested():
+        easy, hard = (format_value(terrain.requested()[name]) for terrain in (first, last))
         (values if easy == hard else ranges).append(
             f"{name} {easy}" if easy == hard else f"{name} {easy} to {hard}"
         )

@@ -66,7 +66,7 @@ benchmarks/collision.py gave 91 to 103."""
 
 
 def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "auto") -> None:
-    """Write the map as MJCF.
+    """Write the map as MJCF. Each goal is a site.
 
     Args:
         terrain_map: The map.
@@ -114,6 +114,7 @@ def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -
         geom = _add_hfield_geom(world, name, terrain_map.grid, heights, part)
         _set_friction(geom, friction, static)
     _add_solids(asset, world, terrain_map.solids, static)
+    _add_goals(world, terrain_map.goals)
     # The elevation data are the larger part of the file, so they are not kept as one text.
     file.write('<?xml version="1.0" encoding="utf-8"?>\n<mujoco model="terrain">\n  <asset>\n')
     for name, (part, _) in hfields.items():
@@ -174,6 +175,9 @@ def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
         margin="0",
         gap="0",
         rgba="0.55 0.55 0.52 1",
+    )
+    ET.SubElement(
+        terrain, "site", type="box", size="0.15 0.03 0.03", group="0", rgba="0.2 0.4 0.8 1"
     )
 
 
@@ -387,3 +391,15 @@ def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids, static: fl
             geom.set("conaffinity", "0")
         if not visible:
             geom.set("group", "3")
+
+
+def _add_goals(world: ET.Element, goals: NDArray[np.float32]) -> None:
+    """Add a site for each goal, `goal_ROW_COL_NUMBER`, whose x axis is the heading."""
+    for row, col, k in np.argwhere(~np.isnan(goals[..., 0])).tolist():
+        *position, heading = goals[row, col, k].tolist()
+        pose = {
+            "pos": format_numbers(*position),
+            "quat": format_numbers(np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2)),
+        }
+        name = f"goal_{row}_{col}_{k}"
+        ET.SubElement(world, "site", {"name": name, "class": "terrain", **pose})

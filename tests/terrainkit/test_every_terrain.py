@@ -268,10 +268,13 @@ def test_every_terrain_is_realized_within_a_cell(terrain, given_parameters, shap
     ],
 )
 def test_every_terrain_builds_or_rejects_extreme_values(terrain, parameter, value):
-    kind = type(parameters_of(registry.get_terrain(terrain))[parameter].easy)
+    declared = parameters_of(registry.get_terrain(terrain))[parameter]
     grid = Grid(shape=(80, 80), cell=0.1)
     try:
-        choice = SubTerrain(terrain=terrain, parameters={parameter: kind(value)})
+        choice = SubTerrain(
+            terrain=terrain,
+            parameters={parameter: [value] if declared.table else type(declared.easy)(value)},
+        )
         built = choice.at(1.0)
         heights = built.build(grid, np.random.default_rng(0))
     except TerrainkitError:

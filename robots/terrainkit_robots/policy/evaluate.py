@@ -225,7 +225,7 @@ def _assign(count: int, num_envs: int, seed: int) -> NDArray[np.int64]:
 
 
 def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1) -> Task:
-    """Return a task without noise, randomization, pushes, curricula and timeouts in `seconds`."""
+    """Return a task without noise, randomization, pushes, waypoints, curricula and timeouts."""
     names = "friction added_mass gains motor_strength action_delay"
     off: dict[str, Any] = dict.fromkeys(names.split())
     off |= dict.fromkeys(["com_shift", "joint_offset", "push_interval_s", "max_push_vel_xy"], 0.0)
@@ -233,6 +233,7 @@ def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1
         task,
         env=replace(task.env, num_envs=num_envs, episode_length_s=2 * seconds + 1),
         terrain=replace(task.terrain, curriculum=False),
+        commands=replace(task.commands, waypoints=False),
         init_state=replace(task.init_state, reset_range=(1.0, 1.0), lin_vel=0.0, ang_vel=0.0),
         domain_rand=replace(task.domain_rand, **off),
         noise=replace(task.noise, noise_level=0.0),

@@ -10,9 +10,16 @@ from numpy.typing import NDArray
 from terrainkit import TerrainMap
 from terrainkit.errors import ConfigError
 from terrainkit.patch import Patch
+from terrainkit.waypoints import Waypoints
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, rollout
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
-from terrainkit_robots.report_card.route import SPEED, Routes, patch_routes
+from terrainkit_robots.report_card.route import (
+    GOAL_RADIUS,
+    HEADING_STIFFNESS,
+    SPEED,
+    patch_routes,
+    route_lengths,
+)
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import MapTerrain
@@ -106,25 +113,29 @@ class _Progress:
         goals = np.full((n, max(map(len, routes)), 2), np.nan)
         for robot, route in enumerate(routes):
             goals[robot, : len(route)] = route
-        self._routes = Routes(goals=goals, index=np.zeros(n, np.int64))
+        self._waypoints = Waypoints.make(n, goals.shape[1], GOAL_RADIUS)
+        self._waypoints.reset(np.arange(n), goals)
+        self._speed = speed
         self._lower = np.array([patch.grid.lower for patch in patches])
         self._upper = np.array([patch.grid.upper for patch in patches])
         turn = np.pi / min(-env.cfg.commands.ang_vel_yaw[0], env.cfg.commands.ang_vel_yaw[1])
-        seconds = TIME_FACTOR * self._routes.lengths(env.start_pos) / speed + turn + EXTRA_TIME
+        seconds = TIME_FACTOR * route_lengths(goals, env.start_pos) / speed + turn + EXTRA_TIME
         self._max_steps = np.rint(seconds / env.cfg.dt)
 
     def schedule(self) -> Iterator[NDArray[np.float32]]:
         """Yield the commands of each step until every attempt has ended."""
         while self._active.any():
             state = self._env.state
-            yaw = quat_to_yaw(state.base_quat)
-            yield self._routes.commands(state.base_pos[:, :2], yaw, self._env.cfg.commands)
+            yaw, limits = quat_to_yaw(state.base_quat), self._env.cfg.commands.ang_vel_yaw
+            yield self._waypoints.commands(
+                state.base_pos[:, :2], yaw, self._speed, HEADING_STIFFNESS, limits
+            )
 
     def update(self, fell: NDArray[np.bool_]) -> None:
         """Record the attempts that a step ended."""
         self._steps += 1
         position = self._env.state.base_pos[:, :2]
-        crossed = self._routes.update(position)
+        crossed = self._waypoints.update(position)
         left = ((position < self._lower) | (position > self._upper)).any(axis=1)
         late = self._steps >= self._max_steps
         for outcome, mask in ((FELL, fell), (CROSSED, crossed), (LEFT, left), (TIMED_OUT, late)):

@@ -1,4 +1,6 @@
-"""Velocity commands: sampling, resampling, heading control, and the gait."""
+"""Velocity commands: sampling, resampling, heading control, waypoints, and the gait."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,6 +8,9 @@ from numpy.typing import NDArray
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
+
+if TYPE_CHECKING:
+    from terrainkit.waypoints import Waypoints
 
 GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
 """Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m, and 0.8 s
@@ -40,6 +45,8 @@ class VelocityCommand:
         self.commands = np.zeros((num_envs, 3), np.float32)
         self.heading = np.zeros(num_envs, np.float32)
         self.heading_command = heading_command
+        self.speed = np.zeros(num_envs, np.float32)  # toward the waypoints [m/s], NaN to stand
+        self.waypoints: Waypoints | None = None  # override the commands of robots with goals
         self.fixed: FloatArray | None = None  # overrides the sampled commands, shape (n, 3)
         self._cfg = cfg
         self._interval = max(1, round(cfg.resampling_time / dt))
@@ -48,6 +55,7 @@ class VelocityCommand:
         """Sample new commands for some environments."""
         sample = sample_commands(rng, len(env_ids), self._cfg)
         self.commands[env_ids], self.heading[env_ids] = sample
+        self.speed[env_ids] = np.abs(sample[0][:, 0]) + 0 * sample[1]
 
     def resample_due(self, rng: np.random.Generator, steps: Ids) -> None:
         """Resample where the resampling time has passed; `steps` since reset, shape (n,)."""
@@ -55,13 +63,20 @@ class VelocityCommand:
         if len(env_ids):
             self.resample(rng, env_ids)
 
-    def update_heading(self, yaw: FloatArray) -> None:
-        """Apply the fixed commands, or compute yaw rates from headings; yaw [rad], shape (n,)."""
+    def update_heading(self, yaw: FloatArray, position: FloatArray | None = None) -> None:
+        """Apply the fixed commands, or compute those that depend on headings and waypoints.
+
+        Yaw [rad] has the shape (n,), the position, x and y [m], (n, 2).
+        """
+        stiffness, limits = self._cfg.heading_stiffness, self._cfg.ang_vel_yaw
+        if self.heading_command:
+            rate = np.float32(stiffness) * wrap_to_pi(self.heading - yaw)
+            self.commands[:, 2] = np.nan_to_num(np.clip(rate, *limits), nan=0.0)
+        if self.waypoints and position is not None:
+            toward = self.waypoints.commands(position, yaw, self.speed, stiffness, limits)
+            np.copyto(self.commands, toward, where=~np.isnan(toward))
         if self.fixed is not None:
             self.commands[:] = self.fixed
-        elif self.heading_command:
-            rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
-            self.commands[:, 2] = np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
 
 
 class Gait:

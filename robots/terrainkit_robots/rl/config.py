@@ -135,6 +135,11 @@ class Commands(Config):
     because a robot that keeps turning does not cross the terrain."""
     heading_stiffness: NonNegativeFloat = 0.5
     """Yaw velocity per heading error [1/s]."""
+    waypoints: bool = False
+    """Whether to command to walk ahead to the goals of the patch in turn, at the magnitude of the
+    forward velocity. The levels then depend on the share of the goals that a robot reaches."""
+    waypoint_radius: PositiveFloat = 0.4
+    """Horizontal distance at which a goal is reached [m]."""
     resampling_time: PositiveFloat = 10.0
     """Time after which a new command is sampled [s]."""
     min_norm: NonNegativeFloat = 0.2

@@ -16,6 +16,10 @@ from terrainkit_robots.rl.terrain import Terrain
 SUCCESS_DECAY = 0.95
 """Weight of the previous success rate when an episode ends."""
 
+PROMOTION, DEMOTION = 0.8, 0.4
+"""Shares of the goals above and below which a robot moves up or down. Extreme Parkour has them as
+shares of the commanded distance."""
+
 
 class TerrainCurriculum:
     """Terrain levels of n environments, and success rates of the patches.
@@ -23,7 +27,7 @@ class TerrainCurriculum:
     A robot moves up when it covered half a patch. It moves down when it fell before that, or
     covered less than half the distance that its commands integrate to over the episode it had.
     (legged_gym multiplies the current command by the length of a full episode, so a robot that is
-    commanded to stop moves down.)
+    commanded to stop moves down.) With waypoints, the share of the goals that it reached counts.
     """
 
     def __init__(self, terrain: Terrain, num_envs: int, max_init_level: int, seed: int) -> None:
@@ -55,14 +59,22 @@ class TerrainCurriculum:
         fallen: NDArray[np.bool_],
         *,
         update_levels: bool,
+        progress: NDArray[np.float64] | None = None,
     ) -> None:
         """Record the success of complete episodes, and update the terrain levels if requested.
 
-        `distance` from the start [m] and `fallen` have the shape (k,) of `env_ids`.
+        `distance` from the start [m], `fallen` and `progress`, the share of the goals reached or
+        NaN, have the shape (k,) of `env_ids`.
         """
         commanded = np.linalg.norm(self.commanded[env_ids], axis=1)
         crossed = distance > self._terrain.patch_length / 2
         success = crossed | (~fallen & (distance >= commanded / 2))
+        commanded[fallen] = np.inf
+        if progress is not None:
+            no_goals = np.isnan(progress)
+            success = np.where(no_goals, success, progress >= PROMOTION)
+            distance = np.where(no_goals, distance, np.where(success, np.inf, 0.0))
+            commanded = np.where(no_goals, commanded, np.where(progress < DEMOTION, np.inf, 0.0))
         patches = zip(self.levels[env_ids], self.columns[env_ids], strict=True)
         for patch, succeeded in zip(patches, success, strict=True):
             rate = self.success[patch]
@@ -74,7 +86,7 @@ class TerrainCurriculum:
             self.levels[env_ids] = next_levels(
                 self.levels[env_ids],
                 distance,
-                np.where(fallen, np.inf, commanded),
+                commanded,
                 rows=rows,
                 patch_length=self._terrain.patch_length,
                 seed=(self._seed, self._updates),

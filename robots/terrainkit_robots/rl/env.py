@@ -11,6 +11,7 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
+from terrainkit.waypoints import Waypoints
 from terrainkit_robots.rl import observations
 from terrainkit_robots.rl.commands import Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
@@ -45,6 +46,11 @@ class LeggedEnv(VecEnv):
         heading = task.commands.heading_command
         heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
+        self.waypoints = None
+        if task.commands.waypoints and terrain.has_goals:
+            num_goals, radius = terrain.goals.shape[2], task.commands.waypoint_radius
+            self.waypoints = Waypoints.make(n, num_goals, radius)
+        self.velocity_command.waypoints = self.waypoints
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
         self.sensors = Sensors(self.sim, terrain, task, self.gait.averaging_time, scan=scan)
         self.pushes = Pushes(task.domain_rand, n, task.dt)
@@ -109,7 +115,10 @@ class LeggedEnv(VecEnv):
         self.state = state = self._compute_state(np.arange(self.num_envs), unstable)
         rewards = self._compute_rewards(state, unstable)
         self.path_length += np.hypot(*state.base_lin_vel[:, :2].T) * self.cfg.dt
-        time_out = (self.episode_length_buf.numpy() >= self.max_episode_length) & ~state.fallen
+        time_out = self.episode_length_buf.numpy() >= self.max_episode_length
+        if self.waypoints and self.velocity_command.fixed is None:
+            time_out |= self.waypoints.update(state.base_pos[:, :2])
+        time_out &= ~state.fallen
         done = state.fallen | time_out
         self.curriculum.accumulate_command(self.commands, quat_to_yaw(state.base_quat), self.cfg.dt)
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
@@ -118,7 +127,7 @@ class LeggedEnv(VecEnv):
             extras["log"] = self._end_episodes(env_ids, state, unstable)
             self._reset_idx(env_ids)
         self.velocity_command.resample_due(self.rng, self.steps_since_reset)
-        self.velocity_command.update_heading(self._yaw())
+        self._update_heading()
         if len(env_ids):
             state.update(env_ids, self._compute_state(env_ids, after_reset=True))
         self._update_commands()
@@ -129,7 +138,7 @@ class LeggedEnv(VecEnv):
         """Reset every environment."""
         env_ids = np.arange(self.num_envs)
         self._reset_idx(env_ids)
-        self.velocity_command.update_heading(self._yaw())
+        self._update_heading()
         self.state = self._compute_state(env_ids, after_reset=True)
         self._compute_observations()
 
@@ -140,7 +149,7 @@ class LeggedEnv(VecEnv):
         self.velocity_command.fixed = commands
         if commands is None:
             self.velocity_command.resample(self.rng, np.arange(self.num_envs))
-        self.velocity_command.update_heading(self._yaw())
+        self._update_heading()
         self._update_commands()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
@@ -225,8 +234,9 @@ class LeggedEnv(VecEnv):
             policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
         self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
-    def _yaw(self) -> FloatArray:
-        return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
+    def _update_heading(self) -> None:
+        pose = self.sim.qpos[:, :7].astype(np.float32)
+        self.velocity_command.update_heading(quat_to_yaw(pose[:, 3:]), pose[:, :2])
 
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
         """Update the curricula at the end of episodes, and return the values to log."""
@@ -245,7 +255,14 @@ class LeggedEnv(VecEnv):
         distance[terrain_out_of_bounds(base_pos, self.terrain)] = self.terrain.patch_length
         distance[unstable[env_ids]] = 0  # MuJoCo moved these to the world's origin
         ended = env_ids[complete], distance[complete], fallen[complete]
-        self.curriculum.on_episode_end(*ended, update_levels=self.cfg.terrain.curriculum)
+        progress = None
+        if self.waypoints:
+            reached = self.waypoints.progress[env_ids]
+            progress = reached[complete]
+            if not np.isnan(reached).all():
+                log["Episode/goals_reached"] = float(np.nanmean(reached))
+        update_levels = self.cfg.terrain.curriculum
+        self.curriculum.on_episode_end(*ended, update_levels=update_levels, progress=progress)
         return log if self.terrain.is_flat else log | self.curriculum.log()
 
     def _reset_idx(self, env_ids: Ids) -> None:
@@ -263,6 +280,9 @@ class LeggedEnv(VecEnv):
             self.sim.forward(env_ids)
         self.start_pos[env_ids] = qpos[:, :2]
         self.curriculum.reset(env_ids)
+        if self.waypoints:
+            level, column = self.curriculum.levels[env_ids], self.curriculum.columns[env_ids]
+            self.waypoints.reset(env_ids, self.terrain.goals[level, column, :, :2])
         self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
         self.path_length[env_ids] = self.actions[:, env_ids] = 0
         self.pushes.reset(self.rng, env_ids)
@@ -321,6 +341,9 @@ class LeggedEnv(VecEnv):
         state = {f"state_{name}": array for name, array in vars(self.state).items()}
         if not self.obs_history.size:
             del state["state_history"]
+        if self.waypoints:
+            arrays |= {"goals": self.waypoints.goals, "next_goal": self.waypoints.index}
+            arrays["speed"] = self.velocity_command.speed
         if self.cfg.domain_rand.action_delay:
             arrays["action_delay"] = self.sim.batch.expand("actuator_delay")
         return arrays | sums | state | vars(self.params)

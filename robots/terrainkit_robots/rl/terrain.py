@@ -23,12 +23,18 @@ class Terrain(ABC):
     # Shapes are (rows, cols) and more, spawns padded with NaN; rows are levels.
     env_origins: FloatArray = np.zeros((1, 1, 3), np.float32)  # spawn origins [m]
     spawns: FloatArray = np.zeros((1, 1, 1, 4), np.float32)  # positions [m], headings [rad]
+    goals: FloatArray = np.full((1, 1, 1, 4), np.nan, np.float32)  # as the spawns
     terrain_names: NDArray[np.str_]  # name of each patch's terrain
     patch_length: float = 8.0  # distance to walk to cross a patch [m]
     lower: tuple[float, float]  # lower corner, x and y [m]
     upper: tuple[float, float]  # upper corner, x and y [m]
     surface: HeightfieldSurface | None = None  # of ground and solids; None for a plane at height 0
     is_flat: bool  # whether the ground is level everywhere: a height scan carries no information
+
+    @property
+    def has_goals(self) -> bool:
+        """Whether any patch has goals."""
+        return not np.isnan(self.goals).all()
 
     @abstractmethod
     def spec(self) -> Any:
@@ -66,6 +72,7 @@ class MapTerrain(Terrain):
 
     def __init__(self, terrain_map: TerrainMap, collision: Any = "auto") -> None:
         self.env_origins, self.spawns = terrain_map.env_origins, terrain_map.spawns
+        self.goals = terrain_map.goals
         self.terrain_names = np.array(terrain_map.terrain_names)[terrain_map.terrain_types]
         self.patch_length = terrain_map.config.patch_size[0]
         self.lower, self.upper = terrain_map.grid.lower, terrain_map.grid.upper
@@ -77,6 +84,8 @@ class MapTerrain(Terrain):
         with tempfile.TemporaryDirectory() as folder:
             path = self.terrain_map.save(Path(folder) / "ground.xml", collision=self._collision)
             spec = mujoco.MjSpec.from_file(str(path))
+        for goal in spec.sites:  # every step would compute their positions
+            spec.delete(goal)
         _add_material(spec)
         for geom in spec.geoms:
             geom.material, geom.rgba = "ground", [1, 1, 1, 1]

@@ -429,3 +429,16 @@ def test_mjcf_slippery_patch_lets_a_box_slide(tmp_path):
     slid = start - data.xpos[1:, 0]
     assert abs(slid[0]) < 0.1
     assert slid[1] > 0.4
+
+
+def test_mjcf_has_a_site_per_goal(solid_map, tmp_path):
+    model = loaded(solid_map, tmp_path)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    names = [model.site(k).name for k in range(model.nsite)]
+    assert names == ["goal_0_1_0", "goal_0_1_1"]
+    goals = solid_map.goals[0, 1]
+    assert data.site_xpos == pytest.approx(goals[:, :3], abs=1e-5)
+    forward = data.site_xmat.reshape(-1, 3, 3)[:, :, 0]
+    heading = np.arctan2(forward[:, 1], forward[:, 0])
+    assert heading == pytest.approx(goals[:, 3], abs=1e-5)

@@ -57,7 +57,7 @@ def test_outcomes(make_progress):
     env.state.base_pos[1, :2] = 2.5, -0.01
     progress.update(fell)
     assert outcomes(progress)[:2] == ["fell", "left"]
-    goal = progress._routes.goals[3, 0]
+    goal = progress._waypoints.goals[3, 0]
     env.state.base_pos[:, :2] = goal  # neither the fallen robot nor the one that left crosses
     env.state.base_pos[2, :2] = 2.5
     progress.update(np.zeros(4, bool))
@@ -74,6 +74,6 @@ def test_outcomes(make_progress):
 
 def test_a_fall_at_the_goal_is_a_fall(make_progress):
     progress, env = make_progress(1)
-    env.state.base_pos[:, :2] = progress._routes.goals[0, 0]
+    env.state.base_pos[:, :2] = progress._waypoints.goals[0, 0]
     progress.update(np.ones(1, bool))
     assert outcomes(progress) == ["fell"]

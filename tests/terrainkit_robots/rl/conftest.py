@@ -150,6 +150,17 @@ def map_ground(mixed_map: TerrainMap) -> Terrain:
 
 
 @pytest.fixture(scope="session")
+def course_ground() -> Terrain:
+    """Return one patch 8 m long with goals at x = 4 m and 7 m, and one without goals."""
+    lanes = (
+        SubTerrain(terrain="course", parameters={"elements": [{"terrain": "flat"}] * 2}),
+        SubTerrain(terrain="flat"),
+    )
+    config = MapConfig(rows=1, cols=2, patch_size=(8.0, 4.0), border=1.0, terrains=lanes)
+    return MapTerrain(generate(config))
+
+
+@pytest.fixture(scope="session")
 def nominal_task() -> Callable[..., Task]:
     """Return a function that makes tasks without randomization, noise and pushes."""
 

@@ -441,3 +441,16 @@ class TestInEnvironment:
     def test_max_init_level_is_respected(self) -> None:
         assert set(TerrainCurriculum(Patches(), 500, 2, 1).levels) == {0, 1, 2}
         assert set(TerrainCurriculum(Patches(rows=3), 500, 5, 1).levels) == {0, 1, 2}
+
+
+def test_levels_follow_the_share_of_goals(curriculum: TerrainCurriculum) -> None:
+    """As the thresholds of Extreme Parkour: 0.8 up, 0.4 down. Without goals, distance counts."""
+    curriculum.on_episode_end(
+        np.arange(4),
+        np.full(4, 0.0),
+        np.array([False, True, False, False]),
+        update_levels=True,
+        progress=np.array([0.8, 0.6, 0.2, np.nan]),
+    )
+    assert curriculum.levels.tolist() == [5, 4, 3, 4]
+    assert curriculum.success[4].tolist() == pytest.approx([0.95, 0.05])

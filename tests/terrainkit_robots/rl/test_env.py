@@ -412,6 +412,66 @@ class TestSeeds:
         assert torch.equal(torch.get_rng_state(), before[1])
 
 
+class TestWaypoints:
+    COMMANDS = Commands(waypoints=True, lin_vel_x=(0.6, 0.6), standing=0.0)
+
+    @pytest.fixture
+    def env(self, quadruped, nominal_task, course_ground):
+        return LeggedEnv(nominal_task(4, commands=self.COMMANDS), quadruped, course_ground)
+
+    def move(self, env, robot, x, y):
+        env.sim.qpos[robot, :2] = x, y
+        *_, done, extras = env.step(torch.zeros(4, 12))
+        return done, extras
+
+    def test_commands_lead_to_the_next_goal(self, env):
+        assert env.commands[0] == pytest.approx([0.6, 0, 0], abs=1e-6)
+        self.move(env, 0, 1.0, 1.0)
+        bearing = np.arctan2(1.0, 3.0)
+        assert env.commands[0] == pytest.approx([0.6 * np.cos(bearing), 0, bearing / 2], abs=0.01)
+        self.move(env, 0, 3.8, 1.8)  # 0.28 m from the first goal
+        bearing = np.arctan2(0.2, 3.2)
+        assert env.waypoints.index.tolist() == [1, 0, 0, 0]
+        assert env.commands[0] == pytest.approx([0.6 * np.cos(bearing), 0, bearing / 2], abs=0.01)
+
+    def test_commands_are_observed_and_sampled_without_goals(self, env):
+        policy = env.get_observations()["policy"]
+        scaled = env.commands * [2.0, 2.0, 0.25]
+        names = [slice(k, k + 3) for k in range(policy.shape[1] - 2)]
+        assert any(np.allclose(policy[:, each], scaled, atol=1e-5) for each in names)
+        assert (env.commands[2:, 2] != 0).all()  # a heading
+        assert np.isnan(env.waypoints.progress[2:]).all()
+
+    def test_last_goal_ends_the_episode_as_a_success(self, env):
+        self.move(env, 0, 4.0, 2.0)
+        done, extras = self.move(env, 0, 7.0, 2.0)
+        assert done.tolist() == extras["time_outs"].tolist() == [1, 0, 0, 0]
+        assert extras["log"]["Episode/goals_reached"] == 1.0
+        assert env.curriculum.success[0].tolist() == pytest.approx([1.0, np.nan], nan_ok=True)
+        assert env.waypoints.index.tolist() == [0, 0, 0, 0]
+
+    def test_robots_told_to_stand_do_not_walk(self, quadruped, nominal_task, course_ground):
+        commands = replace(self.COMMANDS, standing=1.0)
+        env = LeggedEnv(nominal_task(4, commands=commands), quadruped, course_ground)
+        env.step(torch.zeros(4, 12))
+        assert not env.commands.any()
+
+    def test_fixed_commands_have_no_goals(self, env):
+        env.set_commands(np.zeros((4, 3), np.float32))
+        self.move(env, 0, 4.0, 2.0)
+        assert env.waypoints.index[0] == 0
+        assert not env.commands.any()
+
+    def test_resume_is_bit_identical(self, env, quadruped, random_task, course_ground):
+        task = random_task(4, commands=replace(self.COMMANDS, resampling_time=0.1))
+        env, other = (LeggedEnv(task, quadruped, course_ground) for _ in "ab")
+        self.move(env, 0, 4.0, 2.0)
+        actions = acts(env, 10)
+        record(other, actions[:5])
+        other.load_state_dict(env.state_dict())
+        assert record(other, actions) == record(env, actions)
+
+
 class TestStateDict:
     @pytest.mark.parametrize("on_map", [False, True])
     @pytest.mark.parametrize("more", [False, True])

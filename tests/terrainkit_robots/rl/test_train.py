@@ -15,7 +15,7 @@ import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import tasks
-from terrainkit_robots.rl.config import Algorithm, Env, Policy, Runner, Task, Terrain
+from terrainkit_robots.rl.config import Algorithm, Commands, Env, Policy, Runner, Task, Terrain
 from terrainkit_robots.rl.run import checkpoints, open_run
 from terrainkit_robots.rl.runner import TrainingProgress
 from terrainkit_robots.rl.train import train
@@ -388,3 +388,10 @@ def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
     train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
+
+
+def test_train_rejects_waypoints_without_goals(task, tmp_path):
+    task = replace(task, commands=Commands(waypoints=True))
+    with pytest.raises(ConfigError, match="waypoints: got plane without goals"):
+        train("quadruped", "plane", task, folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()

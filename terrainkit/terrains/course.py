@@ -1,0 +1,259 @@
+"""Courses of several terrains."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from terrainkit import parameter
+from terrainkit.errors import ConfigError
+from terrainkit.features.blocks import number_that_fits
+from terrainkit.features.lane import Lane, lane_goals
+from terrainkit.grid import Grid
+from terrainkit.parameter import MAX_VALUE, Parameter, Range, Realized, Value, parameters_of
+from terrainkit.solids import Solids
+from terrainkit.sub_terrain import SubTerrain
+from terrainkit.terrain import Terrain
+
+MAX_ELEMENTS = 100
+"""Largest number of elements of a course."""
+
+ELEMENT_START = 0.2
+"""Flat start of a terrain with `start` as an element [m], unless it is given. The platform before
+it is the start that it needs as a patch of its own."""
+
+_ELEMENT_LENGTH = Parameter(easy=1.0, hard=1.0, snap="cells", allow_zero=False, allow_range=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Element(SubTerrain):
+    """A terrain of a course, with its parameters."""
+
+    proportion: Annotated[float, Meta(gt=0, le=MAX_VALUE)] = 1.0
+    """Share of the length that elements with their own leave; with the order random, of the draws.
+    """
+
+    element_length: Annotated[float, Meta(gt=0, le=MAX_VALUE)] | None = None
+    """Length along x [m]; none for a share of the patch."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if any(each.table for each in parameters_of(self.terrain_class).values()):
+            raise ConfigError(f"terrain: got {self.terrain}; expected a terrain without elements")
+        own = {"name": self.name != self.terrain, "overlays": self.overlays}
+        for key, value in {**own, "friction": self.friction is not None}.items():
+            if value:
+                raise ConfigError(f"{self.terrain}: got {key} of an element; only a course has it")
+
+    def __str__(self) -> str:
+        return str(self.terrain)
+
+    def to_table(self) -> dict[str, Any]:
+        """Return the keys of a `[[terrains.elements]]` table."""
+        length = {} if self.element_length is None else {"element_length": self.element_length}
+        return {"terrain": self.terrain, **length, **super().to_table()}
+
+    def at(self, difficulty: float) -> Terrain:
+        """Return the terrain at `difficulty`, 0 to 1."""
+        start = {"start": ELEMENT_START} if issubclass(self.terrain_class, Lane) else {}
+        return self.terrain_class.at(difficulty, start | dict(self.parameters))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course(Lane):
+    """Terrains one after another along a lane along x, with flat platforms between them.
+
+    The robot is spawned at low x. There is a goal on each platform, and one behind the last
+    element. The elements are any terrains, as wide as the patch, in the given order or drawn at
+    random, and each has the difficulty of the patch. The platforms are at height 0, where all
+    terrains begin and end. The overlay `side_walls` keeps the robot in the lane. In mode
+    curriculum, the rows of a column have the same elements.
+
+    In TOML, each element is a `[[terrains.elements]]` table with `terrain`, `element_length`,
+    `proportion` and the parameters of the terrain.
+    """
+
+    has_column_seed: ClassVar[bool] = True
+
+    elements: tuple[Element, ...] = parameter.tables(
+        Element(
+            terrain="hurdles",
+            parameters={"height": (0.05, 0.3), "min_spacing": 0.7, "max_spacing": 0.9},
+        ),
+        Element(
+            terrain="gap_track",
+            parameters={"length": (0.1, 0.5), "min_spacing": 0.7, "max_spacing": 0.9},
+        ),
+    )
+    """Terrains along the lane."""
+
+    order: str = parameter.choice("given", "random")
+    """Order of the elements: given, or as many as fit, each drawn at random."""
+
+    slot_length: float = parameter.length(2.0)
+    """With the order random: length along x of the slots that elements are drawn for [m]."""
+
+    platform: float = parameter.length(1.0)
+    """Length of the flat platform between two elements along x [m]."""
+
+    backward: bool = parameter.switch()
+    """Spawn the robot at high x, with the goals in the opposite order."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 1 <= len(self.elements) <= MAX_ELEMENTS:
+            got = len(self.elements)
+            raise ConfigError(f"course.elements: got {got}; expected 1 to {MAX_ELEMENTS}")
+
+    @classmethod
+    def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
+        """Return the course at `difficulty`, with its elements; see :meth:`Terrain.at`."""
+        course = super().at(difficulty, values)
+        elements = [replace(e, parameters=e.at(difficulty).requested()) for e in course.elements]
+        return replace(course, elements=tuple(elements))
+
+    def requested(self) -> dict[str, Value]:
+        """Return the parameters before snapping, those of the elements by path."""
+        names = ", ".join(each.terrain for each in self.elements)
+        return {**super().requested(), "elements": names, **dict(self._element_values(None))}
+
+    def realized(self, grid: Grid) -> dict[str, Realized]:
+        """Return the parameters after snapping, those of the elements by path."""
+        return {**super().realized(grid), **dict(self._element_values(grid))}
+
+    def declarations(self) -> dict[str, Parameter]:
+        """Return the declarations of the parameters, those of the elements by path."""
+        declared = super().declarations()
+        for k, (element, terrain) in enumerate(zip(self.elements, self._terrains, strict=True)):
+            if element.element_length is not None:
+                declared[_path(k, "element_length")] = _ELEMENT_LENGTH
+            declared |= {_path(k, name): each for name, each in terrain.declarations().items()}
+        return declared
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the center of the flat start, or of as long a strip at the other end."""
+        x, y = super().spawn(grid)
+        return (grid.lower[0] + grid.upper[0] - x if self.backward else x), y
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the heights of the elements, and 0 between them."""
+        ground = np.zeros(grid.shape, np.float32)
+        # Solids and goals get the first child of this generator. It decides on the order.
+        for k, span in self._layout(grid, rng.spawn(1)[0]):
+            with _naming(k):
+                ground[span] = self._terrains[k].build(_block(grid, span), _child(rng))
+        return ground
+
+    def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
+        """Return the solids of the elements."""
+        solids = []
+        for k, span in self._layout(grid, rng):
+            with _naming(k):
+                block = _block(grid, span)
+                solids.append(self._terrains[k].solids(block, heights[span], _child(rng)))
+        return Solids.concatenate(solids)
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal in the middle of each platform but that of the spawn."""
+        spans = [span for _, span in self._layout(grid, rng)]
+        begin, end = [0, *(each.stop for each in spans)], [*(each.start for each in spans)]
+        middle = np.add(begin, [*end, grid.shape[0]]) / 2
+        goals = lane_goals(grid, grid.lower[0] + grid.cell * middle)
+        if self.backward:
+            goals[:, 3] = np.pi
+        return goals[-2::-1] if self.backward else goals[1:]
+
+    @cached_property
+    def _terrains(self) -> tuple[Terrain, ...]:
+        return tuple(each.at(1.0) for each in self.elements)
+
+    def _layout(self, grid: Grid, rng: np.random.Generator) -> list[tuple[int, slice]]:
+        """Return the elements along the lane: index into `elements`, and cells along x."""
+        cells = self._element_cells(grid)
+        start, platform = grid.cells(self.start), grid.cells(self.platform)
+        order, slots = list(range(len(cells))), cells
+        if self.order == "random":
+            slot = grid.cells(self.slot_length)
+            free = grid.length(grid.shape[0] - 2 * start + platform)
+            number = number_that_fits("course", grid.length(slot + platform), free)
+            weights = np.array([each.proportion for each in self.elements])
+            order = rng.choice(len(cells), number, p=weights / weights.sum()).tolist()
+            slots = [slot] * number
+        first = start + np.cumsum(np.add(slots, platform)) - np.add(slots, platform)
+        return [(k, slice(i, i + cells[k])) for k, i in zip(order, first.tolist(), strict=True)]
+
+    def _element_cells(self, grid: Grid) -> list[int]:
+        """Return the cells along x of each of `elements`.
+
+        Raises:
+            ConfigError: if they do not fit in the patch.
+        """
+        lengths = [each.element_length for each in self.elements]
+        cells = np.array([0 if each is None else grid.cells(each) for each in lengths])
+        is_share, total = cells == 0, int(cells.sum())
+        free = grid.shape[0] - 2 * grid.cells(self.start)
+        if self.order == "random":
+            cells[is_share] = slot = grid.cells(self.slot_length)
+            if slot > free or cells.max() > slot:
+                raise ConfigError(
+                    f"course: got elements up to {grid.length(int(cells.max())):g} m long, "
+                    f"slot_length {self.slot_length:g} m and a start of {self.start:g} m at both "
+                    "ends; expected no element longer than slot_length, which has to fit in a "
+                    f"patch {grid.size[0]:g} m long"
+                )
+            return [int(each) for each in cells]
+        free -= grid.cells(self.platform) * (len(cells) - 1)
+        if is_share.any():
+            shares = is_share * np.array([each.proportion for each in self.elements])
+            ends = np.rint(np.cumsum(shares) / shares.sum() * max(free - total, 0))
+            cells += np.diff(ends, prepend=0).astype(np.int64)
+        if min(cells) < 1 or sum(cells) > free:
+            raise ConfigError(
+                f"course: got {len(cells)} elements, {grid.length(total):g} m of own lengths, "
+                f"platforms of {self.platform:g} m and a start of {self.start:g} m at both ends; "
+                f"expected elements that fit in a patch {grid.size[0]:g} m long"
+            )
+        return [int(each) for each in cells]
+
+    def _element_values(self, grid: Grid | None) -> Iterator[tuple[str, Value]]:
+        """Yield the parameters of the elements by path, requested or realized on `grid`."""
+        cells = None if grid is None else self._element_cells(grid)
+        for k, (element, terrain) in enumerate(zip(self.elements, self._terrains, strict=True)):
+            values = terrain.requested()
+            length = element.element_length
+            if grid is not None and cells is not None:
+                values = terrain.realized(_block(grid, slice(0, cells[k])))
+                length = length and grid.length(cells[k])
+            own = {} if length is None else {"element_length": length}
+            yield from ((_path(k, name), value) for name, value in (own | values).items())
+
+
+def _block(grid: Grid, span: slice) -> Grid:
+    """Return the grid of the cells `span` along x."""
+    return grid.block((span.start, 0), (span.stop - span.start, grid.shape[1]))
+
+
+@contextmanager
+def _naming(number: int) -> Iterator[None]:
+    """Name an element in errors."""
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(f"course.{_path(number)}: {error}") from error
+
+
+def _child(rng: np.random.Generator) -> np.random.Generator:
+    """Return the generator of an element: each element takes one number from `rng`."""
+    return np.random.default_rng(rng.integers(2**63))
+
+
+def _path(number: int, name: str = "") -> str:
+    """Return the name of an element, or of one of its parameters, among those of the course."""
+    return f"elements[{number}].{name}".rstrip(".")
