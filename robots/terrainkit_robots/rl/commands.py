@@ -55,13 +55,18 @@ class VelocityCommand:
         if len(env_ids):
             self.resample(rng, env_ids)
 
+    def yaw_rate(self, yaw: FloatArray) -> FloatArray:
+        """Return the commanded yaw rate of robots with the heading `yaw` [rad], shape (n,)."""
+        if self.fixed is not None or not self.heading_command:
+            return self.commands[:, 2]
+        rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
+        return np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
+
     def update_heading(self, yaw: FloatArray) -> None:
         """Apply the fixed commands, or compute yaw rates from headings; yaw [rad], shape (n,)."""
         if self.fixed is not None:
             self.commands[:] = self.fixed
-        elif self.heading_command:
-            rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
-            self.commands[:, 2] = np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
+        self.commands[:, 2] = self.yaw_rate(yaw)
 
 
 class Gait:

@@ -332,7 +332,7 @@ class TestTermination:
         _, _, dones, _ = stand(env)
         assert dones.tolist() == [False, False, True, False]
         assert env.curriculum.levels[2] <= 1
-        assert np.nansum(env.curriculum.success) == 0
+        assert np.nansum(env.curriculum.sampler.statistics.success) == 0
 
     def test_termination_reward_has_the_tasks_scale(self, quadruped, nominal_task):
         task = nominal_task(2, rewards=Rewards(termination=-100.0))

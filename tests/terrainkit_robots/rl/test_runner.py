@@ -101,12 +101,12 @@ def test_same_seed_learns_same_weights(make, task):
 def test_load_with_other_num_envs_keeps_curriculum(make, task, tmp_path, map_ground):
     before = make(task, map_ground)
     before.env.curriculum.levels[:] = 2
-    before.env.curriculum.success[1, 0] = 0.75
+    before.env.curriculum.sampler.statistics.success[1, 0] = 0.75
     before.save()
     more = make(replace(task, env=replace(task.env, num_envs=9)), map_ground)
     more.load(tmp_path / "model_0.pt")
     assert (more.env.curriculum.levels == 2).all()
-    assert more.env.curriculum.success[1, 0] == 0.75
+    assert more.env.curriculum.sampler.statistics.success[1, 0] == 0.75
     assert differences(before.alg.save(), more.alg.save()) == []
     more.learn(1)
 

@@ -224,7 +224,7 @@ def test_new_run_keeps_levels_on_same_map(task, tmp_path, mixed_map):
     mixed_map.save(path)
     mixed_map.save(copied)
     terrainkit.generate(replace(mixed_map.config, seed=mixed_map.config.seed + 1)).save(other)
-    task = with_iterations(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
+    task = with_iterations(replace(task, terrain=Terrain(curriculum=None, max_init_level=0)), 1)
     train("quadruped", path, task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
