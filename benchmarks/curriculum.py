@@ -1,126 +1,134 @@
 """The samplers of `terrainkit.curriculum` with simulated learners.
 
-A learner has a skill in each column of a map with 10 x 10 patches. It succeeds on a level below
-its skill, and practice increases the skill of the column most where success is as likely as
-failure. One column is impossible, one trivial, and one is learned only after the others. All
-samplers get the same number of samples (environment steps). The values are means over `_SEEDS`.
+A learner has a skill in each column of a map of 10 x 10 patches: the level on which it succeeds in
+half of the episodes. An episode increases the skill in its column most where success and failure
+are equally likely. Some columns are impossible, one is trivial, and one is learned only after the
+others. Skills are means over the columns that can be learned, and all values are means over the
+seeds.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.curriculum import SAMPLERS, PatchSampler
+from terrainkit.curriculum import SAMPLERS, PatchSampler, SamplerName
 
 _ROWS, _COLS, _NUM_ENVS = 10, 10, 128
-_IMPOSSIBLE, _TRIVIAL, _LATE = 0, 1, 2
+_TRIVIAL, _LATE, _LATE_SKILL = 9, 8, 4.0
+_SOLVED = 8.0
 _SEEDS = range(3)
-_TICK = 100
-"""Steps between two updates of a sampler."""
-
-_SAMPLES = 10_000_000
-_EPISODE = 1000
-"""Steps of an episode in which the robot does not fall."""
-
-_SOLVED = 0.8
-"""Mean success on the patches, without the impossible ones, of a solved map."""
+_EARLY_SAMPLES, _SAMPLES = 5_000_000, 10_000_000
+_EPISODE, _TICK = 1000, 100
+"""Steps of an episode without a fall, and between two updates of a sampler."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Learner:
-    """How skills, in levels, change."""
+    """How the skills change."""
 
     gain: float = 0.02
-    """Largest increase of the skill of a column by one episode."""
+    """Largest increase of a skill by an episode in its column, in levels."""
     transfer: float = 0.0
-    """Share of an increase by which the other columns increase as well."""
+    """Share of the increase by which the skills in the other columns increase."""
     forgetting: float = 0.0
-    """Decrease of each skill by an episode elsewhere."""
-    width: float = 0.5
-    """Difference of skill and level over which success changes."""
+    """Decrease of a skill by an episode in another column, in levels."""
+    impossible: int = 1
+    """Number of columns on which every episode fails."""
 
 
 LEARNERS = {
     "independent": Learner(),
     "transfer": Learner(gain=0.01, transfer=0.1),
-    "forgetting": Learner(gain=0.02, forgetting=2e-4),
+    "forgetting": Learner(forgetting=2e-4),
+    "half_impossible": Learner(impossible=5),
 }
 
 
-class Simulation:
-    """A learner that trains with a sampler."""
+class Training:
+    """The training of a learner with a sampler."""
 
     def __init__(self, learner: Learner, sampler: PatchSampler, seed: int) -> None:
-        self.learner, self.sampler = learner, sampler
+        self.learner, self.sampler, self.skill = learner, sampler, np.zeros(_COLS)
         self.rng = np.random.default_rng(seed)
-        self.skill = np.zeros(_COLS)
-        self.samples = np.zeros((_ROWS, _COLS))
-
-    def success(self) -> NDArray[np.float64]:
-        """Return the probability of success on each patch, shape (rows, cols)."""
-        margin = self.skill + 0.5 - np.arange(_ROWS)[:, None]
-        chances = 1 / (1 + np.exp(-margin / self.learner.width))
-        chances[:, _IMPOSSIBLE], chances[:, _TRIVIAL] = 0, 1
-        return chances
+        self.learnable = (np.arange(_COLS) >= learner.impossible) & (np.arange(_COLS) != _TRIVIAL)
 
     def run(self) -> tuple[float, float, float]:
-        """Return the final success, the share of the impossible column, and samples to solve."""
-        solved, time = np.inf, 0
+        """Return the skill after `_EARLY_SAMPLES`, and two values until the map is solved.
+
+        They are the share of the samples in impossible columns, and the number of samples.
+        """
+        early, wasted, total = np.nan, 0, 0
         levels, columns = self.sampler.levels.copy(), self.sampler.columns.copy()
-        succeeds, progress, length = self.outcomes(levels, columns)
+        progress, length = self._outcomes(levels, columns)
         end = self.rng.integers(1, _EPISODE, _NUM_ENVS)  # as rsl-rl cuts the first episodes
-        while time * _NUM_ENVS < _SAMPLES:
-            time += _TICK
+        for time in range(0, _SAMPLES // _NUM_ENVS, _TICK):
+            if np.isnan(early) and time * _NUM_ENVS >= _EARLY_SAMPLES:
+                early = self._mean_skill()
+            if self._mean_skill() >= _SOLVED and not np.isnan(early):
+                break
             ids = np.flatnonzero(end <= time)
             if not len(ids):
                 continue
-            np.add.at(self.samples, (levels[ids], columns[ids]), length[ids])
-            self.practice(levels[ids], columns[ids])
-            levels[ids], columns[ids] = self.sampler.update(ids, progress[ids])
-            succeeds[ids], progress[ids], length[ids] = self.outcomes(levels[ids], columns[ids])
-            end[ids] = time + length[ids]
-            if solved == np.inf and time % 1000 == 0 and self.mean_success() >= _SOLVED:
+            if self._mean_skill() < _SOLVED:
+                total += length[ids].sum()
+                wasted += length[ids][columns[ids] < self.learner.impossible].sum()
                 solved = time * _NUM_ENVS
-        share = self.samples[:, _IMPOSSIBLE].sum() / self.samples.sum()
-        return self.mean_success(), share, solved
+            self._practice(levels[ids], columns[ids])
+            levels[ids], columns[ids] = self.sampler.update(ids, progress[ids])
+            progress[ids], length[ids] = self._outcomes(levels[ids], columns[ids])
+            end[ids] = time + length[ids]
+        is_solved = self._mean_skill() >= _SOLVED
+        return early, wasted / total, solved if is_solved else np.inf
 
-    def mean_success(self) -> float:
-        """Return the mean probability of success, without the impossible column."""
-        return float(np.delete(self.success(), _IMPOSSIBLE, axis=1).mean())
+    def _mean_skill(self) -> float:
+        return float(self.skill[self.learnable].mean())
 
-    def outcomes(self, levels, columns):  # type: ignore[no-untyped-def]
-        """Return success, progress and length of episodes that start."""
+    def _success(
+        self, levels: NDArray[np.int64], columns: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Return the probability of success on patches, shape (k,)."""
+        chance = 1 / (1 + np.exp(2 * (levels - self.skill[columns])))
+        chance[columns == _TRIVIAL] = 1
+        chance[columns < self.learner.impossible] = 0
+        return chance
+
+    def _outcomes(
+        self, levels: NDArray[np.int64], columns: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return progress and length of episodes: half of the failures are falls, and short."""
         n = len(levels)
-        succeeds = self.rng.random(n) < self.success()[levels, columns]
-        falls = ~succeeds & (self.rng.random(n) < 0.5) & (columns != _IMPOSSIBLE)
-        progress = np.where(succeeds, 1.0, np.where(falls, 0, self.rng.uniform(0, 0.6, n)))
+        succeeds = self.rng.random(n) < self._success(levels, columns)
+        falls = ~succeeds & (self.rng.random(n) < 0.5)
+        progress = np.where(falls, 0, self.rng.uniform(0, 0.6, n))
         length = np.where(falls, self.rng.integers(100, 600, n), _EPISODE)
-        return succeeds, progress, length
+        return np.where(succeeds, 1, progress), length
 
-    def practice(self, levels, columns):  # type: ignore[no-untyped-def]
-        """Increase the skills by episodes that ended."""
-        chance = self.success()[levels, columns]
-        gain = self.learner.gain * 4 * chance * (1 - chance)
-        total = np.bincount(columns, gain, minlength=_COLS)
-        ready = np.delete(self.skill, [_IMPOSSIBLE, _TRIVIAL, _LATE]).mean() >= 4
-        total[_LATE] *= ready
-        total += self.learner.transfer * (total.sum() - total) * (np.arange(_COLS) != _LATE)
+    def _practice(self, levels: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
+        """Change the skills by episodes that ended."""
+        chance = self._success(levels, columns)
+        gain = 4 * self.learner.gain * chance * (1 - chance)
+        own = np.bincount(columns, gain, minlength=_COLS)
+        change = own + self.learner.transfer * (own.sum() - own)
+        others = np.delete(self.skill, _LATE)[self.learnable[np.arange(_COLS) != _LATE]]
+        if others.mean() < _LATE_SKILL:
+            change[_LATE] = 0
         elsewhere = len(columns) - np.bincount(columns, minlength=_COLS)
-        self.skill += total - self.learner.forgetting * elsewhere
-        self.skill = np.clip(self.skill, 0, _ROWS)
+        change -= self.learner.forgetting * elsewhere
+        self.skill = np.clip(self.skill + change, 0, _ROWS)
 
 
 def run() -> Iterator[tuple[str, float]]:
+    names = ("skill_after_5M_samples", "share_in_impossible_columns", "million_samples_to_solve")
     for learner_name, learner in LEARNERS.items():
-        for name, kind in SAMPLERS.items():
+        for sampler_name in get_args(SamplerName):
             results = []
             for seed in _SEEDS:
+                kind = SAMPLERS[sampler_name]
                 sampler = kind(_ROWS, _COLS, _NUM_ENVS, max_init_level=5, seed=seed)
-                results.append(Simulation(learner, sampler, seed).run())
-            success, share, solved = np.array(results).mean(axis=0)
-            key = f"{learner_name}.{name or 'none'}"
-            yield f"{key}.success", success
-            yield f"{key}.share_of_impossible", share
-            yield f"{key}.samples_to_solve_in_millions", solved / 1e6
+                results.append(Training(learner, sampler, seed).run())
+            means = np.mean(results, axis=0) / (1, 1, 1e6)
+            for name, value in zip(names, means.tolist(), strict=True):
+                yield f"{learner_name}.{sampler_name}.{name}", value

@@ -120,12 +120,12 @@ class PatchSampler:
         """
         if missing := sorted({"updates", *self.arrays()} - set(state)):
             expected = f"expected the state of a {type(self).__name__}"
-            raise ConfigError(f"state of a sampler: got no {missing[0]}; {expected}")
+            raise ConfigError(f"state of the curriculum: got no {missing[0]}; {expected}")
         arrays = {name: to_numpy(name, state[name]) for name in self.arrays()}
         rows, cols = shape = self.statistics.visits.shape
         if (got := arrays["visits"].shape) != shape:
             sizes = (" x ".join(map(str, each)) for each in (got, shape))
-            raise ConfigError("state of a sampler: got {} patches; expected {}".format(*sizes))
+            raise ConfigError("state of the curriculum: got {} patches; expected {}".format(*sizes))
         levels = to_indices("levels", arrays.pop("levels"), rows)
         columns = to_indices("columns", arrays.pop("columns"), cols, len(levels))
         for name, array in arrays.items():

@@ -164,13 +164,13 @@ def test_other_num_envs_keep_levels_and_statistics(kind):
 @every_sampler
 def test_load_rejects_another_map(kind):
     state = kind(5, COLS, NUM_ENVS).state_dict()
-    with pytest.raises(ConfigError, match=r"state of a sampler: got 5 x 3 patches; expected 4 x 3"):
+    with pytest.raises(ConfigError, match=r"curriculum: got 5 x 3 patches; expected 4 x 3$"):
         make(kind).load_state_dict(state)
 
 
 def test_load_rejects_another_sampler():
     state = make(UniformSampler).state_dict()
-    with pytest.raises(ConfigError, match="state of a sampler: got no fast; expected the state of"):
+    with pytest.raises(ConfigError, match="curriculum: got no fast; expected the state of a Lea"):
         make(LearningProgressSampler).load_state_dict(state)
 
 

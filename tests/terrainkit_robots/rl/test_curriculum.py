@@ -114,7 +114,7 @@ class TestCheckpoint:
 
     @pytest.mark.parametrize("other", [Patches(rows=9), Patches(names=("flat",))])
     def test_load_rejects_another_map(self, other: Patches) -> None:
-        with pytest.raises(ConfigError, match="state of a sampler: got 10 x 2 patches; expected"):
+        with pytest.raises(ConfigError, match="curriculum: got 10 x 2 patches; expected"):
             make(other).load_state_dict(make().state_dict())
 
 

@@ -492,7 +492,7 @@ class TestStateDict:
         saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
         with pytest.raises(ConfigError, match="another robot"):
             LeggedEnv(random_task(3), biped, Plane()).load_state_dict(saved)
-        with pytest.raises(ConfigError, match="checkpoint's map has 1 x 1 patches"):
+        with pytest.raises(ConfigError, match="state of the curriculum: got 1 x 1 patches"):
             LeggedEnv(random_task(3), quadruped, map_ground).load_state_dict(saved)
 
 
