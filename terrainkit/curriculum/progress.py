@@ -45,7 +45,7 @@ class CommandProgress:
     """Length of the path of the reference [m], shape (n,)."""
     reach: FloatArray
     """Largest distance from the start that was also progress along the commands [m], shape (n,)."""
-    demand: FloatArray
+    target_reach: FloatArray
     """Largest distance of the reference from its start [m], shape (n,)."""
 
     @classmethod
@@ -95,7 +95,7 @@ class CommandProgress:
         self.commanded[:] += speed * dt
         self.along[:] = np.minimum(self.along + along, self.commanded)
         self.target[:] += velocity * dt
-        self.demand[:] = np.maximum(self.demand, np.linalg.norm(self.target, axis=1))
+        self.target_reach[:] = np.maximum(self.target_reach, np.linalg.norm(self.target, axis=1))
         distance = np.linalg.norm(self.position - self.start, axis=1)
         self.reach[:] = np.maximum(self.reach, np.minimum(self.along, distance))
         self.yaw[:] += to_numpy("yaw_rate", yaw_rate) * dt
@@ -132,7 +132,7 @@ class CommandProgress:
         outcomes = [
             (crossed, 1.0),
             (to_numpy("fallen", fallen), 0.0),
-            (followed & (self.demand[ids] < distance), np.nan),
+            (followed & (self.target_reach[ids] < distance), np.nan),
         ]
         conditions, values = zip(*outcomes, strict=True)
         return like(np.select(conditions, values, share), env_ids)

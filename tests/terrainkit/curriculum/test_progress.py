@@ -42,7 +42,7 @@ def test_progress_of_straight_walk_is_integrated():
     assert walk.progress.along == pytest.approx(3)
     assert walk.progress.commanded == pytest.approx(3)
     assert walk.progress.reach == pytest.approx(3)
-    assert walk.progress.demand == pytest.approx(3)
+    assert walk.progress.target_reach == pytest.approx(3)
     expected = [3 * np.cos(0.7 + np.arctan2(0.8, 0.6)), 3 * np.sin(0.7 + np.arctan2(0.8, 0.6))]
     assert walk.progress.target[0] == pytest.approx(expected)
 
