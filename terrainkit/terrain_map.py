@@ -347,31 +347,21 @@ class TerrainMap:
             headings=spawns[:, 3],
         )
 
-    def resample_columns(
-        self, levels: ArrayLike, columns: ArrayLike, *, seed: int | Sequence[int]
-    ) -> NDArray[np.int64]:
+    def resample_columns(self, levels: Any, columns: Any, *, seed: int | Sequence[int]) -> Any:
         """Return other columns at a reset; see :func:`terrainkit.curriculum.resample_columns`."""
         return resample_columns(levels, columns, self.terrain_types, seed=seed)
 
     def update_levels(
         self,
-        levels: ArrayLike,
-        distance: ArrayLike,
-        command_distance: ArrayLike,
+        levels: Any,
+        progress: Any,
         *,
         seed: int | Sequence[int],
         top_levels: int = 3,
-    ) -> NDArray[np.int64]:
+    ) -> Any:
         """Return the levels after an episode; see :func:`terrainkit.update_levels`."""
-        return update_levels(
-            levels,
-            distance,
-            command_distance,
-            rows=len(self.difficulty),
-            patch_length=self.config.patch_size[0],
-            seed=seed,
-            top_levels=top_levels,
-        )
+        rows = len(self.difficulty)
+        return update_levels(levels, progress, rows=rows, seed=seed, top_levels=top_levels)
 
     def save(self, path: "str | Path", *, overwrite: bool = False, **options: Any) -> "Path":
         """Write the map in the format of the suffix of `path`; see :mod:`terrainkit.export`."""

@@ -140,8 +140,8 @@ class EpisodeEnv(LeggedEnv):
         """Reset every environment, with new random numbers if there is a seed, and observe."""
         if seed is not None:
             self.rng = rng
-            max_level = self.cfg.terrain.max_init_level
-            self.curriculum = TerrainCurriculum(self.terrain, self.num_envs, max_level, seed)
+            terrain = self.cfg.terrain
+            self.curriculum = TerrainCurriculum(self.terrain, self.num_envs, terrain, seed)
         self.reset()
         return self.policy_observations()
 

@@ -232,7 +232,7 @@ def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1
     return replace(
         task,
         env=replace(task.env, num_envs=num_envs, episode_length_s=2 * seconds + 1),
-        terrain=replace(task.terrain, curriculum=False),
+        terrain=replace(task.terrain, curriculum=None),
         commands=replace(task.commands, waypoints=False),
         init_state=replace(task.init_state, reset_range=(1.0, 1.0), lin_vel=0.0, ang_vel=0.0),
         domain_rand=replace(task.domain_rand, **off),
@@ -360,7 +360,7 @@ class EvaluationRollout:
         settled = self._update_errors(commands, velocity - commands, active)
         self._update_gait(commands, velocity, settled)
         distance = np.linalg.norm(state.base_pos[:, :2] - self.start_pos, axis=1)
-        commanded = np.linalg.norm(self.env.curriculum.commanded, axis=1)
+        commanded = np.linalg.norm(self.env.curriculum.progress.target, axis=1)
         self.distance[active] = distance[active]
         self.commanded_distance[active] = commanded[active]
         self.crossed |= active & (distance > self.half_patch)

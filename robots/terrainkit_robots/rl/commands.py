@@ -63,20 +63,26 @@ class VelocityCommand:
         if len(env_ids):
             self.resample(rng, env_ids)
 
+    def yaw_rate(self, yaw: FloatArray) -> FloatArray:
+        """Return the commanded yaw rate of robots with the heading `yaw` [rad], shape (n,)."""
+        if self.fixed is not None or not self.heading_command:
+            return self.commands[:, 2]
+        rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
+        return np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
+
     def update_heading(self, yaw: FloatArray, position: FloatArray | None = None) -> None:
         """Apply the fixed commands, or compute those that depend on headings and waypoints.
 
         Yaw [rad] has the shape (n,), the position, x and y [m], (n, 2).
         """
-        stiffness, limits = self._cfg.heading_stiffness, self._cfg.ang_vel_yaw
-        if self.heading_command:
-            rate = np.float32(stiffness) * wrap_to_pi(self.heading - yaw)
-            self.commands[:, 2] = np.nan_to_num(np.clip(rate, *limits), nan=0.0)
-        if self.waypoints and position is not None:
-            toward = self.waypoints.commands(position, yaw, self.speed, stiffness, limits)
-            np.copyto(self.commands, toward, where=~np.isnan(toward))
         if self.fixed is not None:
             self.commands[:] = self.fixed
+            return
+        self.commands[:, 2] = self.yaw_rate(yaw)
+        if self.waypoints and position is not None:
+            stiffness, limits = self._cfg.heading_stiffness, self._cfg.ang_vel_yaw
+            toward = self.waypoints.commands(position, yaw, self.speed, stiffness, limits)
+            np.copyto(self.commands, toward, where=~np.isnan(toward))
 
 
 class Gait:

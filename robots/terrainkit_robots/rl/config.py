@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from terrainkit.curriculum import SamplerName
 from terrainkit.errors import ConfigError
 from terrainkit.schema import Config
 from terrainkit.type_hint import (
@@ -47,8 +48,10 @@ class Terrain(Config):
     collision: Literal["auto", "hfield", "boxes", "plane"] = "auto"
     """Collision geometry of the terrain: the map's heightfield, its boxes, the better of the two
     for the map, or a flat plane in place of the map."""
-    curriculum: bool = True
-    """Whether robots that walk far enough move to more difficult rows of the map."""
+    curriculum: SamplerName | None = "levels"
+    """How patches are sampled: levels moves robots that succeed to more difficult rows, uniform
+    samples any, learning_progress those where success changes, prioritized_replay those where it
+    is hard to predict; none keeps the patch of each robot."""
     max_init_level: Annotated[int, Meta(ge=0)] = 5
     """Highest row to start on; the last row of the map if it has fewer."""
     measure_heights: bool | None = None

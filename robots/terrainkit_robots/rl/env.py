@@ -15,7 +15,7 @@ from terrainkit.waypoints import Waypoints
 from terrainkit_robots.rl import observations
 from terrainkit_robots.rl.commands import Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.curriculum import TerrainCurriculum
+from terrainkit_robots.rl.curriculum import PROMOTION, TerrainCurriculum
 from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
 from terrainkit_robots.rl.rewards import active_rewards, is_moving
 from terrainkit_robots.rl.scene import build_scene
@@ -61,11 +61,9 @@ class LeggedEnv(VecEnv):
         }
         self.params = sample_params(self.rng, n, self.sim, task.domain_rand)
         apply_params(self.sim, self.params)
-        max_level, seed = task.terrain.max_init_level, task.runner.seed
-        self.curriculum = TerrainCurriculum(terrain, n, max_level, seed)
+        self.curriculum = TerrainCurriculum(terrain, n, task.terrain, task.runner.seed)
         self.episode_length_buf = torch.zeros(n, dtype=torch.int64)  # rsl-rl may replace it
         self.steps_since_reset = np.zeros(n, np.int64)
-        self.start_pos = np.zeros((n, 2))  # base position at the last reset
         self.path_length = np.zeros(n)  # since the last reset [m]
         self.actions = np.zeros((2, n, joints), np.float32)  # of the last two steps
         self.joint_offset = np.zeros((n, joints), np.float32)
@@ -86,6 +84,11 @@ class LeggedEnv(VecEnv):
     def mirror_maps(self) -> MirrorMaps:
         """Left-right symmetry of observations and actions."""
         return mirror_maps(self)
+
+    @property
+    def start_pos(self) -> NDArray[np.float64]:
+        """Position of each base at its last reset, x and y [m], shape (n, 2)."""
+        return self.curriculum.progress.start
 
     @property
     def num_obs(self) -> dict[str, int]:
@@ -120,7 +123,7 @@ class LeggedEnv(VecEnv):
             time_out |= self.waypoints.update(state.base_pos[:, :2])
         time_out &= ~state.fallen
         done = state.fallen | time_out
-        self.curriculum.accumulate_command(self.commands, quat_to_yaw(state.base_quat), self.cfg.dt)
+        self._update_progress(state, unstable)
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
         env_ids = np.flatnonzero(done)
         if len(env_ids):
@@ -234,9 +237,20 @@ class LeggedEnv(VecEnv):
             policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
         self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
+    def _update_progress(self, state: State, unstable: BoolArray) -> None:
+        progress = self.curriculum.progress
+        # MuJoCo moved the unstable robots to the world's origin.
+        pos = np.where(unstable[:, None], progress.position, state.base_pos[:, :2])
+        rate = self.velocity_command.yaw_rate(progress.yaw.astype(np.float32))
+        yaw = quat_to_yaw(state.base_quat)
+        progress.update(pos, yaw, self.commands, rate, self.cfg.dt)
+
+    def _yaw(self) -> FloatArray:
+        return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
+
     def _update_heading(self) -> None:
-        pose = self.sim.qpos[:, :7].astype(np.float32)
-        self.velocity_command.update_heading(quat_to_yaw(pose[:, 3:]), pose[:, :2])
+        position = self.sim.qpos[:, :2].astype(np.float32)
+        self.velocity_command.update_heading(self._yaw(), position)
 
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
         """Update the curricula at the end of episodes, and return the values to log."""
@@ -249,20 +263,18 @@ class LeggedEnv(VecEnv):
         log["Episode/speed"] = float((self.path_length[env_ids] / seconds).mean())
         # rsl-rl cuts the first episodes to random lengths; those say nothing about the terrain.
         complete = (self.episode_length_buf.numpy() == self.steps_since_reset)[env_ids]
-        base_pos = state.base_pos[env_ids]
-        distance = np.linalg.norm(base_pos[:, :2] - self.start_pos[env_ids], axis=1)
-        # A robot that left the map crossed its patch, even if the patch is wider than long.
-        distance[terrain_out_of_bounds(base_pos, self.terrain)] = self.terrain.patch_length
-        distance[unstable[env_ids]] = 0  # MuJoCo moved these to the world's origin
-        ended = env_ids[complete], distance[complete], fallen[complete]
-        progress = None
+        left_map = terrain_out_of_bounds(state.base_pos, self.terrain) & ~unstable
+        progress = self.curriculum.progress.of_episodes(
+            env_ids, fallen, self.terrain.patch_length / 2, left_map=left_map[env_ids]
+        )
         if self.waypoints:
             reached = self.waypoints.progress[env_ids]
-            progress = reached[complete]
+            to_goals = np.minimum(reached / PROMOTION, 1)
+            progress = np.where(np.isnan(reached), progress, to_goals)
             if not np.isnan(reached).all():
                 log["Episode/goals_reached"] = float(np.nanmean(reached))
-        update_levels = self.cfg.terrain.curriculum
-        self.curriculum.on_episode_end(*ended, update_levels=update_levels, progress=progress)
+        returns = np.sum([total[env_ids] for total in self.episode_sums.values()], axis=0)
+        self.curriculum.sampler.update(env_ids[complete], progress[complete], returns[complete])
         return log if self.terrain.is_flat else log | self.curriculum.log()
 
     def _reset_idx(self, env_ids: Ids) -> None:
@@ -278,8 +290,7 @@ class LeggedEnv(VecEnv):
         if (depth > 0).any():
             self.sim.qpos[env_ids, 2] += np.maximum(depth, 0)
             self.sim.forward(env_ids)
-        self.start_pos[env_ids] = qpos[:, :2]
-        self.curriculum.reset(env_ids)
+        self.curriculum.progress.reset(env_ids, qpos, self._yaw()[env_ids])
         if self.waypoints:
             level, column = self.curriculum.levels[env_ids], self.curriculum.columns[env_ids]
             self.waypoints.reset(env_ids, self.terrain.goals[level, column, :, :2])
@@ -326,7 +337,7 @@ class LeggedEnv(VecEnv):
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""
-        names = "commands actions joint_offset steps_since_reset start_pos path_length"
+        names = "commands actions joint_offset steps_since_reset path_length"
         arrays = {name: getattr(self, name) for name in names.split()} | {
             "physics": self.sim.batch.state,
             "episode_length": self.episode_length_buf.numpy(),
@@ -336,6 +347,7 @@ class LeggedEnv(VecEnv):
             "push_vel": self.pushes.velocity,
             "steps_until_push": self.pushes.steps_until_push,
         }
+        arrays |= {f"progress_{k}": array for k, array in vars(self.curriculum.progress).items()}
         sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
         # Computing the state again would draw noise.
         state = {f"state_{name}": array for name, array in vars(self.state).items()}

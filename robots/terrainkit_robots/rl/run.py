@@ -1,7 +1,8 @@
 """Run folders: what training writes, and what it needs to continue.
 
 A run has `task.toml`, `robot.toml` (the spec as it was trained), `run.toml` (robot, terrain and
-versions), `map.toml` (the config of its map, if any), and `model_<iteration>.pt` checkpoints.
+versions), `map.toml` (the config of its map, if any), `model_<iteration>.pt` checkpoints, and, on a
+map, `curriculum.png` (success and visits of the patches at the end of training).
 """
 
 import hashlib
@@ -28,6 +29,7 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
+CURRICULUM_FILE = "curriculum.png"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,7 +242,9 @@ def parts_to_load(
         "actor": True,
         "critic": True,
         "optimizer": rates[0] == rates[1],
-        "curriculum": is_plane == was_plane and is_same_map,
+        "curriculum": is_plane == was_plane
+        and is_same_map
+        and task.terrain.curriculum == run.task.terrain.curriculum,
     }
 
 

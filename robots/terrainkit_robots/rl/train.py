@@ -86,6 +86,8 @@ def train(
             start_callback(runner)
         # Resets of a new run would otherwise all time out in the same step.
         runner.learn(total - completed, init_at_random_ep_len=not env.steps_since_reset.any())
+        if runner.folder is not None and not ground.is_flat:
+            (runner.folder / runs.CURRICULUM_FILE).write_bytes(env.curriculum.draw())
     except (TerrainkitError, OSError) as error:
         if runner.folder is None:
             raise

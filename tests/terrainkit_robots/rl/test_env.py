@@ -332,7 +332,7 @@ class TestTermination:
         _, _, dones, _ = stand(env)
         assert dones.tolist() == [False, False, True, False]
         assert env.curriculum.levels[2] <= 1
-        assert np.nansum(env.curriculum.success) == 0
+        assert np.nansum(env.curriculum.sampler.statistics.success) == 0
 
     def test_termination_reward_has_the_tasks_scale(self, quadruped, nominal_task):
         task = nominal_task(2, rewards=Rewards(termination=-100.0))
@@ -447,8 +447,24 @@ class TestWaypoints:
         done, extras = self.move(env, 0, 7.0, 2.0)
         assert done.tolist() == extras["time_outs"].tolist() == [1, 0, 0, 0]
         assert extras["log"]["Episode/goals_reached"] == 1.0
-        assert env.curriculum.success[0].tolist() == pytest.approx([1.0, np.nan], nan_ok=True)
+        assert env.curriculum.sampler.statistics.success[0].tolist() == pytest.approx(
+            [1.0, np.nan], nan_ok=True
+        )
         assert env.waypoints.index.tolist() == [0, 0, 0, 0]
+
+    @pytest.mark.parametrize(("goals", "progress"), [(0, 0.0), (1, 0.625), (2, 1.0)])
+    def test_progress_is_the_share_of_goals_over_the_promotion(
+        self, env, monkeypatch, goals, progress
+    ):
+        updates = []
+        monkeypatch.setattr(env.curriculum.sampler, "update", lambda *args: updates.append(args))
+        for x in (4.0, 7.0)[:goals]:
+            self.move(env, 0, x, 2.0)
+        if goals < 2:
+            env.sim.qpos[0, 3:7] = 0, 1, 0, 0  # upside down
+            self.move(env, 0, 1.0, 2.0)
+        assert updates[-1][0].tolist() == [0]
+        assert updates[-1][1].tolist() == pytest.approx([progress])
 
     def test_robots_told_to_stand_do_not_walk(self, quadruped, nominal_task, course_ground):
         commands = replace(self.COMMANDS, standing=1.0)
@@ -552,7 +568,7 @@ class TestStateDict:
         saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
         with pytest.raises(ConfigError, match="another robot"):
             LeggedEnv(random_task(3), biped, Plane()).load_state_dict(saved)
-        with pytest.raises(ConfigError, match="checkpoint's map has 1 x 1 patches"):
+        with pytest.raises(ConfigError, match="state of the curriculum: got 1 x 1 patches"):
             LeggedEnv(random_task(3), quadruped, map_ground).load_state_dict(saved)
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import pytest
 import torch
 
@@ -224,7 +225,7 @@ def test_new_run_keeps_levels_on_same_map(task, tmp_path, mixed_map):
     mixed_map.save(path)
     mixed_map.save(copied)
     terrainkit.generate(replace(mixed_map.config, seed=mixed_map.config.seed + 1)).save(other)
-    task = with_iterations(replace(task, terrain=Terrain(curriculum=False, max_init_level=0)), 1)
+    task = with_iterations(replace(task, terrain=Terrain(curriculum=None, max_init_level=0)), 1)
     train("quadruped", path, task, folder=tmp_path / "run")
     run = open_run(tmp_path / "run")
     before = read_checkpoint(run.checkpoint)
@@ -233,9 +234,16 @@ def test_new_run_keeps_levels_on_same_map(task, tmp_path, mixed_map):
     curriculum["levels"][:] = top
     save_checkpoint(run.checkpoint, before)
     rewarded = replace(task, rewards=replace(task.rewards, base_height=-1.0))
-    for ground, levels in ((path, {top}), (copied, {top}), (other, {0})):
-        folder = tmp_path / f"from_{ground.stem}"
-        train("quadruped", ground, rewarded, resume=run, folder=folder)
+    uniform = replace(rewarded, terrain=Terrain(curriculum="uniform", max_init_level=0))
+    for ground, changed, levels in (
+        (path, rewarded, {top}),
+        (copied, rewarded, {top}),
+        (other, rewarded, {0}),
+        (path, uniform, {0}),
+    ):
+        folder = tmp_path / f"from_{ground.stem}_{changed.terrain.curriculum}"
+        train("quadruped", ground, changed, resume=run, folder=folder)
+        assert cv2.imread(str(folder / "curriculum.png")) is not None
         after = read_checkpoint(open_run(folder).checkpoint)["processes"][0]["env"]["curriculum"]
         assert set(after["levels"].tolist()) == levels
 

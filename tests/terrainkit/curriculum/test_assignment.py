@@ -1,19 +1,8 @@
 import numpy as np
 import pytest
 
-from terrainkit.curriculum import (
-    assign_levels,
-    assign_spawns,
-    resample_columns,
-    update_levels,
-)
+from terrainkit.curriculum import assign_levels, assign_spawns, resample_columns
 from terrainkit.errors import ConfigError
-
-
-def update(levels, distance, command_distance, *, rows=10, seed=0, **options):
-    return update_levels(
-        levels, distance, command_distance, rows=rows, patch_length=8.0, seed=seed, **options
-    )
 
 
 def test_assign_levels_shares_columns_in_order():
@@ -73,122 +62,6 @@ def test_assign_levels_rejects_invalid_value(given, message):
     valid = {"num_envs": 8, "rows": 10, "cols": 20, "max_init_level": None, "seed": 0}
     with pytest.raises(ConfigError, match=f"^{message}$"):
         assign_levels(**(valid | given))
-
-
-@pytest.mark.parametrize(
-    ("distance", "command_distance", "level"),
-    [
-        (4.1, 8.0, 6),  # over half of the 8 m patch
-        (4.0, 8.0, 5),  # just half
-        (4.1, 20.0, 6),  # up wins over down
-        (4.0, 8.1, 4),  # under half of the command
-        (0.0, 8.0, 4),
-        (0.0, 0.0, 5),  # told to stand, and stood
-        (1.0, 2.0, 5),
-        (1.0, 2.1, 4),
-    ],
-)
-def test_update_levels_moves_up_and_down(distance, command_distance, level):
-    assert update([5], [distance], [command_distance]).tolist() == [level]
-
-
-def test_update_levels_is_per_environment():
-    assert update([1, 2, 3], [8.0, 0.0, 3.0], [8.0, 8.0, 5.0]).tolist() == [2, 1, 3]
-
-
-def test_update_levels_stops_at_zero():
-    assert update([0], [0.0], [8.0]).tolist() == [0]
-
-
-def test_update_levels_spreads_solved_over_last_rows():
-    solved = update(np.full(300, 9), np.full(300, 8.0), np.full(300, 8.0))
-    assert np.bincount(solved, minlength=10)[7:].min() > 60
-    assert solved.min() == 7
-
-
-@pytest.mark.parametrize(
-    ("rows", "top_levels", "levels"), [(10, 1, {9}), (2, 3, {0, 1}), (1, 3, {0})]
-)
-def test_update_levels_limits_top_levels_to_rows(rows, top_levels, levels):
-    last = np.full(100, rows - 1)
-    solved = update(last, np.full(100, 8.0), np.full(100, 8.0), rows=rows, top_levels=top_levels)
-    assert set(solved.tolist()) == levels
-
-
-def test_update_levels_accepts_seed_sequences():
-    last, far = np.full(100, 9), np.full(100, 8.0)
-    assert (update(last, far, far, seed=(0, 1)) == update(last, far, far, seed=(0, 1))).all()
-    assert (update(last, far, far, seed=(0, 1)) != update(last, far, far, seed=(0, 2))).any()
-
-
-def test_update_levels_keeps_its_input():
-    before = np.array([1, 2, 3])
-    update(before, [8.0, 8.0, 8.0], [8.0, 8.0, 8.0])
-    assert before.tolist() == [1, 2, 3]
-
-
-def test_update_levels_of_no_environments():
-    assert update([], [], []).shape == (0,)
-
-
-@pytest.mark.parametrize(
-    ("levels", "message"),
-    [([0, 10], "levels: got 0 to 10; expected 0 to 9"), ([-1, 3], "levels: got -1 to 3")],
-)
-def test_update_levels_rejects_unknown_levels(levels, message):
-    with pytest.raises(ConfigError, match=message):
-        update(levels, [0.0, 0.0], [0.0, 0.0])
-
-
-def test_update_levels_rejects_top_levels_below_one():
-    with pytest.raises(ConfigError, match="top_levels: got 0; expected an integer >= 1"):
-        update([0], [0.0], [0.0], top_levels=0)
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"levels": [0.5, 1.0]}, "levels: got values of float64; expected integers"),
-        ({"levels": 3}, r"levels: got shape \(\); expected \(n,\)"),
-        ({"levels": [[1], [2, 3]]}, "levels: got lists of different lengths; expected one list"),
-        ({"distance": [1.0]}, r"distance: got shape \(1,\); expected \(2,\)"),
-        ({"command_distance": ["a", "b"]}, "command_distance: got values of <U1; expected numb"),
-        ({"seed": -1}, "seed: got -1; expected integers >= 0"),
-    ],
-)
-def test_update_levels_rejects_invalid_values(given, message):
-    valid = {"levels": [0, 1], "distance": [0.0, 1.0], "command_distance": [1.0, 1.0]}
-    with pytest.raises(ConfigError, match=message):
-        update(**(valid | given))
-
-
-def careers(can_walk, episodes=120, num_envs=200):
-    levels, _ = assign_levels(num_envs, 10, 20, 5, seed=0)
-    rng = np.random.default_rng(0)
-    for episode in range(episodes):
-        distance = np.where(can_walk(levels, rng), 8.0, 0.0)
-        levels = update(levels, distance, np.full(num_envs, 8.0), seed=(0, episode))
-    return levels
-
-
-def test_update_levels_perfect_robots_reach_the_top():
-    levels = careers(lambda levels, _: levels < 10)
-    assert levels.min() >= 7
-    assert set(levels.tolist()) == {7, 8, 9}
-
-
-def test_update_levels_imperfect_robots_stay_near_the_top():
-    levels = careers(lambda levels, rng: rng.random(levels.size) < 0.85)
-    assert levels.mean() > 7.5
-
-
-def test_update_levels_settle_at_walkable_level():
-    levels = careers(lambda levels, _: levels <= 4)
-    assert set(levels.tolist()) <= {4, 5}
-
-
-def test_update_levels_standing_robots_end_at_zero():
-    assert not careers(lambda levels, _: levels < 0).any()
 
 
 def spawn_sets():

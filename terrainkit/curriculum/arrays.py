@@ -1,0 +1,75 @@
+"""Arrays of callers: numpy arrays, lists, or tensors of torch on any device."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit.type_hint import show
+
+
+def to_numpy(name: str, values: Any) -> NDArray[Any]:
+    """Return an array, a list or a tensor as a numpy array; torch is not imported."""
+    if hasattr(values, "detach"):
+        values = values.detach().cpu()
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise ConfigError(f"{name}: got lists of different lengths; expected one list") from None
+
+
+def like(array: NDArray[Any], given: Any) -> Any:
+    """Return an array as a tensor on the device of `given` if that is a tensor of torch."""
+    if not hasattr(given, "new_tensor"):
+        return array
+    import torch
+
+    return torch.as_tensor(array, device=given.device)
+
+
+def to_indices(name: str, values: Any, size: int, number: int | None = None) -> NDArray[np.int64]:
+    """Return integers from 0 to `size` - 1, such as rows of a map, shape (n,) or (number,)."""
+    given = to_numpy(name, values)
+    if given.ndim != 1 or len(given) != (len(given) if number is None else number):
+        expected = "(n,)" if number is None else f"({number},)"
+        raise ConfigError(f"{name}: got shape {given.shape}; expected {expected}")
+    if given.size and given.dtype.kind not in "iu":
+        raise ConfigError(f"{name}: got values of {given.dtype}; expected integers")
+    if given.size and not (given.min() >= 0 and given.max() < size):
+        raise ConfigError(f"{name}: got {given.min()} to {given.max()}; expected 0 to {size - 1}")
+    return given.astype(np.int64)
+
+
+def to_numbers(name: str, values: Any, number: int) -> NDArray[np.float64]:
+    """Return one number for each of `number` episodes, or the one of all of them."""
+    given = to_numpy(name, values)
+    if given.dtype.kind not in "fiub":
+        raise ConfigError(f"{name}: got values of {given.dtype}; expected numbers")
+    if given.shape not in ((), (number,)):
+        raise ConfigError(f"{name}: got shape {given.shape}; expected ({number},)")
+    return np.broadcast_to(given.astype(np.float64), (number,))
+
+
+def to_progress(values: Any, number: int) -> NDArray[np.float64]:
+    """Return the progress of each of `number` episodes, 0 to 1, or NaN."""
+    progress = to_numbers("progress", values, number)
+    outside = progress[(progress < 0) | (progress > 1)]
+    if outside.size:
+        raise ConfigError(f"progress: got {outside[0]:g}; expected numbers from 0 to 1, or NaN")
+    return progress
+
+
+def make_rng(seed: int | Sequence[int]) -> np.random.Generator:
+    """Return the generator of a seed; numpy would accept None, and warn of nothing."""
+    try:
+        values = np.asarray(seed)
+        is_valid = (
+            values.dtype.kind in "iu" and values.ndim < 2 and values.size and values.min() >= 0
+        )
+    except ValueError:  # lists of different lengths
+        is_valid = False
+    if not is_valid:
+        raise ConfigError(f"seed: got {show(seed)}; expected integers >= 0")
+    return np.random.default_rng(seed)

@@ -1,0 +1,64 @@
+"""The game-inspired curriculum: environments move to harder rows when they succeed."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from terrainkit.curriculum.arrays import like, make_rng, to_indices, to_progress
+from terrainkit.curriculum.sampler import FloatArray, IntArray, PatchSampler
+from terrainkit.type_hint import PositiveInt, convert
+
+
+def update_levels(
+    levels: Any,
+    progress: Any,
+    *,
+    rows: int,
+    seed: int | Sequence[int],
+    top_levels: int = 3,
+) -> Any:
+    """Return the level of each environment after an episode.
+
+    An environment moves up with a progress of 1, and down with a progress below 1/2. Otherwise it
+    stays. An environment that moves up from the last row is assigned one of the last `top_levels`
+    rows at random. legged_gym assigns any row instead, which keeps the mean level of a solved
+    curriculum at half of the maximum.
+
+    Args:
+        levels: Levels before, shape (n,).
+        progress: Progress of each episode, 0 to 1, or NaN if it says nothing about its patch, shape
+            (n,). See :class:`CommandProgress`; where a robot is to reach goals, it is the
+            share of the goals reached.
+        rows: Rows of the map.
+        seed: Seed of the random rows. Pass a new one at each call, such as (seed, iteration).
+        top_levels: Number of rows that solved environments are spread over.
+
+    Returns:
+        Levels after, shape (n,): a tensor if `levels` is one.
+
+    Raises:
+        ConfigError: if `top_levels` is below 1, a level is not on the map, the progress is not from
+            0 to 1, or `seed` is negative.
+    """
+    before = to_indices("levels", levels, rows)
+    top_levels = convert("top_levels", top_levels, PositiveInt)
+    share = to_progress(progress, len(before))
+    after = np.maximum(before + (share >= 1) - (share < 0.5), 0)
+    solved = make_rng(seed).integers(max(0, rows - top_levels), rows, size=before.shape)
+    return like(np.where(after >= rows, solved, after), levels)
+
+
+class LevelSampler(PatchSampler):
+    """Move an environment up or down the rows of its column, by :func:`update_levels`.
+
+    The columns are distributed evenly and never change. From N. Rudin et al., Learning to Walk in
+    Minutes Using Massively Parallel Deep Reinforcement Learning, 2021 (arXiv:2109.11978).
+    """
+
+    def next_patches(
+        self, levels: IntArray, columns: IntArray, progress: FloatArray, seed: tuple[int, int]
+    ) -> tuple[IntArray, IntArray]:
+        """Return the levels after the rule; see :meth:`PatchSampler.next_patches`."""
+        rows = len(self.statistics.visits)
+        return update_levels(levels, progress, rows=rows, seed=seed), columns

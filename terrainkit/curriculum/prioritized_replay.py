@@ -1,0 +1,64 @@
+"""Prioritized replay of patches whose outcome is hard to predict."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.curriculum.sampler import FloatArray, IntArray
+from terrainkit.curriculum.statistics import add_to_means
+from terrainkit.curriculum.uniform import UniformSampler
+
+DECAY = 0.8
+"""Weight of the previous means when an episode ends."""
+
+TEMPERATURE = 0.5
+"""Exponent: the weight of a patch is (1 / rank)^(1 / temperature)."""
+
+STALENESS = 0.1
+"""Share of the patches that are sampled in proportion to the time since their last episode."""
+
+
+class PrioritizedReplaySampler(UniformSampler):
+    """Sample patches by the rank of their score, and those that were not visited for long.
+
+    As in M. Jiang et al., Prioritized Level Replay, 2021 (arXiv:2010.03934): patches without an
+    episode are sampled uniformly, with their share of the map as the probability; the others with a
+    probability of (1 - s) P_score + s P_staleness, where P_score is proportional to (1 / rank)^(1 /
+    temperature). There, the score is the magnitude of the error of the value function. A sampler
+    does not know that function: its score is the error of the running mean of the success on the
+    patch, |success - mean|. It is 0 on patches that always or never succeed.
+    """
+
+    def __init__(self, rows: int, cols: int, num_envs: int, **options: Any) -> None:
+        """Assign the first patches; see :class:`PatchSampler`."""
+        super().__init__(rows, cols, num_envs, **options)
+        self.value = np.full((rows, cols), 0.5)
+        self.score = np.full((rows, cols), np.nan)
+        self.last_visit = np.zeros((rows, cols))  # update of the last episode
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays that change, by name."""
+        own = {"value": self.value, "score": self.score, "last_visit": self.last_visit}
+        return {**super().arrays(), **own}
+
+    def record(self, patches: IntArray, success: FloatArray) -> None:
+        """Update the scores with the success of episodes."""
+        error = np.abs(success - self.value.ravel()[patches])
+        add_to_means(self.score, patches, error, DECAY)
+        add_to_means(self.value, patches, success, DECAY)
+        self.last_visit.ravel()[patches] = self._updates
+
+    def probabilities(self) -> FloatArray:
+        """Return the probability of each patch, shape (rows, cols)."""
+        seen = ~np.isnan(self.score)
+        chances: FloatArray = (~seen) / seen.size
+        score, order = self.score[seen], np.sort(-self.score[seen])
+        # Patches with the same score share their mean rank.
+        first, last = (np.searchsorted(order, -score, side) for side in ("left", "right"))
+        weight = ((1 + first + last) / 2) ** (-1 / TEMPERATURE)
+        age = self._updates - self.last_visit[seen] + 1
+        chances[seen] = seen.mean() * (
+            (1 - STALENESS) * weight / weight.sum() + STALENESS * age / age.sum()
+        )
+        return chances

@@ -1,0 +1,147 @@
+"""Progress of robots along their velocity commands."""
+
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.curriculum.arrays import like, to_numpy
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CommandProgress:
+    """The progress of n robots along their velocity commands, since the start of each episode.
+
+    A robot that follows its commands exactly moves along a reference: it turns at the commanded
+    yaw rate, and walks at the commanded velocity in the frame that turns with it. The progress of a
+    robot is the integral of its velocity along the velocity of the reference, in the world frame.
+    At no time is it larger than the distance that was commanded until then, so that sliding down
+    a slope gains nothing. The yaw of the reference starts at that of the robot, again with
+    each new linear velocity command, so that small errors of the yaw rate do not add up.
+
+    legged_gym compares the distance from the spawn origin with the commanded speed times the length
+    of the episode. By this measure, a robot succeeds that drifts sideways, or slides down a
+    slope while it is commanded to walk up; one fails that walks back and forth as commanded.
+    Commands in the frame of the robot itself would be no better: a robot that keeps turning would
+    follow them on a circle.
+    """
+
+    start: FloatArray
+    """Position at the start of the episode, world frame [m], shape (n, 2)."""
+    position: FloatArray
+    """Position at the last update, world frame [m], shape (n, 2)."""
+    command: FloatArray
+    """Linear velocity command at the last update, shape (n, 2) [m/s]."""
+    yaw: FloatArray
+    """Yaw of the reference [rad], shape (n,)."""
+    target: FloatArray
+    """Displacement of the reference, world frame [m], shape (n, 2)."""
+    along: FloatArray
+    """Progress along the commands [m], shape (n,)."""
+    commanded: FloatArray
+    """Length of the path of the reference [m], shape (n,)."""
+    reach: FloatArray
+    """Largest distance from the start that was also progress along the commands [m], shape (n,)."""
+    target_reach: FloatArray
+    """Largest distance of the reference from its start [m], shape (n,)."""
+
+    @classmethod
+    def zeros(cls, num_envs: int) -> Self:
+        """Return the progress of robots that have not moved."""
+        vectors = ("start", "position", "command", "target")
+        shapes = {f.name: (num_envs, 2)[: 1 + (f.name in vectors)] for f in fields(cls)}
+        return cls(**{name: np.zeros(shape) for name, shape in shapes.items()})
+
+    def reset(self, env_ids: Any, position: Any, yaw: Any) -> None:
+        """Start new episodes.
+
+        Args:
+            env_ids: Environments, shape (k,).
+            position: Position of each robot, x and y [m], shape (k, 2) or more columns.
+            yaw: Heading of each robot [rad], shape (k,).
+        """
+        ids = to_numpy("env_ids", env_ids)
+        for array in vars(self).values():
+            array[ids] = 0
+        self.start[ids] = self.position[ids] = to_numpy("position", position)[:, :2]
+        self.yaw[ids] = to_numpy("yaw", yaw)
+
+    def update(self, position: Any, yaw: Any, command: Any, yaw_rate: Any, dt: float) -> None:
+        """Add a step.
+
+        Args:
+            position: Position of each robot after the step, x and y [m], shape (n, 2) or more
+                columns.
+            yaw: Heading of each robot after the step [rad], shape (n,).
+            command: Commanded velocity of the step, forward and left [m/s], shape (n, 2) or more
+                columns.
+            yaw_rate: Commanded yaw rate of the step [rad/s], shape (n,). If headings are commanded,
+                it is that of the reference: compute it from the attribute `yaw`.
+            dt: Length of the step [s].
+        """
+        new = to_numpy("command", command)[:, :2].astype(np.float64)
+        is_new = (new != self.command).any(axis=1)
+        self.yaw[is_new] = to_numpy("yaw", yaw)[is_new]
+        self.command[:] = new
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        velocity = np.stack([c * new[:, 0] - s * new[:, 1], s * new[:, 0] + c * new[:, 1]], axis=1)
+        speed = np.linalg.norm(new, axis=1)
+        moved = to_numpy("position", position)[:, :2] - self.position
+        along = (moved * velocity).sum(axis=1) / np.maximum(speed, 1e-9)
+        self.position[:] += moved
+        self.commanded[:] += speed * dt
+        self.along[:] = np.minimum(self.along + along, self.commanded)
+        self.target[:] += velocity * dt
+        self.target_reach[:] = np.maximum(self.target_reach, np.linalg.norm(self.target, axis=1))
+        distance = np.linalg.norm(self.position - self.start, axis=1)
+        self.reach[:] = np.maximum(self.reach, np.minimum(self.along, distance))
+        self.yaw[:] += to_numpy("yaw_rate", yaw_rate) * dt
+
+    def of_episodes(
+        self, env_ids: Any, fallen: Any, distance: float, *, left_map: Any = False
+    ) -> Any:
+        """Return the progress of episodes that end, as samplers take it.
+
+        - 1 if the robot crossed: its progress and its distance from the start were both at least
+          `distance` at some time, or it left the map after at least half of the commanded distance.
+        - 0 if it fell before that.
+        - NaN if the commands led nowhere, and it followed them: its progress is at least half of
+          the commanded distance, but the reference itself did not get `distance` away from its
+          start. That says nothing about the terrain. Examples are commands to stand, to walk back
+          and forth, and to walk in a circle on the spawn platform.
+        - Otherwise, its progress as a share of the commanded distance.
+
+        Args:
+            env_ids: Environments, shape (k,).
+            fallen: Whether each robot fell, shape (k,).
+            distance: Distance that crosses a patch [m]; half its length, as in legged_gym.
+            left_map: Whether each robot left the map, shape (k,).
+
+        Returns:
+            Progress, 0 to 1 or NaN, shape (k,).
+        """
+        ids = to_numpy("env_ids", env_ids)
+        commanded = self.commanded[ids]
+        share = np.clip(self.along[ids] / np.maximum(commanded, 1e-9), 0, 1)
+        followed = share >= 0.5
+        crossed = (self.reach[ids] >= distance) | (to_numpy("left_map", left_map) & followed)
+        followed |= commanded == 0
+        outcomes = [
+            (crossed, 1.0),
+            (to_numpy("fallen", fallen), 0.0),
+            (followed & (self.target_reach[ids] < distance), np.nan),
+        ]
+        conditions, values = zip(*outcomes, strict=True)
+        return like(np.select(conditions, values, share), env_ids)
+
+    def state_dict(self) -> dict[str, FloatArray]:
+        """Return a copy of all arrays, for a checkpoint."""
+        return {name: array.copy() for name, array in vars(self).items()}
+
+    def load_state_dict(self, state: Any) -> None:
+        """Restore the arrays of :meth:`state_dict`."""
+        for name, array in vars(self).items():
+            array[:] = to_numpy(name, state[name])

@@ -1,0 +1,29 @@
+"""Sampling from probabilities of the patches, which are equal unless a subclass changes them."""
+
+import numpy as np
+
+from terrainkit.curriculum.arrays import make_rng
+from terrainkit.curriculum.sampler import FloatArray, IntArray, PatchSampler
+
+
+class UniformSampler(PatchSampler):
+    """Sample every patch with the same probability, as domain randomization does."""
+
+    def probabilities(self) -> FloatArray:
+        """Return the probability of each patch, shape (rows, cols)."""
+        visits = self.statistics.visits
+        return np.full(visits.shape, 1 / visits.size)
+
+    def record(self, patches: IntArray, success: FloatArray) -> None:
+        """Update what the probabilities depend on; success is 0 or 1, shape (k,)."""
+
+    def next_patches(
+        self, levels: IntArray, columns: IntArray, progress: FloatArray, seed: tuple[int, int]
+    ) -> tuple[IntArray, IntArray]:
+        """Record the episodes and sample; see :meth:`PatchSampler.next_patches`."""
+        rows, cols = self.statistics.visits.shape
+        known = ~np.isnan(progress)
+        self.record((levels * cols + columns)[known], (progress[known] >= 1).astype(np.float64))
+        chances = self.probabilities().ravel()
+        patches = make_rng(seed).choice(rows * cols, size=len(levels), p=chances)
+        return np.divmod(patches, cols)
