@@ -17,7 +17,7 @@ PACKAGES = {
     "pybullet": [["pybullet==3.2.7"]],
     "warp": [["newton==1.8.0", "mujoco-warp==4.0.0"]],
     "mjx": [["mujoco-mjx==3.17.0"]],
-    "isaaclab": [["torch"], ["--no-deps", "isaaclab==2.3.2.post1"]],
+    "isaaclab": [["torch", "packaging"], ["--no-deps", "isaaclab==2.3.2.post1"]],
 }
 """Arguments of `pip install` for each check."""
 
