@@ -1,4 +1,4 @@
-"""Run Isaac Lab's own TerrainImporter and TerrainGenerator; the simulator, Isaac Sim, is a stand-in.
+"""Run Isaac Lab's own TerrainImporter and TerrainGenerator; the simulator is a stand-in.
 
 Needs the wheel of Isaac Lab without its dependencies; `make integrations` runs it.
 """
@@ -76,7 +76,6 @@ for name in ("isaaclab.markers", "isaaclab.markers.config", "isaaclab.utils.warp
     sys.modules[name] = MagicMock()
 
 import isaaclab.terrains.terrain_importer  # noqa: E402
-
 from isaaclab.terrains import TerrainGenerator  # noqa: E402
 from isaaclab.terrains.config.rough import ROUGH_TERRAINS_CFG  # noqa: E402
 
