@@ -14,6 +14,7 @@ def genesis(monkeypatch):
     """The adapter with a stand-in for Genesis; tests/frameworks runs the real one."""
     package = MagicMock(np_float=np.float32, tc_float=None, device=None)
     monkeypatch.setitem(sys.modules, "genesis", package)
+    monkeypatch.setitem(sys.modules, "torch", MagicMock())  # takes seconds to import
     monkeypatch.delitem(sys.modules, "terrainkit.integrations.genesis", raising=False)
     import terrainkit.integrations.genesis as adapter
 
