@@ -1,4 +1,4 @@
-"""Import a map with Isaac Lab's own TerrainImporter; the simulator, Isaac Sim, is a stand-in.
+"""Run Isaac Lab's own TerrainImporter and TerrainGenerator; the simulator is a stand-in.
 
 Needs the wheel of Isaac Lab without its dependencies; `make integrations` runs it.
 """
@@ -76,9 +76,13 @@ for name in ("isaaclab.markers", "isaaclab.markers.config", "isaaclab.utils.warp
     sys.modules[name] = MagicMock()
 
 import isaaclab.terrains.terrain_importer  # noqa: E402
+from isaaclab.terrains import TerrainGenerator  # noqa: E402
+from isaaclab.terrains.config.rough import ROUGH_TERRAINS_CFG  # noqa: E402
 
 import terrainkit  # noqa: E402
+from terrainkit.importing import import_terrain_mesh  # noqa: E402
 from terrainkit.integrations.isaaclab import terrain_importer_cfg  # noqa: E402
+from terrainkit.validate import validate  # noqa: E402
 
 prims = {}
 isaaclab.terrains.terrain_importer.create_prim_from_mesh = lambda path, mesh, **materials: (
@@ -109,3 +113,32 @@ assert (importer.terrain_levels == before + 1).all()
 origins = importer.env_origins.numpy() + center
 np.testing.assert_allclose(terrain_map.scan(np.add(origins, [0, 0, 0.5])), origins[:, 2], atol=1e-4)
 print(f"Isaac Lab {version('isaaclab')}: levels move, origins on the ground; simulator: stand-in")
+
+# The reverse: a terrain of Isaac Lab's generator as a map.
+cfg = ROUGH_TERRAINS_CFG.replace(curriculum=True, num_rows=4, num_cols=6, border_width=2.0, seed=1)
+generator = TerrainGenerator(cfg)
+found = import_terrain_mesh(
+    generator.terrain_mesh.vertices,
+    generator.terrain_mesh.faces,
+    generator.terrain_origins,
+    patch_size=cfg.size,
+    border=cfg.border_width,
+).terrain_map
+assert found.difficulty.shape == (4, 6)
+assert not (issues := validate(found)), issues
+lower, upper = (np.array(each) for each in (found.grid.lower, found.grid.upper))
+points = np.random.default_rng(0).uniform(lower + 0.1, upper - 0.1, (200, 2))
+starts = np.column_stack([points, np.full(200, 20.0)])
+hits, rays, _ = generator.terrain_mesh.ray.intersects_location(
+    starts, np.tile([0.0, 0.0, -1.0], (200, 1))
+)
+heights = np.full(200, -np.inf)
+np.maximum.at(heights, rays, hits[:, 2])
+# Walls of the map are halfway between two samples, and heights between samples are interpolated.
+errors = np.abs(heights - found.height(points))
+assert np.quantile(errors, 0.9) < 0.03, errors
+kept = np.linalg.norm(found.env_origins - generator.terrain_origins, axis=-1) < 0.05
+print(
+    f"import: height error median {np.median(errors) * 1e3:.1f} mm, 90 % within "
+    f"{np.quantile(errors, 0.9) * 1e3:.0f} mm; {kept.mean():.0%} of the origins kept"
+)

@@ -17,7 +17,10 @@ PACKAGES = {
     "pybullet": [["pybullet==3.2.7"]],
     "warp": [["newton==1.8.0", "mujoco-warp==4.0.0"]],
     "mjx": [["mujoco-mjx==3.17.0"]],
-    "isaaclab": [["torch"], ["--no-deps", "isaaclab==2.3.2.post1"]],
+    "isaaclab": [["torch", "packaging"], ["--no-deps", "isaaclab==2.3.2.post1"]],
+    "genesis": [["torch"], ["genesis-world==1.4.5"]],
+    "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
+    "sdformat": [],
 }
 """Arguments of `pip install` for each check."""
 
@@ -27,6 +30,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", default=list(PACKAGES), metavar="NAME")
     parser.add_argument("--environments", type=Path, default=FOLDER.parents[1] / ".frameworks")
     arguments = parser.parse_args()
+    failed = []
     for name in arguments.names:
         python = arguments.environments / name / "bin" / "python"
         if not python.exists():
@@ -34,13 +38,16 @@ def main() -> None:
             for packages in [[FOLDER.parents[1]], *PACKAGES[name]]:
                 subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([python, FOLDER / f"{name}_check.py", folder], check=True)
+            checks = [subprocess.run([python, FOLDER / f"{name}_check.py", folder])]
         if name == "mjlab":  # trains onboarded robots
             test = FOLDER.parent / "terrainkit_robots/onboarding/frameworks/test_mjlab.py"
             variables = os.environ | {"TERRAINKIT_MJLAB_PYTHON": str(python.absolute())}
-            subprocess.run(
-                [sys.executable, "-m", "pytest", "-n", "0", test], env=variables, check=True
-            )
+            pytest = [sys.executable, "-m", "pytest", "-n", "0", test]
+            checks.append(subprocess.run(pytest, env=variables))
+        if any(each.returncode for each in checks):
+            failed.append(name)
+    if failed:
+        sys.exit(f"failed: {', '.join(failed)}")
 
 
 if __name__ == "__main__":

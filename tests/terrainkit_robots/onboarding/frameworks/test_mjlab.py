@@ -312,6 +312,7 @@ def test_mjlab_trains_onboarded_robot(tmp_path, mjlab_python, name, terrain):
     task = f"Mjlab-Velocity-{terrain}-{name.capitalize()}"
     command = [mjlab_python, "robot/mjlab_config.py", task, "--env.scene.num-envs", "4"]
     command += ["--agent.max-iterations", "2", "--agent.logger", "tensorboard"]
+    command += ["--gpu-ids", "None"]
     done = subprocess.run(
         command,
         capture_output=True,
