@@ -65,4 +65,4 @@ def _samples_to_track(name: str) -> float:
             share = (last_error - _VEL_ERROR) / (last_error - error) if last_error < np.inf else 1.0
             return last_samples + share * (samples - last_samples)
         last_samples, last_error = samples, error
-    return float("nan")
+    return np.inf

@@ -6,6 +6,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+PROMOTION = 0.8
+"""Share of the goals from which an episode is a success, and below half of which it is a failure.
+Extreme Parkour has 0.8 and 0.4 as shares of the commanded distance, in its
+`_update_terrain_curriculum`."""
+
 
 @dataclass(kw_only=True, eq=False)
 class Waypoints:
@@ -49,6 +54,36 @@ class Waypoints:
         reached = np.linalg.norm(self._current() - position, axis=1) <= self.radius
         self.index += reached & (self.index < self.numbers)
         return np.asarray(self.progress == 1)
+
+    def of_episodes(
+        self,
+        env_ids: NDArray[np.int64],
+        fallen: NDArray[np.bool_],
+        start: NDArray[np.floating],
+        commanded: NDArray[np.floating],
+    ) -> NDArray[np.float64]:
+        """Return the progress of episodes that end, for the samplers of `terrainkit.curriculum`.
+
+        It is the share of the goals that the robot reached, divided by `PROMOTION`. It is NaN if
+        the episode says nothing about the terrain: the robot has no goals, or it followed commands
+        that were too slow to reach so many goals.
+
+        Args:
+            env_ids: Environments, shape (m,).
+            fallen: Whether each robot fell, shape (m,).
+            start: Position of each robot at the start of the episode, x and y [m], shape (m, 2).
+            commanded: Distance that was commanded [m], shape (m,).
+
+        Returns:
+            Progress, 0 to 1 or NaN, shape (m,).
+        """
+        points = np.concatenate([start[:, None], self.goals[env_ids]], axis=1)
+        lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).cumsum(axis=1)
+        possible = (lengths - self.radius <= commanded[:, None]).sum(axis=1)
+        needed, reached = PROMOTION * self.numbers[env_ids], self.index[env_ids]
+        too_slow = ~fallen & (possible < needed) & (reached >= PROMOTION * possible / 2)
+        progress = np.minimum(self.progress[env_ids] / PROMOTION, 1)
+        return np.where(too_slow & (progress < 1), np.nan, progress)
 
     def reset(self, env_ids: NDArray[np.int64], goals: NDArray[np.floating]) -> None:
         """Start new episodes of some robots, with their goals, shape (m, k, 2)."""

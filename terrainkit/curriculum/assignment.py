@@ -9,7 +9,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from terrainkit.curriculum.arrays import like, make_rng, to_indices, to_numpy
-from terrainkit.type_hint import convert
+from terrainkit.type_hint import PositiveInt, convert
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,9 +52,11 @@ def assign_levels(
         Levels and columns, each of shape (num_envs,).
 
     Raises:
-        ConfigError: if `num_envs` or `seed` is negative, or there is no row `max_init_level`.
+        ConfigError: if `num_envs` or `seed` is negative, the map is empty, or there is no row
+            `max_init_level`.
     """
     num_envs = convert("num_envs", num_envs, Annotated[int, Meta(ge=0)])
+    rows, cols = convert("rows", rows, PositiveInt), convert("cols", cols, PositiveInt)
     row = Annotated[int, Meta(ge=0, le=rows - 1)]
     highest = convert("max_init_level", rows - 1 if max_init_level is None else max_init_level, row)
     levels = make_rng(seed).integers(0, highest + 1, size=num_envs)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.curriculum.arrays import like, to_numpy
+from terrainkit.errors import ConfigError
 
 FloatArray = NDArray[np.float64]
 
@@ -142,6 +143,17 @@ class CommandProgress:
         return {name: array.copy() for name, array in vars(self).items()}
 
     def load_state_dict(self, state: Any) -> None:
-        """Restore the arrays of :meth:`state_dict`."""
+        """Restore the arrays of :meth:`state_dict`.
+
+        Raises:
+            ConfigError: if an array is missing, or for another number of robots.
+        """
+        arrays = {name: to_numpy(name, state[name]) for name in vars(self) if name in state}
         for name, array in vars(self).items():
-            array[:] = to_numpy(name, state[name])
+            got = f"shape {arrays[name].shape}" if name in arrays else "nothing"
+            if got != f"shape {array.shape}":
+                raise ConfigError(
+                    f"{name} of the progress: got {got}; expected shape {array.shape}"
+                )
+        for name, array in vars(self).items():
+            array[:] = arrays[name]

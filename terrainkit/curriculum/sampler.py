@@ -61,8 +61,8 @@ class PatchSampler:
         Args:
             env_ids: Environments whose episodes ended, shape (k,).
             progress: Progress of each episode: 0 to 1, where 1 is success, or NaN if the episode
-                says nothing about its patch, shape (k,). See :class:`CommandProgress`; where a
-                robot is to reach goals, it is the share of the goals reached.
+                says nothing about its patch, shape (k,). See :class:`CommandProgress`, and for
+                robots with goals :meth:`terrainkit.waypoints.Waypoints.of_episodes`.
             returns: Sum of the rewards of each episode, shape (k,); None if unknown.
 
         Returns:
@@ -97,6 +97,9 @@ class PatchSampler:
             columns: Column of each episode.
             progress: Its progress, 0 to 1 or NaN.
             seed: Seed of this call.
+
+        Returns:
+            Levels and columns, each of shape (k,).
         """
         return levels, columns
 
@@ -126,6 +129,10 @@ class PatchSampler:
         if (got := arrays["visits"].shape) != shape:
             sizes = (" x ".join(map(str, each)) for each in (got, shape))
             raise ConfigError("state of the curriculum: got {} patches; expected {}".format(*sizes))
+        for name, array in self.arrays().items():
+            if name not in ("levels", "columns") and arrays[name].shape != array.shape:
+                different = f"got shape {arrays[name].shape}; expected {array.shape}"
+                raise ConfigError(f"{name} of the curriculum: {different}")
         levels = to_indices("levels", arrays.pop("levels"), rows)
         columns = to_indices("columns", arrays.pop("columns"), cols, len(levels))
         for name, array in arrays.items():

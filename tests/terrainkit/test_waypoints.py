@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.waypoints import Waypoints
+from terrainkit.waypoints import PROMOTION, Waypoints
 
 NONE = [np.nan, np.nan]
 
@@ -43,3 +43,27 @@ def test_waypoints_robot_without_goals_never_arrives():
     assert np.isnan(waypoints.progress).all()
     got = waypoints.commands(np.zeros((1, 2)), np.zeros(1), 1.0, 1.0, (-1.0, 1.0))
     assert np.isnan(got).all()
+
+
+@pytest.mark.parametrize(
+    ("reached", "fallen", "commanded", "progress"),
+    [
+        (4, False, 20.0, 1.0),  # four of five goals are enough
+        (3, False, 20.0, 0.75),
+        (1, False, 20.0, 0.25),
+        (2, True, 0.0, 0.5),
+        (0, False, 0.0, np.nan),  # commanded to stand
+        (2, False, 4.5, np.nan),  # commanded to walk to the second goal
+        (1, False, 4.5, np.nan),
+        (0, False, 4.5, 0.0),
+        (0, True, 0.0, 0.0),
+    ],
+)
+def test_waypoints_progress_of_episodes(reached, fallen, commanded, progress):
+    waypoints = make([[2.0 * k, 0.0] for k in range(1, 6)], [NONE] * 5)
+    waypoints.index[0] = reached
+    got = waypoints.of_episodes(
+        np.arange(2), np.array([fallen, False]), np.zeros((2, 2)), np.full(2, commanded)
+    )
+    assert PROMOTION == 0.8
+    assert got.tolist() == pytest.approx([progress, np.nan], nan_ok=True)

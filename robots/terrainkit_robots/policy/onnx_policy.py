@@ -122,10 +122,12 @@ def _replace_joints(robot: Robot, joints: dict[str, list[Any]], control_type: st
     """Return a robot with the joint order, pose, gains and limits of a policy."""
     names, spec = joints.get("name", []), robot.spec
     if sorted(map(str, names)) != sorted(spec.joint_order):
-        other = [listing(a for a in names if a not in spec.joint_order)]
-        other += [listing(a for a in spec.joint_order if a not in names)]
-        got = f"got {other[0]}, which {spec.name} lacks, and not its {other[1]}"
-        raise ConfigError(f"joints.name, the policy belongs to another robot: {got}")
+        got = listing(str(name) for name in names if name not in spec.joint_order)
+        missing = listing(name for name in spec.joint_order if name not in names)
+        what = f"got {got}, which {spec.name} lacks, and not its {missing}"
+        if set(names) == set(spec.joint_order):
+            what = f"got {len(names)} names; expected each of the {len(spec.joint_order)} once"
+        raise ConfigError(f"joints.name, the policy belongs to another robot: {what}")
     keys = {name: name for name in _TABLES[control_type]} | {"default_pose": "default_position"}
     tables = {name: joints[key] for name, key in keys.items() if key in joints}
     for name, values in tables.items():

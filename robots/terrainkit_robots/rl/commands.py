@@ -70,7 +70,7 @@ class VelocityCommand:
         rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
         return np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
 
-    def update_heading(self, yaw: FloatArray, position: FloatArray | None = None) -> None:
+    def update_heading(self, yaw: FloatArray, position: FloatArray) -> None:
         """Apply the fixed commands, or compute those that depend on headings and waypoints.
 
         Yaw [rad] has the shape (n,), the position, x and y [m], (n, 2).
@@ -79,7 +79,7 @@ class VelocityCommand:
             self.commands[:] = self.fixed
             return
         self.commands[:, 2] = self.yaw_rate(yaw)
-        if self.waypoints and position is not None:
+        if self.waypoints:
             stiffness, limits = self._cfg.heading_stiffness, self._cfg.ang_vel_yaw
             toward = self.waypoints.commands(position, yaw, self.speed, stiffness, limits)
             np.copyto(self.commands, toward, where=~np.isnan(toward))

@@ -102,7 +102,7 @@ class Control(Config):
     """D gain of every joint [N m s/rad]."""
     action_scale: PositiveFloat | None = None
     """Factor from action to position [rad], velocity [rad/s] or torque [N m]; none: the spec's for
-    P, the largest velocity for V, the largest torque for T."""
+    P, the largest velocity for V, the largest torque for T. A 0 of the spec remains 0."""
     decimation: Annotated[int, Meta(ge=1, le=1000)] = 4
     """Number of simulation steps per policy step."""
 

@@ -12,10 +12,6 @@ from terrainkit.curriculum.picture import draw_statistics
 from terrainkit_robots.rl import config
 from terrainkit_robots.rl.terrain import Terrain
 
-PROMOTION = 0.8
-"""Share of the goals from which a robot moves up; below half of it, it moves down. Extreme Parkour
-has these as shares of the commanded distance."""
-
 
 class TerrainCurriculum:
     """The patches of n robots and the progress of their episodes; see `terrainkit.curriculum`."""
@@ -59,5 +55,5 @@ class TerrainCurriculum:
         return {k: torch.from_numpy(v) if isinstance(v, np.ndarray) else v for k, v in state}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Continue from a checkpoint; with another number of robots, keep only their levels."""
+        """Continue from a checkpoint; see :meth:`PatchSampler.load_state_dict`."""
         self.sampler.load_state_dict(state)

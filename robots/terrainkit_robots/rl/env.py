@@ -15,7 +15,7 @@ from terrainkit.waypoints import Waypoints
 from terrainkit_robots.rl import observations
 from terrainkit_robots.rl.commands import Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.curriculum import PROMOTION, TerrainCurriculum
+from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
 from terrainkit_robots.rl.rewards import active_rewards, is_moving
 from terrainkit_robots.rl.scene import build_scene
@@ -47,7 +47,11 @@ class LeggedEnv(VecEnv):
         heading = not terrain.is_flat if heading is None else heading
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
         self.waypoints = None
-        if task.commands.waypoints and terrain.has_goals:
+        if task.commands.waypoints:
+            if not terrain.has_goals:
+                got = "got a terrain without goals"
+                expected = "expected a map with terrains such as course, and not collision plane"
+                raise ConfigError(f"commands.waypoints: {got}; {expected}")
             num_goals, radius = terrain.goals.shape[2], task.commands.waypoint_radius
             self.waypoints = Waypoints.make(n, num_goals, radius)
         self.velocity_command.waypoints = self.waypoints
@@ -75,7 +79,8 @@ class LeggedEnv(VecEnv):
         # A motor receives offset + scale * action.
         kind, scale = task.control.control_type, task.control.action_scale
         default = {"P": robot.action_scale, "V": robot.velocity, "T": robot.effort}[kind]
-        self.action_scale = np.full(joints, default if scale is None else scale, np.float32)
+        scales = default if scale is None else np.where(default == 0, 0, scale)
+        self.action_scale = scales.astype(np.float32)
         self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
         self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
         self.reset()
@@ -267,9 +272,11 @@ class LeggedEnv(VecEnv):
         progress = self.curriculum.progress.of_episodes(
             env_ids, fallen, self.terrain.patch_length / 2, left_map=left_map[env_ids]
         )
-        if self.waypoints:
+        if self.waypoints and self.velocity_command.fixed is None:
             reached = self.waypoints.progress[env_ids]
-            to_goals = np.minimum(reached / PROMOTION, 1)
+            commanded = self.curriculum.progress.commanded[env_ids]
+            start = self.start_pos[env_ids]
+            to_goals = self.waypoints.of_episodes(env_ids, fallen, start, commanded)
             progress = np.where(np.isnan(reached), progress, to_goals)
             if not np.isnan(reached).all():
                 log["Episode/goals_reached"] = float(np.nanmean(reached))

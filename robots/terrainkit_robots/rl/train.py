@@ -61,8 +61,6 @@ def train(
 
     task = tasks.get_task(robot).task if task is None else task
     ground = load_terrain(terrain, task.terrain.collision)
-    if task.commands.waypoints and not ground.has_goals:
-        raise ConfigError(f"commands.waypoints: got {terrain} without goals; expected a map")
     parts = runs.parts_to_load(resume, robot, terrain, task) if resume else None
     continued = resume if parts is None else None
     share = runners.process_share(task)

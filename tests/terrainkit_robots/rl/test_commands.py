@@ -85,7 +85,7 @@ class TestHeading:
     def turn(self, heading: float, yaw: float, **settings: Any) -> float:
         command = VelocityCommand(Commands(**settings), 1, 0.02, heading_command=True)
         command.heading[:] = heading
-        command.update_heading(np.array([yaw], np.float32))
+        command.update_heading(np.array([yaw], np.float32), np.zeros((1, 2), np.float32))
         return float(command.commands[0, 2])
 
     def test_by_hand(self) -> None:
@@ -112,7 +112,7 @@ class TestHeading:
         command = VelocityCommand(Commands(), 3, 0.02, heading_command=True)
         command.heading[:] = heading
         for _ in range(1000):
-            command.update_heading(yaw)
+            command.update_heading(yaw, np.zeros((len(yaw), 2), np.float32))
             yaw += np.float32(0.02) * command.commands[:, 2]
         off = np.angle(np.exp(1j * (heading - yaw)))
         np.testing.assert_allclose(off, 0, atol=1e-3)
@@ -132,7 +132,8 @@ class TestHeadingCommand:
         env = make_env(ground=ground, commands=settings)
         assert env.velocity_command.heading_command == expected
         before = env.commands[:, 2].copy()
-        env.velocity_command.update_heading(quat_to_yaw(env.state.base_quat) + np.float32(0.5))
+        yaw = quat_to_yaw(env.state.base_quat) + np.float32(0.5)
+        env.velocity_command.update_heading(yaw, env.state.base_pos[:, :2])
         assert (env.commands[:, 2] != before).any() == expected
 
 

@@ -466,6 +466,10 @@ class TestWaypoints:
         assert updates[-1][0].tolist() == [0]
         assert updates[-1][1].tolist() == pytest.approx([progress])
 
+    def test_terrain_without_goals_is_rejected(self, quadruped, nominal_task):
+        with pytest.raises(ConfigError, match="without goals; expected a map with terrains such"):
+            LeggedEnv(nominal_task(4, commands=self.COMMANDS), quadruped, Plane())
+
     def test_robots_told_to_stand_do_not_walk(self, quadruped, nominal_task, course_ground):
         commands = replace(self.COMMANDS, standing=1.0)
         env = LeggedEnv(nominal_task(4, commands=commands), quadruped, course_ground)

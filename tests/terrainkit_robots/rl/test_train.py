@@ -400,6 +400,6 @@ def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
 
 def test_train_rejects_waypoints_without_goals(task, tmp_path):
     task = replace(task, commands=Commands(waypoints=True))
-    with pytest.raises(ConfigError, match="waypoints: got plane without goals"):
+    with pytest.raises(ConfigError, match="waypoints: got a terrain without goals"):
         train("quadruped", "plane", task, folder=tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -101,8 +101,13 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
     if not any(keys.clashes for keys in shared.values()):
         result = Keys(keys=tuple(key for keys in shared.values() for key in keys.keys))
         values = {key: pair for pair, keys in shared.items() for key in keys.keys}
-    scales = robot.action_scales(robot.position_joints).values()
-    scale, difference = robot.shared_value([each for each in scales if each], "median", depth=2)
+    scales = robot.action_scales(robot.position_joints)
+    held = [joint for joint, value in scales.items() if not value]
+    moved = (value for value in scales.values() if value)
+    scale, difference = robot.shared_value(moved, "median", depth=2)
+    if held:
+        note = f"Set the actions of these joints to 0, to hold the default pose: {listing(held)}."
+        difference += comment(note, depth=2)
     velocity_note = ""
     if robot.velocity_joints:
         joints = listing(robot.velocity_joints)
