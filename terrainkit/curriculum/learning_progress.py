@@ -42,12 +42,12 @@ class LearningProgressSampler(UniformSampler):
         for means, decay in ((self.fast, FAST_DECAY), (self.slow, SLOW_DECAY)):
             add_to_means(means, patches, success, decay)
 
-    def probabilities(self) -> FloatArray:
+    def probs(self) -> FloatArray:
         """Return the probability of each patch, shape (rows, cols)."""
-        change, uniform = np.abs(self.fast - self.slow), super().probabilities()
+        change, uniform = np.abs(self.fast - self.slow), super().probs()
         if not change.any():
             return uniform
         padded = np.pad(change, ((1, 1), (0, 0)), mode="edge")
         change = change / 2 + (padded[:-2] + padded[2:]) / 4
-        chances: FloatArray = EXPLORATION * uniform + (1 - EXPLORATION) * change / change.sum()
-        return chances
+        probs: FloatArray = EXPLORATION * uniform + (1 - EXPLORATION) * change / change.sum()
+        return probs

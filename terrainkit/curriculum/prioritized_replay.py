@@ -49,16 +49,16 @@ class PrioritizedReplaySampler(UniformSampler):
         add_to_means(self.value, patches, success, DECAY)
         self.last_visit.ravel()[patches] = self._updates
 
-    def probabilities(self) -> FloatArray:
+    def probs(self) -> FloatArray:
         """Return the probability of each patch, shape (rows, cols)."""
         seen = ~np.isnan(self.score)
-        chances: FloatArray = (~seen) / seen.size
+        probs: FloatArray = (~seen) / seen.size
         score, order = self.score[seen], np.sort(-self.score[seen])
         # Patches with the same score share their mean rank.
         first, last = (np.searchsorted(order, -score, side) for side in ("left", "right"))
         weight = ((1 + first + last) / 2) ** (-1 / TEMPERATURE)
         age = self._updates - self.last_visit[seen] + 1
-        chances[seen] = seen.mean() * (
+        probs[seen] = seen.mean() * (
             (1 - STALENESS) * weight / weight.sum() + STALENESS * age / age.sum()
         )
-        return chances
+        return probs

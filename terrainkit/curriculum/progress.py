@@ -44,9 +44,9 @@ class CommandProgress:
     """Progress along the commands [m], shape (n,)."""
     commanded: FloatArray
     """Length of the path of the reference [m], shape (n,)."""
-    reach: FloatArray
+    max_distance: FloatArray
     """Largest distance from the start that was also progress along the commands [m], shape (n,)."""
-    target_reach: FloatArray
+    target_max_distance: FloatArray
     """Largest distance of the reference from its start [m], shape (n,)."""
 
     @classmethod
@@ -96,9 +96,11 @@ class CommandProgress:
         self.commanded[:] += speed * dt
         self.along[:] = np.minimum(self.along + along, self.commanded)
         self.target[:] += velocity * dt
-        self.target_reach[:] = np.maximum(self.target_reach, np.linalg.norm(self.target, axis=1))
+        self.target_max_distance[:] = np.maximum(
+            self.target_max_distance, np.linalg.norm(self.target, axis=1)
+        )
         distance = np.linalg.norm(self.position - self.start, axis=1)
-        self.reach[:] = np.maximum(self.reach, np.minimum(self.along, distance))
+        self.max_distance[:] = np.maximum(self.max_distance, np.minimum(self.along, distance))
         self.yaw[:] += to_numpy("yaw_rate", yaw_rate) * dt
 
     def of_episodes(
@@ -128,12 +130,12 @@ class CommandProgress:
         commanded = self.commanded[ids]
         share = np.clip(self.along[ids] / np.maximum(commanded, 1e-9), 0, 1)
         followed = share >= 0.5
-        crossed = (self.reach[ids] >= distance) | (to_numpy("left_map", left_map) & followed)
+        crossed = (self.max_distance[ids] >= distance) | (to_numpy("left_map", left_map) & followed)
         followed |= commanded == 0
         outcomes = [
             (crossed, 1.0),
             (to_numpy("fallen", fallen), 0.0),
-            (followed & (self.target_reach[ids] < distance), np.nan),
+            (followed & (self.target_max_distance[ids] < distance), np.nan),
         ]
         conditions, values = zip(*outcomes, strict=True)
         return like(np.select(conditions, values, share), env_ids)

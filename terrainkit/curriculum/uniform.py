@@ -9,7 +9,7 @@ from terrainkit.curriculum.sampler import FloatArray, IntArray, PatchSampler
 class UniformSampler(PatchSampler):
     """Sample every patch with the same probability, as domain randomization does."""
 
-    def probabilities(self) -> FloatArray:
+    def probs(self) -> FloatArray:
         """Return the probability of each patch, shape (rows, cols)."""
         visits = self.statistics.visits
         return np.full(visits.shape, 1 / visits.size)
@@ -24,6 +24,6 @@ class UniformSampler(PatchSampler):
         rows, cols = self.statistics.visits.shape
         known = ~np.isnan(progress)
         self.record((levels * cols + columns)[known], (progress[known] >= 1).astype(np.float64))
-        chances = self.probabilities().ravel()
-        patches = make_rng(seed).choice(rows * cols, size=len(levels), p=chances)
+        probs = self.probs().ravel()
+        patches = make_rng(seed).choice(rows * cols, size=len(levels), p=probs)
         return np.divmod(patches, cols)

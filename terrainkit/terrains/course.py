@@ -145,7 +145,7 @@ class Course(Lane):
         ground = np.zeros(grid.shape, np.float32)
         # Solids and goals get the first child of this generator. It decides on the order.
         for k, span in self._layout(grid, rng.spawn(1)[0]):
-            with _naming(k):
+            with _element_errors(k):
                 ground[span] = self._terrains[k].build(_block(grid, span), _child(rng))
         return ground
 
@@ -153,7 +153,7 @@ class Course(Lane):
         """Return the solids of the elements."""
         solids = []
         for k, span in self._layout(grid, rng):
-            with _naming(k):
+            with _element_errors(k):
                 block = _block(grid, span)
                 solids.append(self._terrains[k].solids(block, heights[span], _child(rng)))
         return Solids.concatenate(solids)
@@ -241,7 +241,7 @@ def _block(grid: Grid, span: slice) -> Grid:
 
 
 @contextmanager
-def _naming(number: int) -> Iterator[None]:
+def _element_errors(number: int) -> Iterator[None]:
     """Name an element in errors."""
     try:
         yield

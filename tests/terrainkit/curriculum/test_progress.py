@@ -41,8 +41,8 @@ def test_progress_of_straight_walk_is_integrated():
     walk = Walk(yaw=0.7).go(3, (0.6, 0.8))
     assert walk.progress.along == pytest.approx(3)
     assert walk.progress.commanded == pytest.approx(3)
-    assert walk.progress.reach == pytest.approx(3)
-    assert walk.progress.target_reach == pytest.approx(3)
+    assert walk.progress.max_distance == pytest.approx(3)
+    assert walk.progress.target_max_distance == pytest.approx(3)
     expected = [3 * np.cos(0.7 + np.arctan2(0.8, 0.6)), 3 * np.sin(0.7 + np.arctan2(0.8, 0.6))]
     assert walk.progress.target[0] == pytest.approx(expected)
 
@@ -75,7 +75,7 @@ def test_walking_against_the_command_fails():
 def test_sliding_gains_no_more_than_the_command():
     walk = Walk().go(1, (0.5, 0.0), (9.0, 0.0))
     assert walk.progress.along == pytest.approx(0.5)
-    assert walk.progress.reach == pytest.approx(0.5)
+    assert walk.progress.max_distance == pytest.approx(0.5)
 
 
 def test_swaying_loses_nothing():
@@ -143,7 +143,7 @@ def test_reset_clears_environments():
         pos = np.column_stack([np.full(3, step), np.zeros(3)])
         progress.update(pos, np.zeros(3), np.tile([1.0, 0.0], (3, 1)), np.zeros(3), 1.0)
     progress.reset([1], [[5.0, 6.0]], [0.5])
-    assert progress.along.tolist() == progress.reach.tolist() == [2, 0, 2]
+    assert progress.along.tolist() == progress.max_distance.tolist() == [2, 0, 2]
     assert progress.start[1].tolist() == progress.position[1].tolist() == [5, 6]
     assert progress.yaw[1] == 0.5
 

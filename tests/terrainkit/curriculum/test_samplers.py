@@ -178,7 +178,7 @@ def test_load_rejects_another_sampler():
 def test_probabilities_are_a_distribution(name):
     sampler = make(SAMPLERS[name])
     for _ in range(4):
-        chances = sampler.probabilities()
+        chances = sampler.probs()
         assert chances.shape == (ROWS, COLS)
         assert chances.min() >= 0
         assert chances.sum() == pytest.approx(1)
@@ -205,7 +205,7 @@ def test_adaptive_samplers_avoid_what_cannot_be_learned(kind):
     """Column 0 never succeeds, column 1 always does, and column 2 sometimes."""
     chances = np.tile([0.0, 1.0, 0.5], (ROWS, 1))
     sampler = train(make(kind, num_envs=60), chances, calls=200)
-    share = sampler.probabilities().sum(axis=0)
+    share = sampler.probs().sum(axis=0)
     assert share[0] < 0.15
     assert share[1] < 0.15
     assert share[2] > 0.7
@@ -217,13 +217,13 @@ def test_learning_progress_is_the_difference_of_two_means():
     # The means of level 0 are 0.5 and 0.2. A quarter of the difference is that of level 1, and one
     # more is its own, where there is no level below.
     expected = 0.2 / 4 + 0.8 * np.array([3 / 4, 1 / 4, 0, 0])
-    assert sampler.probabilities().ravel() == pytest.approx(expected)
+    assert sampler.probs().ravel() == pytest.approx(expected)
 
 
 def test_learning_progress_counts_forgetting():
     sampler = LearningProgressSampler(4, 1, 4)
     sampler.fast[2], sampler.slow[2] = 0.4, 0.9
-    assert sampler.probabilities().argmax() == 2
+    assert sampler.probs().argmax() == 2
 
 
 def test_prioritized_replay_ranks_scores_and_age():
@@ -234,4 +234,4 @@ def test_prioritized_replay_ranks_scores_and_age():
     weight = np.array([2.5, 1, 2.5]) ** -2.0  # two patches share the ranks 2 and 3
     seen = 0.9 * weight / weight.sum() + 0.1 * np.array([1, 3, 2]) / 6
     expected = [0.75 * seen[0], 0.75 * seen[1], 0.25, 0.75 * seen[2]]
-    assert sampler.probabilities().ravel() == pytest.approx(expected)
+    assert sampler.probs().ravel() == pytest.approx(expected)
