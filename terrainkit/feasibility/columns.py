@@ -15,6 +15,9 @@ MAX_SPACING = 0.035
 """Largest distance between two columns of a patch with solids [m]. Solids do not snap to the cells
 of the map; the edge of a foothold of 0.1 m has to be found within a third of it."""
 
+STANCE = 0.1
+"""Largest distance of a foot from the position of a robot, along x and y [m]."""
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -59,12 +62,14 @@ class Columns:
     def node_at(self, position: FloatArray) -> int:
         """Return the node on which a robot at `position` (x, y, z) stands.
 
-        It is the highest floor that is not above the position, or else the lowest, of the nearest
-        column that has a floor.
+        It is the floor with the smallest sum of horizontal distance and difference of height, of
+        the columns within `STANCE`: between two rows of stones, feet are on the stones.
         """
         index = (position[:2] - self.lower) / self.spacing
         i, j = np.clip(np.rint(index), 0, np.array(self.shape) - 1).astype(int)
-        reach = slice(max(i - 1, 0), i + 2), slice(max(j - 1, 0), j + 2)
+        n = math.ceil(STANCE / self.spacing - 1e-9)
+        last_i, last_j = np.minimum((i + n + 1, j + n + 1), self.shape)
+        reach = slice(max(i - n, 0), last_i), slice(max(j - n, 0), last_j)
         error = np.abs(self.floor[reach] - position[2])
         error[np.isnan(error)] = np.inf
         # Of floors at about the same height, the nearest one.

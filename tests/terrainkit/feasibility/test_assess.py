@@ -25,6 +25,7 @@ CASES = {
     # A gap of w: w / gap.
     "gap": ({"width": 0.3}, 0.75, "gap"),
     "gap_track": ({"length": 0.3}, 0.75, "gap"),
+    "course": ({"elements": [{"terrain": "gap_track", "length": 0.2}]}, 0.5, "gap"),
     "rings": ({"gap": 0.2, "width": 0.4, "variation": 0.0}, 0.5, "gap"),
     "stepping_stones": ({"stone": 0.8}, 0.25, "gap"),  # one cell between two stones
     "stone_rows": ({"stone": 0.4, "gap": 0.2, "variation": 0.0}, 0.5, "gap"),
@@ -114,6 +115,12 @@ def test_demand_by_hand(terrain):
 def test_demand_between_bounds(terrain):
     parameters, low, high = BOUNDS[terrain]
     assert low - 1e-6 <= assess(terrain, **parameters).demand <= high + 1e-6
+
+
+def test_goal_between_two_rows_of_stones_is_reached_on_a_stone():
+    """A column in the row gap of 0.1 m is three columns from a stone."""
+    result = assess("stone_rows", stone=0.8, gap=0.1, row_gap=0.1, variation=0.0)
+    assert (result.demand, result.limit) == (pytest.approx(0.25, abs=1e-3), "gap")
 
 
 def test_pyramid_stairs_inverted_are_climbed():
