@@ -128,8 +128,8 @@ def test_map_config_is_frozen():
         ),
         (
             {"preset": "moon"},
-            "no preset 'moon'; there are: legged_gym, legged_gym_rough, isaaclab, mjlab, rough, "
-            "stairs, parkour, sparse, confined, natural, all",
+            "no preset 'moon'; there are: legged_gym, legged_gym_rough, isaaclab, mjlab, "
+            "parkour_course, rough, stairs, hard, parkour, sparse, confined, natural, all",
         ),
         ({"preset": "stair"}, "no preset 'stair'; did you mean 'stairs'"),
         ({"terrains": (FLAT, "gap")}, r"terrains\[1\]: got 'gap'; expected a table \(SubTerrain\)"),

@@ -49,7 +49,9 @@ def test_validate_generated_map_has_no_issues(config):
 
 @pytest.mark.parametrize("preset", presets.preset_names())
 def test_validate_presets_realize_their_parameters(preset):
-    cols = 20 if preset == "legged_gym_rough" else len(presets.get_preset(preset))
+    # Proportions below or above 1 need more columns.
+    cols = {"legged_gym_rough": 20, "parkour_course": 10}.get(preset)
+    cols = cols or len(presets.get_preset(preset))
     terrain_map = tk.generate(tk.MapConfig(rows=4, cols=cols, border=0.0, preset=preset))
     assert found(terrain_map) == []
 
