@@ -12,6 +12,20 @@ Extreme Parkour has 0.8 and 0.4 as shares of the commanded distance, in its
 `_update_terrain_curriculum`."""
 
 
+def route_lengths(start: NDArray[np.floating], goals: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return the length of the route from the start of each robot through its goals, up to each.
+
+    Args:
+        start: Positions, x and y [m], shape (n, 2).
+        goals: Goals, x and y [m], shape (n, k, 2), padded with NaN.
+
+    Returns:
+        Lengths [m], shape (n, k), padded with NaN.
+    """
+    points = np.concatenate([start[:, None], goals], axis=1)
+    return np.asarray(np.linalg.norm(np.diff(points, axis=1), axis=2).cumsum(axis=1))
+
+
 @dataclass(kw_only=True, eq=False)
 class Waypoints:
     """The goals of n robots, and the goal that each robot walks to.
@@ -77,8 +91,7 @@ class Waypoints:
         Returns:
             Progress, 0 to 1 or NaN, shape (m,).
         """
-        points = np.concatenate([start[:, None], self.goals[env_ids]], axis=1)
-        lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).cumsum(axis=1)
+        lengths = route_lengths(start, self.goals[env_ids])
         possible = (lengths - self.radius <= commanded[:, None]).sum(axis=1)
         needed, reached = PROMOTION * self.numbers[env_ids], self.index[env_ids]
         too_slow = ~fallen & (possible < needed) & (reached >= PROMOTION * possible / 2)

@@ -28,8 +28,8 @@ def update_levels(
     Args:
         levels: Levels before, shape (n,).
         progress: Progress of each episode, 0 to 1, or NaN if it says nothing about its patch, shape
-            (n,). See :class:`CommandProgress`; where a robot is to reach goals, it is the
-            share of the goals reached.
+            (n,). See :class:`CommandProgress`, and for robots with goals
+            :meth:`terrainkit.waypoints.Waypoints.of_episodes`.
         rows: Rows of the map.
         seed: Seed of the random rows. Pass a new one at each call, such as (seed, iteration).
         top_levels: Number of rows that solved environments are spread over.

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.waypoints import PROMOTION, Waypoints
+from terrainkit.waypoints import PROMOTION, Waypoints, route_lengths
 
 NONE = [np.nan, np.nan]
 
@@ -67,3 +67,9 @@ def test_waypoints_progress_of_episodes(reached, fallen, commanded, progress):
     )
     assert PROMOTION == 0.8
     assert got.tolist() == pytest.approx([progress, np.nan], nan_ok=True)
+
+
+def test_route_lengths_start_at_the_robot():
+    goals = np.array([[[1.0, 0.0], [2.0, 0.0]], [[1.0, 0.0], [np.nan, np.nan]]])
+    lengths = route_lengths(np.array([[0.0, 0.0], [1.0, 1.0]]), goals)
+    assert np.nanmax(lengths, axis=1).tolist() == [2.0, 1.0]

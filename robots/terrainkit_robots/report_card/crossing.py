@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from terrainkit import TerrainMap
 from terrainkit.errors import ConfigError
 from terrainkit.patch import Patch
-from terrainkit.waypoints import Waypoints
+from terrainkit.waypoints import Waypoints, route_lengths
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, rollout
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.report_card.route import (
@@ -18,7 +18,6 @@ from terrainkit_robots.report_card.route import (
     HEADING_STIFFNESS,
     SPEED,
     patch_routes,
-    route_lengths,
 )
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec
@@ -119,7 +118,8 @@ class _Progress:
         self._lower = np.array([patch.grid.lower for patch in patches])
         self._upper = np.array([patch.grid.upper for patch in patches])
         turn = np.pi / min(-env.cfg.commands.ang_vel_yaw[0], env.cfg.commands.ang_vel_yaw[1])
-        seconds = TIME_FACTOR * route_lengths(goals, env.start_pos) / speed + turn + EXTRA_TIME
+        lengths = np.nanmax(route_lengths(env.start_pos, goals), axis=1)
+        seconds = TIME_FACTOR * lengths / speed + turn + EXTRA_TIME
         self._max_steps = np.rint(seconds / env.cfg.dt)
 
     def schedule(self) -> Iterator[NDArray[np.float32]]:

@@ -30,10 +30,3 @@ def patch_routes(patch: Patch) -> list[NDArray[np.float64]]:
             goal[axis] = corners[side][axis]
             routes.append(goal[None])
     return routes
-
-
-def route_lengths(goals: NDArray[np.float64], start: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the lengths of the routes from the starts (n, 2) through goals (n, k, 2), (n,) [m]."""
-    points = np.concatenate([start[:, None], goals], axis=1)
-    legs = np.linalg.norm(np.diff(points, axis=1), axis=2)
-    return np.asarray(np.nansum(legs, axis=1))

@@ -1,7 +1,7 @@
 import numpy as np
 
 from terrainkit import MapConfig, SubTerrain, make_patch
-from terrainkit_robots.report_card.route import patch_routes, route_lengths
+from terrainkit_robots.report_card.route import patch_routes
 
 
 def make(terrain, size=(8.0, 8.0), **parameters):
@@ -24,8 +24,3 @@ def test_routes_follow_goals():
     patch = make("hurdles")
     (route,) = patch_routes(patch)
     np.testing.assert_allclose(route, patch.goals[:, :2])
-
-
-def test_route_lengths_start_at_the_robot():
-    goals = np.array([[[1.0, 0.0], [2.0, 0.0]], [[1.0, 0.0], [np.nan, np.nan]]])
-    assert route_lengths(goals, np.array([[0.0, 0.0], [1.0, 1.0]])).tolist() == [2.0, 1.0]
