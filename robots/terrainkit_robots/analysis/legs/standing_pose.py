@@ -6,7 +6,7 @@ ankle keeps the sole level, and all other joints stay at zero. Of mirrored legs 
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,9 @@ _HEIGHT_RATIO = {2: 0.965}
 
 _DEFAULT_HEIGHT_RATIO = 0.75
 """The same ratio for all other numbers of legs."""
+
+_MAX_REACH_RATIO = 0.98
+"""The ratio of that distance to the longest one that the limits of the knee allow, at most."""
 
 _PRECISION = np.array([0.02, 0.02, 0.1])
 """Distance of the foot from its target that costs 1, along x, y and z, over the leg length. The
@@ -46,6 +49,10 @@ _DEFAULT_RANGE = 2.4
 
 _LIMIT_MARGIN = 0.08
 """Positions closer to a limit than this are penalized, over the range."""
+
+_INSET = 0.25
+"""Distance to the limits of a joint that bends a leg and cannot reach 0, over its range. The search
+does not move all of them: Cassie has two above its knee, and the second cannot reach 0."""
 
 _MAX_FOOT_OFFSET = 0.3
 """Largest horizontal offset of all feet from their hips, over the leg length. A robot that needs
@@ -75,6 +82,12 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
     if is_standing_keyframe(robot):
         return {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
     positions = {joint.name: clip_to_limits(joint, joint.reference) for joint in robot.joints}
+    positions |= {
+        joint.name: _initial_position(joint)
+        for leg in robot.legs
+        for joint, role in zip(leg.joints, leg.roles, strict=True)
+        if role in _BENDING_ROLES
+    }
     # The center of mass moves with the legs, hence a second pass.
     for _ in range(2 if robot.legs else 0):
         shift = _foot_shift(robot, positions)
@@ -101,6 +114,15 @@ def clip_to_limits(joint: Joint, position: float) -> float:
     """Return the position closest to `position` within the limits [rad] or [m]."""
     lower, upper = joint_range(joint)
     return float(np.clip(position, lower, upper))
+
+
+def _initial_position(joint: Joint) -> float:
+    """Return the reference position, or one at a distance from the limits that exclude it."""
+    lower, upper = joint_range(joint)
+    if lower <= joint.reference <= upper:
+        return joint.reference
+    inset = _INSET * (upper - lower) if np.isfinite(upper - lower) else 0.0
+    return float(np.clip(joint.reference, lower + inset, upper - inset))
 
 
 def joint_range(joint: Joint) -> tuple[float, float]:
@@ -226,6 +248,12 @@ class _LegObjective:
         low = _MIN_KNEE_HEIGHT * self.length - (knee_point[..., 2] - contact[..., 2])
         return np.asarray(total + 100 * np.clip(low / self.length, 0, None))
 
+    def reachable_target(self, knee: Matrix) -> Matrix:
+        """Return the target, raised if no position of the knee extends the leg as far."""
+        contact, _ = self._forward(self.positions(np.zeros_like(knee), knee))
+        reach = float(np.linalg.norm(contact - self.hip_point, axis=-1).max())
+        return np.array([*self.target[:2], max(self.target[2], -_MAX_REACH_RATIO * reach)])
+
     def _level_ankle(self, hip: Matrix, knee: Matrix) -> Matrix:
         constant, per_hip, per_knee = self.level
         return np.asarray(constant + per_hip * hip + per_knee * knee)
@@ -264,6 +292,7 @@ def _solve_leg(
         return {}
     limits = np.array([_search_range(objective.hip), _search_range(objective.knee)])
     axes = np.linspace(limits[:, 0], limits[:, 1], _GRID_SIZE, axis=-1)
+    objective = replace(objective, target=objective.reachable_target(axes[1]))
     cost = objective.cost(*np.meshgrid(axes[0], axes[1], indexing="ij"))
     # The knee may bend both ways, and only the refined minima tell which way is better.
     starts = np.array([(axes[0, i], axes[1, j]) for i, j in _local_minima(cost)[:_MAX_STARTS]])
