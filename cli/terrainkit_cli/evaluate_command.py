@@ -143,9 +143,9 @@ class Evaluate(PolicyCommand):
     format: Literal["table", "json"] = "table"
     """Format of the printed result."""
 
-    suite: Annotated[str, text_option("NAME")] = ""
-    """Measure how often robots cross the patches of this suite (terrainkit suite list), along
-    their goals or to a far side, and print a report card."""
+    suite: Annotated[str, text_option("SUITE|MAP.npz")] = ""
+    """Measure how often robots cross the patches of this suite (terrainkit suite list) or map,
+    along their goals or to a far side, and print a report card."""
 
     limits: Flag = False
     """Measure the highest step, widest gap, steepest slope and narrowest passage that all robots
@@ -222,7 +222,7 @@ class Evaluate(PolicyCommand):
         targets = report_card.targets(Path(self.output), is_card=bool(self.suite))
         for target in targets if self.output else ():
             check_target(target, overwrite=self.overwrite)
-        if self.suite:
+        if self.suite and not report_card.is_map(self.suite):
             get_suite(self.suite)  # an unknown name is reported before the run is loaded
         spec, config = self.load_spec(), self.eval_config(self.seconds)
         if self.suite:

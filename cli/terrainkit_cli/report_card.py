@@ -1,4 +1,4 @@
-"""The report card of a policy on a suite, and its limits."""
+"""The report card of a policy on a suite or a map, and its limits."""
 
 import json
 from pathlib import Path
@@ -14,15 +14,32 @@ CARD_SUFFIXES = (".json", ".md", ".png")
 """Files of a report card."""
 
 
+def is_map(suite: str) -> bool:
+    """Return whether the value of --suite is a map, not the name of a suite."""
+    return Path(suite).suffix == ".npz"
+
+
 def report_suite(
     spec: "PolicySpec", suite: str, config: "EvaluationConfig", repetitions: int
 ) -> list[bytes]:
-    """Measure a policy on a suite, print the card, and return it as the files of a report card."""
-    from terrainkit.suites import generate_suite
+    """Measure a policy, print the card, and return it as the files of a report card.
+
+    Args:
+        spec: The policy.
+        suite: Name of a suite, or a map (.npz).
+        config: Seed and device.
+        repetitions: Robots on each patch.
+
+    Raises:
+        ConfigError: if there is no such suite, or the policy cannot cross a map.
+        MapFileError: if the map is missing, truncated or of another version.
+        MemoryLimitError: if the simulations would not fit in memory.
+    """
+    from terrainkit import TerrainMap, generate_suite
     from terrainkit_robots.report_card.card import CRITERION, measure, summary
     from terrainkit_robots.report_card.picture import draw_card
 
-    terrain_map = generate_suite(suite)
+    terrain_map = TerrainMap.load(suite) if is_map(suite) else generate_suite(suite)
     with render.steps() as steps:
         card = measure(
             spec,

@@ -244,6 +244,18 @@ def test_suite_prints_and_writes_a_report_card(here, tmp_path, monkeypatch):
     assert "card.json exists" in one_line(here(*words)[2])
 
 
+def test_suite_may_be_a_map(here, tmp_path):
+    flat = SubTerrain(terrain="flat")
+    terrain_map = generate(MapConfig(rows=1, cols=1, patch_size=(4.0, 3.0), terrains=(flat,)))
+    terrain_map.save(tmp_path / "yard.npz")
+    code, out, _ = here("walk", "--suite", "yard.npz", "--repetitions", 1, "-o", "card")
+    assert code == 0
+    assert out.splitlines()[0].startswith("quadruped, model_7.pt, on yard.npz: success ")
+    document = json.loads((tmp_path / "card.json").read_text())
+    assert document["sha256"] == suites.suite_hash(terrain_map)
+    assert "no file missing.npz" in here("walk", "--suite", "missing.npz")[2]
+
+
 def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
     def measure(_run, robot_limits, repetitions, *_):
         assert repetitions == 10
