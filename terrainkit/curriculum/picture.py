@@ -4,14 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.curriculum.statistics import PatchStatistics
+from terrainkit.heat_map import HeatMapRow, draw_heat_map
 
-_CELL_WIDTH, _CELL_HEIGHT, _MARGIN = 56, 24, 12
-"""Sizes [px]."""
-
-_FAILED, _SUCCEEDED = np.array((62, 62, 201)), np.array((96, 168, 58))
-"""Colors of no and full success, as BGR."""
-
-_UNSEEN, _BLACK, _WHITE = (225, 225, 225), (0, 0, 0), (255, 255, 255)
+_MAX_LABEL = 40
+"""Longest label of a column, in characters."""
 
 
 def draw_statistics(statistics: PatchStatistics, terrain_names: NDArray[np.str_]) -> bytes:
@@ -23,30 +19,15 @@ def draw_statistics(statistics: PatchStatistics, terrain_names: NDArray[np.str_]
     Args:
         statistics: Statistics of the patches of a map.
         terrain_names: Terrain of each patch, shape (rows, cols).
+
+    Returns:
+        The bytes of the PNG.
     """
-    import cv2
-
-    def write(text: str, x: int, y: int, color: tuple[int, int, int] = _BLACK) -> None:
-        font = cv2.FONT_HERSHEY_SIMPLEX
-        cv2.putText(image, text, (x, y + 17), font, 0.45, color, 1, cv2.LINE_AA)
-
-    levels, columns = statistics.visits.shape
-    labels = [f"{c}  {', '.join(dict.fromkeys(terrain_names[:, c]))}" for c in range(columns)]
-    left = 9 * min(max(map(len, labels)), 40) + 2 * _MARGIN
-    width = max(left + levels * _CELL_WIDTH + _MARGIN, 480)
-    image = np.full(((columns + 2) * _CELL_HEIGHT + 2 * _MARGIN, width, 3), 255, np.uint8)
-    write("color: success (red 0, green 1); number: episodes", _MARGIN, _MARGIN)
-    write("column, level", _MARGIN, _MARGIN + _CELL_HEIGHT)
-    for level in range(levels):
-        write(str(level), left + level * _CELL_WIDTH + 22, _MARGIN + _CELL_HEIGHT)
-    for column, label in enumerate(labels):
-        y = _MARGIN + (column + 2) * _CELL_HEIGHT
-        write(label[:40], _MARGIN, y)
-        for level in range(levels):
-            x = left + level * _CELL_WIDTH
-            rate, visits = statistics.success[level, column], int(statistics.visits[level, column])
-            cell = image[y + 1 : y + _CELL_HEIGHT, x + 1 : x + _CELL_WIDTH]
-            cell[:] = _UNSEEN if np.isnan(rate) else (1 - rate) * _FAILED + rate * _SUCCEEDED
-            text = str(visits) if visits < 10_000 else f"{visits / 1000:.0f}k"
-            write(text, x + 28 - 4 * len(text), y, _BLACK if np.isnan(rate) else _WHITE)
-    return bytes(cv2.imencode(".png", image)[1])
+    rows = []
+    for column, (rates, visits) in enumerate(
+        zip(statistics.success.T, statistics.visits.T, strict=True)
+    ):
+        label = f"{column}  {', '.join(dict.fromkeys(terrain_names[:, column]))}"
+        texts = [f"{n:.0f}" if n < 10_000 else f"{n / 1000:.0f}k" for n in visits]
+        rows.append(HeatMapRow(label=label[:_MAX_LABEL], success=rates, texts=texts))
+    return draw_heat_map("color: success (red 0, green 1); number: episodes", rows)
