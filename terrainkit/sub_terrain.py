@@ -13,6 +13,7 @@ from terrainkit.overlay import Overlay
 from terrainkit.parameter import MAX_VALUE, Parameter, convert_range, parameters_of
 from terrainkit.schema import Config, field_keys
 from terrainkit.terrain import Terrain
+from terrainkit.text import closest
 from terrainkit.type_hint import convert, show
 
 
@@ -90,6 +91,10 @@ class SubTerrain(Config):
         own = {key: table[key] for key in table if key in keys}
         parameters = {key: value for key, value in table.items() if key not in own}
         try:
+            if "terrain" not in own and (near := closest("terrain", parameters)):
+                raise ConfigError(f"got the key {near!r}; did you mean 'terrain'?")
+            if isinstance(parameters.get("elements"), Mapping):
+                raise ConfigError("elements: got a table; expected [[terrains.elements]]")
             if "overlays" in own:
                 own["overlays"] = _read_overlays(own["overlays"])
             return super().from_table({**own, "parameters": parameters}, default)

@@ -154,6 +154,8 @@ def test_preset_parkour_course_has_a_goal_for_each_obstacle(length, number):
             r"course\.elements: got 'hurdles'; expected a list, each value a",
         ),
         ({"elements": [3]}, r"course\.elements\[0\]: got 3; expected a table \(Element\)"),
+        ({"elements": {"terrain": "gap"}}, r"got a table; expected \[\[terrains.elements\]\]"),
+        ({"elements": [{"terain": "gap"}]}, r"got the key 'terain'; did you mean 'terrain'\?"),
         ({"elements": [{}]}, r"course\.elements\[0\]: terrain: missing; expected a string"),
         ({"elements": [{"terrain": "hurdle"}]}, r"elements\[0\]: no terrain 'hurdle'.* 'hurdles'"),
         ({"elements": [{"terrain": "pit", "depht": 1}]}, r"elements\[0\]: pit has no parameter"),
@@ -165,7 +167,7 @@ def test_preset_parkour_course_has_a_goal_for_each_obstacle(length, number):
 )
 def test_course_rejects_bad_elements(parameters, message):
     with pytest.raises(ConfigError, match=message):
-        SubTerrain(terrain="course", parameters=parameters)
+        SubTerrain.from_table({"terrain": "course", **parameters})
 
 
 @pytest.mark.parametrize(
