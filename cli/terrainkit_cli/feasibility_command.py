@@ -141,11 +141,12 @@ def solve_demand(
     progress = partial(render.progress, of="terrains")
     solved = solve_ranges(config, derived.limits, ends, progress=progress, executor=executor)
     rows = [("terrain", "demand", f"ranges for {derived.robot}")]
-    for before, each in zip(config.sub_terrains, solved, strict=True):
-        changed = each.sub_terrain.parameters.items() - before.parameters.items()
-        ranges = [f"{name} {easy:g} to {hard:g}" for name, (easy, hard) in sorted(changed)]
-        span = " to ".join(map(demand_text, each.demand))
-        rows.append((each.sub_terrain.name, span, ", ".join(ranges) or "unchanged"))
+    for terrain in solved:
+        for indent, each in [("", terrain), *(("  ", element) for element in terrain.elements)]:
+            ranges = [f"{name} {easy:g} to {hard:g}" for name, (easy, hard) in each.ranges.items()]
+            what = ", ".join(ranges) or ("" if each.elements else "unchanged")
+            span = " to ".join(map(demand_text, each.demand))
+            rows.append((indent + each.sub_terrain.name, span, what))
     render.table(rows)
     render.result("")
     return replace(config, terrains=tuple(each.sub_terrain for each in solved))

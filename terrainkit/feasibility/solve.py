@@ -1,7 +1,7 @@
 """Solve the ranges of a map for a robot: each terrain from one demand to another."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -38,9 +38,15 @@ class SolvedTerrain:
     sub_terrain: SubTerrain
     """The sub-terrain; unchanged if its demand does not depend on its ranges."""
 
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+    """The solved ranges, by parameter."""
+
     demand: Range
     """Demands at difficulty 0 and 1. They are above those requested if no value is easy enough, and
     below if the demand changes in steps, or no value reaches them."""
+
+    elements: "tuple[SolvedTerrain, ...]" = ()
+    """The elements of a course, each solved on its own."""
 
 
 def solve_ranges(
@@ -55,7 +61,7 @@ def solve_ranges(
 
     The ranges of a terrain are interpolated and extrapolated together, as with the difficulty, to
     the hardest values that demand at most `demand`; if there are none, to the closest. Overlays and
-    friction keep their ranges.
+    friction keep their ranges. Each element of a course is solved as a course of that element.
 
     Args:
         config: The map. Its sub-terrains with parameters that depend on the difficulty are solved.
@@ -84,7 +90,31 @@ def solve_ranges(
 def _solve(
     config: MapConfig, limits: RobotLimits, demand: Range, sub_terrain: SubTerrain
 ) -> SolvedTerrain:
-    """Return the sub-terrain with solved ranges."""
+    """Return the sub-terrain with solved ranges, or a course with those of its elements."""
+    declared = parameters_of(sub_terrain.terrain_class)
+    name = next((name for name, each in declared.items() if each.table), None)
+    if name is None:
+        return _solve_ranges(config, limits, demand, sub_terrain, lambda solved: solved)
+    given: Any = sub_terrain.parameters.get(name, declared[name].default)
+    elements = tuple(
+        _solve_ranges(
+            config, limits, demand, element, lambda solved: _with(sub_terrain, {name: (solved,)})
+        )
+        for element in given
+    )
+    course = _with(sub_terrain, {name: tuple(each.sub_terrain for each in elements)})
+    low, high = np.max([each.demand for each in elements], axis=0).tolist()
+    return SolvedTerrain(sub_terrain=course, demand=(low, high), elements=elements)
+
+
+def _solve_ranges(
+    config: MapConfig,
+    limits: RobotLimits,
+    demand: Range,
+    sub_terrain: SubTerrain,
+    patch_terrain: Callable[[SubTerrain], SubTerrain],
+) -> SolvedTerrain:
+    """Return a sub-terrain with solved ranges; `patch_terrain` returns that of its patches."""
     ranges, grid = _ranges(sub_terrain), config.patch_grid(0, 0)
     known: dict[tuple[float, float], float] = {}
 
@@ -96,7 +126,8 @@ def _solve(
         if (end, difficulty) not in known:
             values = {name: r.at(difficulty, grid) for name, r in ranges.items()}
             try:
-                demand = _demand(config, limits, _with(sub_terrain, values), end)
+                terrain = patch_terrain(_with(sub_terrain, values))
+                demand = _demand(config, limits, terrain, end)
             except ConfigError:
                 if 0 <= difficulty <= 1:
                     raise
@@ -111,7 +142,7 @@ def _solve(
         )
     solved = {name: (r.at(easy, grid), r.at(hard, grid)) for name, r in ranges.items()}
     ends = demand_at(0.0, easy), demand_at(1.0, hard)
-    return SolvedTerrain(sub_terrain=_with(sub_terrain, solved), demand=ends)
+    return SolvedTerrain(sub_terrain=_with(sub_terrain, solved), ranges=solved, demand=ends)
 
 
 @dataclass(frozen=True, kw_only=True)

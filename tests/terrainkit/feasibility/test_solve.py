@@ -10,6 +10,7 @@ from terrainkit.feasibility import assess_map, assess_patch, solve_ranges
 from terrainkit.generation import generate
 from terrainkit.patch import build_patch
 from terrainkit.registry import make_overlay
+from terrainkit.terrains.course import Element
 from tests.limits import LIMITS
 
 
@@ -65,6 +66,20 @@ def test_closest_value_is_used_where_extrapolation_does_not_reach_the_demand():
     solved = solve("stairs", step_height=(0.15, 0.2))
     assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.1, 0.18), abs=0.001)
     assert solved.demand == pytest.approx((0.5, 0.9), abs=0.01)
+
+
+def test_elements_of_a_course_are_solved_one_by_one():
+    """Hurdles of 0.2 and 0.9 of the limit of a step, 0.2 m, and gaps of at most that of 0.4 m."""
+    hurdles = Element(terrain="hurdles", parameters={"height": (0.05, 0.3)})
+    gaps = Element(terrain="gap_track", element_length=4.0)
+    solved = solve("course", size=(8.0, 4.0), elements=(hurdles, gaps))
+    first, second = solved.elements
+    assert first.ranges["height"] == pytest.approx((0.2 * 0.2, 0.9 * 0.2), abs=0.008)
+    assert second.ranges["length"] == (0.1, 0.3)
+    assert solved.demand == pytest.approx((first.demand[0], 0.9), abs=0.04)
+    course = solved.sub_terrain.parameters["elements"]
+    assert course == (first.sub_terrain, second.sub_terrain)
+    assert course[1].element_length == 4.0
 
 
 def test_overlays_count_at_the_ends_of_the_map():
