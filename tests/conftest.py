@@ -1,10 +1,14 @@
 import dataclasses
+import resource
+import subprocess
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
 from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.importing import child_process, isolated
 from terrainkit.solids import Solids, make_boxes, make_cylinders, make_hulls
 
 settings.register_profile("untimed", deadline=None)
@@ -88,3 +92,23 @@ def ray_down():
         return heights
 
     return cast
+
+
+@pytest.fixture
+def import_in_process(monkeypatch):
+    """Run child_process.py in this process: trimesh takes most of a second to import."""
+
+    def run(command, **_options):
+        try:
+            child_process.main(*command[3:])
+        except SystemExit as error:
+            stderr = str(error.code).encode()
+            raise subprocess.CalledProcessError(1, command, stderr=stderr) from None
+
+    child = SimpleNamespace(
+        run=run,
+        TimeoutExpired=subprocess.TimeoutExpired,
+        CalledProcessError=subprocess.CalledProcessError,
+    )
+    monkeypatch.setattr(isolated, "subprocess", child)
+    monkeypatch.setattr(resource, "setrlimit", lambda *_: None)

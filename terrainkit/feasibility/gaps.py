@@ -136,20 +136,42 @@ def _between(graph: FootholdGraph, start: IntArray, end: IntArray) -> tuple[Floa
     level = np.maximum(floor[start], floor[end])
     top, clearance = level.copy(), np.full(len(start), np.inf)
     for place, inside in _line(columns, start, end):
-        floors, ceilings = columns.floor[place], columns.ceiling[place]
-        above = np.fmax(floors, level[inside][:, None])
-        free = ceilings - above
-        # Of several intervals, the body takes the one with the least demand.
+        above, free = _passed(graph, place, level[inside], floor[start[inside]])
+        top[inside] = np.maximum(top[inside], above)
+        clearance[inside] = np.minimum(clearance[inside], free)
+    return top, clearance
+
+
+def _passed(
+    graph: FootholdGraph, place: tuple[IntArray, IntArray], level: FloatArray, start: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the height at which the body passes each column, and the clearance there [m].
+
+    Of several intervals, the body takes the one with the least demand. The clearance is -inf if it
+    passes through none.
+
+    Args:
+        graph: The graph.
+        place: Index of each column.
+        level: Least height of the body [m].
+        start: Height of the node where it starts [m].
+    """
+    columns = graph.columns
+    floors, ceilings = (z[place].T for z in (columns.floor, columns.ceiling))
+    top, least = np.fmax(floors[0], level), np.full(len(level), np.inf)
+    clearance = -least
+    for floor, ceiling in zip(floors, ceilings, strict=True):
+        above = np.fmax(floor, level)
+        free = ceiling - above
         cost = np.maximum(
-            ratio("step_up", above - floor[start[inside]][:, None], graph.limits),
+            ratio("step_up", above - start, graph.limits),
             ratio("crouched_height", free, graph.limits),
         )
         cost[~(free > 0)] = np.inf
-        best = np.argmin(cost, axis=1)
-        row = np.arange(len(best))
-        top[inside] = np.maximum(top[inside], above[row, best])
-        found = np.where(np.isfinite(cost[row, best]), free[row, best], -np.inf)
-        clearance[inside] = np.minimum(clearance[inside], found)
+        is_least = cost < least
+        least = np.where(is_least, cost, least)
+        top = np.where(is_least, above, top)
+        clearance = np.where(is_least, free, clearance)
     return top, clearance
 
 
@@ -174,13 +196,15 @@ def _line(
 ) -> list[tuple[tuple[IntArray, IntArray], NDArray[np.int64]]]:
     """Return the columns between the nodes of each edge: those at each place, and their edges."""
     (i, j), (i2, j2) = columns.column(start), columns.column(end)
-    count = 2 * np.maximum(np.abs(i2 - i), np.abs(j2 - j))  # points half a column apart
+    di, dj = i2 - i, j2 - j
+    count = 2 * np.maximum(np.abs(di), np.abs(dj))  # points half a column apart
     lines = []
     for n in range(1, int(count.max(initial=0))):
         inside = np.flatnonzero(n < count)
-        t = n / count[inside]
-        a = np.rint(i[inside] + t * (i2 - i)[inside]).astype(np.int64)
-        b = np.rint(j[inside] + t * (j2 - j)[inside]).astype(np.int64)
-        own = ((a == i[inside]) & (b == j[inside])) | ((a == i2[inside]) & (b == j2[inside]))
-        lines.append(((a[~own], b[~own]), inside[~own]))
+        t, x, y = n / count[inside], i[inside], j[inside]
+        a = np.rint(x + t * di[inside]).astype(np.int64)
+        b = np.rint(y + t * dj[inside]).astype(np.int64)
+        own = ((a == x) & (b == y)) | ((a == i2[inside]) & (b == j2[inside]))
+        between = ~own
+        lines.append(((a[between], b[between]), inside[between]))
     return lines

@@ -40,6 +40,9 @@ class Passages:
     """For each interval but the last, the lowest and the highest ceiling within the body width of
     each column [m], shapes (nx, ny)."""
 
+    intervals: tuple[tuple[FloatArray, FloatArray], ...]
+    """Floor and ceiling of each interval of the columns [m], shapes (nx * ny,)."""
+
     @classmethod
     def build(cls, columns: Columns, limits: RobotLimits) -> Self:
         """Return the passages of the columns of a patch."""
@@ -58,6 +61,10 @@ class Passages:
             limits=limits,
             highest=cv2.dilate(np.nanmax(columns.floor, axis=2), kernel),
             ceilings=tuple(ceilings),
+            intervals=tuple(
+                (columns.floor[..., k].reshape(-1), columns.ceiling[..., k].reshape(-1))
+                for k in range(columns.floor.shape[2])
+            ),
         )
 
     def node_widths(self) -> FloatArray:
@@ -130,17 +137,42 @@ class Passages:
         (i, j), (nx, ny) = place, columns.shape
         for cell in _ray_cells(angle, most, columns.spacing):
             # Beyond the patch, the ground continues as at its edge.
-            a = np.minimum(np.maximum(i[active] + cell.i, 0), nx - 1)
-            b = np.minimum(np.maximum(j[active] + cell.j, 0), ny - 1)
-            above, is_open = _pass(columns, (a, b), levels[-1], levels[cell.before] + step_up, need)
+            a = np.minimum(np.maximum(i + cell.i, 0), nx - 1)
+            b = np.minimum(np.maximum(j + cell.j, 0), ny - 1)
+            above = self._pass(a * ny + b, levels[-1], levels[cell.before] + step_up, need)
+            is_open = np.isfinite(above)
             if not is_open.all():
                 free[active[~is_open]] = cell.distance
-                active, above, need = active[is_open], above[is_open], need[is_open]
-                levels = [each[is_open] for each in levels]
+                i, j, active = i[is_open], j[is_open], active[is_open]
+                above, need = above[is_open], need[is_open]
+                # No later cell looks further back.
+                levels[cell.before :] = [each[is_open] for each in levels[cell.before :]]
             if not len(active):
                 break
             levels.append(above)
         return free
+
+    def _pass(
+        self, column: IntArray, level: FloatArray, highest: FloatArray, need: FloatArray
+    ) -> FloatArray:
+        """Return the height at which the body passes each column [m], inf if it does not.
+
+        Args:
+            column: Number of each column, shape (n,).
+            level: Height of the ray before the column [m].
+            highest: Highest floor that is not a wall [m].
+            need: Clearance that the body needs [m].
+        """
+        lowest = np.full(len(column), np.inf)
+        highest, need = highest + _TOLERANCE, need - _TOLERANCE
+        # One interval after the other: reducing a short axis of an array takes several times as
+        # long.
+        for floors, ceilings in self.intervals:
+            floor = floors[column]
+            above = np.fmax(floor, level)
+            passes = (floor <= highest) & (ceilings[column] - above >= need)
+            np.minimum(lowest, above, out=lowest, where=passes)
+        return lowest
 
 
 class _Cell(NamedTuple):
@@ -175,28 +207,3 @@ def _ray_cells(angle: float, length: float, spacing: float) -> list[_Cell]:
         cells.append(_Cell(at[0], at[1], distance, start))
         distances.append(distance)
     return cells
-
-
-def _pass(
-    columns: Columns,
-    place: tuple[IntArray, IntArray],
-    level: FloatArray,
-    highest: FloatArray,
-    need: FloatArray,
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the height at which the body passes a column, and whether it passes at all.
-
-    Args:
-        columns: The columns.
-        place: Index of each column.
-        level: Height of the ray before the column [m].
-        highest: Highest floor that is not a wall [m].
-        need: Clearance that the body needs [m].
-    """
-    floor, ceiling = columns.floor[place], columns.ceiling[place]
-    above = np.fmax(floor, level[:, None])
-    passes = (floor <= highest[:, None] + _TOLERANCE) & (
-        ceiling - above >= need[:, None] - _TOLERANCE
-    )
-    lowest = np.where(passes, above, np.inf).min(axis=1)
-    return lowest, np.isfinite(lowest)

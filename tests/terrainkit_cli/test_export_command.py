@@ -198,8 +198,8 @@ def test_export_names_the_missing_extra(here, monkeypatch):
     )
 
 
-def test_export_help_covers_maps_and_policies(terrainkit_process):
-    message = terrainkit_process("export", "--help").stdout
+def test_export_help_covers_maps_and_policies(terrainkit):
+    message = terrainkit("export", "--help").stdout
     assert "MAP.npz|RUN" in message
     assert "policy.onnx" in message
     assert "heightfield" in message

@@ -36,6 +36,7 @@ def test_limits_on_the_command_line_replace_the_derived_ones(terrainkit, stairs)
     assert "step_up          0.25   given" in run.stdout
 
 
+@pytest.mark.usefixtures("import_in_process")
 def test_feasibility_of_imported_ground(terrainkit, tmp_path):
     """A wall of 0.15 m around the spawn position."""
     heights = np.zeros((80, 80))

@@ -4,6 +4,8 @@ import trimesh
 
 import terrainkit as tk
 
+pytestmark = pytest.mark.usefixtures("import_in_process")
+
 
 @pytest.fixture
 def bridge(tmp_path):
@@ -15,8 +17,8 @@ def bridge(tmp_path):
     return "bridge.stl"
 
 
-def test_import_writes_map_and_report(terrainkit_process, tmp_path, bridge):
-    run = terrainkit_process("import", bridge, "-o", "a.npz", "--patch-size", 3, 4)
+def test_import_writes_map_and_report(terrainkit, tmp_path, bridge):
+    run = terrainkit("import", bridge, "-o", "a.npz", "--patch-size", 3, 4)
     assert (run.returncode, run.stderr) == (0, "")
     assert "wrote a.npz: 2 x 1 patches of 3 m x 4 m, 60 x 40 samples" in run.stdout
     assert (
@@ -24,7 +26,7 @@ def test_import_writes_map_and_report(terrainkit_process, tmp_path, bridge):
         in run.stdout
     )
     assert tk.TerrainMap.load(tmp_path / "a.npz").config.mode == "custom"
-    run = terrainkit_process("check-map", "a.npz")
+    run = terrainkit("check-map", "a.npz")
     assert run.returncode == 0, run.stdout
 
 

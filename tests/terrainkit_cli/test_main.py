@@ -26,8 +26,8 @@ def test_version_is_that_of_the_package(terrainkit_process):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_describes_command_in_80_columns(terrainkit_process, name):
-    run = terrainkit_process(name, "--help")
+def test_help_describes_command_in_80_columns(terrainkit, name):
+    run = terrainkit(name, "--help")
     assert run.returncode == 0
     assert command(name).__doc__.partition("\n")[0] in run.stdout
     assert max(map(len, run.stdout.splitlines())) <= 80

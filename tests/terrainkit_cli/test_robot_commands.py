@@ -69,8 +69,8 @@ def test_check_robot_exit_code(here, words, code):
 
 
 @pytest.mark.usefixtures("folder")
-def test_check_robot_prints_file_and_line(terrainkit_process):
-    run = terrainkit_process("check-robot", "bad.urdf", "--select", "negative-mass")
+def test_check_robot_prints_file_and_line(here):
+    run = here("check-robot", "bad.urdf", "--select", "negative-mass")
     assert "\nerror INR002 negative-mass\n  line 4: " in run.stdout
     assert run.stdout.endswith("\nbad.urdf: 1 error\n")
     assert run.stderr == ""

@@ -163,10 +163,8 @@ def test_generate_keeps_existing_file(terrainkit, tmp_path):
     assert tk.TerrainMap.load(tmp_path / "a.npz").config.rows == 1
 
 
-def test_generate_warns_of_preset_without_column(terrainkit_process):
-    run = terrainkit_process(
-        "generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs"
-    )
+def test_generate_warns_of_preset_without_column(terrainkit):
+    run = terrainkit("generate", "-o", "a.npz", "--rows", 1, "--cols", 2, "--preset", "stairs")
     assert run.returncode == 0
     assert run.stderr == (
         "terrainkit: warning: cols: got 2, too few for 3 sub-terrains at these proportions: "
@@ -193,9 +191,11 @@ def test_generate_full_disk_is_one_line(tmp_path):
 def test_generate_progress_bar_needs_terminal(tmp_path):
     import pty
 
-    command = [sys.executable, "-m", "terrainkit_cli.main", "generate", "-o", "a.npz"]
-    command += ["--rows", "600", "--cols", "100", "--patch-size", "2", "2", "--cell", "0.5"]
-    command += ["--terrain", "flat"]
+    script = (
+        "import sys; from terrainkit_cli import main, render; render.BAR_DELAY = 0.0;"
+        "sys.exit(main.main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", script, "generate", "-o", "a.npz", "--rows", "3"]
     ours, theirs = pty.openpty()
     run = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=theirs, text=True)
     os.close(theirs)
@@ -221,8 +221,8 @@ def test_list_terrain_shows_parameters(terrainkit):
     assert ["step_height", "0.05", "0.23", "Rise", "of", "a", "step", "[m]."] in lines
 
 
-def test_info_describes_the_map(terrainkit_process, small_map):
-    output = terrainkit_process("info", small_map).stdout
+def test_info_describes_the_map(terrainkit, small_map):
+    output = terrainkit("info", small_map).stdout
     assert "2 x 5 of 8 m x 6 m" in output
     assert "82 x" not in output
     assert "180 x 320, one every 0.1 m" in output  # 2 x 80 and 5 x 60 cells, and 10 on each side
@@ -250,8 +250,8 @@ def test_info_unknown_patch_is_rejected(terrainkit, small_map):
         assert f"no patch {patch} in a map of 2 rows and 5 columns" in run.stderr
 
 
-def test_preview_has_the_given_width(terrainkit_process, tmp_path, small_map):
-    run = terrainkit_process("preview", small_map, "-o", "a.png", "--width", 400)
+def test_preview_has_the_given_width(terrainkit, tmp_path, small_map):
+    run = terrainkit("preview", small_map, "-o", "a.png", "--width", 400)
     assert run.returncode == 0
     picture = cv2.imread(str(tmp_path / "a.png"))
     assert picture.shape[1] >= 400
@@ -288,8 +288,8 @@ def test_export_rejects_option_of_other_format(terrainkit, small_map):
     assert "option of .stl: got 'collision'; expected full, closed, y_up" in run.stderr
 
 
-def test_check_map_accepts_generated_map(terrainkit_process, small_map):
-    run = terrainkit_process("check-map", small_map)
+def test_check_map_accepts_generated_map(terrainkit, small_map):
+    run = terrainkit("check-map", small_map)
     assert run.returncode == 0
     assert "no issues" in run.stdout
 

@@ -107,15 +107,19 @@ def test_codes_and_names_are_unique():
     assert len({each.name for each in rules()}) == len(rules())
 
 
-@pytest.mark.parametrize("each", rules(), ids=lambda each: each.code)
-def test_every_rule_is_well_formed(each):
-    assert re.fullmatch(r"[A-Z]{3}\d{3}", each.code)
-    assert re.fullmatch(r"[a-z]+(-[a-z0-9]+)*", each.name)
-    for text in (each.title, each.why, each.how_to_fix, each.reference):
-        assert text.isascii(), text
-    assert each.title[0].isupper()
-    for text in (each.title, each.why, each.how_to_fix):
-        assert text.endswith(".")
+def test_every_rule_is_well_formed():
+    for each in rules():
+        assert re.fullmatch(r"[A-Z]{3}\d{3}", each.code)
+        assert re.fullmatch(r"[a-z]+(-[a-z0-9]+)*", each.name)
+        assert each.family in FAMILIES, each.code
+        assert each.title[0].isupper(), each.title
+        assert len(each.title) <= 100, each.title
+        for text in (each.title, each.why, each.how_to_fix):
+            assert text.endswith("."), text
+        assert each.reference.endswith((".", ")", "`")), each.reference
+        for text in (each.title, each.why, each.how_to_fix, each.reference):
+            assert text.isascii(), text
+            assert text == each.title or len(text) > 20, text
 
 
 @pytest.mark.parametrize("word", ["INR001", "inr001", "Inr001"])

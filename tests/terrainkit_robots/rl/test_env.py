@@ -241,7 +241,8 @@ class TestTermination:
     def test_time_out_is_not_a_fall(self, quadruped, nominal_task):
         env = LeggedEnv(nominal_task(2), quadruped, Plane())
         assert env.max_episode_length == 1000
-        for k in range(999):
+        env.episode_length_buf[:] = 900
+        for k in range(99):
             _, _, dones, extras = stand(env)
             assert not dones.any(), k
         _, _, dones, extras = stand(env)

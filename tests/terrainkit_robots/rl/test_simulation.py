@@ -265,7 +265,7 @@ def peak():
     status = Path("/proc/self/status").read_text()  # ru_maxrss includes the parent process
     return 1024 * int(re.search(r"VmHWM:\\s*(\\d+) kB", status)[1])
 
-robot, few, many = Robot.load(get_task("quadruped").folder), 32, 512
+robot, few, many = Robot.load(get_task("quadruped").folder), 32, 256
 terrain = Terrain(measure_heights=True)
 peaks = []
 for count in (few, many):
