@@ -189,12 +189,12 @@ def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, FloatArray, li
     regions = None
     for reach in _REACHES:
         bottlenecks = [bottleneck(edges, demand, *leg, size) for leg in legs]
-        most = max(bottlenecks)
-        if most <= searched:
+        max_demand = max(bottlenecks)
+        if max_demand <= searched:
             return edges, demand, bottlenecks
         if regions is None:
             regions = Regions.build(steps, demand, graph.node_demand, narrowest)
-        edges = Edges.concatenate([steps, gap_edges(graph, regions, min(most, reach))])
+        edges = Edges.concatenate([steps, gap_edges(graph, regions, min(max_demand, reach))])
         demand, searched = graph.demand(edges), reach
     return edges, demand, [bottleneck(edges, demand, *leg, size) for leg in legs]
 
@@ -220,10 +220,10 @@ class _Path:
         self.place = np.full(3, np.nan)
         size, position = graph.columns.floor.size, graph.columns.positions
         nodes = [legs[0][0]]
-        for (start, targets), most in zip(legs, bottlenecks, strict=True):
+        for (start, targets), max_demand in zip(legs, bottlenecks, strict=True):
             if nodes[-1] != start:
                 break
-            is_usable = demand <= most
+            is_usable = demand <= max_demand
             usable, ratios = edges.select(is_usable), demand[is_usable]
             ends = position(usable.end) - position(usable.start)
             length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)

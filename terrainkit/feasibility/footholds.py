@@ -29,13 +29,13 @@ def foothold_sizes(columns: Columns, steps: Edges, limits: RobotLimits) -> Float
         Diameters [m], shape (nx, ny, m); 0 where there is no node.
     """
     edge = EDGE_FRACTION * min(limits.step_up, limits.step_down)
-    most = math.ceil(2 * limits.foothold / columns.spacing - 1e-9)
+    max_size = math.ceil(2 * limits.foothold / columns.spacing - 1e-9)
     half = len(steps.start) // 2
     flat = np.maximum(steps.rise[:half], steps.drop[:half]) <= edge
     start, end = steps.start[:half][flat], steps.end[:half][flat]
     sizes = np.zeros(columns.floor.size)
     for nodes, first, second in _surfaces(columns, start, end):
-        sizes[nodes] = _surface_sizes(columns, nodes, first, second, most)
+        sizes[nodes] = _surface_sizes(columns, nodes, first, second, max_size)
     return sizes.reshape(columns.floor.shape) * columns.spacing
 
 
@@ -69,9 +69,9 @@ def _surfaces(
 
 
 def _surface_sizes(
-    columns: Columns, nodes: IntArray, start: IntArray, end: IntArray, most: int
+    columns: Columns, nodes: IntArray, start: IntArray, end: IntArray, max_size: int
 ) -> FloatArray:
-    """Return the diameter at each node in columns, at most `most`, shape (nodes,).
+    """Return the diameter at each node in columns, at most `max_size`, shape (nodes,).
 
     Vertical walls are halfway between two columns, so the surface is drawn with two pixels per
     column: one for the column, and one for the edge to the next.
@@ -93,11 +93,11 @@ def _surface_sizes(
     is_free = _framed(is_free, columns, (low_i, low_j), (nx, ny))
     sizes = np.ones(len(nodes))
     if is_free.all():
-        return np.full(len(nodes), float(most))
+        return np.full(len(nodes), float(max_size))
     # The wall of a node with a step beside it is one pixel away.
     distance = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     inner = pixel[0] + 1, pixel[1] + 1
-    for radius in range(2, most + 1):
+    for radius in range(2, max_size + 1):
         centers = (distance < radius - 1e-3).astype(np.uint8)
         if centers.all():
             break

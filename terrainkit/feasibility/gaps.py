@@ -16,8 +16,8 @@ _MAX_ENDS = 4
 the nodes of a region, so it does not matter where a gap ends, unless there is a wall in between."""
 
 
-def gap_edges(graph: FootholdGraph, regions: Regions, most: float) -> Edges:
-    """Return the edges over gaps with a demand below `most`, in both directions.
+def gap_edges(graph: FootholdGraph, regions: Regions, max_demand: float) -> Edges:
+    """Return the edges over gaps with a demand below `max_demand`, in both directions.
 
     An edge joins two regions. In between, the body passes above the higher one of both nodes, over
     any hurdle, and below any solid.
@@ -25,27 +25,27 @@ def gap_edges(graph: FootholdGraph, regions: Regions, most: float) -> Edges:
     Args:
         graph: The graph.
         regions: What the steps join.
-        most: Demand above which an edge is of no use.
+        max_demand: Demand above which an edge is of no use.
     """
     from scipy.spatial import cKDTree
 
     limits, columns, steps = graph.limits, graph.columns, graph.steps
     nodes = _rim(graph, regions)
-    nodes = nodes[graph.node_demand[nodes] < most]
+    nodes = nodes[graph.node_demand[nodes] < max_demand]
     if len(nodes) < 2:
         return steps.select(np.zeros(len(steps.start), dtype=bool))
     points = columns.positions(nodes)
     # The gap is shorter than the distance of the nodes by a column, or by up to sqrt(2) of it.
-    reach = most * limits.gap + 1.5 * columns.spacing
-    height = most * max(limits.step_up, limits.step_down)
+    reach = max_demand * limits.gap + 1.5 * columns.spacing
+    height = max_demand * max(limits.step_up, limits.step_down)
     # A slab of this height, and no cylinder around it, would be exact; the rest is dropped below.
     pairs = cKDTree(points / (reach, reach, height)).query_pairs(2**0.5, output_type="ndarray")
     first, second = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
     start, end = _candidates(
-        graph, regions, np.concatenate([first, second]), np.concatenate([second, first]), most
+        graph, regions, np.concatenate([first, second]), np.concatenate([second, first]), max_demand
     )
     parts = [
-        _evaluate(graph, start[n : n + _MAX_PAIRS], end[n : n + _MAX_PAIRS], most)
+        _evaluate(graph, start[n : n + _MAX_PAIRS], end[n : n + _MAX_PAIRS], max_demand)
         for n in range(0, max(len(start), 1), _MAX_PAIRS)
     ]
     return Edges.concatenate(parts)
@@ -69,7 +69,7 @@ def _rim(graph: FootholdGraph, regions: Regions) -> IntArray:
 
 
 def _candidates(
-    graph: FootholdGraph, regions: Regions, start: IntArray, end: IntArray, most: float
+    graph: FootholdGraph, regions: Regions, start: IntArray, end: IntArray, max_demand: float
 ) -> tuple[IntArray, IntArray]:
     """Return the pairs whose gap may be useful: the narrowest from each node to each region."""
     limits, floor = graph.limits, graph.columns.floor.reshape(-1)
@@ -84,7 +84,7 @@ def _candidates(
             -rise / limits.step_down,
         ]
     )
-    useful = is_apart & (demand < most)
+    useful = is_apart & (demand < max_demand)
     start, end, demand = start[useful], end[useful], demand[useful]
     apart = ~regions.joined(start, end, demand)
     start, end, demand = start[apart], end[apart], demand[apart]
@@ -111,8 +111,8 @@ def _gap_widths(
     return np.hypot(dx, dy) * columns.spacing * outside, (far > 1) | ((dx > 0) & (dy > 0))
 
 
-def _evaluate(graph: FootholdGraph, start: IntArray, end: IntArray, most: float) -> Edges:
-    """Return the edges from `start` to `end` whose demand is below `most`."""
+def _evaluate(graph: FootholdGraph, start: IntArray, end: IntArray, max_demand: float) -> Edges:
+    """Return the edges from `start` to `end` whose demand is below `max_demand`."""
     floor = graph.columns.floor.reshape(-1)
     gap, _ = _gap_widths(graph.columns, start, end)
     top, clearance = _between(graph, start, end)
@@ -125,8 +125,8 @@ def _evaluate(graph: FootholdGraph, start: IntArray, end: IntArray, most: float)
         clearance=clearance,
         width=np.full(len(start), np.inf),
     )
-    edges = edges.select(graph.demand(edges) < most)
-    return _with_width(graph, edges, most)
+    edges = edges.select(graph.demand(edges) < max_demand)
+    return _with_width(graph, edges, max_demand)
 
 
 def _between(graph: FootholdGraph, start: IntArray, end: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -175,7 +175,7 @@ def _passed(
     return top, clearance
 
 
-def _with_width(graph: FootholdGraph, edges: Edges, most: float) -> Edges:
+def _with_width(graph: FootholdGraph, edges: Edges, max_demand: float) -> Edges:
     """Return the edges with the free width between walls at the height of the body."""
     floor = graph.columns.floor.reshape(-1)
     level = np.maximum(floor[edges.start], floor[edges.end])
@@ -188,7 +188,7 @@ def _with_width(graph: FootholdGraph, edges: Edges, most: float) -> Edges:
     found = graph.passages.widths(i, j, level[inside], edges.clearance[inside])
     np.minimum.at(width, inside, found)
     edges = Edges(**{**vars(edges), "width": width})
-    return edges.select(graph.demand(edges) < most)
+    return edges.select(graph.demand(edges) < max_demand)
 
 
 def _line(

@@ -86,8 +86,8 @@ class Passages:
             z: Height at which the robot stands or passes [m], shape (n,).
             clearance: Clearance there [m], shape (n,). The robot needs no more beside it.
         """
-        most = 2 * self.limits.body_width
-        width = np.full(len(z), most)
+        max_width = 2 * self.limits.body_width
+        width = np.full(len(z), max_width)
         need = np.minimum(clearance, self.limits.crouched_height)
         near = self._near_walls(i, j, z, need)
         if not near.any():
@@ -100,11 +100,11 @@ class Passages:
         unique, which = np.unique(key, return_inverse=True)
         *place, height, part = np.unravel_index(unique, shape)
         z, need = heights[height] * _TOLERANCE, needs[part] * _TOLERANCE
-        found = np.full(len(unique), most)
+        found = np.full(len(unique), max_width)
         for angle in np.arange(NUM_DIRECTIONS) * (math.pi / NUM_DIRECTIONS):
             ahead = self._free_length((place[0], place[1]), z, need, angle)
-            # A line with no wall within `most` on one side is long enough.
-            both = np.flatnonzero(ahead < most)
+            # A line with no wall within `max_width` on one side is long enough.
+            both = np.flatnonzero(ahead < max_width)
             behind = place[0][both], place[1][both]
             back = self._free_length(behind, z[both], need[both], angle + math.pi)
             found[both] = np.minimum(found[both], ahead[both] + back)
@@ -130,12 +130,12 @@ class Passages:
         The ray follows the ground where it rises, and stays level where it falls. It ends where
         the ground rises by more than a step, or where the body does not fit under a solid.
         """
-        columns, most = self.columns, 2 * self.limits.body_width
-        free = np.full(len(z), most)
+        columns, max_width = self.columns, 2 * self.limits.body_width
+        free = np.full(len(z), max_width)
         step_up = self.limits.step_up
         active, levels = np.arange(len(z)), [z]
         (i, j), (nx, ny) = place, columns.shape
-        for cell in _ray_cells(angle, most, columns.spacing):
+        for cell in _ray_cells(angle, max_width, columns.spacing):
             # Beyond the patch, the ground continues as at its edge.
             a = np.minimum(np.maximum(i + cell.i, 0), nx - 1)
             b = np.minimum(np.maximum(j + cell.j, 0), ny - 1)

@@ -203,19 +203,19 @@ def _is_same(first: Patch, second: Patch) -> bool:
     return len(points[0]) == len(points[1]) and np.allclose(points[0] + shift, points[1], atol=1e-4)
 
 
-def _largest(demand_at: Callable[[float], float], most: float) -> float:
-    """Return the largest difficulty that demands at most `most`, or else the closest.
+def _largest(demand_at: Callable[[float], float], max_demand: float) -> float:
+    """Return the largest difficulty that demands at most `max_demand`, or else the closest.
 
     If none is easy enough, it is the easiest valid one; if all are, the hardest. It is 0 or 1 if
     those demand the same.
     """
     low, high = _EASIEST, _HARDEST
-    if demand_at(high) <= most:
+    if demand_at(high) <= max_demand:
         low = high
     else:
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
-            low, high = (middle, high) if demand_at(middle) <= most else (low, middle)
-    if not -np.inf < demand_at(low) <= most:
+            low, high = (middle, high) if demand_at(middle) <= max_demand else (low, middle)
+    if not -np.inf < demand_at(low) <= max_demand:
         return high if demand_at(high) < demand_at(0.0) else 0.0
     return low if low < 1 or demand_at(low) > demand_at(1.0) else 1.0
