@@ -35,7 +35,8 @@ def report_suite(
         MapFileError: if the map is missing, truncated or of another version.
         MemoryLimitError: if the simulations would not fit in memory.
     """
-    from terrainkit import TerrainMap, generate_suite
+    from terrainkit import TerrainMap
+    from terrainkit.suites import generate_suite
     from terrainkit_robots.report_card.card import CRITERION, measure, summary
     from terrainkit_robots.report_card.picture import draw_card
 

@@ -51,7 +51,10 @@ def run_main(capsys) -> Callable[..., Run]:
 
     def run(*words: object) -> Run:
         capsys.readouterr()
-        code = main([str(word) for word in words])
+        try:
+            code = main([str(word) for word in words])
+        except SystemExit as error:  # after --help
+            code = error.code
         captured = capsys.readouterr()
         return Run(words, code, captured.out, captured.err)
 
