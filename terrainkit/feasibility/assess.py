@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility.bottleneck import bottleneck, shortest_path
+from terrainkit.feasibility.bottleneck import Leg, bottlenecks, shortest_path
 from terrainkit.feasibility.columns import Columns, FloatArray, IntArray, sample_columns
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
@@ -117,8 +117,8 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
     columns = sample_columns(patch, threshold)
     legs = _legs(patch, columns)
     graph = FootholdGraph.build(columns, limits, _rim(patch, columns, legs))
-    edges, demand, bottlenecks = _edges(graph, legs)
-    path = _Path(graph, edges, demand, legs, bottlenecks)
+    edges, demand, leg_demands = _edges(graph, legs)
+    path = _Path(graph, edges, demand, legs, leg_demands)
     return PatchFeasibility(
         row=0,
         col=0,
@@ -130,10 +130,6 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
         place=path.place,
         path=path.points,
     )
-
-
-Leg = tuple[int, IntArray]
-"""A node, and the nodes of which the path from there reaches one."""
 
 
 def _legs(patch: Patch, columns: Columns) -> list[Leg]:
@@ -188,15 +184,15 @@ def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, FloatArray, li
     searched = narrowest
     regions = None
     for reach in _REACHES:
-        bottlenecks = [bottleneck(edges, demand, *leg, size) for leg in legs]
-        max_demand = max(bottlenecks)
+        leg_demands = bottlenecks(edges, demand, legs, size)
+        max_demand = max(leg_demands)
         if max_demand <= searched:
-            return edges, demand, bottlenecks
+            return edges, demand, leg_demands
         if regions is None:
             regions = Regions.build(steps, demand, graph.node_demand, narrowest)
         edges = Edges.concatenate([steps, gap_edges(graph, regions, min(max_demand, reach))])
         demand, searched = graph.demand(edges), reach
-    return edges, demand, [bottleneck(edges, demand, *leg, size) for leg in legs]
+    return edges, demand, bottlenecks(edges, demand, legs, size)
 
 
 def _narrowest_gap(graph: FootholdGraph) -> float:
@@ -214,13 +210,13 @@ class _Path:
         edges: Edges,
         demand: FloatArray,
         legs: list[Leg],
-        bottlenecks: list[float],
+        leg_demands: list[float],
     ) -> None:
         self.demand, self.limit, self.value = 0.0, "", float("nan")
         self.place = np.full(3, np.nan)
         size, position = graph.columns.floor.size, graph.columns.positions
         nodes = [legs[0][0]]
-        for (start, targets), max_demand in zip(legs, bottlenecks, strict=True):
+        for (start, targets), max_demand in zip(legs, leg_demands, strict=True):
             if nodes[-1] != start:
                 break
             is_usable = demand <= max_demand

@@ -5,6 +5,7 @@ Minimax paths on a directed graph do not follow from a minimum spanning tree; th
 at which the target can be reached is found by bisection.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 
 from terrainkit.feasibility.columns import FloatArray, IntArray
 from terrainkit.feasibility.edges import Edges
+
+Leg = tuple[int, IntArray]
+"""A node, and the nodes of which the path from there reaches one."""
 
 
 def find_components(edges: Edges, usable: NDArray[np.bool_], num_nodes: int) -> IntArray:
@@ -29,27 +33,39 @@ def find_components(edges: Edges, usable: NDArray[np.bool_], num_nodes: int) -> 
     return np.asarray(labels, dtype=np.int64)
 
 
-def bottleneck(
-    edges: Edges, demand: FloatArray, start: int, targets: IntArray, num_nodes: int
-) -> float:
-    """Return the smallest demand at which a path leads from `start` to one of `targets`.
+def bottlenecks(
+    edges: Edges, demand: FloatArray, legs: Sequence[Leg], num_nodes: int
+) -> list[float]:
+    """Return the smallest demand at which a path leads from the start of each leg to its targets.
 
     Args:
         edges: The edges.
         demand: Demand of each edge, shape (n,).
-        start: The first node.
-        targets: Nodes of which the path reaches one, shape (t,).
+        legs: Node where each path starts, and nodes of which it reaches one, shape (t,).
         num_nodes: Number of nodes.
 
     Returns:
-        The largest demand of an edge of the path; 0 if `start` is a target, inf without a path.
+        The largest demand of an edge of each path; 0 if its start is a target, inf without a path.
     """
-    if (targets == start).any():
-        return 0.0
     order = np.argsort(edges.start, kind="stable")
     rows = np.searchsorted(edges.start[order], np.arange(num_nodes + 1))
     ends, demand = edges.end[order], demand[order]
     levels = np.unique(demand[np.isfinite(demand)])
+    return [
+        0.0 if (targets == start).any() else _bottleneck(rows, ends, demand, levels, start, targets)
+        for start, targets in legs
+    ]
+
+
+def _bottleneck(
+    rows: IntArray,
+    ends: IntArray,
+    demand: FloatArray,
+    levels: FloatArray,
+    start: int,
+    targets: IntArray,
+) -> float:
+    """Return the smallest of the levels at which a path leads to a target; see `_reaches`."""
     low, high = 0, len(levels)  # the answer is levels[low] to levels[high]; the last stands for inf
     while low < high:
         middle = (low + high) // 2

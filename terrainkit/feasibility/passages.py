@@ -171,7 +171,7 @@ class Passages:
             floor = floors[column]
             above = np.fmax(floor, level)
             passes = (floor <= highest) & (ceilings[column] - above >= need)
-            np.minimum(lowest, above, out=lowest, where=passes)
+            lowest = np.minimum(lowest, np.where(passes, above, np.inf))
         return lowest
 
 

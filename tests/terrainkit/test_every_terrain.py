@@ -117,7 +117,7 @@ def test_every_terrain_rejects_block_as_wide_as_patch(terrain, block, size):
 @every_grid
 @every_terrain
 def test_every_terrain_spawn_is_level(terrain, given_parameters, grid):
-    terrain_map = map_of_draws(terrain, given_parameters, grid, cols=4)
+    terrain_map = map_of_draws(terrain, given_parameters, grid, cols=2)
     assert_spawns_are_level(terrain_map, 0.5)
     assert_spawns_are_inside(terrain_map, 0.5)
 

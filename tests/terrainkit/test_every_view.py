@@ -15,8 +15,8 @@ every_terrain = pytest.mark.parametrize(
 )
 every_grid = pytest.mark.parametrize(
     ("patch_size", "cell"),
-    [((8.0, 8.0), 0.1), ((8.0, 4.0), 0.1), ((8.0, 8.0), 0.05), ((8.0, 4.0), 0.05)],
-    ids=["8x8", "8x4", "8x8 fine", "8x4 fine"],
+    [((8.0, 8.0), 0.1), ((8.0, 4.0), 0.05)],
+    ids=["8x8", "8x4 fine"],
 )
 coarse = pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
 
@@ -95,7 +95,7 @@ def test_every_view_is_the_same_surface(sub_terrain, patch_size, cell, tmp_path)
     intervals, ground = terrain_map.intervals(xy), terrain_map.height(xy)
     is_bare = intervals[:, 0, 0] - ground < CONTACT
     free = np.where(is_bare, intervals[:, 0, 1] - ground, 0.0)
-    assert terrain_map.clearance(xy) == pytest.approx(free, abs=TOLERANCE)
+    np.testing.assert_allclose(terrain_map.clearance(xy), free, rtol=0, atol=TOLERANCE)
 
     # Start in any of the free intervals of a point, 1 m above the floor under the open sky.
     number = (~np.isnan(intervals[..., 0])).sum(axis=1)
