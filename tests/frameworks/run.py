@@ -35,8 +35,8 @@ def main() -> None:
         python = arguments.environments / name / "bin" / "python"
         if not python.exists():
             venv.create(python.parents[1], with_pip=True)
-            for packages in [[FOLDER.parents[1]], *PACKAGES[name]]:
-                subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
+        for packages in [["-e", FOLDER.parents[1]], *PACKAGES[name]]:
+            subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
         with tempfile.TemporaryDirectory() as folder:
             checks = [subprocess.run([python, FOLDER / f"{name}_check.py", folder])]
         if name == "mjlab":  # trains onboarded robots
