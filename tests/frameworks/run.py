@@ -20,6 +20,7 @@ PACKAGES = {
     "isaaclab": [["torch", "packaging"], ["--no-deps", "isaaclab==2.3.2.post1"]],
     "genesis": [["torch"], ["genesis-world==1.4.5"]],
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
+    "drake": [["drake==1.51.1"]],
     "sdformat": [],
 }
 """Arguments of `pip install` for each check."""
