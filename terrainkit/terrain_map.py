@@ -223,6 +223,10 @@ class TerrainMap:
         return np.ascontiguousarray(int16_heights(self.heights.T, vertical_scale))
 
     @property
+    def _num_partial_solids(self) -> int:
+        return int(np.count_nonzero(self.solids.collides != self.solids.visible))
+
+    @property
     def patch_names(self) -> NDArray[np.str_]:
         """Name of the sub-terrain of each patch, shape (rows, cols)."""
         return np.array(self.terrain_names)[self.terrain_types]
@@ -267,8 +271,23 @@ class TerrainMap:
                 "expected no friction of sub-terrains, friction patches or solids"
             )
 
-    def warn_about_friction(self, what: str) -> None:
-        """Warn if the map has several friction coefficients, which `what` cannot represent."""
+    def require_whole_solids(self, what: str) -> None:
+        """Raise ExportError if a solid only collides or is only visible; `what` does both."""
+        if self._num_partial_solids:
+            raise ExportError(
+                f"got {self._num_partial_solids} solids that only collide or are only visible, "
+                f"which {what} cannot represent; expected solids that are both"
+            )
+
+    def warn_about_losses(self, what: str) -> None:
+        """Warn about friction and visibility, of which `what` has only those of the ground."""
+        if self._num_partial_solids:
+            warnings.warn(
+                f"{what} has the solids that collide, visible or not: "
+                f"{self._num_partial_solids} solids are only one of both; use .npz or .xml",
+                TerrainkitWarning,
+                stacklevel=5,
+            )
         if not self.has_one_friction:
             warnings.warn(
                 f"{what} has one friction, {self.config.static_friction:g}: the friction of "

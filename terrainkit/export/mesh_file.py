@@ -48,7 +48,7 @@ def export(
         closed: Add sides and a bottom to make a watertight solid.
         y_up: Rotate the map so that y is up, as glTF viewers expect; by default z is up.
     """
-    terrain_map.warn_about_friction("a mesh file")
+    terrain_map.warn_about_losses("a mesh file")
     mesh = terrain_map.mesh(merged=not full, closed=closed)
     if y_up:
         y, z = mesh.vertices[:, 1].copy(), mesh.vertices[:, 2].copy()

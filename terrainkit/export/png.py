@@ -32,7 +32,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     import cv2
 
     terrain_map.require_no_solids("an image of heights")
-    terrain_map.warn_about_friction("an image of heights")
+    terrain_map.warn_about_losses("an image of heights")
     heights, config = terrain_map.heights, terrain_map.config
     scale, low = scale_and_offset(terrain_map)
     # Image rows go down, y goes up.

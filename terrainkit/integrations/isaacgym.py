@@ -18,10 +18,12 @@ def add_trimesh(gym: Any, sim: Any, source: TerrainMap | str | Path) -> None:
     """Add the map to `sim` as a triangle mesh with vertical walls and its solids.
 
     Raises:
-        ExportError: if the map has several friction coefficients; a mesh has one.
+        ExportError: if the map has several friction coefficients, or solids that only collide or
+            are only visible; a mesh has one friction and does both.
     """
     terrain_map = load_map(source)
     terrain_map.require_one_friction("a triangle mesh of Isaac Gym")
+    terrain_map.require_whole_solids("a triangle mesh of Isaac Gym")
     mesh = terrain_map.mesh()
     params = gymapi.TriangleMeshParams()
     params.nb_vertices, params.nb_triangles = len(mesh.vertices), len(mesh.triangles)

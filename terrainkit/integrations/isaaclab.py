@@ -34,10 +34,12 @@ def terrain_importer_cfg(
         prim_path: Path of the terrain on the stage.
 
     Raises:
-        ExportError: if the map has several friction coefficients; an imported mesh has one.
+        ExportError: if the map has several friction coefficients, or solids that only collide or
+            are only visible; an imported mesh has one friction and does both.
     """
     terrain_map = TerrainMap.load(path)
     terrain_map.require_one_friction("the mesh of Isaac Lab's terrain importer")
+    terrain_map.require_whole_solids("the mesh of Isaac Lab's terrain importer")
     config = terrain_map.config
     generator = MapGeneratorCfg(
         path=str(Path(path).resolve()),

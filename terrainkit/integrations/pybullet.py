@@ -23,10 +23,12 @@ def add_map(source: TerrainMap | str | Path, *, client: int = 0) -> int:
         The body of the map.
 
     Raises:
-        ExportError: if the map has several friction coefficients; a body has one.
+        ExportError: if the map has several friction coefficients, or solids that only collide or
+            are only visible; a body has one friction and does both.
     """
     terrain_map = load_map(source)
     terrain_map.require_one_friction("a body of PyBullet")
+    terrain_map.require_whole_solids("a body of PyBullet")
     with tempfile.TemporaryDirectory() as folder:
         # Arrays of vertices are limited to the size of a message; a file is not.
         path = terrain_map.save(Path(folder) / "map.obj")

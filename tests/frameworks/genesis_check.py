@@ -10,16 +10,15 @@ from pathlib import Path
 import genesis as gs
 import numpy as np
 import torch
+from parkour import CONFIG, RADIUS, ball_starts, rest_error
 
 import terrainkit
 from terrainkit.integrations.genesis import add_map
 
-RADIUS = 0.1
 page = (Path(__file__).parents[2] / "docs/integrations.md").read_text()
 (block,) = re.findall(r"```python\n(import genesis.*?)```", page, re.DOTALL)
 os.chdir(sys.argv[1])
-config = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
-terrain_map = terrainkit.generate(config)
+terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save("map.npz", overwrite=True)
 names: dict = {}
 exec(block, names)
@@ -41,17 +40,12 @@ print(
     f"{error * 1e3:.1f} mm, {off} of 200 heights off by more than 1 mm, next to walls"
 )
 
-# Balls on solids.
-solids = terrain_map.solids
-boxes = solids.boxes[(np.abs(solids.boxes[:, 6]) > 0.999) & solids.collides[: len(solids.boxes)]]
-starts = boxes[np.argsort(-boxes[:, 3] * boxes[:, 4])[:16], :3].astype(float)
-starts[:, 2] = terrain_map.scan(np.column_stack([starts[:, :2], np.full(16, 20.0)])) + RADIUS + 0.01
+starts = ball_starts(terrain_map, num_on_ground=0, num_on_solids=16)
 ball.set_pos(torch.as_tensor(starts, dtype=torch.float32))
 ball.zero_all_dofs_velocity()
-for _ in range(20):
+for _ in range(50):
     names["scene"].step()
-positions = ball.get_pos().cpu().numpy().astype(float)
-error = np.abs(positions[:, 2] - RADIUS - terrain_map.scan(positions)).max()
+error = rest_error(terrain_map, starts, ball.get_pos().cpu())
 assert error < 5e-3, error
 print(f"Genesis: balls on solids within {error * 1e3:.1f} mm")
 

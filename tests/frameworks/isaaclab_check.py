@@ -78,6 +78,7 @@ for name in ("isaaclab.markers", "isaaclab.markers.config", "isaaclab.utils.warp
 import isaaclab.terrains.terrain_importer  # noqa: E402
 from isaaclab.terrains import TerrainGenerator  # noqa: E402
 from isaaclab.terrains.config.rough import ROUGH_TERRAINS_CFG  # noqa: E402
+from parkour import CONFIG  # noqa: E402
 
 import terrainkit  # noqa: E402
 from terrainkit.importing import import_terrain_mesh  # noqa: E402
@@ -89,8 +90,7 @@ isaaclab.terrains.terrain_importer.create_prim_from_mesh = lambda path, mesh, **
     prims.update({path: (mesh, materials["physics_material"])})
 )
 path = Path(sys.argv[1]) / "map.npz"
-config = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
-terrain_map = terrainkit.generate(config)
+terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save(path)
 cfg = terrain_importer_cfg(path, max_init_terrain_level=2)
 cfg.num_envs = 16

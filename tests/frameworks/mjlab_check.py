@@ -13,14 +13,14 @@ from mjlab.sensor import RayCastSensor
 from mjlab.tasks.registry import load_env_cfg
 from mjlab.terrains import TerrainGenerator
 from mjlab.terrains.config import ROUGH_TERRAINS_CFG
+from parkour import CONFIG
 
 import terrainkit
 from terrainkit.integrations.mjlab import import_terrain, terrain_entity_cfg
 from terrainkit.validate import validate
 
 path = Path(sys.argv[1]) / "map.npz"
-config = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
-terrain_map = terrainkit.generate(config)
+terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save(path)
 
 cfg = load_env_cfg("Mjlab-Velocity-Rough-Unitree-Go1")

@@ -24,13 +24,14 @@ meshes = package("mujoco_playground") / "external_deps/mujoco_menagerie/unitree_
 if not meshes.exists():
     shutil.copytree(package("mjlab") / "asset_zoo/robots/unitree_go1/xmls/assets", meshes)
 
+from parkour import CONFIG  # noqa: E402
+
 import terrainkit  # noqa: E402
 
 page = (Path(__file__).parents[2] / "docs/integrations.md").read_text()
 (block,) = re.findall(r"```python\n(import jax.*?)```", page, re.DOTALL)
 os.chdir(sys.argv[1])
-config = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
-terrain_map = terrainkit.generate(config)
+terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save("map.npz", overwrite=True)
 names: dict = {}
 start = time.process_time()
@@ -39,17 +40,39 @@ cpu = time.process_time() - start
 print(f"Playground {version('playground')}: compiled and ran 50 steps in {cpu:.0f} s of CPU time")
 
 env, state = names["env"], names["state"]
-position = np.asarray(state.data.qpos, dtype=float)[:, :3]
-assert np.isfinite(position).all()
-origins = np.asarray(names["origins"])
-distance = np.linalg.norm(position[:, None, :2] - origins[:, :2], axis=-1).min(axis=1)
-assert distance.max() < 1.5, distance
-height = position[:, 2] - terrain_map.scan(position)
-assert (np.abs(height - 0.28) < 0.1).mean() > 0.8, height
-# Feet are spheres of 2.3 cm that rest on the ground.
-feet = np.asarray(state.data.site_xpos, dtype=float)[:, env._feet_site_id]
-gap = feet[..., 2] - terrain_map.scan(np.add(feet, [0.0, 0.0, 0.05]))
-contact = np.asarray(state.info["last_contact"])
-assert contact.mean() > 0.8, contact
-base = height.mean()
-print(f"base {base:.3f} m, feet {gap[contact].mean() * 1e3:.0f} mm above the ground on average")
+
+
+def check_robots(state, origins):
+    """Assert that the robots stand at the heights of the map, near `origins`."""
+    position = np.asarray(state.data.qpos, dtype=float)[:, :3]
+    assert np.isfinite(position).all()
+    distance = np.linalg.norm(position[:, None, :2] - origins[:, :2], axis=-1)
+    nearest = distance.argmin(axis=1)
+    assert distance.min(axis=1).max() < 1.5, distance.min(axis=1)
+    height = position[:, 2] - origins[nearest, 2]
+    assert (np.abs(height - 0.28) < 0.1).mean() > 0.8, height
+    # Feet are spheres of 2.3 cm that rest on the surface.
+    feet = np.asarray(state.data.site_xpos, dtype=float)[:, env._feet_site_id]
+    gap = feet[..., 2] - terrain_map.scan(np.add(feet, [0.0, 0.0, 0.05]))
+    contact = np.asarray(state.info["last_contact"])
+    assert contact.mean() > 0.8, contact
+    base, above = height.mean(), gap[contact].mean() * 1e3
+    print(f"base {base:.3f} m, feet {above:.0f} mm above the surface on average")
+
+
+check_robots(state, np.asarray(names["origins"], float))
+# Robots on the bars of `crawl`, which hang over the ground.
+boxes = terrain_map.solids.boxes.astype(float)
+bars = boxes[(boxes[:, 3] > 0.25) & (boxes[:, 4] > 2.0)]
+tops = bars[np.arange(16) % len(bars), :3]
+tops[:, 1] += np.linspace(-2.0, 2.0, 16)
+tops[:, 2] = terrain_map.scan(np.add(tops, [0, 0, 20]))
+assert (tops[:, 2] > terrain_map.height(tops[:, :2]) + 0.2).all()
+jnp, qpos = names["jax"].numpy, np.tile(env._init_q, (16, 1))
+qpos[:, :2], qpos[:, 2] = tops[:, :2], qpos[:, 2] + tops[:, 2]
+data = state.data.replace(qpos=jnp.asarray(qpos), qvel=jnp.zeros_like(state.data.qvel))
+state = state.replace(data=data)
+for _ in range(50):
+    state = names["step"](state, jnp.zeros((16, env.action_size)))
+print("on solids: ", end="")
+check_robots(state, tops)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pybullet
+from parkour import RADIUS, ball_starts, rest_error
 
 import terrainkit
 from terrainkit.integrations.pybullet import add_map
@@ -19,13 +20,13 @@ for preset in ("legged_gym", "parkour"):
     hits = np.array([hit[3] for hit in pybullet.rayTestBatch(starts.tolist(), ends.tolist())])
     error = np.abs(hits[:, 2] - terrain_map.scan(starts)).max()
     assert error < 1e-3, error
-    sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=0.1)
-    origins = np.add(terrain_map.env_origins.reshape(-1, 3), [0, 0, 0.3])
-    balls = [pybullet.createMultiBody(1, sphere, basePosition=p.tolist()) for p in origins]
+    sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=RADIUS)
+    starts = ball_starts(terrain_map, num_on_solids=8 if len(terrain_map.solids) else 0)
+    balls = [pybullet.createMultiBody(1, sphere, basePosition=p.tolist()) for p in starts]
     for _ in range(400):
         pybullet.stepSimulation()
-    position = np.array([pybullet.getBasePositionAndOrientation(ball)[0] for ball in balls])
-    gap = np.abs(position[:, 2] - 0.1 - terrain_map.scan(position)).max()
+    positions = [pybullet.getBasePositionAndOrientation(ball)[0] for ball in balls]
+    gap = rest_error(terrain_map, starts, positions)
     assert gap < 2e-3, gap
     pybullet.disconnect(client)
     print(f"PyBullet, {preset}: rays within {error * 1e3:.1g} mm, balls within {gap * 1e3:.1g} mm")

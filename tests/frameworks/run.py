@@ -20,6 +20,7 @@ PACKAGES = {
     "isaaclab": [["torch", "packaging"], ["--no-deps", "isaaclab==2.3.2.post1"]],
     "genesis": [["torch"], ["genesis-world==1.4.5"]],
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
+    "drake": [["drake==1.51.1"]],
     "sdformat": [],
 }
 """Arguments of `pip install` for each check."""
@@ -35,8 +36,8 @@ def main() -> None:
         python = arguments.environments / name / "bin" / "python"
         if not python.exists():
             venv.create(python.parents[1], with_pip=True)
-            for packages in [[FOLDER.parents[1]], *PACKAGES[name]]:
-                subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
+        for packages in [["-e", FOLDER.parents[1]], *PACKAGES[name]]:
+            subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
         with tempfile.TemporaryDirectory() as folder:
             checks = [subprocess.run([python, FOLDER / f"{name}_check.py", folder])]
         if name == "mjlab":  # trains onboarded robots

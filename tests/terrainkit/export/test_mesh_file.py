@@ -16,7 +16,7 @@ from terrainkit.solids import Solids
 
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 
-one_friction = pytest.mark.filterwarnings("ignore:a mesh file has one friction")
+lossy = pytest.mark.filterwarnings("ignore:a mesh file has")
 every_suffix = pytest.mark.parametrize("suffix", SUFFIXES)
 
 
@@ -142,7 +142,7 @@ def test_mesh_file_glb_has_friction_extras(terrain_map, tmp_path):
     assert contact.items() <= mesh["extras"].items()
 
 
-@one_friction
+@lossy
 @every_suffix
 def test_mesh_file_has_the_solids_that_collide(solid_map, tmp_path, suffix):
     mesh = saved(solid_map, tmp_path, suffix, closed=True)
@@ -156,7 +156,7 @@ def test_mesh_file_has_the_solids_that_collide(solid_map, tmp_path, suffix):
     assert mesh.volume - plain.volume == pytest.approx(box + cylinder + hull, rel=1e-2)
 
 
-@one_friction
+@lossy
 @every_suffix
 def test_mesh_file_open_has_ground_and_solids(solid_map, tmp_path, suffix):
     mesh = saved(solid_map, tmp_path, suffix)
@@ -164,6 +164,13 @@ def test_mesh_file_open_has_ground_and_solids(solid_map, tmp_path, suffix):
     assert mesh.bounds[1, 2] == pytest.approx(0.7, abs=1e-6)
 
 
+@lossy
 def test_mesh_file_warns_about_several_frictions(solid_map, tmp_path):
     with pytest.warns(TerrainkitWarning, match=r"a mesh file has one friction, 1: .*; use \.npz"):
+        solid_map.save(tmp_path / "map.stl")
+
+
+@lossy
+def test_mesh_file_warns_about_visibility_of_solids(solid_map, tmp_path):
+    with pytest.warns(TerrainkitWarning, match=r"solids that collide, visible or not: 2 solids"):
         solid_map.save(tmp_path / "map.stl")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
-from terrainkit.errors import ExportError
+from terrainkit.errors import ExportError, TerrainkitWarning
 from terrainkit.export.ros import occupied_cells
 from terrainkit.importing import ImportOptions, import_map
 
@@ -97,3 +97,10 @@ def test_map_with_solids_is_rejected(solid_map, tmp_path):
     with pytest.raises(ExportError, match="solids"):
         solid_map.save(tmp_path / "map.yaml")
     assert not list(tmp_path.iterdir())
+
+
+def test_map_with_several_frictions_warns(tmp_path):
+    icy = tk.SubTerrain(terrain="flat", friction=0.3)
+    config = tk.MapConfig(rows=1, cols=1, patch_size=(2.0, 2.0), border=0.0, terrains=(icy,))
+    with pytest.warns(TerrainkitWarning, match="has one friction"):
+        tk.generate(config).save(tmp_path / "map.yaml")

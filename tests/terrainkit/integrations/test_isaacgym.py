@@ -1,4 +1,5 @@
 import sys
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -6,6 +7,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
+from terrainkit.errors import ExportError
 
 
 @pytest.fixture
@@ -50,3 +52,15 @@ def test_add_heightfield_buffer_is_column_major(isaacgym, terrain_map):
     y = params.transform.p.y + row * params.row_scale
     found = buffer[::37] * params.vertical_scale
     assert found == pytest.approx(terrain_map.height(np.column_stack([x, y])), abs=0.0026)
+
+
+def test_add_trimesh_rejects_solids_that_are_only_visible(isaacgym, solid_map):
+    solids = replace(solid_map.solids, friction=np.full(4, np.nan, np.float32))
+    with pytest.raises(ExportError, match="2 solids that only collide or are only visible"):
+        isaacgym.add_trimesh(MagicMock(), 0, replace(solid_map, solids=solids))
+
+
+def test_add_heightfield_rejects_solids(isaacgym, solid_map):
+    solids = replace(solid_map.solids, friction=np.full(4, np.nan, np.float32))
+    with pytest.raises(ExportError, match="4 solids, which a heightfield cannot represent"):
+        isaacgym.add_heightfield(MagicMock(), 0, replace(solid_map, solids=solids))
