@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -44,7 +44,7 @@ class Feasibility(Command):
     robot: RobotName = ""
     """Name of a bundled robot, or a folder written by terrainkit onboard."""
 
-    limit: LimitWords = ()
+    limit: LimitWords = field(default_factory=list)
     """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
     output: Annotated[str, text_option("PATH", "-o")] = ""

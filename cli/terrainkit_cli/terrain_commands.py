@@ -3,7 +3,7 @@
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
@@ -20,7 +20,7 @@ from terrainkit.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.parse import Command, check_options, value_of, word_after
-from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, text_option
+from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, StringList, text_option
 
 if TYPE_CHECKING:
     from typing import Self
@@ -53,9 +53,9 @@ class Generate(ConfigCommand):
     NAME=[X,Y,...] for a tuple."""
 
     overlay: Annotated[
-        tuple[str, ...],
+        StringList,
         tyro.conf.arg(metavar="NAME[:PARAMETER=VALUE,...]", help_behavior_hint=""),
-    ] = ()
+    ] = field(default_factory=list)
     """Overlays on all terrains, in their order, such as `noise:amplitude=0:0.05 side_walls`;
     `terrainkit list` prints the names."""
 
@@ -66,7 +66,7 @@ class Generate(ConfigCommand):
     """Replace the ranges of each terrain, so that they demand LOW to HIGH of --robot: 0 is level
     ground, 1 the limit of the robot; see terrainkit feasibility."""
 
-    limit: LimitWords = ()
+    limit: LimitWords = field(default_factory=list)
     """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 1
@@ -396,7 +396,7 @@ class CheckMap(Command):
     """Also check that this robot can cross every patch: name of a bundled robot, or a folder
     written by terrainkit onboard."""
 
-    limit: LimitWords = ()
+    limit: LimitWords = field(default_factory=list)
     """With --robot: limits that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
     def run(self) -> int:
