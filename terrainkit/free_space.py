@@ -27,7 +27,7 @@ def first_surface(
         z: Height of each start [m], shape (n,).
         direction: Direction of the rays.
     """
-    surfaces = np.concatenate([heights[:, None], bounds.reshape(len(bounds), -1)], axis=1)
+    surfaces = np.concatenate([heights[:, None], bounds[..., 0], bounds[..., 1]], axis=1)
     if direction == "down":
         found = np.max(surfaces, axis=1, where=surfaces <= z[:, None], initial=-np.inf)
     else:

@@ -213,7 +213,7 @@ def _warn_about_map(terrain_map: TerrainMap) -> None:
             TerrainkitWarning,
             stacklevel=3,
         )
-    if cliffs := Seams(config=config, heights=terrain_map.heights).cliffs():
+    if cliffs := Seams(terrain_map=terrain_map).cliffs():
         text = cliffs_text(cliffs, terrain_map.patch_names)
         warnings.warn(
             f"cliffs between patches: {text}; a robot cannot climb them",

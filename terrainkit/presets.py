@@ -12,18 +12,24 @@ from terrainkit.text import expected_names
 # The obstacles of Extreme Parkour and Robot Parkour Learning, one on a length of 2 m each. At the
 # hard end, the former climbs 0.5 m and leaps 0.8 m, and the latter crawls under 0.2 m and passes
 # openings of 0.28 m.
-_OBSTACLES: dict[str, dict[str, Any]] = {
-    "hurdle": {"terrain": "hurdles", "height": (0.05, 0.4)},
-    "step": {
-        "terrain": "hurdles",
-        "height": (0.05, 0.5),
-        "min_thickness": 0.6,
-        "max_thickness": 1.0,
-    },
-    "leap": {"terrain": "gap_track", "length": (0.1, 0.8), "min_spacing": 1.5, "max_spacing": 2.0},
-    "tilt": {"terrain": "side_ramps", "gap": (0.0, 0.2), "spacing": 1.2, "end": 0.4},
-    "crawl": {"terrain": "crawl", "spacing": 0.8},
-    "squeeze": {"terrain": "slit", "opening": (1.3, 0.8), "offset": 0.4},
+_TILT = {"terrain": "side_ramps", "gap": (0.0, 0.2), "spacing": 1.2, "end": 0.4, "proportion": 0.5}
+
+_OBSTACLES: dict[str, list[dict[str, Any]]] = {
+    "hurdle": [{"terrain": "hurdles", "height": (0.05, 0.4)}],
+    "step": [
+        {
+            "terrain": "hurdles",
+            "height": (0.05, 0.5),
+            "min_thickness": 0.6,
+            "max_thickness": 1.0,
+        }
+    ],
+    "leap": [
+        {"terrain": "gap_track", "length": (0.1, 0.8), "min_spacing": 1.5, "max_spacing": 2.0}
+    ],
+    "tilt": [_TILT, {**_TILT, "first_side": "right"}],
+    "crawl": [{"terrain": "crawl", "spacing": 0.8}],
+    "squeeze": [{"terrain": "slit", "opening": (1.3, 0.8), "offset": 0.4}],
 }
 
 _COURSE = {"terrain": "course", "order": "random", "start": 1.5}
@@ -79,10 +85,14 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
     # Courses of one obstacle as in the training of both, and mixed ones as in their distillation.
     "parkour_course": {
         **{
-            f"{name}_course": {**_COURSE, "elements": [obstacle]}
-            for name, obstacle in _OBSTACLES.items()
+            f"{name}_course": {**_COURSE, "elements": obstacles}
+            for name, obstacles in _OBSTACLES.items()
         },
-        "mixed_course": {**_COURSE, "proportion": 4.0, "elements": list(_OBSTACLES.values())},
+        "mixed_course": {
+            **_COURSE,
+            "proportion": 4.0,
+            "elements": [each for obstacles in _OBSTACLES.values() for each in obstacles],
+        },
     },
 }
 """Terrain (its name by default), proportion (1 by default) and parameters of each sub-terrain, by

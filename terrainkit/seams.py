@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.config import MapConfig
+from terrainkit.terrain_map import TerrainMap
 
 MIN_CLIFF_HEIGHT = 0.5
 """Height difference that no leg bridges; a lower seam is never a cliff [m]."""
@@ -30,11 +30,8 @@ class Seam:
 class Seams:
     """The seams of a map."""
 
-    config: MapConfig
-    """The configuration of the map."""
-
-    heights: NDArray[np.float32]
-    """Heights of the map [m], shape `config.grid.shape`."""
+    terrain_map: TerrainMap
+    """The map."""
 
     def largest(self) -> Seam | None:
         """Return the seam with the largest height difference; None without seams."""
@@ -45,11 +42,16 @@ class Seams:
 
         A seam is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and than the sum of the largest
         steps within the two patches. The holes of stepping stones, which end at the edge of their
-        patch, are therefore no cliffs; the side of a flight of stairs is one.
+        patch, are therefore no cliffs; the side of a flight of stairs is one. There are no cliffs
+        where walls stand on both sides of the whole seam.
         """
         candidates = list(self._above(MIN_CLIFF_HEIGHT))
         steps = {p: self._max_step(p) for p in {p for seam in candidates for p in seam.patches}}
-        cliffs = [seam for seam in candidates if seam.height > sum(steps[p] for p in seam.patches)]
+        cliffs = [
+            seam
+            for seam in candidates
+            if seam.height > sum(steps[p] for p in seam.patches) and not self._is_walled(seam)
+        ]
         return sorted(cliffs, key=lambda seam: -seam.height)
 
     def _above(self, limit: float) -> Iterator[Seam]:
@@ -65,27 +67,43 @@ class Seams:
 
         Where the map ends at a patch, there is no seam, and the height is -inf.
         """
-        config, (nx, ny) = self.config, self.config.patch_shape
+        config, heights = self.terrain_map.config, self.terrain_map.heights
+        nx, ny = config.patch_shape
         border, (rows, cols) = config.border_cells, (config.rows, config.cols)
         inner = slice(border, border + rows * nx), slice(border, border + cols * ny)
-        along_x = _line_heights(self.heights[:, inner[1]], border, nx, rows)
-        along_y = _line_heights(self.heights[inner[0]].T, border, ny, cols)
+        along_x = _line_heights(heights[:, inner[1]], border, nx, rows)
+        along_y = _line_heights(heights[inner[0]].T, border, ny, cols)
         return (
             along_x.reshape(rows + 1, cols, ny).max(axis=2),
             along_y.reshape(cols + 1, rows, nx).max(axis=2).T,
         )
 
     def _patch(self, row: int, col: int) -> Index | None:
-        inside = 0 <= row < self.config.rows and 0 <= col < self.config.cols
+        config = self.terrain_map.config
+        inside = 0 <= row < config.rows and 0 <= col < config.cols
         return (row, col) if inside else None
 
     def _max_step(self, patch: Index | None) -> float:
         if patch is None:
             return 0.0
-        (i, j), (nx, ny) = self.config.patch_start(*patch), self.config.patch_shape
-        heights = self.heights[i : i + nx, j : j + ny]
+        config = self.terrain_map.config
+        (i, j), (nx, ny) = config.patch_start(*patch), config.patch_shape
+        heights = self.terrain_map.heights[i : i + nx, j : j + ny]
         steps = heights[1:] - heights[:-1], heights[:, 1:] - heights[:, :-1]
         return float(max(max(s.max(initial=0.0), -s.min(initial=0.0)) for s in steps))
+
+    def _is_walled(self, seam: Seam) -> bool:
+        """Return whether solids cover the samples on both sides of a seam between two patches."""
+        first, second = seam.patches
+        if first is None or second is None:
+            return False
+        config = self.terrain_map.config
+        (i, j), (nx, ny) = config.patch_start(*second), config.patch_shape
+        across_x = first[1] == second[1]
+        x = config.grid.axis(0)[slice(i - 1, i + 1) if across_x else slice(i, i + nx)]
+        y = config.grid.axis(1)[slice(j, j + ny) if across_x else slice(j - 1, j + 1)]
+        xy = np.stack(np.meshgrid(x, y), axis=-1)
+        return not self.terrain_map.clearance(xy).any()
 
 
 def _line_heights(

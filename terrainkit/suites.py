@@ -24,16 +24,16 @@ may depend on the version of numpy."""
 
 _SHA256 = {
     "basics-1": "f00eae7013071e577ab8dfeb8efb6ea464dd30820d7b6eee018763b3b3dc4828",
-    "response-1-small": "93dc6924aa4eb83ef93afe7eeb0619c4684f3a847ff68cdd1cad31d47c75c079",
-    "response-1-medium": "c0b288e726fb5eef4cf098677d1f411f621f45c26153b213c2b3c0db07c853e3",
-    "response-1-large": "c91d7e73bb48e2be399a19dd1f6177ef04990948f9af7581827f542cba44476b",
+    "response-1-small": "d52701149482beac5cfd379095a964aab0dc3cde3f46679ef5d959fdeb489123",
+    "response-1-medium": "27ef209ff0db74ea0f7b9f6094b7183a22c940dd01060e09b2988ce643190c5f",
+    "response-1-large": "54f2dc1068b423c7c7c37c5b06c91be7d3d5a3c1b1c91f95c1eb0c25c498a747",
     "parkour-1": "e1214a35cada47f5545abd67a8eccd3b46b94eb4ef0b612cef28c61b49982d28",
     "sparse-1": "87b0ca35034ee628efd73986f37b5353f4f45b98cf2dcfc5544b428fe95a3d27",
     "confined-1": "c94dc43000531de302a2f7598e645993f3e036cca17c6c12d5d58a5533d7af62",
     "natural-1": "5315adcf7baf293c85f657fc039866befdef7588baf9f28ec6681f315c679559",
 }
-"""Hash of the content of each suite. A suite never changes: a change is a suite with a new version.
-"""
+"""Hash of the content of each suite. A released suite never changes: a change is a suite with a new
+version."""
 
 _FOLDER = Path(__file__).with_name("suite_maps")
 

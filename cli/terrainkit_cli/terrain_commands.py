@@ -415,7 +415,7 @@ class CheckMap(Command):
         issues = validate(terrain_map, read_mesh(self.map))
         for issue in issues:
             render.result(f"{issue.check}: {issue.message}")
-        seams = Seams(config=terrain_map.config, heights=terrain_map.heights)
+        seams = Seams(terrain_map=terrain_map)
         if largest := seams.largest():
             render.result(f"largest seam: {seam_text(largest, terrain_map.patch_names)}")
         if cliffs := seams.cliffs():

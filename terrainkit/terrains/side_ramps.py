@@ -44,6 +44,9 @@ class SideRamps(Lane):
     end: float = parameter.size(1.2)
     """Minimum length along x behind the last ramp, with its gap [m]."""
 
+    first_side: str = parameter.choice("left", "right")
+    """Side of the first ramp."""
+
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and `-depth` in the pit."""
         edges = self._slots(grid)
@@ -76,10 +79,10 @@ class SideRamps(Lane):
         y = grid.center[1] + np.append(self._sides(edges), 0.0) * self.offset
         return np.column_stack([x, y, 0 * y, 0 * y])
 
-    @staticmethod
-    def _sides(edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _sides(self, edges: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return 1 for each ramp on the left, and -1 for each on the right."""
-        return np.where(np.arange(len(edges) - 1) % 2 == 0, 1.0, -1.0)
+        is_first = np.arange(len(edges) - 1) % 2 == 0
+        return np.where(is_first == (self.first_side == "left"), 1.0, -1.0)
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing, end = (self.spacing, self.spacing), max(self.end, self.gap + grid.cell)

@@ -130,7 +130,7 @@ def test_every_terrain_map_is_valid(terrain, given_parameters, grid):
     assert terrain_map.difficulty.ravel().tolist() == [0.0, 0.5, 1.0]
     # The mesh, the spawn origins, and a second build of each patch. Some parameters do not fit.
     assert [issue for issue in validate(terrain_map) if issue.check != "realized"] == []
-    cliffs = Seams(config=terrain_map.config, heights=terrain_map.heights).cliffs()
+    cliffs = Seams(terrain_map=terrain_map).cliffs()
     assert [seam for seam in cliffs if None not in seam.patches] == []
 
 

@@ -1,7 +1,11 @@
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate, presets
+from terrainkit.overlays.side_walls import SideWalls
 from terrainkit.seams import Seam, Seams, cliffs_text, seam_text
 
 SMALL = MapConfig(
@@ -15,7 +19,7 @@ SMALL = MapConfig(
 
 
 def seams_of(terrain_map):
-    return Seams(config=terrain_map.config, heights=terrain_map.heights)
+    return Seams(terrain_map=terrain_map)
 
 
 def raised(config, *blocks):
@@ -23,7 +27,7 @@ def raised(config, *blocks):
     heights = np.zeros(config.grid.shape, dtype=np.float32)
     for x, y, height in blocks:
         heights[x, y] = height
-    return Seams(config=config, heights=heights)
+    return seams_of(replace(generate(config), heights=heights))
 
 
 # The border has 2 samples; patches have 40 x 20.
@@ -74,6 +78,18 @@ def test_cliff_is_higher_than_steps_within_patches():
     # A post of 1 m at the edge is a step of 1 m within its patch.
     assert raised(SMALL, (2, 10, 1.0)).cliffs() == []
     assert raised(SMALL, (slice(2, 42), slice(2, 22), 0.5)).cliffs() == []
+
+
+@pytest.mark.parametrize(("sides", "walled"), [("both", True), ("one", False)])
+def test_seam_between_walls_is_no_cliff(sides, walled):
+    walls = SideWalls(probability=1.0, height=1.0)
+    high = SubTerrain(terrain="stairs", overlays=(walls,))
+    low = SubTerrain(terrain="flat", overlays=(walls,) if sides == "both" else ())
+    config = MapConfig(rows=2, cols=2, border=0.0, terrains=(high, low))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error" if walled else "ignore")
+        cliffs = seams_of(generate(config)).cliffs()
+    assert (cliffs == []) == walled
 
 
 def test_cliffs_are_sorted_by_height():

@@ -291,7 +291,7 @@ def test_scan_sees_visible_solids_and_clearance_those_that_collide(solid_map):
     assert solid_map.intervals(xy)[0] == pytest.approx(np.array([[0, 0.4], [0.6, np.inf]]))
 
 
-@pytest.mark.parametrize("shape", [(3,), (2, 3), (2, 5, 3)])
+@pytest.mark.parametrize("shape", [(3,), (2, 3), (2, 5, 3), (0, 3)])
 def test_scan_keeps_the_shape(solid_map, shape):
     points = np.ones(shape)
     assert solid_map.scan(points).shape == shape[:-1]

@@ -29,6 +29,15 @@ def test_side_ramps_lean_toward_the_lane_in_turn(difficulty):
         assert terrain_map.scan(points, "down") == pytest.approx([rise, 0.0, -rise], abs=1e-4)
 
 
+def test_first_side_ramp_on_the_right_mirrors_the_ramps():
+    points = np.random.default_rng(0).uniform([0.1, 0.1, 5.0], [7.9, 7.9, 5.0], (200, 3))
+    mirrored = points * [1, -1, 1] + [0, 8, 0]
+    left, right = map_at(0.5), map_at(0.5, first_side="right")
+    np.testing.assert_allclose(right.scan(mirrored), left.scan(points), atol=1e-5)
+    assert (left.scan(mirrored) != left.scan(points)).any()
+    np.testing.assert_allclose(right.goals[0, 0] * [1, -1, 1, 1], left.goals[0, 0] - [0, 8, 0, 0])
+
+
 @pytest.mark.parametrize(("difficulty", "gap"), [(0.5, 0.2), (1.0, 0.4)])
 def test_side_ramps_gaps_are_over_the_pit(difficulty, gap):
     terrain_map = map_at(difficulty)
