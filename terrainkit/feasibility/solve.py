@@ -79,43 +79,66 @@ def solve_ranges(
         got = f"demand: got {low:g}:{high:g}"
         raise ConfigError(f"{got}; expected LOW:HIGH with 0 <= LOW < HIGH <= {MAX_DEMAND:g}")
     samples = replace(config, rows=1, cols=_SAMPLES)
+    parts = [_parts(sub_terrain) for sub_terrain in config.sub_terrains]
+    jobs = {_key(part): part for each in parts for part in each}
     solve = partial(_solve, samples, limits, demand)
-    terrains = config.sub_terrains
-    results = (executor.map if executor else map)(solve, terrains)
-    indices = iter([(0, k) for k in range(len(terrains))])
-    steps = progress(indices, len(terrains)) if progress else indices
-    return [result for _, result in zip(steps, results, strict=True)]
+    results = (executor.map if executor else map)(solve, jobs.values())
+    indices = iter([(0, k) for k in range(len(jobs))])
+    steps = progress(indices, len(jobs)) if progress else indices
+    solved = dict(
+        zip(jobs, (result for _, result in zip(steps, results, strict=True)), strict=True)
+    )
+    return [
+        _solved(sub_terrain, [solved[_key(part)] for part in each])
+        for sub_terrain, each in zip(config.sub_terrains, parts, strict=True)
+    ]
 
 
-def _solve(
-    config: MapConfig, limits: RobotLimits, demand: Range, sub_terrain: SubTerrain
-) -> SolvedTerrain:
-    """Return the sub-terrain with solved ranges, or a course with those of its elements."""
+def _table_name(sub_terrain: SubTerrain) -> str | None:
+    """Return the name of the parameter with the elements of a course."""
     declared = parameters_of(sub_terrain.terrain_class)
-    name = next((name for name, each in declared.items() if each.table), None)
+    return next((name for name, each in declared.items() if each.table), None)
+
+
+def _parts(sub_terrain: SubTerrain) -> list[SubTerrain]:
+    """Return the sub-terrain, or a course of each of its elements."""
+    name = _table_name(sub_terrain)
     if name is None:
-        return _solve_ranges(config, limits, demand, sub_terrain, lambda solved: solved)
-    given: Any = sub_terrain.parameters.get(name, declared[name].default)
+        return [sub_terrain]
+    return [_with(sub_terrain, {name: (each,)}) for each in _value(sub_terrain, name)]
+
+
+def _key(part: SubTerrain) -> str:
+    """Return a text that is equal for parts with the same patches."""
+    if name := _table_name(part):
+        part = _with(part, {name: tuple(replace(e, proportion=1.0) for e in part.parameters[name])})
+    return repr(replace(part, name=part.terrain, proportion=1.0))
+
+
+def _solved(
+    sub_terrain: SubTerrain, solutions: list[tuple[Mapping[str, Range], Range]]
+) -> SolvedTerrain:
+    """Return a sub-terrain with the ranges and demands of its parts."""
+    name = _table_name(sub_terrain)
+    if name is None:
+        ((ranges, demand),) = solutions
+        return SolvedTerrain(sub_terrain=_with(sub_terrain, ranges), ranges=ranges, demand=demand)
     elements = tuple(
-        _solve_ranges(
-            config, limits, demand, element, lambda solved: _with(sub_terrain, {name: (solved,)})
-        )
-        for element in given
+        SolvedTerrain(sub_terrain=_with(element, ranges), ranges=ranges, demand=demand)
+        for element, (ranges, demand) in zip(_value(sub_terrain, name), solutions, strict=True)
     )
     course = _with(sub_terrain, {name: tuple(each.sub_terrain for each in elements)})
     low, high = np.max([each.demand for each in elements], axis=0).tolist()
     return SolvedTerrain(sub_terrain=course, demand=(low, high), elements=elements)
 
 
-def _solve_ranges(
-    config: MapConfig,
-    limits: RobotLimits,
-    demand: Range,
-    sub_terrain: SubTerrain,
-    patch_terrain: Callable[[SubTerrain], SubTerrain],
-) -> SolvedTerrain:
-    """Return a sub-terrain with solved ranges; `patch_terrain` returns that of its patches."""
-    ranges, grid = _ranges(sub_terrain), config.patch_grid(0, 0)
+def _solve(
+    config: MapConfig, limits: RobotLimits, demand: Range, part: SubTerrain
+) -> tuple[Mapping[str, Range], Range]:
+    """Return the solved ranges of a sub-terrain, or of the element of a course, and the demands."""
+    name = _table_name(part)
+    solved_part = part if name is None else part.parameters[name][0]
+    ranges, grid = _ranges(solved_part), config.patch_grid(0, 0)
     known: dict[tuple[float, float], float] = {}
 
     def demand_at(end: float, difficulty: float) -> float:
@@ -126,7 +149,8 @@ def _solve_ranges(
         if (end, difficulty) not in known:
             values = {name: r.at(difficulty, grid) for name, r in ranges.items()}
             try:
-                terrain = patch_terrain(_with(sub_terrain, values))
+                terrain = _with(solved_part, values)
+                terrain = terrain if name is None else _with(part, {name: (terrain,)})
                 demand = _demand(config, limits, terrain, end)
             except ConfigError:
                 if 0 <= difficulty <= 1:
@@ -137,12 +161,9 @@ def _solve_ranges(
 
     easy, hard = (_largest(partial(demand_at, end), demand[int(end)]) for end in (0.0, 1.0))
     if not ranges or easy >= hard:
-        return SolvedTerrain(
-            sub_terrain=sub_terrain, demand=(demand_at(0.0, 0.0), demand_at(1.0, 1.0))
-        )
+        return {}, (demand_at(0.0, 0.0), demand_at(1.0, 1.0))
     solved = {name: (r.at(easy, grid), r.at(hard, grid)) for name, r in ranges.items()}
-    ends = demand_at(0.0, easy), demand_at(1.0, hard)
-    return SolvedTerrain(sub_terrain=_with(sub_terrain, solved), ranges=solved, demand=ends)
+    return solved, (demand_at(0.0, easy), demand_at(1.0, hard))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,10 +188,15 @@ def _ranges(sub_terrain: SubTerrain) -> dict[str, _ParameterRange]:
     """Return the parameters that depend on the difficulty, by name."""
     ranges = {}
     for name, parameter in parameters_of(sub_terrain.terrain_class).items():
-        value: Any = sub_terrain.parameters.get(name, parameter.default)
+        value = _value(sub_terrain, name)
         if isinstance(value, tuple) and not parameter.is_vector and value[0] != value[1]:
             ranges[name] = _ParameterRange(parameter=parameter, ends=value)
     return ranges
+
+
+def _value(sub_terrain: SubTerrain, name: str) -> Any:
+    default = parameters_of(sub_terrain.terrain_class)[name].default
+    return sub_terrain.parameters.get(name, default)
 
 
 def _with(sub_terrain: SubTerrain, values: Mapping[str, Any]) -> SubTerrain:

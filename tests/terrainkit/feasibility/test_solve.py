@@ -1,6 +1,7 @@
 """Ranges that demand what is requested, against values worked out by hand."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import pytest
 
@@ -80,6 +81,40 @@ def test_elements_of_a_course_are_solved_one_by_one():
     course = solved.sub_terrain.parameters["elements"]
     assert course == (first.sub_terrain, second.sub_terrain)
     assert course[1].element_length == 4.0
+
+
+def test_equal_elements_are_solved_once():
+    spacing = {"min_spacing": 0.7, "max_spacing": 0.9}
+    hurdles = Element(terrain="hurdles", parameters={"height": (0.05, 0.4), **spacing})
+    gaps = Element(terrain="gap_track", parameters={"length": (0.1, 0.5), **spacing})
+    short, long = (
+        SubTerrain(
+            terrain="course",
+            name=name,
+            proportion=proportion,
+            parameters={"elements": elements, "order": "random"},
+        )
+        for name, proportion, elements in (
+            ("short", 1.0, (hurdles,)),
+            ("long", 3.0, (gaps, replace(hurdles, proportion=0.5))),
+        )
+    )
+    config = MapConfig(terrains=(short, long), border=0, patch_size=(8.0, 4.0))
+    totals = []
+
+    def progress(steps, total):
+        totals.append(total)
+        return steps
+
+    solved = solve_ranges(config, LIMITS, (0.2, 0.9), progress=progress)
+    assert totals == [2]
+    alone = [
+        solve_ranges(replace(config, terrains=(each,)), LIMITS, (0.2, 0.9))[0]
+        for each in (short, long)
+    ]
+    assert solved == alone
+    assert solved[0].elements[0].ranges == solved[1].elements[1].ranges != {}
+    assert [each.sub_terrain.proportion for each in solved[1].elements] == [1.0, 0.5]
 
 
 def test_overlays_count_at_the_ends_of_the_map():
