@@ -137,7 +137,10 @@ def solve_demand(
     if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
         raise ConfigError(f"--demand: got {demand!r}; expected LOW:HIGH, such as 0.2:0.9")
     derived = robot_limits(robot, limits)
-    terrain_columns(replace(config, terrains=config.sub_terrains))  # each needs a column
+    terrains, columns = config.sub_terrains, terrain_columns(config)
+    if config.mode != "randomized":  # sub-terrains of a preset without a column are not solved
+        terrains = tuple(terrains[k] for k in dict.fromkeys(columns))
+    config = replace(config, terrains=terrains)
     progress = partial(render.progress, of="terrains")
     solved = solve_ranges(config, derived.limits, ends, progress=progress, executor=executor)
     rows = [("terrain", "demand", f"ranges for {derived.robot}")]

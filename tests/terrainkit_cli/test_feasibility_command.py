@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from terrainkit.terrain_map import TerrainMap
 from terrainkit_robots.description import bundled
 
 
@@ -119,6 +120,16 @@ def test_generate_with_a_demand_solves_the_ranges(terrainkit):
     assert "stairs   0.19 to 0.90  step_height 0.03875 to 0.1794\n" in run.stdout
     run = terrainkit("feasibility", "m.npz", "--robot", "quadruped", "--limit", "step_up=0.2")
     assert "stairs   0.19     0.55  0.90" in run.stdout
+
+
+def test_generate_with_a_demand_solves_the_terrains_that_have_a_column(terrainkit, tmp_path):
+    words = ("--preset", "stairs", "--rows", "2", "--cols", "2", "--robot", "quadruped")
+    run = terrainkit("generate", "-o", "m.npz", *words, "--demand", "0.2:0.9")
+    assert run.returncode == 0
+    assert run.stderr.count("no column for pyramid_stairs_inverted (preset stairs)") == 1
+    assert "pyramid_stairs_inverted" not in run.stdout
+    names = TerrainMap.load(tmp_path / "m.npz").terrain_names
+    assert names == ("stairs", "pyramid_stairs")
 
 
 @pytest.mark.parametrize(
