@@ -89,6 +89,41 @@ def test_vector_env_steps_like_single_env(short_task):
     assert vector.observation_space.contains(infos["final_obs"])
 
 
+def test_vector_env_observes_the_heights_of_a_map(tmp_path):
+    config = tk.MapConfig(rows=4, cols=3, patch_size=(8.0, 6.0), border=2.0, preset="stairs")
+    terrain_map = tk.generate(config)
+    task = get_task("quadruped_map").task
+    task = replace(task, noise=replace(task.noise, noise_level=0.0))
+    file = terrain_map.save(tmp_path / "map.npz")
+    vector = TaskVectorEnv("quadruped_map", num_envs=16, terrain=file, task=task)
+    vector.reset(seed=0)
+    for _ in range(50):
+        observations = vector.step(np.zeros((16, 12)))[0]
+    state = vector.env.state
+    x, y = np.meshgrid(
+        task.terrain.measured_points_x, task.terrain.measured_points_y, indexing="ij"
+    )
+    w, i, j, k = state.base_quat.astype(float).T[..., None]
+    yaw = np.arctan2(2 * (w * k + i * j), 1 - 2 * (j**2 + k**2))
+    base = state.base_pos.astype(float)[:, :, None]
+    points = np.stack(
+        [
+            base[:, 0] + np.cos(yaw) * x.ravel() - np.sin(yaw) * y.ravel(),
+            base[:, 1] + np.sin(yaw) * x.ravel() + np.cos(yaw) * y.ravel(),
+            np.broadcast_to(base[:, 2], (16, x.size)),
+        ],
+        axis=-1,
+    )
+    heights = (
+        base[:, 2]
+        - observations[:, -x.size :] / task.normalization.obs_scales.height_measurements
+        - 0.5
+    )
+    is_off = np.abs(heights - terrain_map.scan(points)) > 1e-3
+    assert is_off.mean() < 0.01, is_off.mean()
+    assert np.ptp(heights) > 0.5
+
+
 def test_make_vec_makes_vector_env():
     vector = gymnasium.make_vec(f"{MODULE}:terrainkit/biped-v0", num_envs=2)
     assert isinstance(vector.unwrapped, TaskVectorEnv)
