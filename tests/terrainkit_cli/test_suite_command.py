@@ -13,7 +13,7 @@ def test_list_prints_all_suites(terrainkit):
 def test_show_prints_tests_dimensions_and_hash(terrainkit):
     run = terrainkit("suite", "show", "response-1-medium")
     assert run.returncode == 0
-    assert "20 tests, 10 levels, patches of 9.6 m x 2.4 m, cell 0.05 m, seed 1\n" in run.stdout
+    assert "21 tests, 10 levels, patches of 9.6 m x 2.4 m, cell 0.05 m, seed 1\n" in run.stdout
     assert f"SHA-256 {suites.get_suite('response-1-medium').sha256}\n" in run.stdout
     assert "gaps (gap_track): length 0.1 to 1, start 2.4, depth 1," in run.stdout
     assert "\nopen_stairs_40 (open_stairs): riser 0.05 to 0.2, start 2.4, tread 0.238" in run.stdout
