@@ -66,8 +66,9 @@ class Terrain(Config):
 class Observations(Config):
     """Additional observations of the policy."""
 
-    base_lin_vel: bool = False
-    """Whether the policy observes the base linear velocity, with the noise `noise.lin_vel`."""
+    base_lin_vel: bool | None = None
+    """Whether the policy observes the base linear velocity, with the noise `noise.lin_vel`; none:
+    on two legs."""
     foot_contact: bool = False
     """Whether the policy observes which feet are in contact."""
     history_length: Annotated[int, Meta(ge=1, le=100)] = 1
@@ -280,7 +281,7 @@ class Noise(Config):
     """Noise of joint velocities [rad/s]."""
     ang_vel: NonNegativeFloat = 0.2
     """Noise of the base angular velocity [rad/s]."""
-    lin_vel: NonNegativeFloat = 0.5
+    lin_vel: NonNegativeFloat = 0.1
     """Noise of the base linear velocity, if it is observed [m/s]."""
     gravity: NonNegativeFloat = 0.05
     """Noise of the gravity direction."""

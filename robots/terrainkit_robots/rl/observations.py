@@ -41,8 +41,14 @@ def uses_height_scan(task: Task, *, is_flat: bool) -> bool:
     return not is_flat if setting is None else setting
 
 
+def observes_lin_vel(robot: Robot, task: Task) -> bool:
+    """Return whether the policy observes its linear velocity; the default is True on two legs."""
+    setting = task.observations.base_lin_vel
+    return len(robot.spec.feet) == 2 if setting is None else setting
+
+
 def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTerm, ...]:
-    """Return the policy's terms: 47 numbers for 12 joints, and 187 with the height scan."""
+    """Return the policy's terms: 47 numbers for a quadruped, and 187 with the height scan."""
     term, scales = ObservationTerm, task.normalization.obs_scales
     noise = {key: task.noise.noise_level * value for key, value in vars(task.noise).items()}
     command_scale = (scales.lin_vel, scales.lin_vel, scales.ang_vel)
@@ -65,7 +71,7 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
     )
     if task.commands.gait_period != 0:
         group += (term("gait_phase", lambda s: s.gait_phase, "phase"),)
-    if task.observations.base_lin_vel:
+    if observes_lin_vel(robot, task):
         scale, uniform = scales.lin_vel, noise["lin_vel"]
         group += (term("base_lin_vel", lambda s: s.base_lin_vel, "vector", scale, uniform),)
     if task.observations.foot_contact:
@@ -80,7 +86,7 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
 def history_width(robot: Robot, task: Task) -> int:
     """Return the size of the history: the previous observations, without the height scan."""
     cfg, width = task.observations, 9 + 3 * len(robot.default_pose)
-    width += 2 * (task.commands.gait_period != 0) + 3 * cfg.base_lin_vel
+    width += 2 * (task.commands.gait_period != 0) + 3 * observes_lin_vel(robot, task)
     return (cfg.history_length - 1) * (width + len(robot.spec.feet) * cfg.foot_contact)
 
 

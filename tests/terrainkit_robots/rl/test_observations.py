@@ -29,6 +29,7 @@ from terrainkit_robots.rl.observations import (
     privileged_group,
 )
 from terrainkit_robots.rl.state import State
+from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 
@@ -214,6 +215,24 @@ class TestGroups:
         names = [each.name for each in privileged_of(robot, Task(observations=options))]
         assert names.count("base_lin_vel") == names.count("foot_contact") == 1
         assert "history" not in names
+
+    @pytest.mark.parametrize(
+        ("name", "setting", "observed"),
+        [
+            ("quadruped", None, False),
+            ("quadruped", True, True),
+            ("biped", None, True),
+            ("biped", False, False),
+        ],
+    )
+    def test_two_legs_observe_the_linear_velocity(
+        self, name: str, setting: bool | None, observed: bool
+    ) -> None:
+        task = Task(observations=Observations(base_lin_vel=setting, history_length=2))
+        legged = Robot.load(get_task(name).folder)
+        names = [each.name for each in policy_group(legged, task, scan=False)]
+        assert ("base_lin_vel" in names) == observed
+        assert history_width(legged, task) == 11 + 3 * len(legged.default_pose) + 3 * observed
 
     @pytest.mark.parametrize("gait_period", [0, None])
     @pytest.mark.parametrize("more", [False, True])
