@@ -16,7 +16,7 @@ TASK = Task(
 
 
 @pytest.mark.parametrize(
-    ("name", "joints", "width"), [("go2/urdf/go2.urdf", 12, 47), ("h1/urdf/h1.urdf", 10, 41)]
+    ("name", "joints", "width"), [("go2/urdf/go2.urdf", 12, 47), ("h1/urdf/h1.urdf", 10, 44)]
 )
 def test_real_robot_is_onboarded_trained_exported(
     robot_file, onboarded, tmp_path, name, joints, width

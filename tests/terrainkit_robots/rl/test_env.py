@@ -87,7 +87,7 @@ class TestObservations:
         assert env.get_observations()["policy"].shape == (4, 47 + 187)
         env = LeggedEnv(nominal_task(), biped, Plane())
         joints = len(biped.default_pose)
-        assert env.get_observations()["policy"].shape == (4, 11 + 3 * joints)
+        assert env.get_observations()["policy"].shape == (4, 14 + 3 * joints)
 
     def test_height_scan_follows_the_setting(self, quadruped, nominal_task, map_ground):
         seen = nominal_task(terrain=Terrain(measure_heights=True))
