@@ -24,7 +24,7 @@ from terrainkit_cli.robot_options import (
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
-    from terrainkit_robots.policy.smoke_test import SmokeTestResult
+    from terrainkit_robots.smoke_test.checks import SmokeTestResult
 
 SCHEMA_VERSION = 2
 """Version of the JSON; it changes when a key changes its meaning or is removed."""
@@ -118,7 +118,7 @@ class SmokeTest(Command):
 
     def _smoke_test(self, name: str, progress: Callable[[float], None]) -> "SmokeTestResult":
         from terrainkit_robots.onboarding.pipeline import OnboardOptions
-        from terrainkit_robots.policy.smoke_test import smoke_test
+        from terrainkit_robots.smoke_test.checks import smoke_test
 
         settings = parse_settings(self.ignore, self.package, self.xacro_arg)
         spec = Path(self.spec) if self.spec else None

@@ -7,9 +7,9 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli import training_extra
-from terrainkit_robots.policy import smoke_test as module
-from terrainkit_robots.policy.smoke_test import Check, SmokeTestResult
 from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.smoke_test import checks as module
+from terrainkit_robots.smoke_test.checks import Check, SmokeTestResult
 
 GOOD = Check("spawn height", True, "1.0 cm", "within 2.0 cm")
 BAD = Check("observation policy", False, "44 numbers", "45 numbers")

@@ -1,1 +1,1 @@
-"""Evaluate, play, export and bundle trained policies, and smoke-test robots before training."""
+"""Evaluate, play, export and bundle trained policies."""

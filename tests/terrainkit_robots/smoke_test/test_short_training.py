@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.policy.short_training import RecordingEnv, train_briefly
 from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.smoke_test.short_training import RecordingEnv, train_briefly
 
 TASK = Task(env=Env(num_envs=8, num_threads=1))
 

@@ -7,10 +7,14 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
-from terrainkit_robots.policy import smoke_test as module
 from terrainkit_robots.policy.evaluate import eval_task
-from terrainkit_robots.policy.short_training import TrainingRecord
-from terrainkit_robots.policy.smoke_test import (
+from terrainkit_robots.rl.config import Control, Env, Rewards, Task
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.rewards import REWARDS
+from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.smoke_test import checks as module
+from terrainkit_robots.smoke_test.checks import (
     SmokeTestResult,
     check_action_scale,
     check_observations,
@@ -24,11 +28,7 @@ from terrainkit_robots.policy.smoke_test import (
     run_checks,
     smoke_test,
 )
-from terrainkit_robots.rl.config import Control, Env, Rewards, Task
-from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.rewards import REWARDS
-from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.smoke_test.short_training import TrainingRecord
 from terrainkit_robots.spec.robot import Robot
 
 RECORD = TrainingRecord(

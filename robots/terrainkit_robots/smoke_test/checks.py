@@ -1,4 +1,4 @@
-"""Smoke-test a robot: check whether it can be trained, with a short training."""
+"""Check a robot for its training: environment, actions, rewards, and a short training."""
 
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -14,7 +14,6 @@ from terrainkit.errors import TerrainkitError
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 from terrainkit_robots.policy.evaluate import Progress, eval_task
 from terrainkit_robots.policy.load import single_torch_thread
-from terrainkit_robots.policy.short_training import TrainingRecord, train_briefly
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.config import Task
@@ -24,6 +23,7 @@ from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
+from terrainkit_robots.smoke_test.short_training import TrainingRecord, train_briefly
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.text import count
 
