@@ -32,6 +32,10 @@ _SOFT_LIMIT_FACTOR = 0.9
 _DEFAULT_RESET_RANGE = (0.5, 1.5)
 """Range of the factor on the default pose at a reset, as in legged_gym."""
 
+_MAX_BIPED_RESET_OFFSET = 0.25
+"""Largest offset from the default pose at a reset on two legs [rad]: an action of 1 corrects it.
+Isaac Lab resets its bipeds without any. Four legs stand with more."""
+
 
 def derive_spec(
     facts: Facts,
@@ -157,7 +161,9 @@ def _soft_limits(facts: Facts, pose: Mapping[str, float]) -> dict[str, tuple[flo
 
 def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, float], str]:
     """Return factors on the default pose that keep all joints within their limits, and why."""
-    factors = [_reset_scale(joint, pose[joint.name]) for joint in facts.actuated]
+    is_biped = len(named_bodies.feet(facts)) == 2
+    offset = _MAX_BIPED_RESET_OFFSET if is_biped else math.inf
+    factors = [_reset_scale(joint, pose[joint.name], offset) for joint in facts.actuated]
     lowest = max((low for low, _ in factors), default=_DEFAULT_RESET_RANGE[0])
     highest = min((high for _, high in factors), default=_DEFAULT_RESET_RANGE[1])
     inner = min(1.0, math.ceil(100 * lowest) / 100), max(1.0, math.floor(100 * highest) / 100)
@@ -169,20 +175,20 @@ def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, 
         if low == lowest > _DEFAULT_RESET_RANGE[0] or high == highest < _DEFAULT_RESET_RANGE[1]
     ]
     default = "{:g} to {:g}".format(*_DEFAULT_RESET_RANGE)
-    return (
-        inner,
-        f"{default} as in legged_gym, reduced by the limits of {names(bound, max_count=2)}",
-    )
+    limits = f"the limits, or {offset:g} rad on two legs, of" if is_biped else "the limits of"
+    return inner, f"{default} as in legged_gym, reduced by {limits} {names(bound, max_count=2)}"
 
 
-def _reset_scale(joint: Joint, position: float) -> tuple[float, float]:
-    """Return the factors on a position that move the joint to its limits, clipped."""
-    if joint.range is None or position == 0:
+def _reset_scale(joint: Joint, position: float, offset: float) -> tuple[float, float]:
+    """Return the factors on a position that move the joint to its limits or by an offset."""
+    if position == 0:
         return _DEFAULT_RESET_RANGE
+    lower, upper = joint.range or (-math.inf, math.inf)
+    ends = np.array([max(lower, position - offset), min(upper, position + offset)])
     with np.errstate(all="ignore"):
-        ends = sorted(float(np.float64(end) / position) for end in joint.range)
+        low, high = sorted((ends / position).tolist())
     lowest, highest = _DEFAULT_RESET_RANGE
-    return float(np.clip(ends[0], lowest, 1.0)), float(np.clip(ends[1], 1.0, highest))
+    return float(np.clip(low, lowest, 1.0)), float(np.clip(high, 1.0, highest))
 
 
 def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:

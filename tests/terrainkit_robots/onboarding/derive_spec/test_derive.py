@@ -122,6 +122,32 @@ def test_derive_spec_reset_range_is_within_limits(bundled, gains):
     assert "calf_joint" in spec.provenance["reset_range"].reason
 
 
+TRUNK = """<mujoco model="m"><compiler angle="radian"/><worldbody><body name="trunk" pos="0 0 0.8">
+    <freejoint/><geom type="box" size=".1 .1 .1" mass="5"/>{legs}</body></worldbody></mujoco>"""
+LEG = """<body name="thigh_{k}" pos="{x} {y} 0"><joint name="hip_{k}" axis="0 1 0" range="-2 2"/>
+    <geom type="capsule" size=".03" fromto="0 0 0 0 0 -.4" mass="1"/>
+    <body name="shank_{k}" pos="0 0 -.4"><joint name="knee_{k}" axis="0 1 0" range="0.9 2"/>
+    <geom type="capsule" size=".03" fromto="0 0 0 0 0 -.4" mass="1"/></body></body>"""
+
+
+@pytest.mark.parametrize(
+    ("feet", "is_biped"),
+    [
+        ([(0, 0.1), (0, -0.1)], True),
+        ([(0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1)], False),
+    ],
+)
+def test_derive_spec_resets_two_legs_near_the_default_pose(robot, gains, feet, is_biped):
+    legs = "".join(LEG.format(k=k, x=x, y=y) for k, (x, y) in enumerate(feet))
+    spec = derived(robot(TRUNK.format(legs=legs)), gains)
+    assert len(spec.feet) == len(feet)
+    most = max(abs(position) for position in spec.default_pose.values())
+    assert most > 0.9  # the knees do not stretch further
+    offset = (spec.reset_range[1] - 1) * most
+    assert 0.23 < offset <= 0.25 if is_biped else offset > 0.4
+    assert ("0.25 rad" in spec.provenance["reset_range"].reason) == is_biped
+
+
 def test_derive_spec_rejects_missing_gains_and_bodies(robot, gains):
     facts = robot(ARM)
     with pytest.raises(
