@@ -17,6 +17,7 @@ from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.simulation.standing import StandResult
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _PROJECT = Path(__file__).resolve().parents[2]
@@ -38,6 +39,16 @@ def robot_file() -> Callable[[str], Path]:
         return ROBOTS / name
 
     return find
+
+
+@pytest.fixture(scope="session")
+def quadruped() -> Robot:
+    return Robot.load(bundled_robots.urdf_path("quadruped").parent)
+
+
+@pytest.fixture(scope="session")
+def biped() -> Robot:
+    return Robot.load(bundled_robots.urdf_path("biped").parent)
 
 
 @pytest.fixture(scope="session")

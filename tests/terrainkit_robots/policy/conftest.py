@@ -1,4 +1,4 @@
-"""A quadruped, runs without a checkpoint, one trained run, and environments for rollouts."""
+"""Runs without a checkpoint, one trained run, and environments for rollouts."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,7 +19,6 @@ from terrainkit_robots.rl.config import Control, Env, Normalization, Policy, Run
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 from terrainkit_robots.spec.robot import Robot
 
@@ -31,16 +30,6 @@ SMALL = Task(
     normalization=Normalization(clip_actions=0.3),  # small enough to clip
     runner=Runner(num_steps_per_env=4, save_interval=1),
 )
-
-
-@pytest.fixture(scope="session")
-def quadruped() -> Robot:
-    return Robot.load(get_task("quadruped").folder)
-
-
-@pytest.fixture(scope="session")
-def biped() -> Robot:
-    return Robot.load(get_task("biped").folder)
 
 
 @pytest.fixture(scope="session")

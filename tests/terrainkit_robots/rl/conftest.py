@@ -24,7 +24,6 @@ from terrainkit_robots.rl.config import (
     Task,
 )
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -78,16 +77,6 @@ CART = """
 </mujoco>
 """
 """A robot whose own defaults, motors and sensors training must ignore."""
-
-
-@pytest.fixture(scope="session")
-def quadruped() -> Robot:
-    return Robot.load(get_task("quadruped").folder)
-
-
-@pytest.fixture(scope="session")
-def biped() -> Robot:
-    return Robot.load(get_task("biped").folder)
 
 
 @pytest.fixture(scope="session")
