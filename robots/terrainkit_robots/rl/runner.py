@@ -160,7 +160,9 @@ class LeggedRunner(OnPolicyRunner):
         self.current_learning_iteration += 1  # rsl-rl's first iteration has the number 0
         # TensorBoard's thread prints an OSError, which the next log call raises again.
         hook = threading.excepthook
-        threading.excepthook = lambda args: None if args.exc_type is OSError else hook(args)
+        threading.excepthook = lambda args: (
+            None if issubclass(args.exc_type, OSError) else hook(args)
+        )
         try:
             with redirect_stdout(None) if self.is_distributed else nullcontext(), suppress(_Stop):
                 super().learn(num_learning_iterations, init_at_random_ep_len)

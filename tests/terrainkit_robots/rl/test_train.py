@@ -342,6 +342,18 @@ def test_full_disk_for_logs_is_one_error(task, tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+def test_removed_folder_is_one_error(task, tmp_path, capfd):
+    run = tmp_path / "run"
+
+    def remove(progress: TrainingProgress) -> None:
+        if progress.iteration == 1:
+            shutil.rmtree(run)
+
+    with pytest.raises(ExportError, match=r"cannot write .*: No such file or directory"):
+        train("quadruped", "plane", task, folder=run, progress_callback=remove)
+    assert capfd.readouterr() == ("", "")
+
+
 def test_divergence_names_the_last_checkpoint(task, tmp_path):
     algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
     diverging = replace(task, algorithm=algorithm)
