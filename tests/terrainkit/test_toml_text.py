@@ -40,11 +40,11 @@ def test_parse_toml_returns_a_table():
     ],
 )
 def test_parse_toml_rejects_hostile_text_quickly(text, message):
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(ConfigError) as caught:
         parse_toml(text)
     assert str(caught.value).startswith(message)
-    assert time.perf_counter() - start < 1
+    assert time.process_time() - start < 1
 
 
 def test_parse_toml_accepts_usual_dots():

@@ -196,8 +196,9 @@ def run(*files: Path) -> tuple[int, str, str]:
     """Return exit code and output of check-robot; fails if it takes more than it may."""
     # Not what getrusage says: on Linux a process inherits the peak of the one that started it.
     watch = (
-        "import re, sys\n"
+        "import re, resource, sys\n"
         "from pathlib import Path\n"
+        f"resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))\n"
         "from terrainkit_cli.main import main\n"
         "code = main(sys.argv[1:])\n"
         "peak = re.search(r'VmHWM:\\s*(\\d+) kB', Path('/proc/self/status').read_text())\n"
@@ -210,7 +211,7 @@ def run(*files: Path) -> tuple[int, str, str]:
         capture_output=True,
         text=True,
         errors="replace",
-        timeout=SECONDS,
+        timeout=30 * SECONDS,  # beside other work; the limit of CPU time ends it first
         env=os.environ | {"PYTHONPATH": paths},
         cwd=files[0].parent,
         check=False,
