@@ -19,7 +19,7 @@ URDF = (bundled.urdf_path("quadruped") or Path()).read_text()
 MJCF = (bundled.urdf_path("quadruped") or Path()).with_suffix(".xml").read_text()
 
 SECONDS, BYTES = 10, 2 * 2**30
-"""What checking any file may take."""
+"""CPU time and memory that checking any file may take."""
 
 NASTY = [
     "nan", "inf", "-inf", "1e308", "-1e308", "1e-320", "0", "-1", "1e29", "", " ", "x", "1 2",
@@ -211,7 +211,7 @@ def run(*files: Path) -> tuple[int, str, str]:
         capture_output=True,
         text=True,
         errors="replace",
-        timeout=30 * SECONDS,  # beside other work; the limit of CPU time ends it first
+        timeout=6 * SECONDS,  # for a process that waits; the limit of CPU time ends a busy one
         env=os.environ | {"PYTHONPATH": paths},
         cwd=files[0].parent,
         check=False,

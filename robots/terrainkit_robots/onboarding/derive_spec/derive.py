@@ -34,7 +34,7 @@ _DEFAULT_RESET_RANGE = (0.5, 1.5)
 
 _MAX_BIPED_RESET_OFFSET = 0.25
 """Largest offset from the default pose at a reset on two legs [rad]: an action of 1 corrects it.
-Isaac Lab resets its bipeds without any. Four legs stand with more."""
+Isaac Lab resets its bipeds at the default pose. Quadrupeds also stand with larger offsets."""
 
 
 def derive_spec(
