@@ -1,5 +1,6 @@
 """Docstrings of the fields of a dataclass."""
 
+import inspect
 from functools import cache
 from typing import Any
 
@@ -12,6 +13,6 @@ def field_docs(cls: type[Any]) -> dict[str, str]:
     return {
         param.arg_name: " ".join((param.description or "").split())
         for owner in reversed(cls.__mro__)  # a subclass inherits the docs of its parents
-        if "__dataclass_fields__" in vars(owner)
+        if "__dataclass_fields__" in vars(owner) and inspect.get_annotations(owner)
         for param in docstring_parser.parse_from_object(owner).params
     }

@@ -228,8 +228,9 @@ class Rewards(Config):
     tracking_sigma: PositiveFloat = 0.06
     """Width of the tracking rewards, exp(-error^2 / sigma), at zero command [m2/s2]; otherwise it
     is proportional to the squared command."""
-    swing_height: PositiveFloat = 0.18
-    """Height of a swinging foot above the ground, as a fraction of the leg length."""
+    swing_height: PositiveFloat | None = None
+    """Height of a swinging foot above the ground, as a fraction of the leg length; none: 0.18, on
+    four legs at most 9 cm."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,12 @@ MIN_YAW_RATE = 0.1
 STANDING_TRACKING = 0.25
 """Share of the tracking rewards that a robot earns by standing, whatever the command."""
 
+SWING_HEIGHT = 0.18
+"""Default height of a swinging foot, as a fraction of the leg length."""
+
+MAX_SWING_HEIGHT = 0.09
+"""Largest default height of a swinging foot on four legs [m]: flat ground needs no more."""
+
 LEVEL_SIN2 = 0.01
 """Squared sine of the tilt at which `upright` is exp(-1)."""
 
@@ -182,8 +188,10 @@ def feet_gait(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def foot_swing_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize feet off the arc that they should swing in, mean square, relative to its height."""
-    arc = np.sin(np.pi * state.swing_phase)
-    height = state.foot_height / np.float32(cfg.swing_height * robot.leg_length)
+    target = (cfg.swing_height or SWING_HEIGHT) * robot.leg_length
+    if cfg.swing_height is None and state.foot_height.shape[1] == 4:
+        target = min(target, MAX_SWING_HEIGHT)
+    arc, height = np.sin(np.pi * state.swing_phase), state.foot_height / np.float32(target)
     return (np.square(np.clip(height, 0, 2) - arc) * (state.swing_phase > 0)).mean(axis=1)
 
 

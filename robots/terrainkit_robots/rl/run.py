@@ -61,12 +61,15 @@ class PolicySpec:
     terrain: str = "plane"  # of the training, as `load_terrain` takes it: `plane` or a path
     policy: Callable[[Any], Any] | None = None
     """A function from observations, a tensor of shape (n, k), to actions, a tensor or array of
-    shape (n, j). It replaces the checkpoint of a run."""
+    shape (n, j). It replaces the checkpoint."""
+    checkpoint: Path | None = None  # of a run, by default the last; None if there is none
 
     @property
     def policy_name(self) -> str:
-        """The name of the policy, in results."""
-        return getattr(self.policy, "__name__", type(self.policy).__name__)
+        """The name of the policy or of the checkpoint, in results."""
+        if self.policy is not None:
+            return getattr(self.policy, "__name__", type(self.policy).__name__)
+        return self.checkpoint.name if self.checkpoint else ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,14 +78,6 @@ class Run(PolicySpec):
 
     folder: Path  # folder of the run
     info: RunInfo  # what it was made from
-    checkpoint: Path | None  # the selected checkpoint, by default the last; None if there is none
-
-    @property
-    def policy_name(self) -> str:
-        """The name of the checkpoint, or of the policy that replaces it."""
-        if self.policy is not None:
-            return super().policy_name
-        return self.checkpoint.name if self.checkpoint is not None else ""
 
 
 def checkpoints(folder: Path) -> dict[int, Path]:

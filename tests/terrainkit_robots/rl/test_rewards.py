@@ -194,6 +194,21 @@ _BOUNDED = {"tracking_lin_vel", "tracking_ang_vel", "progress", "feet_gait", "up
 _PENALTIES = sorted({*REWARDS} - _BOUNDED)
 
 
+@pytest.mark.parametrize(
+    ("num_feet", "leg_length", "height"), [(4, 0.4, 0.072), (4, 0.6, 0.09), (2, 0.6, 0.108)]
+)
+def test_default_swing_height_is_limited_on_four_legs(
+    robot: Robot, num_feet: int, leg_length: float, height: float
+) -> None:
+    robot = replace(robot, spec=replace(robot.spec, leg_length=leg_length))
+    sizes = shapes(joints=2, feet=num_feet, penalized=3, points=0)
+    phase, heights = [[0.5] * num_feet], [[height] * num_feet]
+    given = made_state(sizes, 1, swing_phase=phase, foot_height=heights)
+    assert paid("foot_swing_height", robot, given) == pytest.approx([0], abs=1e-6)
+    scaled = paid("foot_swing_height", robot, given, swing_height=2 * height / leg_length)
+    assert scaled == pytest.approx([0.25])
+
+
 @pytest.mark.parametrize("name", sorted(REWARDS))
 class TestEveryReward:
     def test_values_are_finite(self, name: str, robot: Robot) -> None:
