@@ -82,7 +82,7 @@ def open_checkpoint(
 
     Args:
         path: The checkpoint.
-        joints: Joints of the robot, in the order of the actions.
+        joints: Joints of the robot, in the order of its spec.
         observed: Number of observations in each group that is used.
 
     Raises:

@@ -2,8 +2,9 @@
 
 import os
 import re
+import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.simulation.standing import StandResult
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _PROJECT = Path(__file__).resolve().parents[2]
@@ -49,6 +50,16 @@ def quadruped() -> Robot:
 @pytest.fixture(scope="session")
 def biped() -> Robot:
     return Robot.load(bundled_robots.urdf_path("biped").parent)
+
+
+@pytest.fixture(scope="session")
+def held_calves(quadruped: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a quadruped whose calf joints have no action."""
+    folder = tmp_path_factory.mktemp("held") / "held_calves"
+    shutil.copytree(quadruped.folder, folder, ignore=shutil.ignore_patterns("trained", "tasks"))
+    scale = {".*_(hip|thigh)_joint": 0.25, ".*_calf_joint": 0.0}
+    (folder / SPEC_FILE).write_text(replace(quadruped.spec, action_scale=scale).to_toml())
+    return folder
 
 
 @pytest.fixture(scope="session")

@@ -39,6 +39,7 @@ qpos_index = [model.joint(name).qposadr[0] for name in joints["name"]]
 qvel_index = [model.joint(name).dofadr[0] for name in joints["name"]]
 data.qpos[:7] = 0, 0, config["robot"]["spawn_height"], 1, 0, 0, 0
 data.qpos[qpos_index] = joints["default_position"]
+controlled = [config["joints"]["name"].index(name) for name in config["action"]["joints"]]
 
 
 def observe(command: Any, action: Any, rotation: Any, previous: Any = None) -> Any:
@@ -71,13 +72,14 @@ if args.viewer:
     import mujoco.viewer
 
     viewer = mujoco.viewer.launch_passive(model, data)
-command, action = np.array([args.vx, args.vy, args.yaw]), np.zeros(len(qpos_index))
+command, action = np.array([args.vx, args.vy, args.yaw]), np.zeros(len(controlled))
 rotation, velocity, obs = np.eye(3), np.zeros(3), None
 steps = max(1, round(args.seconds / timing["policy_dt"]))
 for _ in range(steps):
     obs = observe(command, action, rotation, obs)
     action = policy.run(None, {"obs": obs[None]})[0][0]
-    target = joints["action_offset"] + joints["action_scale"] * action
+    target = joints["action_offset"].copy()
+    target[controlled] += joints["action_scale"][controlled] * action
     for _ in range(timing["decimation"]):
         torque = joints["gain"] * target - joints["stiffness"] * data.qpos[qpos_index]
         torque -= joints["damping"] * data.qvel[qvel_index]

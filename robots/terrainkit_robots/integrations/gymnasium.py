@@ -113,7 +113,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
     def step(
         self, actions: FloatArray
     ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
-        """Apply actions of shape (n, j) for one control step."""
+        """Apply actions of shape (n, a) for one control step."""
         observations, rewards, dones, truncated = self.env.step_arrays(actions)
         infos = {"final_obs": self.env.final, "_final_obs": dones} if dones.any() else {}
         return observations, rewards, dones & ~truncated, truncated, infos

@@ -43,7 +43,8 @@ _FORMULAS = {
     "velocity, and a yaw rate below min_yaw_rate",
     "history": "first numbers of the previous obs; in the first step, copies of those before it",
     "foot_contact": "1 if the vertical contact force on the foot is above contact_force, else 0",
-    "action": "target = action_offset + action_scale * action",
+    "action": "target = action_offset + action_scale * action for the joints of action.joints, "
+    "action_offset for the others",
     "torque": "clip(gain * target - stiffness * position - damping * velocity, -effort, effort), "
     "every physics_dt; a new action every policy_dt",
 }
@@ -145,8 +146,7 @@ def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
 def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     """Return what a controller needs to run a policy: timing, observations, actions and gains.
 
-    Units are SI and radians. Arrays over joints are in the order of the actions. Gains are those of
-    the scene without randomization.
+    Units are SI and radians. Gains are those of the scene without randomization.
     """
     from terrainkit import __version__
 
@@ -198,7 +198,11 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "clip": task.normalization.clip_observations,
             "history_length": task.observations.history_length,
         },
-        "action": {"size": env.num_actions, "clip": task.normalization.clip_actions},
+        "action": {
+            "size": env.num_actions,
+            "clip": task.normalization.clip_actions,
+            "joints": [robot.spec.joint_order[k] for k in env.action_joints],
+        },
         "control_type": task.control.control_type,
         "joints": {
             "name": list(robot.spec.joint_order),

@@ -45,7 +45,7 @@ class _Description(msgspec.Struct):
 
 
 class OnnxPolicy:
-    """A policy without memory in an ONNX file, from observations (n, k) to actions (n, j)."""
+    """A policy without memory in an ONNX file, from observations (n, k) to actions (n, a)."""
 
     def __init__(self, path: Path) -> None:
         """Load the file and run it once; raise ConfigError if it is not such a policy."""
@@ -63,11 +63,11 @@ class OnnxPolicy:
             self.num_actions: int = self(torch.zeros(2, self.num_obs)).reshape(2, -1).shape[1]
         except Exception as error:
             got = f"{path} is not a policy: got the inputs {listing(map(str, inputs))}"
-            expected = "expected one of shape (n, k) or (1, k), and actions of shape (n, j)"
+            expected = "expected one of shape (n, k) or (1, k), and actions of shape (n, a)"
             raise ConfigError(f"{got}; {expected}: {_one_line(error)}") from error
 
     def __call__(self, obs: torch.Tensor) -> FloatArray:
-        """Return actions (n, j) for observations (n, k)."""
+        """Return actions (n, a) for observations (n, k)."""
         rows = obs.numpy(force=True)
         parts = np.split(rows, len(rows)) if self._is_single else [rows]
         return np.concatenate([self.session.run(None, {self._input: part})[0] for part in parts])

@@ -36,7 +36,7 @@ class LeggedEnv(VecEnv):
     def __init__(self, task: Task, robot: Robot, terrain: Terrain, device: str = "cpu") -> None:
         """Build the simulations and reset every environment."""
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
-        self.num_envs, self.num_actions = n, joints = task.env.num_envs, len(robot.default_pose)
+        self.num_envs = n = task.env.num_envs
         self.max_episode_length = task.max_episode_length
         self.scene = build_scene(robot, terrain, task)
         scan = observations.uses_height_scan(task, is_flat=terrain.is_flat)
@@ -69,18 +69,23 @@ class LeggedEnv(VecEnv):
         self.episode_length_buf = torch.zeros(n, dtype=torch.int64)  # rsl-rl may replace it
         self.steps_since_reset = np.zeros(n, np.int64)
         self.path_length = np.zeros(n)  # since the last reset [m]
-        self.actions = np.zeros((2, n, joints), np.float32)  # of the last two steps
-        self.joint_offset = np.zeros((n, joints), np.float32)
-        self.obs_history = np.zeros((n, observations.history_width(robot, task)), np.float32)
         self.rewards = active_rewards(task.rewards, weight / 9.81, robot.leg_length)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
         self.commands = self.velocity_command.commands  # a view of the current commands
 
-        # A motor receives offset + scale * action.
+        # A motor receives offset + scale * action; without a scale, there is no action.
         kind, scale = task.control.control_type, task.control.action_scale
         default = {"P": robot.action_scale, "V": robot.velocity, "T": robot.effort}[kind]
         scales = default if scale is None else np.where(default == 0, 0, scale)
         self.action_scale = scales.astype(np.float32)
+        self.action_joints = np.flatnonzero(self.action_scale)  # indices in the robot's order
+        self.num_actions = len(self.action_joints)
+        if not self.num_actions:
+            raise ConfigError(f"action_scale of {robot.spec.name}: got 0 for every joint")
+        self.actions = np.zeros((2, n, self.num_actions), np.float32)  # of the last two steps
+        self.joint_offset = np.zeros((n, len(robot.default_pose)), np.float32)
+        width = observations.history_width(robot, task, self.num_actions)
+        self.obs_history = np.zeros((n, width), np.float32)
         self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
         self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
         self.reset()
@@ -107,7 +112,7 @@ class LeggedEnv(VecEnv):
     def step(
         self, actions: torch.Tensor
     ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
-        """Apply actions of shape (n, j) for one control step.
+        """Apply actions of shape (n, a), one for each of `action_joints`, for one control step.
 
         Returns:
             Observations, rewards (n,), dones (n,), and extras with `time_outs` and `log`.
@@ -161,8 +166,9 @@ class LeggedEnv(VecEnv):
         self._update_commands()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
-        """Return the actuator controls for actions of shape (n, j)."""
-        target = self.action_offset + self.action_scale * actions
+        """Return the actuator controls (n, j) for actions of shape (n, a)."""
+        target = np.tile(self.action_offset, (len(actions), 1))
+        target[:, self.action_joints] += self.action_scale[self.action_joints] * actions
         return target - self.joint_offset * self.is_position_controlled
 
     def _apply_actions(self, actions: torch.Tensor) -> None:
@@ -305,7 +311,7 @@ class LeggedEnv(VecEnv):
         self.path_length[env_ids] = self.actions[:, env_ids] = 0
         self.pushes.reset(self.rng, env_ids)
         self.sensors.reset(env_ids)
-        limit, shape = self.cfg.domain_rand.joint_offset, (len(env_ids), self.num_actions)
+        limit, shape = self.cfg.domain_rand.joint_offset, (len(env_ids), self.joint_offset.shape[1])
         self.joint_offset[env_ids] = self.rng.uniform(-limit, limit, shape)
         if limits := self.cfg.domain_rand.action_delay:
             delay = self.rng.uniform(*limits, len(env_ids))

@@ -20,7 +20,17 @@ HEIGHT_SCAN_OFFSET = 0.5
 
 
 Symmetry = Literal[
-    "scalar", "vector", "axial", "command", "joints", "feet", "contacts", "scan", "phase", "history"
+    "scalar",
+    "vector",
+    "axial",
+    "command",
+    "joints",
+    "actions",
+    "feet",
+    "contacts",
+    "scan",
+    "phase",
+    "history",
 ]
 
 
@@ -67,7 +77,7 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
         term("base_ang_vel", lambda s: s.base_ang_vel, "axial", scales.ang_vel, noise["ang_vel"]),
         term("dof_pos", dof_pos, "joints", dof_pos_scale, noise["dof_pos"]),
         term("dof_vel", lambda s: s.dof_vel, "joints", scales.dof_vel, noise["dof_vel"]),
-        term("actions", lambda s: s.actions, "joints"),
+        term("actions", lambda s: s.actions, "actions"),
     )
     if task.commands.gait_period != 0:
         group += (term("gait_phase", lambda s: s.gait_phase, "phase"),)
@@ -83,9 +93,9 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
     return (*group, scan_term) if scan else group
 
 
-def history_width(robot: Robot, task: Task) -> int:
+def history_width(robot: Robot, task: Task, num_actions: int) -> int:
     """Return the size of the history: the previous observations, without the height scan."""
-    cfg, width = task.observations, 9 + 3 * len(robot.default_pose)
+    cfg, width = task.observations, 9 + 2 * len(robot.default_pose) + num_actions
     width += 2 * (task.commands.gait_period != 0) + 3 * observes_lin_vel(robot, task)
     return (cfg.history_length - 1) * (width + len(robot.spec.feet) * cfg.foot_contact)
 

@@ -61,7 +61,7 @@ class PolicySpec:
     terrain: str = "plane"  # of the training, as `load_terrain` takes it: `plane` or a path
     policy: Callable[[Any], Any] | None = None
     """A function from observations, a tensor of shape (n, k), to actions, a tensor or array of
-    shape (n, j). It replaces the checkpoint."""
+    shape (n, a). It replaces the checkpoint."""
     checkpoint: Path | None = None  # of a run, by default the last; None if there is none
 
     @property

@@ -23,7 +23,7 @@ CONTACT_FORCE = 1.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
-    """The state of n robots: j joints, f feet, p penalized bodies, k scan points.
+    """The state of n robots: j joints, a actions, f feet, p penalized bodies, k scan points.
 
     The arrays are copies; later steps do not change them.
     """
@@ -45,8 +45,8 @@ class State:
     penalized_force: FloatArray  # magnitude of the force on each penalized body [N], shape (n, p)
     height_scan: FloatArray  # height of the base above each scan point [m], shape (n, k)
     fallen: NDArray[np.bool_]  # robots whose episode ends with a fall, shape (n,)
-    actions: FloatArray  # actions of this step, shape (n, j)
-    last_actions: FloatArray  # actions of the previous step, shape (n, j)
+    actions: FloatArray  # actions of this step, shape (n, a)
+    last_actions: FloatArray  # actions of the previous step, shape (n, a)
     commands: FloatArray  # forward and left velocity [m/s], yaw rate [rad/s], shape (n, 3)
     gait_phase: FloatArray  # sine and cosine, shape (n, 2); 0 when commanded to stand
     swing_phase: FloatArray  # completed fraction of each foot's swing, shape (n, f); 0 in stance

@@ -40,9 +40,10 @@ class SignedPermutation:
 
 
 class MirrorMaps(NamedTuple):
-    """The mirror map of each observation group, and that of the actions."""
+    """The mirror map of each observation group, of the joints, and of the actions."""
 
     groups: dict[str, SignedPermutation]
+    joints: SignedPermutation
     actions: SignedPermutation
 
 
@@ -52,15 +53,18 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
     """
-    names, images = env.robot.spec.joint_order, env.robot.spec.mirror_joints()
-    joints = _map([names.index(each.joint) for each in images], [each.sign for each in images])
+    names, pairs = env.robot.spec.joint_order, env.robot.spec.mirror_joints()
+    joints = _map([names.index(each.joint) for each in pairs], [each.sign for each in pairs])
     _check_control(env, joints)
+    controlled = env.action_joints
+    images = np.searchsorted(controlled, joints.index[controlled])
     maps = {
         "vector": _map(range(3), [1, -1, 1]),
         "axial": _map(range(3), [-1, 1, -1]),
         "command": _map(range(3), [1, -1, -1]),
         "phase": _map(range(2), [-1, -1]),  # left and right are half a period apart
         "joints": joints,
+        "actions": _map(images, joints.sign[controlled]),
         **_foot_maps(env),
     }
     groups = {}
@@ -80,7 +84,7 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
                 raise ConfigError(f"observation {term.name}: got {width} numbers; {expected}")
             index, sign = np.append(index, part.index + start), np.append(sign, part.sign)
         groups[name] = SignedPermutation(index, sign)
-    return MirrorMaps(groups, joints)
+    return MirrorMaps(groups, joints, maps["actions"])
 
 
 def has_symmetry(env: "LeggedEnv") -> bool:

@@ -1,4 +1,4 @@
-"""A robot to train: its spec as arrays in the order of its actions."""
+"""A robot to train: its spec as arrays."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ SPEC_FILE = "robot.toml"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Robot:
-    """A robot as arrays, with j joints in the order of its actions."""
+    """A robot as arrays, with j joints in the order of its spec."""
 
     spec: RobotSpec
     """Its spec."""
@@ -29,7 +29,8 @@ class Robot:
     wheels: NDArray[np.bool_]
     """Joints with damping but no stiffness, shape (j,)."""
     action_scale: FloatArray
-    """Change of each joint's position target [rad] for an action of 1, shape (j,)."""
+    """Change of each joint's position target [rad] for an action of 1, shape (j,); a joint
+    with 0 has no action."""
     effort: FloatArray
     """Torque limits [N m], shape (j,)."""
     velocity: FloatArray

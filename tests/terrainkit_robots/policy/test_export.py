@@ -17,10 +17,11 @@ from terrainkit_robots.policy import export as module
 from terrainkit_robots.policy.evaluate import eval_task, rollout
 from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
 from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.onnx_policy import open_onnx
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Control, DomainRand, Env, Noise, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
@@ -87,7 +88,8 @@ def test_json_describes_the_policy(exported):
     assert config["robot"]["name"] == "quadruped"
     assert config["iteration"] == 2
     assert config["timing"] == {"physics_dt": 0.005, "decimation": 4, "policy_dt": 0.02}
-    assert config["action"] == {"size": 12, "clip": 0.3}
+    joints = config["joints"]["name"]
+    assert config["action"] == {"size": 12, "clip": 0.3, "joints": joints}
     parts = config["observation"]["parts"]
     names = "commands projected_gravity base_ang_vel dof_pos dof_vel actions gait_phase"
     assert [part["name"] for part in parts] == names.split()
@@ -231,6 +233,24 @@ def test_example_walks_with_bundled_policies(name, tmp_path, monkeypatch, capsys
     first, second = capsys.readouterr().out.splitlines()
     assert first == f"distance: {distance:.2f} m in 3.00 s"
     assert float(second.split()[2]) == pytest.approx(distance / 3, abs=0.05)
+
+
+def test_joints_without_action(held_calves, tmp_path, monkeypatch):
+    run = create_run(tmp_path / "run", SMALL, held_calves, "plane")
+    env = LeggedEnv(eval_task(run.task, 1), run.robot, Plane())
+    LeggedRunner(LeggedEnv(run.task, run.robot, Plane()), run.folder).learn(1)
+    folder = tmp_path / "exported"
+    result = export_policy(open_run(run.folder), folder, example=True)
+    assert (result.num_observations, result.num_actions) == (43, 8)
+    names = run_example(folder, monkeypatch, "--seconds", "0.02")
+    action = names["config"]["action"]
+    assert action["joints"] == [k for k in run.robot.spec.joint_order if "calf" not in k]
+    # The same observation and targets as in the environment.
+    obs = names["observe"](np.zeros(3), np.zeros(8), np.eye(3))
+    assert obs.shape == (43,)
+    expected = env.to_ctrl(names["action"][None])[0]
+    np.testing.assert_allclose(names["target"], expected, atol=1e-6)
+    assert open_onnx(folder / "policy.onnx", held_calves).policy.num_actions == 8
 
 
 def test_example_computes_the_observations(exported, trained, monkeypatch):

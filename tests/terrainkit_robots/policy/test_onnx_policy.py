@@ -104,11 +104,14 @@ def test_metadata_is_used_without_a_json_file(mine):
 
 
 def test_json_replaces_gains_and_joint_order(mine):
-    document = json.loads(mine.with_name("policy.json").read_text())["joints"]
+    policy = json.loads(mine.with_name("policy.json").read_text())
+    document = policy["joints"]
     order = np.roll(np.arange(12), 3)
     joints = {key: [value[k] for k in order] for key, value in document.items()}
     joints |= {"stiffness": [31.0] * 12, "gain": [31.0] * 12}
-    change_json(mine, joints=joints, observation=None)  # its offsets have the old order
+    action = policy["action"] | {"joints": joints["name"]}
+    # The offsets of the observation have the old order.
+    change_json(mine, joints=joints, action=action, observation=None)
     spec = open_onnx(mine, "quadruped").robot.spec
     assert list(spec.joint_order) == joints["name"]
     assert spec.per_joint("stiffness") == dict.fromkeys(joints["name"], 31.0)

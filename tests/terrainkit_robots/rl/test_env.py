@@ -21,6 +21,7 @@ from terrainkit_robots.rl.config import (
 )
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.spec.robot import Robot
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
 
@@ -722,6 +723,36 @@ class TestTorqueControl:
 
     def test_torques_are_clipped_at_effort(self, torques):
         np.testing.assert_allclose(torques((-9, 9, 9), control_type="T"), [-3, 5, 6])
+
+
+class TestJointsWithoutAction:
+    @pytest.mark.parametrize("control", [Control(), Control(action_scale=0.5)])
+    def test_joints_with_a_scale_of_zero_hold_the_default_pose(
+        self, held_calves, nominal_task, control
+    ):
+        robot = Robot.load(held_calves)
+        env = LeggedEnv(nominal_task(2, control=control), robot, Plane())
+        calves = np.array([name.endswith("calf_joint") for name in robot.spec.joint_order])
+        np.testing.assert_array_equal(env.action_joints, np.flatnonzero(~calves))
+        actions = np.arange(-8, 8, dtype=np.float32).reshape(2, 8) / 10
+        moved = env.to_ctrl(actions) - robot.default_pose
+        np.testing.assert_array_equal(moved[:, calves], 0)
+        np.testing.assert_allclose(
+            moved[:, ~calves], actions * (control.action_scale or 0.25), atol=1e-6
+        )
+        observations = env.step(torch.from_numpy(actions))[0]["policy"]
+        assert observations.shape == (2, 47 - 4)
+        np.testing.assert_array_equal(env.state.actions, actions)
+
+    def test_other_numbers_of_actions_are_rejected(self, held_calves, nominal_task):
+        env = LeggedEnv(nominal_task(2), Robot.load(held_calves), Plane())
+        with pytest.raises(ConfigError, match=r"got \(2, 12\); expected \(2, 8\)"):
+            env.step(torch.zeros(2, 12))
+
+    def test_a_robot_without_actions_is_rejected(self, quadruped, nominal_task):
+        robot = replace(quadruped, action_scale=np.zeros(12, np.float32))
+        with pytest.raises(ConfigError, match="action_scale of quadruped: got 0 for every joint"):
+            LeggedEnv(nominal_task(2), robot, Plane())
 
 
 def test_zero_action_is_the_default_pose(quadruped, nominal_task):

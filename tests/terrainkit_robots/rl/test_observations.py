@@ -232,7 +232,8 @@ class TestGroups:
         legged = Robot.load(get_task(name).folder)
         names = [each.name for each in policy_group(legged, task, scan=False)]
         assert ("base_lin_vel" in names) == observed
-        assert history_width(legged, task) == 11 + 3 * len(legged.default_pose) + 3 * observed
+        assert history_width(legged, task, 12) == 11 + 3 * 12 + 3 * observed
+        assert history_width(legged, task, 8) == 11 + 2 * 12 + 8 + 3 * observed
 
     @pytest.mark.parametrize("gait_period", [0, None])
     @pytest.mark.parametrize("more", [False, True])
@@ -244,8 +245,8 @@ class TestGroups:
         before = [t for t in group_of(robot, task) if t.name not in ("history", "height_scan")]
         width = sum(term.function(state()).shape[1] for term in before)
         assert width == 45 + 2 * (gait_period is None) + 7 * more
-        assert history_width(robot, task) == 3 * width
-        assert history_width(robot, Task()) == 0
+        assert history_width(robot, task, 12) == 3 * width
+        assert history_width(robot, Task(), 12) == 0
 
     def test_scales_are_the_tasks(self, robot: Robot) -> None:
         scales = ObsScales(lin_vel=3, ang_vel=5, dof_pos=7, dof_vel=11, height_measurements=13)

@@ -48,6 +48,10 @@ def make_env(
 
 
 def robot_named(name: str) -> Robot:
+    if name == "held_calves":  # joints without an action
+        scale = {".*_(hip|thigh)_joint": 0.25, ".*_calf_joint": 0.0}
+        robot = robot_named("quadruped")
+        return Robot.from_spec(replace(robot.spec, action_scale=scale), robot.folder)
     return Robot.load(Path(str(bundled.urdf_path(name))).parent)
 
 
@@ -61,7 +65,7 @@ def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> 
     quat = np.array([1.0, 0, 0, 0]) + rng.uniform(-0.1, 0.1, (_PAIRS, 4))
     quat[:, 3] += rng.uniform(-2, 2, _PAIRS) * turn
     p.qpos[a, 3:7] = quat / np.linalg.norm(quat, axis=1, keepdims=True)
-    bent = env.robot.default_pose + rng.uniform(-0.1, 0.1, (_PAIRS, env.num_actions))
+    bent = env.robot.default_pose + rng.uniform(-0.1, 0.1, (_PAIRS, len(env.robot.default_pose)))
     p.qpos[a, scene.joint_qpos] = bent
     p.qvel[a] = rng.uniform(-0.5, 0.5, (_PAIRS, scene.model.nv))
     # The mirror image: y is negated, and so are rotations about x and z.
@@ -73,8 +77,8 @@ def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> 
     p.qvel[b, 1] *= -1
     p.qvel[b, 3] *= -1
     p.qvel[b, 5] *= -1
-    p.qpos[b, scene.joint_qpos] = mirror.actions(p.qpos[a, scene.joint_qpos])
-    p.qvel[b, scene.joint_qvel] = mirror.actions(p.qvel[a, scene.joint_qvel])
+    p.qpos[b, scene.joint_qpos] = mirror.joints(p.qpos[a, scene.joint_qpos])
+    p.qvel[b, scene.joint_qvel] = mirror.joints(p.qvel[a, scene.joint_qvel])
 
 
 def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
@@ -90,7 +94,7 @@ def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
     env.actions[:, b] = [mirror.actions(each) for each in env.actions[:, a]]
     env.pushes.velocity[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
     env.pushes.velocity[b] = env.pushes.velocity[a] * np.array([1, -1, 1])
-    env.joint_offset[b] = mirror.actions(env.joint_offset[a])
+    env.joint_offset[b] = mirror.joints(env.joint_offset[a])
     env.sensors.mean_vel[b] = env.sensors.mean_vel[a] * np.array([1, -1, -1])
     env.steps_since_reset[a], env.steps_since_reset[b] = 3, 13  # half a period later
     d = env.params
@@ -98,7 +102,7 @@ def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
         same[b] = same[a]
     d.com_shift[b] = d.com_shift[a] * np.array([1, -1, 1])
     for each in (d.stiffness, d.damping):
-        each[b] = each[a][:, mirror.actions.index]  # a factor has no direction
+        each[b] = each[a][:, mirror.joints.index]  # a factor has no direction
     apply_params(env.sim, env.params)
 
 
@@ -116,12 +120,12 @@ def assert_images(env: LeggedEnv, mirror: MirrorMaps, tolerance: float) -> None:
         assert width == values.shape[1]
 
 
-@pytest.mark.parametrize("name", ["quadruped", "biped"])
+@pytest.mark.parametrize("name", ["quadruped", "biped", "held_calves"])
 class TestRobot:
     def test_maps_are_involutions(self, name: str) -> None:
         env = make_env(name, Valley())
         mirror = mirror_maps(env)
-        for image in (*mirror.groups.values(), mirror.actions):
+        for image in (*mirror.groups.values(), mirror.joints, mirror.actions):
             values = np.random.default_rng(1).normal(size=(3, len(image.index))).astype(np.float32)
             np.testing.assert_array_equal(image(image(values)), values)
             assert not np.array_equal(image(values), values)
