@@ -150,7 +150,7 @@ class RobotSpec(Config):
 
     action_scale: Mapping[Name, Scale]
     """Change of a joint's position target for an action of 1; of its velocity target if it has no
-    stiffness, such as a wheel. A joint with 0 has no action: it holds its default position."""
+    stiffness, such as a wheel."""
 
     soft_limits: Mapping[Name, Annotated[tuple[Position, Position], SORTED]]
     """Lower and upper position that rewards keep each joint with limits within."""
