@@ -26,8 +26,8 @@ timing, joints = config["timing"], {k: np.array(v) for k, v in config["joints"].
 
 # The robot on a plane, with the joints and the friction of the training.
 spec = mujoco.MjSpec.from_file(str(folder / config["files"]["mjcf"]))
-for actuator in list(spec.actuators):
-    spec.delete(actuator)  # the gains of policy.json replace them
+for element in (*spec.actuators, *spec.keys):  # policy.json has the gains and the default pose
+    spec.delete(element)
 for k, joint in enumerate(map(spec.joint, joints["name"])):
     joint.armature, joint.frictionloss = joints["armature"][k], joints["frictionloss"][k]
 plane = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], priority=2)

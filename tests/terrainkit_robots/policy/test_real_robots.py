@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import torch
@@ -34,6 +37,11 @@ def test_real_robot_is_onboarded_trained_exported(
     assert all(not torch.equal(a, b) for a, b in zip(before, after, strict=True))
     assert all(torch.isfinite(weight).all() for weight in after)
     assert np.isfinite(env.sim.qpos).all()
-    result = export_policy(open_run(run.folder), tmp_path / "policy")
+    result = export_policy(open_run(run.folder), tmp_path / "policy", example=True)
     assert result.num_observations == width
     assert max(result.errors) <= 1e-5
+    # The program for plain MuJoCo runs the robot of onboard, which has a keyframe and actuators.
+    program = [sys.executable, tmp_path / "policy" / "run_policy.py", "--seconds", "0.1"]
+    ended = subprocess.run(program, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    assert "m in 0.10 s" in ended.stdout
