@@ -25,7 +25,7 @@ _SETTINGS: dict[str, dict[str, dict[str, object]]] = {
     "default": {},
     "legged_gym": {
         "env": {"num_envs": 512},
-        "algorithm": {"symmetry": "none", "desired_kl": 0.01, "entropy_coef": 0.01},
+        "algorithm": {"symmetry": False, "desired_kl": 0.01, "entropy_coef": 0.01},
         "policy": {"activation": "elu", "init_noise_std": 1.0},
     },
 }

@@ -82,7 +82,7 @@ def test_task_command_has_option_for_each_value():
         "quadruped --rewards.tracking-lin-vel 1.25 --commands.lin-vel-x -1 2 --terrain rough.npz "
         "--terrain.collision plane --rewards.dof-acc -1e-8 --domain-rand.friction none "
         "--domain-rand.added-mass 0 3 --terrain.measure_heights true --quick "
-        "--policy.actor-hidden-dims 64 32 --algorithm.symmetry loss --env.num-envs=64 "
+        "--policy.actor-hidden-dims 64 32 --algorithm.symmetry false --env.num-envs=64 "
         "--normalization.obs-scales.lin-vel 1 --commands.heading-command true --robot x -o y"
     )
     made = parse_words(*words.split())
@@ -97,7 +97,7 @@ def test_task_command_has_option_for_each_value():
         "domain_rand.added_mass": (0.0, 3.0),
         "terrain.measure_heights": True,
         "policy.actor_hidden_dims": (64, 32),
-        "algorithm.symmetry": "loss",
+        "algorithm.symmetry": False,
         "env.num_envs": 64,
         "normalization.obs_scales.lin_vel": 1.0,
         "commands.heading_command": True,

@@ -222,11 +222,11 @@ def test_train_works_without_video_packages(monkeypatch):
 
 
 def test_train_options_override_task_file(train, tmp_path):
-    (tmp_path / "task.toml").write_text("[rewards]\ntorques = -0.5\ndof_power = -0.25\n")
+    (tmp_path / "task.toml").write_text("[rewards]\ntorques = -0.5\nbase_height = -0.25\n")
     words = ("--config", "task.toml", "--rewards.torques", "-0.125", "--num-envs", 4)
     assert train("quadruped", *words, "--max-iterations", 1, "--log-dir", "run") == 0
     rewards = open_run(tmp_path / "run").task.rewards
-    assert (rewards.torques, rewards.dof_power) == (-0.125, -0.25)
+    assert (rewards.torques, rewards.base_height) == (-0.125, -0.25)
 
 
 PROGRESS = TrainingProgress(

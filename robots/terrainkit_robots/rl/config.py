@@ -112,10 +112,6 @@ class Control(Config):
 class Asset(Config):
     """Parts of the robot that are simulated."""
 
-    collisions: Literal["all", "feet_and_termination"] = "all"
-    """Bodies that collide with the terrain: all with collision geometry, or only the feet and the
-    bodies that end an episode. The latter is 1.5 times as fast, but the legs pass through the
-    edges of stairs, and `rewards.collision` counts nothing."""
     self_collisions: bool = False
     """Whether the bodies of a robot collide with each other."""
     joint_friction: bool = False
@@ -207,8 +203,6 @@ class Rewards(Config):
     """Deviation of the base height from its target."""
     torques: float = -1.0
     """Joint torques, squared."""
-    dof_power: float = 0.0
-    """Mechanical power of the joints."""
     dof_acc: float = -0.0015
     """Joint accelerations, squared."""
     action_rate: float = -0.12
@@ -344,11 +338,9 @@ class Algorithm(Config):
     """KL divergence that the adaptive schedule aims at."""
     max_grad_norm: PositiveFloat = 1.0
     """Largest gradient norm."""
-    symmetry: Literal["auto", "none", "augmentation", "loss"] = "auto"
-    """Symmetry: add mirrored samples to each batch, or add a mirror loss; auto: mirrored samples
-    if left and right of the robot are mirror images."""
-    mirror_loss_coeff: NonNegativeFloat = 0.5
-    """Weight of the mirror loss."""
+    symmetry: bool | None = None
+    """Whether mirrored samples are added to each batch; none: if left and right of the robot are
+    mirror images."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -394,9 +386,6 @@ class Task(Config):
         if self.max_episode_length < 1:
             got = f"env.episode_length_s: got {self.env.episode_length_s:g}"
             raise ConfigError(f"{got}; expected at least one policy step, {self.dt:g} s")
-        if self.asset.collisions != "all" and self.rewards.collision:
-            got = f"rewards.collision: got {self.rewards.collision:g}"
-            raise ConfigError(f"{got}; expected 0 with asset.collisions {self.asset.collisions}")
         if (delay := self.domain_rand.action_delay) and not self.sim.dt / 2 < delay[1] <= 1:
             expected = f"expected an end above half of sim.dt {self.sim.dt:g}, at most 1 s; or none"
             raise ConfigError(f"domain_rand.action_delay: got {list(delay)}; {expected}")

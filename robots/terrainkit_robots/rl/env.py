@@ -48,7 +48,7 @@ class LeggedEnv(VecEnv):
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
         self.waypoints = None
         if task.commands.waypoints:
-            if not terrain.has_goals:
+            if np.isnan(terrain.goals).all():
                 got = "got a terrain without goals"
                 expected = "expected a map with terrains such as course, and not collision plane"
                 raise ConfigError(f"commands.waypoints: {got}; {expected}")

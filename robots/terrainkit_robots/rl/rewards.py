@@ -37,7 +37,6 @@ UNITS = {
     "ang_vel_xy": (0, 0, -2),
     "foot_slip": (0, 2, -2),
     "torques": (2, 4, -4),
-    "dof_power": (1, 2, -3),
     "dof_acc": (0, 0, -4),
 }
 """Powers of the robot's mass, its leg length, and sqrt(leg length / g), by term."""
@@ -141,12 +140,6 @@ def base_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 def torques(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize torques, squared [N2 m2]."""
     return _sum_squares(state.torques)
-
-
-@reward
-def dof_power(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Penalize the absolute mechanical power of the joints [W]."""
-    return np.abs(state.torques * state.dof_vel).sum(axis=1)
 
 
 @reward

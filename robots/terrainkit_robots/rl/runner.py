@@ -312,15 +312,9 @@ class LeggedRunner(OnPolicyRunner):
 def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
     """Return the configuration of rsl-rl's runner."""
     policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
-    symmetry = algorithm.pop("symmetry")
-    if symmetry == "auto":
-        symmetry = "augmentation" if is_symmetric else "none"
-    symmetry_cfg = {
-        "data_augmentation_func": "terrainkit_robots.rl.symmetry:augment",
-        "use_data_augmentation": symmetry == "augmentation",
-        "use_mirror_loss": symmetry == "loss",
-        "mirror_loss_coeff": algorithm.pop("mirror_loss_coeff"),
-    }
+    symmetry, augment = algorithm.pop("symmetry"), "terrainkit_robots.rl.symmetry:augment"
+    symmetry_cfg = {"data_augmentation_func": augment, "use_data_augmentation": True}
+    is_augmented = is_symmetric if symmetry is None else symmetry
     distribution = {"class_name": "GaussianDistribution", "init_std": policy.init_noise_std}
     network: dict[str, Any] = {"class_name": "MLPModel", "activation": policy.activation}
     network |= {"obs_normalization": policy.obs_normalization}
@@ -342,7 +336,7 @@ def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
             "class_name": "PPO",
             **algorithm,
             "rnd_cfg": None,
-            "symmetry_cfg": None if symmetry == "none" else symmetry_cfg,
+            "symmetry_cfg": symmetry_cfg if is_augmented else None,
         },
     }
 

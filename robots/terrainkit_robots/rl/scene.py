@@ -132,12 +132,8 @@ def _set_joints_and_collisions(robot: Robot, base: Any, task: Task) -> None:
             joint.actfrclimited = False  # the spec's effort is the limit
             if not task.asset.joint_friction:
                 joint.frictionloss = 0
-    bodies = {*robot.spec.feet, *robot.spec.termination_contacts}
     for geom in base.find_all("geom"):
         if not geom.contype and not geom.conaffinity:
-            continue
-        if task.asset.collisions != "all" and geom.parent.name not in bodies:
-            geom.contype = geom.conaffinity = 0
             continue
         geom.contype, geom.conaffinity = int(task.asset.self_collisions), ALL_BITS
         geom.condim = 3

@@ -77,7 +77,7 @@ def check_env_memory(task: Task, robot: Robot, *, scan: bool, ngeom: int) -> Non
     num_envs, history = task.env.num_envs, task.observations.history_length - 1
     observations = 45 + 7 * joints + 2 * scan * points + history * (20 + 3 * joints)
     hidden = sum(policy.actor_hidden_dims + policy.critic_hidden_dims)
-    samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry != "none"))
+    samples = steps / task.algorithm.num_mini_batches * (1 + (task.algorithm.symmetry is not False))
     learning = max(3 * steps * observations, samples * (5 * hidden + 2 * observations))
     floats = (12 + steps) * observations + 3 * steps * joints + learning
     per_env = 4 * floats + 8 * (100 + (60 + 2 * task.max_delay_steps) * joints + 3 * ngeom)

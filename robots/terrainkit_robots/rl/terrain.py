@@ -31,11 +31,6 @@ class Terrain(ABC):
     surface: HeightfieldSurface | None = None  # of ground and solids; None for a plane at height 0
     is_flat: bool  # whether the ground is level everywhere: a height scan carries no information
 
-    @property
-    def has_goals(self) -> bool:
-        """Whether any patch has goals."""
-        return not np.isnan(self.goals).all()
-
     @abstractmethod
     def spec(self) -> Any:
         """Return the terrain as an `mujoco.MjSpec`."""

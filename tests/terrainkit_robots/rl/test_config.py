@@ -12,7 +12,6 @@ from terrainkit.schema import Config
 from terrainkit.type_hint import SORTED, PositiveFloat
 from terrainkit_robots.rl.config import (
     Algorithm,
-    Asset,
     Commands,
     Control,
     DomainRand,
@@ -120,7 +119,7 @@ def test_non_finite_numbers_are_rejected(section):
         (Policy, "critic_hidden_dims", (128, 10**12), "critic_hidden_dims: .* from 1 to 65536"),
         (Policy, "activation", "relu6", "got 'relu6'; expected one of: elu, .*mean 'relu'"),
         (Algorithm, "gamma", 1.01, "gamma: got 1.01; expected a number from 0 to 1"),
-        (Algorithm, "symmetry", True, "expected one of: auto, none, augmentation, loss"),
+        (Algorithm, "symmetry", "loss", "symmetry: got 'loss'; expected true or false"),
         (Runner, "seed", -1, "seed: got -1; expected an integer from 0"),
     ],
 )
@@ -164,14 +163,6 @@ def test_action_delay_has_at_least_one_simulation_step():
     for end, steps in {0.003: 1, 0.005: 1, 0.02: 4, 1: 200}.items():
         assert Task(domain_rand=DomainRand(action_delay=(0, end))).max_delay_steps == steps
     assert Task().max_delay_steps == 0
-
-
-def test_collision_reward_needs_collisions():
-    few = Asset(collisions="feet_and_termination")
-    told = r"rewards.collision: got -1; expected 0 with asset.collisions feet_and_term"
-    with pytest.raises(ConfigError, match=told):
-        Task(asset=few)
-    assert Task(asset=few, rewards=Rewards(collision=0.0)).asset == few
 
 
 def test_section_of_other_class_is_rejected():

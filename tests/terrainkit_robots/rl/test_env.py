@@ -566,8 +566,8 @@ class TestStateDict:
 
     def test_load_rejects_other_rewards(self, quadruped, random_task):
         saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
-        task = random_task(3, rewards=Rewards(dof_power=-1.0))
-        with pytest.raises(ConfigError, match="rew_dof_power belongs to another robot, task"):
+        task = random_task(3, rewards=Rewards(base_height=-1.0))
+        with pytest.raises(ConfigError, match="rew_base_height belongs to another robot, task"):
             LeggedEnv(task, quadruped, Plane()).load_state_dict(saved)
 
     def test_load_rejects_other_robot_or_map(self, quadruped, biped, random_task, map_ground):

@@ -120,11 +120,6 @@ class TestByHand:
     def test_torques(self, robot: Robot) -> None:
         assert paid("torques", robot, state(torques=[[3, -4]])) == [25]
 
-    def test_dof_power(self, robot: Robot) -> None:
-        # |2 * 3| + |-1 * 4|: negative power counts as well.
-        given = state(torques=[[2, -1]], dof_vel=[[3, 4]])
-        assert paid("dof_power", robot, given) == [10]
-
     def test_dof_acc(self, robot: Robot) -> None:
         assert paid("dof_acc", robot, state(dof_acc=[[10, -20]])) == [250]
 
@@ -288,11 +283,10 @@ def test_active_rewards_have_nonzero_scales() -> None:
 def test_scales_are_in_units_of_the_robot() -> None:
     # 2 kg on legs of 9.81 / 4 m: the unit of time is 0.5 s.
     length = 9.81 / 4
-    scales = {k: v for k, (_, v) in active_rewards(Rewards(dof_power=-1.0), 2.0, length).items()}
+    scales = {k: v for k, (_, v) in active_rewards(Rewards(), 2.0, length).items()}
     assert scales["collision"] == -1
     assert scales["ang_vel_xy"] == pytest.approx(-1 / 2**2)
     assert scales["torques"] == pytest.approx(-1 / (2 * 9.81 * length) ** 2)
-    assert scales["dof_power"] == pytest.approx(-1 / (2 * 9.81 * length / 0.5))
     assert scales["lin_vel_z"] == pytest.approx(-9 / (length / 0.5) ** 2)
 
 

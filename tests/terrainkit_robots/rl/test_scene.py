@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.rl.config import Asset, Control, Rewards, Sim
+from terrainkit_robots.rl.config import Asset, Control, Sim
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
@@ -143,14 +143,9 @@ class TestCollisions:
         assert {"hull", "front_leg", "front_ball", "rear_leg", "tire"} <= touching
         assert "paint" not in touching
 
-    def test_collisions_of_feet_and_termination_bodies_only(self, cart, nominal_task):
-        touching = []
-        for collisions in ("all", "feet_and_termination"):
-            task = nominal_task(asset=Asset(collisions=collisions), rewards=Rewards(collision=0.0))
-            scene = build_scene(cart, Plane(), task)
-            bodies = scene.model.geom_bodyid[scene.geoms]
-            touching.append({scene.model.body(k).name for k in bodies})
-        assert touching == [{"trunk", "front", "rear", "wheel"}, {"trunk", "front", "wheel"}]
+    def test_all_bodies_with_collision_geometry_collide(self, scene):
+        bodies = scene.model.geom_bodyid[scene.geoms]
+        assert {scene.model.body(k).name for k in bodies} == {"trunk", "front", "rear", "wheel"}
 
     def test_contact_friction_is_the_robots(self, scene):
         assert (scene.model.geom_priority[scene.geoms] == 1).all()
