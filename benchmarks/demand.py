@@ -13,8 +13,8 @@ from scipy.stats import spearmanr
 
 import terrainkit
 from terrainkit.feasibility import assess_map
-from terrainkit.measured_difficulty import measured_difficulty
-from terrainkit.presets import get_preset
+from terrainkit.map.measured_difficulty import measured_difficulty
+from terrainkit.terrain.presets import get_preset
 from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.report_card.card import measure
 from terrainkit_robots.rl.run import open_run

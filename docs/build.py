@@ -20,19 +20,19 @@ import numpy as np
 from gallery import render_patches
 
 import terrainkit
-from terrainkit import presets, registry
-from terrainkit.config import MapConfig
 from terrainkit.errors import listing
 from terrainkit.feasibility import assess_map
 from terrainkit.feasibility.report import routes
-from terrainkit.field_docs import field_docs
-from terrainkit.preview import write_preview
-from terrainkit.schema import Config, field_keys, field_types, is_required
-from terrainkit.sub_terrain import SubTerrain
-from terrainkit.terrain_docs import TerrainDoc, overlay_doc, terrain_doc
-from terrainkit.terrain_map import TerrainMap
-from terrainkit.toml_text import value_text
-from terrainkit.type_hint import NONE, describe, is_table, parse_hint
+from terrainkit.map.config import MapConfig
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.settings.field_docs import field_docs
+from terrainkit.settings.schema import Config, field_keys, field_types, is_required
+from terrainkit.settings.toml_text import value_text
+from terrainkit.settings.type_hint import NONE, describe, is_table, parse_hint
+from terrainkit.terrain import presets, registry
+from terrainkit.terrain.sub_terrain import SubTerrain
+from terrainkit.terrain.terrain_docs import TerrainDoc, overlay_doc, terrain_doc
+from terrainkit.views.preview import write_preview
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules

@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.mesh import closed_mesh, full_mesh
-from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
-from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.patch import Patch
-from terrainkit.preview import height_colors
+from terrainkit.geometry.mesh import closed_mesh, full_mesh
+from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
+from terrainkit.map.patch import Patch
+from terrainkit.views.preview import height_colors
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import stream_frames
 

@@ -9,27 +9,47 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from terrainkit.config import MapConfig
     from terrainkit.curriculum import update_levels
+    from terrainkit.curriculum.waypoints import Waypoints
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
-    from terrainkit.generation import generate
-    from terrainkit.patch import Patch, make_patch
-    from terrainkit.registry import register_overlay, register_terrain
-    from terrainkit.sub_terrain import SubTerrain
-    from terrainkit.suites import generate_suite, get_suite, suite_hash, suite_names
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
+    from terrainkit.importing.options import ImportOptions
+    from terrainkit.map.config import MapConfig
+    from terrainkit.map.generation import generate
+    from terrainkit.map.import_map import ImportedMap, ImportReport, import_map
+    from terrainkit.map.patch import Patch, make_patch
+    from terrainkit.map.terrain_map import TerrainMap
+    from terrainkit.map.terrain_mesh import import_terrain_mesh
+    from terrainkit.suites.suite import Suite, generate_suite, get_suite, suite_hash, suite_names
+    from terrainkit.terrain import parameter
+    from terrainkit.terrain.overlay import Overlay
+    from terrainkit.terrain.registry import register_overlay, register_terrain
+    from terrainkit.terrain.sub_terrain import SubTerrain
 
 __all__ = [
+    "ImportOptions",
+    "ImportReport",
+    "ImportedMap",
     "MapConfig",
+    "Overlay",
     "Patch",
+    "Solids",
     "SubTerrain",
+    "Suite",
     "TerrainMap",
     "TerrainkitError",
     "TerrainkitWarning",
+    "Waypoints",
     "generate",
     "generate_suite",
     "get_suite",
+    "import_map",
+    "import_terrain_mesh",
+    "make_boxes",
+    "make_cylinders",
+    "make_hulls",
     "make_patch",
+    "parameter",
     "register_overlay",
     "register_terrain",
     "suite_hash",
@@ -39,18 +59,31 @@ __all__ = [
 __version__ = "0.1.0"
 
 _MODULES = {
-    "MapConfig": "config",
-    "Patch": "patch",
-    "SubTerrain": "sub_terrain",
-    "TerrainMap": "terrain_map",
+    "ImportOptions": "importing.options",
+    "ImportReport": "map.import_map",
+    "ImportedMap": "map.import_map",
+    "MapConfig": "map.config",
+    "Overlay": "terrain.overlay",
+    "Patch": "map.patch",
+    "Solids": "geometry.solids",
+    "SubTerrain": "terrain.sub_terrain",
+    "Suite": "suites",
+    "TerrainMap": "map.terrain_map",
     "TerrainkitError": "errors",
     "TerrainkitWarning": "errors",
-    "generate": "generation",
+    "Waypoints": "curriculum.waypoints",
+    "generate": "map.generation",
     "generate_suite": "suites",
     "get_suite": "suites",
-    "make_patch": "patch",
-    "register_overlay": "registry",
-    "register_terrain": "registry",
+    "import_map": "map.import_map",
+    "import_terrain_mesh": "map.terrain_mesh",
+    "make_boxes": "geometry.solids",
+    "make_cylinders": "geometry.solids",
+    "make_hulls": "geometry.solids",
+    "make_patch": "map.patch",
+    "parameter": "terrain",
+    "register_overlay": "terrain.registry",
+    "register_terrain": "terrain.registry",
     "suite_hash": "suites",
     "suite_names": "suites",
     "update_levels": "curriculum",

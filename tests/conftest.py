@@ -9,8 +9,8 @@ import pytest
 from hypothesis import settings
 
 from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
 from terrainkit.importing import child_process, isolated
-from terrainkit.solids import Solids, make_boxes, make_cylinders, make_hulls
 
 # Before torch is imported: its threads would otherwise spin while they wait for one another, which
 # takes half of the time of training where other tests keep the cores busy.

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import terrainkit as tk
-from terrainkit import presets, registry
+from terrainkit.terrain import presets, registry
 from terrainkit_cli.main import main
 
 README = (Path(__file__).parent.parent / "README.md").read_text()

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar, ge
 import tyro
 
 from terrainkit.errors import ConfigError
-from terrainkit.field_docs import field_docs
-from terrainkit.schema import Config, field_types
-from terrainkit.type_hint import NONE, convert, parse_hint
+from terrainkit.settings.field_docs import field_docs
+from terrainkit.settings.schema import Config, field_types
+from terrainkit.settings.type_hint import NONE, convert, parse_hint
 from terrainkit_cli.parse import Command, UsageError, check_options, option_names, parse, value_of
 from terrainkit_cli.robot_options import InputPath
 

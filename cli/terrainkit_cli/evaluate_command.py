@@ -166,7 +166,7 @@ class Evaluate(PolicyCommand):
 
     def run(self) -> int:
         """Evaluate the policy, and print or write the result."""
-        from terrainkit.atomic_write import atomic_write, check_target
+        from terrainkit.files.atomic_write import atomic_write, check_target
 
         if self.suite or self.limits:
             return self._report_card()
@@ -204,8 +204,8 @@ class Evaluate(PolicyCommand):
 
     def _report_card(self) -> int:
         """Measure the policy on a suite or up to its limits, and print and write the result."""
-        from terrainkit.atomic_write import check_target
-        from terrainkit.suites import get_suite
+        from terrainkit.files.atomic_write import check_target
+        from terrainkit.suites.suite import get_suite
         from terrainkit_cli import report_card
 
         if self.suite and self.limits:

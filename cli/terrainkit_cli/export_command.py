@@ -9,8 +9,8 @@ import tyro
 
 from terrainkit.errors import ConfigError
 from terrainkit.export import export_files
-from terrainkit.terrain_map import TerrainMap
-from terrainkit.text import expected_names, truncate
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import UNSET, Checkpoint, Flag, optional_number, text_option

@@ -7,10 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
-from terrainkit.layout import terrain_columns
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.config import MapConfig
+from terrainkit.map.layout import terrain_columns
+from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command, value_of
 from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, parse_pairs, text_option
@@ -74,7 +74,7 @@ class Feasibility(Command):
         return print_impassable(results, derived, self.map)
 
     def _check_targets(self, target: Path) -> None:
-        from terrainkit.atomic_write import check_target
+        from terrainkit.files.atomic_write import check_target
 
         for suffix in (".json", ".png"):
             check_target(target.with_suffix(suffix), overwrite=self.overwrite)
@@ -87,9 +87,9 @@ class Feasibility(Command):
         derived: "DerivedLimits",
     ) -> None:
         from terrainkit import __version__
-        from terrainkit.atomic_write import atomic_write
         from terrainkit.feasibility.report import routes, to_json
-        from terrainkit.preview import write_preview
+        from terrainkit.files.atomic_write import atomic_write
+        from terrainkit.views.preview import write_preview
 
         about = {
             "tool": {"name": "terrainkit", "version": __version__},

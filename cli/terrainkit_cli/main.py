@@ -94,7 +94,7 @@ def _open_closed_streams() -> None:
 
 def _run(arguments: list[str]) -> int:
     from terrainkit import __version__
-    from terrainkit.text import expected_names, truncate
+    from terrainkit.settings.text import expected_names, truncate
 
     name = arguments[0] if arguments else "--help"
     if name in ("-h", "--help"):

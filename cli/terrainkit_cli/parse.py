@@ -14,8 +14,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.field_docs import field_docs
-from terrainkit.text import closest, expected_names, truncate
+from terrainkit.settings.field_docs import field_docs
+from terrainkit.settings.text import closest, expected_names, truncate
 from terrainkit_cli import render
 
 if TYPE_CHECKING:

@@ -36,7 +36,7 @@ def report_suite(
         MemoryLimitError: if the simulations would not fit in memory.
     """
     from terrainkit import TerrainMap
-    from terrainkit.suites import generate_suite
+    from terrainkit.suites.suite import generate_suite
     from terrainkit_robots.report_card.card import CRITERION, measure, summary
     from terrainkit_robots.report_card.picture import draw_card
 
@@ -86,7 +86,7 @@ def targets(output: Path, *, is_card: bool) -> list[Path]:
 
 def write_files(targets: list[Path], contents: list[bytes]) -> None:
     """Write files that replace existing ones."""
-    from terrainkit.atomic_write import atomic_write
+    from terrainkit.files.atomic_write import atomic_write
 
     for target, content in zip(targets, contents, strict=True):
         with atomic_write(target, overwrite=True) as path:

@@ -206,7 +206,7 @@ class CheckRobot(Command):
         if output is None:
             render.report(text)
         elif reports:
-            from terrainkit.atomic_write import atomic_write
+            from terrainkit.files.atomic_write import atomic_write
 
             _check_output(output, [path for r in reports for path in r.facts.model.sources])
             with atomic_write(output, overwrite=True) as path:
@@ -251,7 +251,7 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
 
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:
     """Raise an error if the report cannot be written, or would replace a checked file."""
-    from terrainkit.atomic_write import check_target
+    from terrainkit.files.atomic_write import check_target
 
     check_target(output, overwrite=True)
     for path in inputs:

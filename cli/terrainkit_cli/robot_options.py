@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import expected_names
+from terrainkit.settings.text import expected_names
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings

@@ -88,7 +88,7 @@ class SmokeTest(Command):
                     render.error(f"{name}: {error.strerror or error}")
         text = as_json(results) if self.format == "json" else as_text(results)
         if self.output:
-            from terrainkit.atomic_write import atomic_write
+            from terrainkit.files.atomic_write import atomic_write
 
             with atomic_write(Path(self.output), overwrite=True) as path:
                 path.write_text(text, encoding="utf-8")
@@ -112,7 +112,7 @@ class SmokeTest(Command):
             robots = listing(self.robots)
             raise ConfigError(f"--{given[0]}: got no robot file among {robots}; expected one")
         if self.output:
-            from terrainkit.atomic_write import check_target
+            from terrainkit.files.atomic_write import check_target
 
             check_target(Path(self.output), overwrite=True)  # before the tests
 

@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 import tyro
 
 from terrainkit import suites
-from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import format_value
-from terrainkit.sub_terrain import SubTerrain
+from terrainkit.map.config import MapConfig
+from terrainkit.terrain.parameter import format_value
+from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import Flag, text_option

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from terrainkit import presets, registry
-from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, listing
-from terrainkit.overlay import Overlay
-from terrainkit.parameter import Parameter, format_value, parameters_of
-from terrainkit.sub_terrain import SubTerrain
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.config import MapConfig
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.terrain import presets, registry
+from terrainkit.terrain.overlay import Overlay
+from terrainkit.terrain.parameter import Parameter, format_value, parameters_of
+from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.parse import Command, check_options, value_of, word_after
@@ -88,7 +88,7 @@ class Generate(ConfigCommand):
     def run(self) -> int:
         """Generate the map, write it, and print the next commands."""
         from terrainkit import export
-        from terrainkit.generation import generate
+        from terrainkit.map.generation import generate
         from terrainkit_cli.feasibility_command import solve_demand
         from terrainkit_cli.worker_pool import worker_pool
 
@@ -182,7 +182,7 @@ class List(Command):
 
     def run(self) -> int:
         """Print the terrains, overlays and presets, or the parameters of one."""
-        from terrainkit.terrain_docs import (
+        from terrainkit.terrain.terrain_docs import (
             overlay_doc,
             overlay_summaries,
             terrain_doc,
@@ -256,7 +256,7 @@ class Info(Command):
 
 
 def _print_map(terrain_map: TerrainMap) -> None:
-    from terrainkit.measured_difficulty import measured_difficulty
+    from terrainkit.map.measured_difficulty import measured_difficulty
 
     config, grid = terrain_map.config, terrain_map.grid
     heights = terrain_map.heights
@@ -305,7 +305,7 @@ def _solids_text(terrain_map: TerrainMap) -> str:
 
 
 def _print_budget(terrain_map: TerrainMap, foot_radius: float) -> None:
-    from terrainkit.budget import MAX_CONTACTS, compute_budget
+    from terrainkit.views.budget import MAX_CONTACTS, compute_budget
 
     budget = compute_budget(terrain_map, foot_radius)
     contacts = (
@@ -373,7 +373,7 @@ class Preview(Command):
 
     def run(self) -> int:
         """Render the image and write it."""
-        from terrainkit.preview import write_preview
+        from terrainkit.views.preview import write_preview
 
         terrain_map = TerrainMap.load(self.map)
         write_preview(terrain_map, self.output, width=self.width, overwrite=self.overwrite)
@@ -403,8 +403,8 @@ class CheckMap(Command):
         """Print the issues and the largest seam, and return 1 if there are issues."""
         from terrainkit.export.npz import read_mesh
         from terrainkit.feasibility import assess_map
-        from terrainkit.seams import Seams, cliffs_text, seam_text
-        from terrainkit.validate import validate
+        from terrainkit.map.seams import Seams, cliffs_text, seam_text
+        from terrainkit.map.validate import validate
         from terrainkit_cli.feasibility_command import print_impassable, robot_limits
         from terrainkit_robots.text import count
 
@@ -449,7 +449,7 @@ class Diff(Command):
 
     def run(self) -> int:
         """Print the differences, and return 1 if there are any."""
-        from terrainkit.map_diff import diff_maps
+        from terrainkit.map.map_diff import diff_maps
 
         a, b = TerrainMap.load(self.a), TerrainMap.load(self.b)
         diff = diff_maps(a, b)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from terrainkit.errors import ConfigError
-from terrainkit.terrain_map import TerrainMap
-from terrainkit.text import expected_names, truncate
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
 from terrainkit_cli.parse import Command
 from terrainkit_cli.robot_options import (
@@ -123,7 +123,7 @@ class View(Command):
             ) from None
 
     def _load_map(self) -> "Show":
-        from terrainkit.viewer import show_map
+        from terrainkit.views.viewer import show_map
 
         terrain_map = TerrainMap.load(self.source)
 

@@ -12,8 +12,8 @@ from typing import Any, Literal, TypedDict
 
 import msgspec
 
-from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ConfigError, listing
+from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.files import open_regular
 
 

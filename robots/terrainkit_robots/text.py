@@ -4,7 +4,7 @@ import re
 from collections.abc import Container, Iterable
 from pathlib import Path
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 
 
 def names(items: Iterable[str], max_count: int = 6, sep: str = ", ") -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.type_hint import show
+from terrainkit.settings.type_hint import show
 
 
 def to_numpy(name: str, values: Any) -> NDArray[Any]:

@@ -9,7 +9,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from terrainkit.curriculum.arrays import like, make_rng, to_indices, to_numpy
-from terrainkit.type_hint import PositiveInt, convert
+from terrainkit.settings.type_hint import PositiveInt, convert
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from terrainkit.curriculum.arrays import like, make_rng, to_indices, to_progress
 from terrainkit.curriculum.sampler import FloatArray, IntArray, PatchSampler
-from terrainkit.type_hint import PositiveInt, convert
+from terrainkit.settings.type_hint import PositiveInt, convert
 
 
 def update_levels(
@@ -29,7 +29,7 @@ def update_levels(
         levels: Levels before, shape (n,).
         progress: Progress of each episode, 0 to 1, or NaN if it says nothing about its patch, shape
             (n,). See :class:`CommandProgress`, and for robots with goals
-            :meth:`terrainkit.waypoints.Waypoints.of_episodes`.
+            :meth:`terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
         rows: Rows of the map.
         seed: Seed of the random rows. Pass a new one at each call, such as (seed, iteration).
         top_levels: Number of rows that solved environments are spread over.

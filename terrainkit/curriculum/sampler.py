@@ -62,7 +62,7 @@ class PatchSampler:
             env_ids: Environments whose episodes ended, shape (k,).
             progress: Progress of each episode: 0 to 1, where 1 is success, or NaN if the episode
                 says nothing about its patch, shape (k,). See :class:`CommandProgress`, and for
-                robots with goals :meth:`terrainkit.waypoints.Waypoints.of_episodes`.
+                robots with goals :meth:`terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
             returns: Sum of the rewards of each episode, shape (k,); None if unknown.
 
         Returns:

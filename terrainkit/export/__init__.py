@@ -13,12 +13,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError, listing
-from terrainkit.memory import check_memory
+from terrainkit.export.requirements import require_finite
+from terrainkit.files.atomic_write import atomic_write, check_target
+from terrainkit.files.memory import check_memory
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 
 def export(
@@ -49,7 +50,7 @@ def export_files(
     for name in options:
         if name not in known:
             raise ExportError(f"option of {path.suffix}: got {name!r}; expected {listing(known)}")
-    terrain_map.require_finite()
+    require_finite(terrain_map)
     with atomic_write(path, overwrite=overwrite) as temporary:
         write(terrain_map, temporary, **options)
         names = sorted({file.name for file in temporary.parent.iterdir()} - {path.name})

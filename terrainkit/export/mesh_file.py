@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from terrainkit.errors import ExportError
-from terrainkit.mesh.node_grid import BYTES_PER_NODE
-from terrainkit.mesh.tri_mesh import TriMesh
+from terrainkit.export.requirements import warn_about_losses
+from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 BYTES_PER_SAMPLE = BYTES_PER_NODE
@@ -48,7 +49,7 @@ def export(
         closed: Add sides and a bottom to make a watertight solid.
         y_up: Rotate the map so that y is up, as glTF viewers expect; by default z is up.
     """
-    terrain_map.warn_about_losses("a mesh file")
+    warn_about_losses(terrain_map, "a mesh file")
     mesh = terrain_map.mesh(merged=not full, closed=closed)
     if y_up:
         y, z = mesh.vertices[:, 1].copy(), mesh.vertices[:, 2].copy()

@@ -15,25 +15,25 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.box_decomposition import (
+from terrainkit.files.memory import check_memory
+from terrainkit.geometry.box_decomposition import (
     BoxDecomposition,
     changes,
     flat_cells,
     merge_boxes,
     neighborhood,
 )
-from terrainkit.grid import Grid
-from terrainkit.memory import check_memory
-from terrainkit.mesh.closed import THICKNESS
-from terrainkit.mesh.node_grid import NodeGrid
-from terrainkit.solid_raster import SolidRaster
-from terrainkit.solids import Solids
-from terrainkit.surface import HeightfieldSurface
-from terrainkit.text import format_numbers
-from terrainkit.type_hint import convert
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.mesh.closed import THICKNESS
+from terrainkit.geometry.mesh.node_grid import NodeGrid
+from terrainkit.geometry.solid_raster import SolidRaster
+from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.surface import HeightfieldSurface
+from terrainkit.settings.text import format_numbers
+from terrainkit.settings.type_hint import convert
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".xml",)
 

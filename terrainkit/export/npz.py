@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
-from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError, MapFileError, listing
-from terrainkit.mesh.node_grid import BYTES_PER_NODE
-from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.parameter import MAX_VALUE, Value
-from terrainkit.patch import Parameters
-from terrainkit.solids import MAX_HULL_VERTICES, MIN_SIZE, Solids, convex_hull
+from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
+from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
+from terrainkit.geometry.solids import MAX_HULL_VERTICES, MIN_SIZE, Solids, convex_hull
+from terrainkit.map.config import MapConfig
+from terrainkit.map.patch import Parameters
+from terrainkit.settings.type_hint import MAX_VALUE
+from terrainkit.terrain.parameter import Value
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".npz",)
 BYTES_PER_SAMPLE = BYTES_PER_NODE

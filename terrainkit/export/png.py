@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terrainkit.errors import ExportError
+from terrainkit.export.requirements import require_no_solids, warn_about_losses
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".png",)
 BYTES_PER_SAMPLE = 20
@@ -31,8 +32,8 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     """
     import cv2
 
-    terrain_map.require_no_solids("an image of heights")
-    terrain_map.warn_about_losses("an image of heights")
+    require_no_solids(terrain_map, "an image of heights")
+    warn_about_losses(terrain_map, "an image of heights")
     heights, config = terrain_map.heights, terrain_map.config
     scale, low = scale_and_offset(terrain_map)
     # Image rows go down, y goes up.

@@ -11,7 +11,7 @@ from terrainkit.errors import ExportError
 from terrainkit.export import png
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".yaml",)
 BYTES_PER_SAMPLE = png.BYTES_PER_SAMPLE

@@ -7,13 +7,14 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from terrainkit.export.mesh_file import write_stl
-from terrainkit.mesh.node_grid import BYTES_PER_NODE
-from terrainkit.mesh.solid_mesh import concatenate_meshes, solid_meshes
-from terrainkit.solids import Solids, rotation_matrices
-from terrainkit.text import format_numbers
+from terrainkit.export.requirements import require_one_ground_friction
+from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
+from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
+from terrainkit.geometry.solids import Solids, rotation_matrices
+from terrainkit.settings.text import format_numbers
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".sdf",)
 BYTES_PER_SAMPLE = BYTES_PER_NODE
@@ -30,7 +31,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     Raises:
         ExportError: if the ground has several friction coefficients.
     """
-    terrain_map.require_one_ground_friction("a mesh in SDF")
+    require_one_ground_friction(terrain_map, "a mesh in SDF")
     contact = terrain_map.config.contact
     root = ET.Element("sdf", version="1.9")
     model = ET.SubElement(root, "model", name="terrain")

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ExportError
-from terrainkit.mesh.node_grid import BYTES_PER_NODE
-from terrainkit.mesh.solid_mesh import solid_meshes
-from terrainkit.mesh.tri_mesh import TriMesh
-from terrainkit.solids import Solids
+from terrainkit.export.requirements import require_one_ground_friction
+from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
+from terrainkit.geometry.mesh.solid_mesh import solid_meshes
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
+from terrainkit.geometry.solids import Solids
 
 if TYPE_CHECKING:
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 BYTES_PER_SAMPLE = 3 * BYTES_PER_NODE
@@ -41,7 +42,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         raise ExportError(
             f"{path.suffix} requires usd-core; install it with: pip install terrainkit[usd]"
         ) from None
-    terrain_map.require_one_ground_friction("a USD mesh")
+    require_one_ground_friction(terrain_map, "a USD mesh")
     config = terrain_map.config
     usd_stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(usd_stage, UsdGeom.Tokens.z)

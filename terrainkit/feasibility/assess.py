@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.export.requirements import require_finite
 from terrainkit.feasibility.bottleneck import Leg, bottlenecks, shortest_path
 from terrainkit.feasibility.columns import Columns, FloatArray, IntArray, sample_columns
 from terrainkit.feasibility.edges import Edges
@@ -15,17 +16,17 @@ from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.gaps import gap_edges
 from terrainkit.feasibility.limits import RobotLimits
 from terrainkit.feasibility.regions import Regions
-from terrainkit.free_space import free_intervals
-from terrainkit.memory import check_memory
-from terrainkit.patch import Patch
-from terrainkit.solid_index import SolidIndex
-from terrainkit.surface import surface_at
+from terrainkit.files.memory import check_memory
+from terrainkit.geometry.free_space import free_intervals
+from terrainkit.geometry.solid_index import SolidIndex
+from terrainkit.geometry.surface import surface_at
+from terrainkit.map.patch import Patch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from terrainkit.generation import Progress
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.generation import Progress
+    from terrainkit.map.terrain_map import TerrainMap
 
 MAX_DEMAND = 2.0
 """Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""
@@ -93,7 +94,7 @@ def assess_map(
         ExportError: if a height is not finite.
         MemoryLimitError: if the graph of a patch would not fit in memory.
     """
-    terrain_map.require_finite()
+    require_finite(terrain_map)
     threshold = terrain_map.config.wall_threshold
     places: Iterator[tuple[int, int]] = iter(list(np.ndindex(terrain_map.difficulty.shape)))
     wrapped = progress(places, terrain_map.difficulty.size) if progress else places

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.free_space import free_intervals
-from terrainkit.patch import Patch
-from terrainkit.solid_index import SolidIndex
-from terrainkit.surface import surface_at
+from terrainkit.geometry.free_space import free_intervals
+from terrainkit.geometry.solid_index import SolidIndex
+from terrainkit.geometry.surface import surface_at
+from terrainkit.map.patch import Patch
 
 MAX_SPACING = 0.035
 """Largest distance between two columns of a patch with solids [m]. Solids do not snap to the cells

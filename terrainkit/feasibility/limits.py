@@ -7,10 +7,9 @@ from typing import Annotated
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
-from terrainkit.parameter import MAX_VALUE
-from terrainkit.schema import Config, field_types
-from terrainkit.text import expected_names
-from terrainkit.type_hint import convert
+from terrainkit.settings.schema import Config, field_types
+from terrainkit.settings.text import expected_names
+from terrainkit.settings.type_hint import MAX_VALUE, convert
 
 Limit = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from terrainkit.feasibility.assess import MAX_DEMAND, PatchFeasibility
 from terrainkit.feasibility.limits import RobotLimits
-from terrainkit.preview import Route
+from terrainkit.views.preview import Route
 
 SCHEMA_VERSION = 1
 """Version of the JSON; it changes when a key changes its meaning or is removed."""
@@ -83,7 +83,7 @@ def to_json(
 
 
 def routes(results: Sequence[PatchFeasibility]) -> list[Route]:
-    """Return the paths and blocking places for :func:`terrainkit.preview.write_preview`."""
+    """Return the paths and blocking places for :func:`terrainkit.views.preview.write_preview`."""
     return [
         Route(
             points=each.path[:, :2],

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility.assess import MAX_DEMAND, assess_patch
 from terrainkit.feasibility.limits import RobotLimits
-from terrainkit.grid import Grid
-from terrainkit.parameter import Parameter, Range, at_difficulty, parameters_of
-from terrainkit.patch import Patch, build_patch
-from terrainkit.sub_terrain import SubTerrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.map.config import MapConfig
+from terrainkit.map.patch import Patch, build_patch
+from terrainkit.terrain.parameter import Parameter, Range, at_difficulty, parameters_of
+from terrainkit.terrain.sub_terrain import SubTerrain
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from terrainkit.generation import Progress
+    from terrainkit.map.generation import Progress
 
 _EASIEST, _HARDEST = -1.0, 3.0
 """Difficulties to search: ranges are extrapolated beyond their ends at 0 and 1."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.solids import Solids, make_boxes, make_hulls
+from terrainkit.geometry.solids import Solids, make_boxes, make_hulls
 
 SINK = 0.05
 """Depth below the ground at which solids that stand on it begin [m]."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 _DIAGONAL = math.sqrt(0.5)
 _GRADIENTS = np.array(

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.grid import Grid
-from terrainkit.parameter import Realized
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain.parameter import Realized
 
 STEP = 0.005
 """Default step of the heights [m], the vertical scale of Isaac Gym."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 
 def pit_around(grid: Grid, depth: float, platform: float) -> NDArray[np.float64]:

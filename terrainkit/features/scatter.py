@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 NUM_CANDIDATES = 1000
 """Number of random positions that objects are placed at."""

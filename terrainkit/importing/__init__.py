@@ -1,11 +1,18 @@
 """Import files of heights and meshes.
 
 Each module in this folder that defines `SUFFIXES` is a reader. Its function `read(path, options)`
-returns a :class:`~terrainkit.importing.source.Source`.
+returns a :class:`~terrainkit.importing.source.Source`. :func:`terrainkit.import_map` makes a map of
+it.
 """
 
-from terrainkit.importing.import_map import ImportedMap, ImportReport, import_map
-from terrainkit.importing.options import ImportOptions
-from terrainkit.importing.terrain_mesh import import_terrain_mesh
+from importlib import import_module
+from typing import Any
 
 __all__ = ["ImportOptions", "ImportReport", "ImportedMap", "import_map", "import_terrain_mesh"]
+
+
+def __getattr__(name: str) -> Any:
+    # They are in terrainkit.map, which imports this package.
+    if name in __all__:
+        return getattr(import_module("terrainkit"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

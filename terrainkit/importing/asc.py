@@ -10,7 +10,7 @@ import numpy as np
 from terrainkit.errors import HeightFileError, listing
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 
 SUFFIXES = (".asc",)
 

@@ -10,7 +10,7 @@ from terrainkit.importing.geotiff import GeoTags, read_geo_tags
 from terrainkit.importing.isolated import run_isolated
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
-from terrainkit.toml_text import read_text
+from terrainkit.settings.toml_text import read_text
 
 _TIFF_SUFFIXES = (".tif", ".tiff")
 SUFFIXES = (".png", *_TIFF_SUFFIXES)

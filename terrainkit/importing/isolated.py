@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 
 MAX_SECONDS = 120.0
 """Time limit of a child process [s]; a mesh of a million triangles takes a few seconds."""

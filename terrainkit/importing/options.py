@@ -5,9 +5,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from terrainkit.config import Count, NonNegative, Size
-from terrainkit.parameter import MAX_VALUE
-from terrainkit.schema import Config
+from terrainkit.settings.schema import Config
+from terrainkit.settings.type_hint import MAX_VALUE, Count, NonNegative, Size
 
 MAX_POSITION = 1e8
 """Largest coordinate in a file [m]: beyond the northings of all map projections."""

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.mesh import closed_mesh, merged_mesh
+from terrainkit.geometry.solids import MAX_HULL_VERTICES, Solids, make_hulls
 from terrainkit.importing.columns import MIN_GAP, Columns
 from terrainkit.importing.isolated import run_isolated
-from terrainkit.mesh import closed_mesh, merged_mesh
-from terrainkit.solids import MAX_HULL_VERTICES, Solids, make_hulls
 
 PARAMETERS = {
     "threshold": 0.03,

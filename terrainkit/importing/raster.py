@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
+from terrainkit.files.memory import check_memory
 from terrainkit.importing.options import Missing, ReadOptions
 from terrainkit.importing.source import Array, fill_missing, open_source
-from terrainkit.memory import check_memory
 
 _BYTES_PER_VALUE = 24
 _BYTES_PER_SAMPLE = 100

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 
 
 def load_map(source: TerrainMap | str | Path) -> TerrainMap:

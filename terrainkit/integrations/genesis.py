@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.export.requirements import require_one_ground_friction
+from terrainkit.geometry.solids import Solids
 from terrainkit.integrations import load_map, missing
-from terrainkit.solids import Solids
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 
 try:
     import genesis as gs
@@ -41,7 +42,7 @@ def add_map(scene: Any, source: TerrainMap | str | Path, *, visualization: bool 
         ExportError: if the ground has several friction coefficients; a heightfield has one.
     """
     terrain_map = load_map(source)
-    terrain_map.require_one_ground_friction("a heightfield of Genesis")
+    require_one_ground_friction(terrain_map, "a heightfield of Genesis")
     friction = float(terrain_map.config.static_friction)
     heights = terrain_map.heights.astype(gs.np_float)
     bounds, scale = _bounds(heights, terrain_map.config.cell)

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from terrainkit.export.requirements import require_one_friction, require_whole_solids
 from terrainkit.integrations import load_map, missing
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 
 try:
     from isaacgym import gymapi
@@ -22,8 +23,8 @@ def add_trimesh(gym: Any, sim: Any, source: TerrainMap | str | Path) -> None:
             are only visible; a mesh has one friction and does both.
     """
     terrain_map = load_map(source)
-    terrain_map.require_one_friction("a triangle mesh of Isaac Gym")
-    terrain_map.require_whole_solids("a triangle mesh of Isaac Gym")
+    require_one_friction(terrain_map, "a triangle mesh of Isaac Gym")
+    require_whole_solids(terrain_map, "a triangle mesh of Isaac Gym")
     mesh = terrain_map.mesh()
     params = gymapi.TriangleMeshParams()
     params.nb_vertices, params.nb_triangles = len(mesh.vertices), len(mesh.triangles)
@@ -48,7 +49,7 @@ def add_heightfield(
             fit in 16 bits.
     """
     terrain_map = load_map(source)
-    terrain_map.require_one_friction("a heightfield of Isaac Gym")
+    require_one_friction(terrain_map, "a heightfield of Isaac Gym")
     raw = terrain_map.height_field_raw(vertical_scale)
     params = gymapi.HeightFieldParams()
     params.nbRows, params.nbColumns = raw.shape

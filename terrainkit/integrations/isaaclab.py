@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from terrainkit.export.requirements import require_one_friction, require_whole_solids
 from terrainkit.integrations import missing, pad_points
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 
 try:
     import torch
@@ -38,8 +39,8 @@ def terrain_importer_cfg(
             are only visible; an imported mesh has one friction and does both.
     """
     terrain_map = TerrainMap.load(path)
-    terrain_map.require_one_friction("the mesh of Isaac Lab's terrain importer")
-    terrain_map.require_whole_solids("the mesh of Isaac Lab's terrain importer")
+    require_one_friction(terrain_map, "the mesh of Isaac Lab's terrain importer")
+    require_whole_solids(terrain_map, "the mesh of Isaac Lab's terrain importer")
     config = terrain_map.config
     generator = MapGeneratorCfg(
         path=str(Path(path).resolve()),

@@ -7,10 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from terrainkit.config import MapConfig
 from terrainkit.errors import ConfigError
+from terrainkit.export.int16_heights import int16_heights
+from terrainkit.export.requirements import require_one_friction
 from terrainkit.integrations import load_map, pad_points
-from terrainkit.terrain_map import TerrainMap, int16_heights
+from terrainkit.map.config import MapConfig
+from terrainkit.map.terrain_map import TerrainMap
 
 _EDGE_WIDTH = 0.05
 """Default distance from a wall up to which extreme-parkour penalizes feet [m]."""
@@ -39,7 +41,7 @@ class Terrain:
 
     def __init__(self, source: TerrainMap | str | Path, cfg: Any, num_robots: int) -> None:
         terrain_map = load_map(source)
-        terrain_map.require_one_friction("legged_gym")
+        require_one_friction(terrain_map, "legged_gym")
         if cfg.mesh_type != "trimesh":
             raise ConfigError(f"mesh_type: got {cfg.mesh_type!r}; expected 'trimesh'")
         config = terrain_map.config

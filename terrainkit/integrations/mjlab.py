@@ -11,7 +11,7 @@ from terrainkit.export.mjcf import Collision
 from terrainkit.importing import ImportedMap, ImportOptions, import_terrain_mesh
 from terrainkit.integrations import missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 
 try:
     import mujoco

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import mujoco
     import trimesh
 
-    from terrainkit.terrain_map import TerrainMap
+    from terrainkit.map.terrain_map import TerrainMap
 
 
 def make_spec(

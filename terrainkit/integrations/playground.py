@@ -8,7 +8,7 @@ from terrainkit.errors import ExportError
 from terrainkit.export.mjcf import Collision
 from terrainkit.integrations import load_map, missing
 from terrainkit.integrations.mujoco import add_map
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 
 try:
     import jax

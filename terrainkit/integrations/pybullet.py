@@ -3,8 +3,9 @@
 import tempfile
 from pathlib import Path
 
+from terrainkit.export.requirements import require_one_friction, require_whole_solids
 from terrainkit.integrations import load_map, missing
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 
 try:
     import pybullet
@@ -27,8 +28,8 @@ def add_map(source: TerrainMap | str | Path, *, client: int = 0) -> int:
             are only visible; a body has one friction and does both.
     """
     terrain_map = load_map(source)
-    terrain_map.require_one_friction("a body of PyBullet")
-    terrain_map.require_whole_solids("a body of PyBullet")
+    require_one_friction(terrain_map, "a body of PyBullet")
+    require_whole_solids(terrain_map, "a body of PyBullet")
     with tempfile.TemporaryDirectory() as folder:
         # Arrays of vertices are limited to the size of a message; a file is not.
         path = terrain_map.save(Path(folder) / "map.obj")

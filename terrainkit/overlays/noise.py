@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.gradient_noise import perlin_noise
 from terrainkit.features.noise import ValueNoise
-from terrainkit.free_space import CONTACT
-from terrainkit.grid import Grid
-from terrainkit.overlay import Overlay
-from terrainkit.parameter import Realized
-from terrainkit.patch_geometry import PatchGeometry
-from terrainkit.solid_index import SolidIndex
+from terrainkit.geometry.free_space import CONTACT
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solid_index import SolidIndex
+from terrainkit.terrain import parameter
+from terrainkit.terrain.overlay import Overlay
+from terrainkit.terrain.parameter import Realized
+from terrainkit.terrain.patch_geometry import PatchGeometry
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.overlay import Overlay
-from terrainkit.patch_geometry import PatchGeometry
+from terrainkit.terrain import parameter
+from terrainkit.terrain.overlay import Overlay
+from terrainkit.terrain.patch_geometry import PatchGeometry
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,13 +6,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.scatter import scatter
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain import Terrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

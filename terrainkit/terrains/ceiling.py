@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.frame import frame_rectangles
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids, make_boxes
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids, make_boxes
+from terrainkit.terrain import Terrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.ramp_field import RampField
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

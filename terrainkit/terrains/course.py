@@ -10,15 +10,15 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import number_that_fits
 from terrainkit.features.lane import Lane, lane_goals
-from terrainkit.grid import Grid
-from terrainkit.parameter import MAX_VALUE, Parameter, Range, Realized, Value, parameters_of
-from terrainkit.solids import Solids
-from terrainkit.sub_terrain import SubTerrain
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.settings.type_hint import MAX_VALUE
+from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain.parameter import Parameter, Range, Realized, Value, parameters_of
+from terrainkit.terrain.sub_terrain import SubTerrain
 
 MAX_ELEMENTS = 100
 """Largest number of elements of a course."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.ramp_field import RampField
+from terrainkit.terrain import parameter
 
 _RAISED = np.array([[0, 1, 1, 0], [0, 0, 1, 1], [1, 0, 0, 1], [1, 1, 0, 0]])
 """Corners that are raised, counterclockwise, for ramps that rise toward +x, +y, -x and -y."""

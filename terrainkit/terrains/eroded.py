@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.erosion import erode
 from terrainkit.features.gradient_noise import fractal_noise, unit_relief
-from terrainkit.grid import Grid
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain import Terrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain
 
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.lane import Lane, lane_goals, lane_slots, slot_centers
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,11 +6,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.lane import Lane, lane_goals, lane_slots, slot_centers
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids, make_cylinders
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids, make_cylinders
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

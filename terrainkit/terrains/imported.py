@@ -10,15 +10,14 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.gradient_noise import faded_relief
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 from terrainkit.importing.isolated import check_file
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, read_raster
-from terrainkit.parameter import Range, Realized, Value
-from terrainkit.terrain import Terrain
+from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain.parameter import Range, Realized, Value
 
 _EXAMPLE = Path(__file__).parent.parent / "importing" / "example.npy"
 _EXAMPLE_CELL = 0.2

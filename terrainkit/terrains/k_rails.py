@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.lane import Lane, lane_goals
-from terrainkit.grid import Grid
-from terrainkit.parameter import MAX_COUNT
-from terrainkit.solids import Solids
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain import parameter
+from terrainkit.terrain.parameter import MAX_COUNT
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import SINK
 from terrainkit.features.lane import lane_goals, lane_spawn
-from terrainkit.grid import Grid
-from terrainkit.parameter import MAX_COUNT
-from terrainkit.solids import Solids, make_boxes, make_cylinders
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders
+from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain.parameter import MAX_COUNT
 
 RAIL = 0.05
 """Side of the cross section of a ladder's rails [m]."""

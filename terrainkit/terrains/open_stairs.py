@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_blocks, number_that_fits
 from terrainkit.features.lane import Lane, lane_goals
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,13 +6,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import SINK
 from terrainkit.features.scatter import scatter
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids, make_boxes
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids, make_boxes
+from terrainkit.terrain import Terrain, parameter
 
 FULL, HALF = (1.2, 0.8, 0.144), (0.6, 0.4, 0.116)
 """Sides and height of a EUR pallet and of a half pallet [m]."""

@@ -6,10 +6,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain import Terrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.noise import STEP, ValueNoise
-from terrainkit.grid import Grid
-from terrainkit.parameter import Realized
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain.parameter import Realized
 from terrainkit.terrains.pyramid_slope import PyramidSlope
 
 

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import MAX_PER_AXIS, SINK
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids, make_cylinders, make_hulls
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids, make_cylinders, make_hulls
+from terrainkit.terrain import Terrain, parameter
 
 _ARC_POINTS = 5
 """Points on the outer edge of a tread."""

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.blocks import SINK, number_that_fits
 from terrainkit.features.pit_ground import pit_around, pit_bounds
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids, make_cylinders
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids, make_cylinders
+from terrainkit.terrain import Terrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)

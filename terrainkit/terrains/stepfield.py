@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.lane import Lane, lane_goals
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain import parameter
 
 _POSTS = 10
 """Posts along each side of a field."""

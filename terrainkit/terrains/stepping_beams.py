@@ -6,13 +6,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.lane import Lane, lane_slots
 from terrainkit.features.pit_ground import pit_between
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

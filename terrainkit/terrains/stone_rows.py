@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between, pit_bounds
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
 from terrainkit.features.pit_ground import pit_around, pit_bounds
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids
-from terrainkit.terrain import Terrain
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain import Terrain, parameter
 
 _MIN_SIDE = 0.02
 """Narrower rests of truncated stones are left out [m]."""

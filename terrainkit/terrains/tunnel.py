@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import parameter
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.lane import Lane, lane_goals, lane_slots
-from terrainkit.grid import Grid
-from terrainkit.solids import Solids, make_boxes
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids, make_boxes
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

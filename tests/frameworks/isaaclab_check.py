@@ -83,7 +83,7 @@ from parkour import CONFIG  # noqa: E402
 import terrainkit  # noqa: E402
 from terrainkit.importing import import_terrain_mesh  # noqa: E402
 from terrainkit.integrations.isaaclab import terrain_importer_cfg  # noqa: E402
-from terrainkit.validate import validate  # noqa: E402
+from terrainkit.map.validate import validate  # noqa: E402
 
 prims = {}
 isaaclab.terrains.terrain_importer.create_prim_from_mesh = lambda path, mesh, **materials: (

@@ -17,7 +17,7 @@ from parkour import CONFIG
 
 import terrainkit
 from terrainkit.integrations.mjlab import import_terrain, terrain_entity_cfg
-from terrainkit.validate import validate
+from terrainkit.map.validate import validate
 
 path = Path(sys.argv[1]) / "map.npz"
 terrain_map = terrainkit.generate(CONFIG)

@@ -3,14 +3,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, SubTerrain, TerrainMap, generate, make_patch, registry
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate, make_patch
 from terrainkit.errors import ConfigError
+from terrainkit.geometry.solids import Solids
+from terrainkit.map.validate import validate
 from terrainkit.overlays.mirror import Mirror
 from terrainkit.overlays.noise import Noise
 from terrainkit.overlays.rotate import Rotate
 from terrainkit.overlays.side_walls import SideWalls
-from terrainkit.solids import Solids
-from terrainkit.validate import validate
+from terrainkit.terrain import registry
 
 TERRAINS = registry.terrain_names()
 OVERLAYS = {name: (registry.get_overlay(name)(),) for name in registry.overlay_names()} | {

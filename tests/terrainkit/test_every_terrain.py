@@ -3,14 +3,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from terrainkit import MapConfig, SubTerrain, TerrainkitError, generate, registry
+from terrainkit import MapConfig, SubTerrain, TerrainkitError, generate
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
-from terrainkit.measured_difficulty import measured_difficulty
-from terrainkit.parameter import MAX_VALUE, parameters_of
-from terrainkit.seams import Seams
-from terrainkit.terrain import Terrain
-from terrainkit.validate import validate
+from terrainkit.geometry.grid import Grid
+from terrainkit.map.measured_difficulty import measured_difficulty
+from terrainkit.map.seams import Seams
+from terrainkit.map.validate import validate
+from terrainkit.terrain import Terrain, registry
+from terrainkit.terrain.parameter import MAX_VALUE, parameters_of
 
 VARIANTS = [(name, {}) for name in registry.terrain_names()] + [
     (name, {"inverted": True})

@@ -4,8 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, TerrainMap, generate, presets
-from terrainkit.free_space import CONTACT
+from terrainkit import MapConfig, TerrainMap, generate
+from terrainkit.geometry.free_space import CONTACT
+from terrainkit.terrain import presets
 
 POINTS = 1000
 TOLERANCE = 1e-3

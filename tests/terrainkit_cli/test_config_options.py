@@ -8,7 +8,7 @@ import pytest
 import tyro
 
 from terrainkit.errors import ConfigError
-from terrainkit.schema import field_types, flatten
+from terrainkit.settings.schema import field_types, flatten
 from terrainkit_cli.config_options import TaskCommand
 from terrainkit_cli.parse import UsageError, parse
 from terrainkit_cli.robot_options import InputPath, Output

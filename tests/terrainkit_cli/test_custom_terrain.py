@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 import terrainkit
-from terrainkit import MapConfig, SubTerrain, TerrainMap, parameter, registry
+from terrainkit import MapConfig, SubTerrain, TerrainMap
+from terrainkit.map.validate import validate
 from terrainkit.overlays.mirror import Mirror
 from terrainkit.overlays.noise import Noise
 from terrainkit.overlays.side_walls import SideWalls
-from terrainkit.terrain import Terrain
-from terrainkit.validate import validate
+from terrainkit.terrain import Terrain, parameter, registry
 
 
 @pytest.fixture

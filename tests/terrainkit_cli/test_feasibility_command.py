@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrainkit.terrain_map import TerrainMap
+from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_robots.description import bundled
 
 

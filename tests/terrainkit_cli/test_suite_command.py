@@ -31,7 +31,7 @@ def test_generate_writes_the_verified_map(terrainkit, tmp_path):
 
 
 def test_generate_with_another_hash_writes_nothing(terrainkit, tmp_path, monkeypatch):
-    monkeypatch.setitem(suites._SHA256, "natural-1", "0" * 64)
+    monkeypatch.setitem(suites.suite._SHA256, "natural-1", "0" * 64)
     run = terrainkit("suite", "generate", "natural-1", "-o", "m.npz")
     assert (run.returncode, run.stderr.count("\n")) == (2, 1)
     assert f"expected {'0' * 64}" in run.stderr

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
-from terrainkit import registry
+from terrainkit.terrain import registry
 
 CONFIG = """
 rows = 3

@@ -28,7 +28,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Literal
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import closest, expected_names
+from terrainkit.settings.text import closest, expected_names
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import Source
 

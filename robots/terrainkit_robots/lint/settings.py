@@ -19,10 +19,10 @@ from typing import Annotated, Any, Self
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.schema import Config
-from terrainkit.text import closest
-from terrainkit.toml_text import parse_toml, read_text
-from terrainkit.type_hint import show
+from terrainkit.settings.schema import Config
+from terrainkit.settings.text import closest
+from terrainkit.settings.toml_text import parse_toml, read_text
+from terrainkit.settings.type_hint import show
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 
 Reason = Annotated[str, Meta(pattern=r"\S", description="a reason, as a string")]

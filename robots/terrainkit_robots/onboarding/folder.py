@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-from terrainkit.atomic_write import atomic_folder
 from terrainkit.errors import ExportError
+from terrainkit.files.atomic_write import atomic_folder
 from terrainkit_robots.text import free_name, names
 
 SPEC = "robot.toml"

@@ -12,8 +12,8 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.schema import Config
-from terrainkit.type_hint import PositiveInt
+from terrainkit.settings.schema import Config
+from terrainkit.settings.type_hint import PositiveInt
 from terrainkit_robots.policy import gait
 from terrainkit_robots.policy.gait import BoolArray
 from terrainkit_robots.policy.load import Policy, load_policy, single_torch_thread

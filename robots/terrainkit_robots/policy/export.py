@@ -14,8 +14,8 @@ import onnxruntime
 import torch
 from tensordict import TensorDict
 
-from terrainkit.atomic_write import atomic_write, check_target
 from terrainkit.errors import ExportError
+from terrainkit.files.atomic_write import atomic_write, check_target
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env

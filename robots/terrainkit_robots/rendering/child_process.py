@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots import gl_backend
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.text import one_line

@@ -61,7 +61,7 @@ def check_video_size(size: tuple[int, int]) -> None:
 
 def check_video_path(path: Path, *, overwrite: bool = False) -> None:
     """Raise a ConfigError or an ExportError unless a video can be written to a path."""
-    from terrainkit.atomic_write import check_target
+    from terrainkit.files.atomic_write import check_target
 
     if path.suffix != ".mp4":
         raise ConfigError(f"video file: got {path.name}; expected a name that ends in .mp4")
@@ -78,7 +78,7 @@ def write_video(spec: VideoSpec, path: Path, *, overwrite: bool = False) -> Iter
     """
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
-    from terrainkit.atomic_write import atomic_write
+    from terrainkit.files.atomic_write import atomic_write
 
     check_video_path(path, overwrite=overwrite)
     with atomic_write(path, overwrite=overwrite) as target:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit import TerrainMap
+from terrainkit.curriculum.waypoints import Waypoints, route_lengths
 from terrainkit.errors import ConfigError
-from terrainkit.patch import Patch
-from terrainkit.waypoints import Waypoints, route_lengths
+from terrainkit.map.patch import Patch
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, rollout
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.report_card.route import (

@@ -11,8 +11,8 @@ import numpy as np
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import TerrainkitWarning
 from terrainkit.feasibility import RobotLimits
-from terrainkit.grid import Grid
-from terrainkit.parameter import Range, at_difficulty
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain.parameter import Range, at_difficulty
 from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
 from terrainkit_robots.rl.run import PolicySpec

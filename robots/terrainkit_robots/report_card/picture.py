@@ -1,6 +1,6 @@
 """The picture of a report card: success by test and level."""
 
-from terrainkit.heat_map import HeatMapRow, draw_heat_map
+from terrainkit.views.heat_map import HeatMapRow, draw_heat_map
 from terrainkit_robots.report_card.card import ReportCard, summary
 from terrainkit_robots.report_card.crossing import CROSSED, OUTCOMES
 

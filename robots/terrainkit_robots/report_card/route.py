@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.patch import Patch
+from terrainkit.map.patch import Patch
 
 GOAL_RADIUS = 0.4
 """Horizontal distance at which a goal is reached [m]."""

@@ -10,7 +10,7 @@ from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 
 if TYPE_CHECKING:
-    from terrainkit.waypoints import Waypoints
+    from terrainkit.curriculum.waypoints import Waypoints
 
 GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
 """Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m, and 0.8 s

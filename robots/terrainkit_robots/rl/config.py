@@ -12,8 +12,8 @@ from msgspec import Meta
 
 from terrainkit.curriculum import SamplerName
 from terrainkit.errors import ConfigError
-from terrainkit.schema import Config
-from terrainkit.type_hint import (
+from terrainkit.settings.schema import Config
+from terrainkit.settings.type_hint import (
     Fraction,
     Interval,
     NonNegativeFloat,

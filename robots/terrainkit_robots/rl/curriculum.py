@@ -8,7 +8,7 @@ import torch
 from numpy.typing import NDArray
 
 from terrainkit.curriculum import SAMPLERS, CommandProgress, assign_spawns
-from terrainkit.curriculum.picture import draw_statistics
+from terrainkit.views.curriculum_picture import draw_statistics
 from terrainkit_robots.rl import config
 from terrainkit_robots.rl.terrain import Terrain
 

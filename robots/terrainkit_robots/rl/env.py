@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
+from terrainkit.curriculum.waypoints import Waypoints
 from terrainkit.errors import ConfigError
-from terrainkit.waypoints import Waypoints
 from terrainkit_robots.rl import observations
 from terrainkit_robots.rl.commands import Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task

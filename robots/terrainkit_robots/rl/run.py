@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from terrainkit import MapConfig, TerrainMap
-from terrainkit.atomic_write import atomic_folder, atomic_write
 from terrainkit.errors import ConfigError, ExportError, listing
-from terrainkit.schema import Config
-from terrainkit.text import expected_names
-from terrainkit.toml_text import read_text
+from terrainkit.files.atomic_write import atomic_folder, atomic_write
+from terrainkit.settings.schema import Config
+from terrainkit.settings.text import expected_names
+from terrainkit.settings.toml_text import read_text
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task

@@ -15,7 +15,7 @@ from os.path import isdir
 from pathlib import Path
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import expected_names, truncate
+from terrainkit.settings.text import expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE

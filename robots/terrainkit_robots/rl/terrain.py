@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from terrainkit import MapConfig, TerrainMap, generate
 from terrainkit.errors import ConfigError
 from terrainkit.export.mjcf import collision_surface
-from terrainkit.surface import HeightfieldSurface
-from terrainkit.text import closest
+from terrainkit.geometry.surface import HeightfieldSurface
+from terrainkit.settings.text import closest
 from terrainkit_robots.transforms import FloatArray
 
 

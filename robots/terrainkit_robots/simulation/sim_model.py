@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.tree import build_tree
 from terrainkit_robots.analysis.cached_fact import cached_fact

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import closest, truncate
-from terrainkit.toml_text import key_text
+from terrainkit.settings.text import closest, truncate
+from terrainkit.settings.toml_text import key_text
 from terrainkit_robots.spec.pattern import compile_pattern, max_matches
 from terrainkit_robots.text import names
 

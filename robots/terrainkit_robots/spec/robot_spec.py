@@ -14,10 +14,10 @@ from typing import Annotated, Any, Literal, Self, get_args, get_origin
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.field_docs import field_docs
-from terrainkit.schema import Config, field_types
-from terrainkit.toml_text import LINE_LENGTH, comment_text, line_text
-from terrainkit.type_hint import SORTED, UNIQUE, parse_hint
+from terrainkit.settings.field_docs import field_docs
+from terrainkit.settings.schema import Config, field_types
+from terrainkit.settings.toml_text import LINE_LENGTH, comment_text, line_text
+from terrainkit.settings.type_hint import SORTED, UNIQUE, parse_hint
 from terrainkit_robots.spec.per_joint import by_joint
 
 FORMAT_VERSION = 1

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.viewer import show_map
+from terrainkit.views.viewer import show_map
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.policy.evaluate import EvaluationConfig, rollout

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from terrainkit.curriculum import PatchStatistics
-from terrainkit.curriculum.picture import draw_statistics
 from terrainkit.curriculum.statistics import add_to_means
+from terrainkit.views.curriculum_picture import draw_statistics
 
 
 def test_statistics_are_recorded_by_patch():

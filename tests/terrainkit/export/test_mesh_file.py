@@ -12,7 +12,7 @@ import trimesh
 from terrainkit import TerrainMap
 from terrainkit.errors import ExportError, TerrainkitWarning
 from terrainkit.export.mesh_file import _FACES_PER_BLOCK
-from terrainkit.solids import Solids
+from terrainkit.geometry.solids import Solids
 
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 

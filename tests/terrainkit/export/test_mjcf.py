@@ -10,8 +10,8 @@ from scipy.ndimage import binary_dilation
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
+from terrainkit.geometry.walls import wall_edges
 from terrainkit.overlays.friction_patches import FrictionPatches
-from terrainkit.walls import wall_edges
 
 ROOT = Path(__file__).parents[3]
 ROBOTS = Path(os.environ.get("TERRAINKIT_ROBOTS", ROOT.parent / "shared" / "robots"))

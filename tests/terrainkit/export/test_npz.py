@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import MapFileError, MemoryLimitError
 from terrainkit.export.npz import read_mesh
-from terrainkit.solids import Solids
-from terrainkit.validate import validate
+from terrainkit.geometry.solids import Solids
+from terrainkit.map.validate import validate
 
 
 @pytest.fixture(scope="module")

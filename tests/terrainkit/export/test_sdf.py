@@ -6,7 +6,7 @@ import trimesh
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.solids import Solids, make_boxes, make_cylinders, make_hulls
+from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from pxr import Usd, UsdGeom, UsdPhysics, UsdShade, UsdValidation
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.mesh.solid_mesh import solid_meshes
+from terrainkit.geometry.mesh.solid_mesh import solid_meshes
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility import RobotLimits, assess_map, assess_patch
-from terrainkit.registry import terrain_names
-from terrainkit.solids import make_boxes
+from terrainkit.geometry.solids import make_boxes
+from terrainkit.terrain.registry import terrain_names
 from tests.limits import LIMITS
 
 CASES = {

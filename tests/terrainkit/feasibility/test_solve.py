@@ -8,9 +8,9 @@ import pytest
 from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility import assess_map, assess_patch, solve_ranges
-from terrainkit.generation import generate
-from terrainkit.patch import build_patch
-from terrainkit.registry import make_overlay
+from terrainkit.map.generation import generate
+from terrainkit.map.patch import build_patch
+from terrainkit.terrain.registry import make_overlay
 from terrainkit.terrains.course import Element
 from tests.limits import LIMITS
 

@@ -10,7 +10,7 @@ from terrainkit.features.blocks import (
     make_walls,
     number_that_fits,
 )
-from terrainkit.solid_index import SolidIndex
+from terrainkit.geometry.solid_index import SolidIndex
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.features.gradient_noise import fractal_noise, perlin_noise, unit_relief
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 
 def test_perlin_noise_is_bounded_and_centered():

@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.lane import lane_goals, lane_slots, slot_centers
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 GRID = Grid(shape=(80, 40), cell=0.1, lower=(10.0, -2.0))
 

@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.pit_ground import pit_around, pit_between, pit_bounds
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 
 def test_pit_around_leaves_platform_and_rim():

@@ -2,7 +2,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.ramp_field import ramp_cells
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 
 def test_ramp_cells_are_centered_across_the_lane():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.features.scatter import scatter
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 GRIDS = [Grid(shape=(80, 80), cell=0.1, lower=(8.0, -4.0)), Grid(shape=(80, 40), cell=0.1)]
 

@@ -5,8 +5,8 @@ import pytest
 
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.importing.image import read
-from terrainkit.importing.import_map import import_map
 from terrainkit.importing.options import ImportOptions, ReadOptions
+from terrainkit.map.import_map import import_map
 
 # Two rows of three cells of 2 m; the upper left corner is at (500000, 4649776).
 HEIGHTS = np.array([[1, 2, 3], [4, -9999, 6]], dtype=np.float32)

@@ -6,7 +6,7 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.sub_terrain import SubTerrain
+from terrainkit.terrain.sub_terrain import SubTerrain
 
 ROBOT = """<mujoco><worldbody><body pos="0 0 {z}"><freejoint/>
   <geom name="foot" type="sphere" size="0.05"/></body></worldbody></mujoco>"""

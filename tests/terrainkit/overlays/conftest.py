@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from terrainkit.grid import Grid
-from terrainkit.patch_geometry import PatchGeometry
-from terrainkit.solids import Solids
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain.patch_geometry import PatchGeometry
 
 
 @pytest.fixture

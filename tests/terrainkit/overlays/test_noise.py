@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from terrainkit.geometry.solids import make_boxes
 from terrainkit.overlays.noise import Noise
-from terrainkit.solids import make_boxes
 
 RNG = np.random.default_rng
 

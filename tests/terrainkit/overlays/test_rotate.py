@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
+from terrainkit.geometry.solids import make_boxes
 from terrainkit.overlays.rotate import Rotate
-from terrainkit.solids import make_boxes
 
 
 @pytest.mark.parametrize(

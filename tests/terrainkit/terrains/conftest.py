@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 
 
 @pytest.fixture

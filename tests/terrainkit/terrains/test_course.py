@@ -3,12 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, SubTerrain, generate, make_patch, registry
+from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
+from terrainkit.map.validate import validate
 from terrainkit.overlays.side_walls import SideWalls
+from terrainkit.terrain import registry
 from terrainkit.terrains.course import Course, Element
-from terrainkit.validate import validate
 
 BLOCK = {"min_spacing": 1.0, "max_spacing": 1.0, "min_thickness": 0.4, "max_thickness": 0.4}
 """Hurdles in the middle of slots of 1 m."""

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.solid_index import SolidIndex
+from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.terrains.crossing_ramps import CrossingRamps
 
 

@@ -1,7 +1,7 @@
 import pytest
 
-from terrainkit.grid import Grid
-from terrainkit.parameter import parameters_of
+from terrainkit.geometry.grid import Grid
+from terrainkit.terrain.parameter import parameters_of
 from terrainkit.terrains.flat import Flat
 
 

@@ -7,9 +7,9 @@ import trimesh
 
 import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
+from terrainkit.map.validate import validate
 from terrainkit.terrains.imported import Imported
-from terrainkit.validate import validate
 
 
 def plane(shape, cell):

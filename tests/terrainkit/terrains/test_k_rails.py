@@ -3,8 +3,8 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import SINK
-from terrainkit.grid import Grid
-from terrainkit.solids import rotation_matrices
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import rotation_matrices
 from terrainkit.terrains.k_rails import KRails
 
 

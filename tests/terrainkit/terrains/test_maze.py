@@ -5,8 +5,8 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
-from terrainkit.solid_index import SolidIndex
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.terrains.maze import Maze
 
 

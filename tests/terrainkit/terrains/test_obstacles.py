@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 from terrainkit.terrains.obstacles import Obstacles
 
 SEEDS = range(12)

@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit.solid_index import SolidIndex
+from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.terrains.spiral_stairs import SpiralStairs
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
+from terrainkit.geometry.grid import Grid
 from terrainkit.terrains.stairs_turning import StairsTurning
 
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.grid import Grid
-from terrainkit.measured_difficulty import measured_difficulty
+from terrainkit.geometry.grid import Grid
+from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.terrains.stepping_stones import SteppingStones
 
 

@@ -7,9 +7,9 @@ import pytest
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
-from terrainkit.field_docs import field_docs
-from terrainkit.schema import Config
-from terrainkit.type_hint import SORTED, PositiveFloat
+from terrainkit.settings.field_docs import field_docs
+from terrainkit.settings.schema import Config
+from terrainkit.settings.type_hint import SORTED, PositiveFloat
 from terrainkit_robots.rl.config import (
     Algorithm,
     Commands,

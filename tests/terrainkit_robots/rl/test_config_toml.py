@@ -7,8 +7,8 @@ from typing import Literal, get_args, get_origin, get_type_hints
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.schema import Config, flatten
-from terrainkit.type_hint import parse_hint
+from terrainkit.settings.schema import Config, flatten
+from terrainkit.settings.type_hint import parse_hint
 from terrainkit_robots.rl.config import Commands, Rewards, Task
 
 

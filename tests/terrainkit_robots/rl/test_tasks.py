@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.schema import flatten
+from terrainkit.settings.schema import flatten
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import rewards, scene, tasks

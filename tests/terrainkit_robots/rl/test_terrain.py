@@ -4,7 +4,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import TerrainkitError
-from terrainkit.surface import HeightfieldSurface
+from terrainkit.geometry.surface import HeightfieldSurface
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import InitState
 from terrainkit_robots.rl.env import LeggedEnv

@@ -5,8 +5,8 @@ import pytest
 from terrainkit import MapConfig
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility import assess_patch
-from terrainkit.patch import build_patch
-from terrainkit.presets import get_preset
+from terrainkit.map.patch import build_patch
+from terrainkit.terrain.presets import get_preset
 from terrainkit_robots.description import bundled
 from terrainkit_robots.simulation.robot_limits import derive_limits
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terrainkit.errors import ConfigError
-from terrainkit.type_hint import parse_hint
+from terrainkit.settings.type_hint import parse_hint
 from terrainkit_robots.spec.robot_spec import (
     JOINT_TABLES,
     MirrorJoint,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
-from terrainkit.viewer import show_map
+from terrainkit.views.viewer import show_map
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.viewer.show_policy import PolicyView

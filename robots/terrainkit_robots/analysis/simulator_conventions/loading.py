@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.model import RobotModel

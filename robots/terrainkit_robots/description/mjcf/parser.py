@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
-from terrainkit.text import closest, truncate
+from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
 from terrainkit_robots.description.model import Problem
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas

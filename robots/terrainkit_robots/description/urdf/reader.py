@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.description.model import (
     Dynamics,
     Geometry,

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from terrainkit.text import closest, truncate
+from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.description.model import Problem
 from terrainkit_robots.description.urdf.tags import has_variable
 from terrainkit_robots.description.xml.document import XmlDocument

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from lxml import etree
 
-from terrainkit.text import closest
+from terrainkit.settings.text import closest
 
 _ATTRIBUTES: Mapping[str, frozenset[str]] = {
     tag: frozenset(names.split())

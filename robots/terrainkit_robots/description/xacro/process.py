@@ -17,7 +17,7 @@ from typing import Any
 from xml.dom import expatbuilder
 from xml.parsers import expat
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.description.package_resolver import PackageResolver
 
 ORIGIN = "terrainkit-origin"

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError
+from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.mesh.surface import Surface
 
 _MAX_BYTES = 64 * 2**20

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from terrainkit.atomic_write import atomic_write
 from terrainkit.errors import ExportError, TerrainkitError
+from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.description.fix import Edit, Fix, InsertChild, ReplaceBytes, WriteFile
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import read_bytes

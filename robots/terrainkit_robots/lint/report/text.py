@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.lint.report.escape import escape_control
 from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from terrainkit.text import closest, truncate
+from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.joint_roles import robot_joints

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.kinematics import joint_axis
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror import swap_sides

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
-from terrainkit.text import closest, truncate
+from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.cannot_check import CannotCheckError

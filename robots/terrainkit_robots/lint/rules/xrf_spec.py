@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from terrainkit.text import closest, truncate
+from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint

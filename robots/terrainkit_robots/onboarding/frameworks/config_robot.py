@@ -8,7 +8,7 @@ from statistics import median
 from typing import Literal, TypeVar
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.text import truncate
+from terrainkit.settings.text import truncate
 from terrainkit_robots.onboarding.frameworks.source import comment, float_literal
 from terrainkit_robots.spec.per_joint import by_joint, match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec, unit_of

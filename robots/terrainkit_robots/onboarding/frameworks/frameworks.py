@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
-from terrainkit.text import expected_names
+from terrainkit.settings.text import expected_names
 from terrainkit_robots.onboarding import frameworks
 from terrainkit_robots.onboarding.derive_spec.named_bodies import body_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot

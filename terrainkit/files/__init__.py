@@ -1,0 +1,1 @@
+"""Files: atomic writing, archives of arrays with limits, and the memory that is available."""

@@ -1,0 +1,114 @@
+"""The merged mesh: coplanar faces merged to large ones.
+
+Flat quads are merged to rectangles, quads that are flat along one axis to rows, and straight
+walls of constant height to panels with a flat strip on both sides. Each polygon keeps the boundary
+vertices that its neighbors use, so large and small faces share all vertices. The surface is exactly
+that of the full mesh.
+"""
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.mesh.full import split_quads
+from terrainkit.geometry.mesh.node_grid import QUADS_PER_BLOCK, NodeGrid
+from terrainkit.geometry.mesh.polygons import Mask
+from terrainkit.geometry.mesh.rectangles import Rectangles
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
+from terrainkit.geometry.mesh.wall_quads import wall_quads
+from terrainkit.geometry.mesh.wall_runs import WallRuns
+
+
+def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> TriMesh:
+    """Return the surface with coplanar faces merged.
+
+    Args:
+        heights: Samples [m], shape `grid.shape`.
+        grid: Positions of the samples.
+        threshold: Difference between neighboring samples above which there is a wall [m].
+
+    Raises:
+        MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
+    """
+    node_grid = NodeGrid.from_heights(heights, grid, threshold)
+    parts, extra_parts = _faces(node_grid, *_merge_quads(node_grid))
+    x, y, z = node_grid.x, node_grid.y, node_grid.z
+    # Arrays that are no longer needed are freed, since they are larger than the mesh.
+    del node_grid
+    triangles, extra = np.concatenate(parts), np.concatenate(extra_parts)
+    del parts, extra_parts
+    used = np.zeros(z.size + len(extra), dtype=bool)
+    used[triangles.ravel()] = True
+    i, j = np.divmod(np.flatnonzero(used[: z.size]), z.shape[1])
+    nodes = np.empty((len(i), 3), dtype=np.float32)
+    nodes[:, 0], nodes[:, 1], nodes[:, 2] = x[i], y[j], z[i, j]
+    vertices = np.concatenate([nodes, extra[used[z.size :]]])
+    del i, j, z, nodes, extra
+    number = np.cumsum(used, dtype=np.int32)
+    for start in range(0, len(triangles), QUADS_PER_BLOCK):
+        part = triangles[start : start + QUADS_PER_BLOCK]
+        part[:] = number[part] - 1
+    return TriMesh(vertices=vertices, triangles=triangles)
+
+
+def _merge_quads(node_grid: NodeGrid) -> tuple[Mask, list[Rectangles], list[WallRuns]]:
+    """Return the quads that are not merged, and those that are."""
+    flat_x, flat_y = node_grid.flat_x, node_grid.flat_y
+    flat = flat_x & flat_y
+    sloped = ~(flat | node_grid.has_wall)
+    rows_x, rows_y = flat_x & sloped, flat_y & sloped
+    del sloped
+    # Where the ground is flat along y, walls on both edges along x are one straight wall.
+    walls_x, walls_y = flat_y, flat_x
+    walls_x &= node_grid.walls_x[:, :-1]
+    walls_x &= node_grid.walls_x[:, 1:]
+    walls_y &= node_grid.walls_y[:-1]
+    walls_y &= node_grid.walls_y[1:]
+    # Each of these clears the mask where there is nothing to merge.
+    rectangles = [Rectangles.flat(flat), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
+    runs = [WallRuns.normal_x(node_grid, walls_x), WallRuns.normal_y(node_grid, walls_y)]
+    merged = flat
+    for mask in (rows_x, rows_y, walls_x, walls_y):
+        merged |= mask
+    return ~merged, rectangles, runs
+
+
+def _faces(
+    node_grid: NodeGrid, single: Mask, rectangles: list[Rectangles], runs: list[WallRuns]
+) -> tuple[list[NDArray[np.int32]], list[NDArray[np.float32]]]:
+    """Return the triangles in several parts, and the positions of the vertices after the nodes."""
+    kept = _corners(single)
+    for rectangle in rectangles:
+        rectangle.keep_corners(kept)
+    for run in runs:
+        run.keep_ends(kept)
+
+    plain = node_grid.first_corners(single & ~node_grid.has_wall)
+    pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
+    split_quads(node_grid, plain, out=pairs)
+    count = node_grid.vertex_count
+    faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.has_wall), count)
+    triangles = [pairs, faces, *(run.panels().astype(np.int32) for run in runs)]
+    extra = [added]
+    count += len(added)
+    for polygons in itertools.chain(
+        (part.polygons(node_grid, kept) for each in rectangles for part in each.blocks()),
+        *(run.strips(kept) for run in runs),
+    ):
+        parts, added = polygons.triangles(count)
+        triangles.append(parts.astype(np.int32))
+        extra.append(added)
+        count += len(added)
+    del kept  # as large as the midpoints
+    return triangles, [node_grid.midpoints(), *extra]
+
+
+def _corners(quads: Mask) -> Mask:
+    """Return the nodes at the corners of `quads`."""
+    nodes = np.zeros((quads.shape[0] + 1, quads.shape[1] + 1), dtype=bool)
+    for i in (slice(None, -1), slice(1, None)):
+        for j in (slice(None, -1), slice(1, None)):
+            nodes[i, j] |= quads
+    return nodes

@@ -1,0 +1,136 @@
+"""The nodes of a mesh, the quads between them, and the walls.
+
+The nodes are the samples, and a rim at the edge of the map that repeats the outermost samples, so
+that the mesh covers the whole map. Node (i, j) has the number `i * ny + j`. The vertices at the
+midpoints of walls follow, two for each wall.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.files.memory import check_memory
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.walls import wall_edges
+
+BYTES_PER_NODE = 120
+"""Peak memory of building a mesh per node [bytes]."""
+
+QUADS_PER_BLOCK = 1 << 14
+"""Quads whose faces are built at a time, so that intermediate arrays stay in the cache."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NodeGrid:
+    """Nodes of shape (nx, ny) and the quads between them, of shape (nx - 1, ny - 1)."""
+
+    x: NDArray[np.float64]
+    """Coordinate of each node along x [m], shape (nx,)."""
+
+    y: NDArray[np.float64]
+    """Coordinate of each node along y [m], shape (ny,)."""
+
+    z: NDArray[np.float32]
+    """Height of each node [m], shape (nx, ny)."""
+
+    walls_x: NDArray[np.bool_]
+    """Whether the edge from (i, j) to (i + 1, j) is a wall, shape (nx - 1, ny)."""
+
+    walls_y: NDArray[np.bool_]
+    """Whether the edge from (i, j) to (i, j + 1) is a wall, shape (nx, ny - 1)."""
+
+    @classmethod
+    def from_heights(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "NodeGrid":
+        """Return the nodes of a heightfield; a difference above `threshold` [m] is a wall."""
+        check_memory(heights.size * BYTES_PER_NODE, f"a mesh of {heights.size} samples")
+        z = np.pad(heights, 1, mode="edge")
+        walls_x, walls_y = wall_edges(z, threshold)
+        x, y = (np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1))
+        return cls(x=x, y=y, z=z, walls_x=walls_x, walls_y=walls_y)
+
+    @cached_property
+    def has_wall(self) -> NDArray[np.bool_]:
+        """Whether each quad has a wall."""
+        either = self.walls_x[:, :-1] | self.walls_x[:, 1:]
+        either |= self.walls_y[:-1]
+        either |= self.walls_y[1:]
+        return either
+
+    @property
+    def flat_x(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along x are flat."""
+        same = self.z[:-1] == self.z[1:]
+        flat: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
+        return flat
+
+    @property
+    def flat_y(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along y are flat."""
+        same = self.z[:, :-1] == self.z[:, 1:]
+        flat: NDArray[np.bool_] = same[:-1] & same[1:]
+        return flat
+
+    def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the numbers of the four corners of each quad (i, j), counterclockwise, (4, n)."""
+        ny = self.z.shape[1]
+        first = i * ny + j
+        return np.stack([first, first + ny, first + ny + 1, first + 1])
+
+    def first_corners(self, quads: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return the number of corner 0 of each quad in the mask `quads`, shape (n,)."""
+        nodes = np.zeros((quads.shape[0], self.z.shape[1]), dtype=bool)
+        nodes[:, :-1] = quads
+        return np.flatnonzero(nodes)
+
+    def walls(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return whether each of the four edges of each quad (i, j) is a wall, (4, n)."""
+        x, y = self.walls_x, self.walls_y
+        return np.stack([x[i, j], y[i + 1, j], x[i, j + 1], y[i, j]])
+
+    @cached_property
+    def edges_x(self) -> NDArray[np.int64]:
+        """Flat index into `walls_x` of each wall, in order."""
+        return np.flatnonzero(self.walls_x)
+
+    @cached_property
+    def edges_y(self) -> NDArray[np.int64]:
+        """Flat index into `walls_y` of each wall, in order."""
+        return np.flatnonzero(self.walls_y)
+
+    @property
+    def vertex_count(self) -> int:
+        """How many numbers the nodes and the midpoints of the walls take."""
+        return int(self.z.size + 2 * (self.edges_x.size + self.edges_y.size))
+
+    def midpoint_x(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the vertex at the midpoint of each wall (i, j)-(i + 1, j), on the side of (i, j).
+
+        The vertex on the other side has the next number. Without a wall, the result is undefined.
+        """
+        index = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * index
+        return vertex
+
+    def midpoint_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the vertex at the midpoint of each wall (i, j)-(i, j + 1), like `midpoint_x`."""
+        index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
+        vertex: NDArray[np.int64] = self.z.size + 2 * index
+        return vertex
+
+    def midpoints(self) -> NDArray[np.float32]:
+        """Return the positions of all midpoints of walls [m], in the order of their numbers."""
+        num_x = 2 * self.edges_x.size
+        result = np.empty((num_x + 2 * self.edges_y.size, 3), dtype=np.float32)
+        i, j = np.divmod(self.edges_x, self.walls_x.shape[1])
+        for side in (0, 1):
+            part = result[side:num_x:2]
+            part[:, 0], part[:, 1] = (self.x[i] + self.x[i + 1]) / 2, self.y[j]
+            part[:, 2] = self.z[i + side, j]
+        i, j = np.divmod(self.edges_y, self.walls_y.shape[1])
+        for side in (0, 1):
+            part = result[num_x + side :: 2]
+            part[:, 0], part[:, 1] = self.x[i], (self.y[j] + self.y[j + 1]) / 2
+            part[:, 2] = self.z[i, j + side]
+        return result

@@ -1,0 +1,100 @@
+"""The triangle mesh of solids."""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ExportError
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
+from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
+
+MAX_CHORD_ERROR = 5e-4
+"""Largest distance between a cylinder and its mesh, half of it inside and half outside [m]."""
+
+_BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
+_BOX_FACES = np.array(
+    [
+        [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5],
+        [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
+        [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3],
+    ]
+)  # fmt: skip
+
+
+def solid_meshes(solids: Solids) -> list[TriMesh]:
+    """Return the mesh of each solid, closed, in the order of the solids."""
+    boxes = _transform(_BOX * solids.boxes[:, None, 3:6], solids.boxes)
+    meshes = [_mesh(vertices, _BOX_FACES) for vertices in boxes]
+    for cylinder in solids.cylinders:
+        vertices, faces = _cylinder(*cylinder[[3, 5]].tolist())
+        meshes.append(_mesh(_transform(vertices[None], cylinder[None])[0], faces))
+    return meshes + [_hull(vertices) for vertices in solids.hulls()]
+
+
+def concatenate_meshes(meshes: list[TriMesh]) -> TriMesh:
+    """Return one mesh with the faces of all `meshes`."""
+    counts = [len(mesh.vertices) for mesh in meshes]
+    starts = np.cumsum([0, *counts])
+    triangles = [m.triangles + np.int32(start) for m, start in zip(meshes, starts, strict=False)]
+    return TriMesh(
+        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
+        triangles=np.concatenate(triangles).astype(np.int32),
+    )
+
+
+def united(meshes: list[TriMesh]) -> TriMesh:
+    """Return the union of closed meshes as one watertight mesh, computed by manifold3d.
+
+    Raises:
+        ExportError: if the union fails.
+    """
+    import manifold3d
+
+    parts = [
+        manifold3d.Manifold(
+            manifold3d.Mesh64(mesh.vertices.astype(float), mesh.triangles.astype(np.uint64))
+        )
+        for mesh in meshes
+    ]
+    whole = manifold3d.Manifold.batch_boolean(parts, manifold3d.OpType.Add)
+    if whole.status() != manifold3d.Error.NoError:
+        raise ExportError(f"union of ground and solids: manifold3d reports {whole.status().name}")
+    result = whole.to_mesh64()
+    return _mesh(result.vert_properties[:, :3], result.tri_verts)
+
+
+def _transform(vertices: NDArray[np.float64], shapes: NDArray[np.float32]) -> NDArray[np.float64]:
+    """Return `vertices`, shape (n, k, 3), in the frames of `shapes`, in the frame of the map."""
+    turned = np.einsum("nij,nkj->nki", rotation_matrices(shapes[:, 6:]), vertices)
+    moved: NDArray[np.float64] = turned + shapes[:, None, :3]
+    return moved
+
+
+def _mesh(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> TriMesh:
+    return TriMesh(vertices=vertices.astype(np.float32), triangles=faces.astype(np.int32))
+
+
+def _cylinder(radius: float, half_length: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the vertices and faces of a prism that approximates an upright cylinder."""
+    # The sides of a regular polygon are radius (1 - cos(pi / n)) inside of its circle.
+    n = max(8, int(np.ceil(np.pi / np.arccos(max(0.0, 1 - MAX_CHORD_ERROR / radius)))))
+    angle = np.arange(n) * (2 * np.pi / n)
+    around = radius * 2 / (1 + np.cos(np.pi / n))
+    circle = around * np.column_stack([np.cos(angle), np.sin(angle)])
+    ends = [np.column_stack([circle, np.full(n, z)]) for z in (-half_length, half_length)]
+    centers = np.array([[0, 0, -half_length], [0, 0, half_length]])
+    a, b = np.arange(n), (np.arange(n) + 1) % n
+    bottom, top = np.full(n, 2 * n), np.full(n, 2 * n + 1)
+    faces = [[a, b, b + n], [a, b + n, a + n], [b, a, bottom], [a + n, b + n, top]]
+    return np.concatenate([*ends, centers]), np.concatenate([np.column_stack(f) for f in faces])
+
+
+def _hull(vertices: NDArray[np.float32]) -> TriMesh:
+    hull = convex_hull(vertices)
+    faces = hull.simplices
+    corners = vertices[faces].astype(float)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = (normal * hull.equations[:, :3]).sum(axis=1) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return _mesh(vertices.astype(float), faces)

@@ -1,0 +1,186 @@
+"""SolidIndex: the parts of vertical lines that solids occupy."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
+
+_MAX_PAIRS = 2_000_000
+"""Candidate pairs of points and solids that are evaluated at once, to bound the memory."""
+
+_MIN_BIN, _MAX_BINS = 0.5, 1_000_000
+"""Minimum side of the bins of the index [m], and their largest number."""
+
+_VERTICAL = 1e-6
+"""Largest z component of the unit normal of a vertical face."""
+
+
+class SolidIndex:
+    """Solids, sorted into square bins on the xy plane.
+
+    Every solid is an intersection of half-spaces; a cylinder is also the inside of an infinite
+    cylinder. A vertical line therefore meets a solid in one interval, which is computed exactly.
+    """
+
+    def __init__(self, solids: Solids, *, radius: float = 0.0) -> None:
+        """Index `solids`.
+
+        Args:
+            solids: The solids.
+            radius: Widen every solid horizontally by this distance [m]; edges become sharp, not
+                round, so corners are widened by more.
+        """
+        self._number = len(solids)
+        if not self._number:
+            return
+        self._radius = radius
+        self._planes, self._num_planes = _half_spaces(solids)
+        self._first_plane = np.cumsum(self._num_planes) - self._num_planes
+        self._cylinders, self._num_boxes = solids.cylinders.astype(float), len(solids.boxes)
+        self._axes = rotation_matrices(solids.cylinders[:, 6:])[..., 2]
+        lower, upper = solids.bounds()
+        # Single precision rounds by less than a tenth of a millimeter.
+        self._lower, self._upper = lower[:, :2] - radius - 1e-4, upper[:, :2] + radius + 1e-4
+        self._make_bins()
+
+    def _make_bins(self) -> None:
+        self._corner = self._lower.min(axis=0)
+        extent = self._upper.max(axis=0) - self._corner
+        self._bin = max(_MIN_BIN, float(np.sqrt(extent.prod() / _MAX_BINS)))
+        self._shape = (extent / self._bin).astype(np.int64) + 1
+        first = ((self._lower - self._corner) / self._bin).astype(np.int64)
+        last = ((self._upper - self._corner) / self._bin).astype(np.int64)
+        sides = last - first + 1
+        solid, place = _expand(sides.prod(axis=1))
+        column = first[solid, 0] + place // sides[solid, 1]
+        bins = column * self._shape[1] + first[solid, 1] + place % sides[solid, 1]
+        order = np.argsort(bins, kind="stable")
+        self._solids = solid[order]
+        self._ends = np.cumsum(np.bincount(bins, minlength=int(self._shape.prod())))
+
+    def spans(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the parts of the vertical lines through `xy` that solids occupy.
+
+        Args:
+            xy: Points [m], shape (n, 2).
+
+        Returns:
+            Bottom and top of each solid on each line [m], shape (n, k, 2), in the order of the
+            bottoms; NaN where a line has fewer than k solids.
+        """
+        if not self._number or not len(xy):
+            return np.empty((len(xy), 0, 2))
+        counts, starts = self._candidates(xy)
+        # Lines are evaluated in blocks with a bounded number of candidates each.
+        cuts = np.searchsorted(
+            np.cumsum(counts), np.arange(_MAX_PAIRS, counts.sum() + 1, _MAX_PAIRS)
+        )
+        blocks = np.split(np.arange(len(xy)), np.unique(cuts))
+        parts = [self._line_spans(xy, counts, starts, block) for block in blocks]
+        line, bottom, top = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        order = np.lexsort((bottom, line))
+        line = line[order]
+        rank = np.arange(len(line)) - np.searchsorted(line, line)
+        result = np.full((len(xy), int(rank.max(initial=-1)) + 1, 2), np.nan)
+        result[line, rank] = np.column_stack([bottom, top])[order]
+        return result
+
+    def _candidates(self, xy: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the number of solids in the bin of each point, and the position of the first."""
+        place = np.floor((xy - self._corner) / self._bin)
+        inside = ((place >= 0) & (place < self._shape)).all(axis=1)
+        place = np.where(inside[:, None], place, 0).astype(np.int64)
+        bins = place[:, 0] * self._shape[1] + place[:, 1]
+        ends = np.concatenate([[0], self._ends])
+        return np.where(inside, ends[bins + 1] - ends[bins], 0), ends[bins]
+
+    def _line_spans(
+        self,
+        xy: NDArray[np.float64],
+        counts: NDArray[np.int64],
+        starts: NDArray[np.int64],
+        block: NDArray[np.int64],
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return line, bottom and top of each solid on the lines `block`."""
+        row, place = _expand(counts[block])
+        line = block[row]
+        solid = self._solids[starts[line] + place]
+        near = ((xy[line] >= self._lower[solid]) & (xy[line] <= self._upper[solid])).all(axis=1)
+        line, solid = line[near], solid[near]
+        bottom, top = self._between_planes(xy[line], solid)
+        k = solid - self._num_boxes
+        round_ = (k >= 0) & (k < len(self._cylinders))
+        low, high = self._inside_cylinders(xy[line[round_]], k[round_])
+        bottom[round_] = np.maximum(bottom[round_], low)
+        top[round_] = np.minimum(top[round_], high)
+        hit = top > bottom
+        return line[hit], bottom[hit], top[hit]
+
+    def _between_planes(
+        self, xy: NDArray[np.float64], solid: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the interval of z between the faces of each solid; empty if top < bottom."""
+        if not len(solid):
+            return np.empty(0), np.empty(0)
+        pair, place = _expand(self._num_planes[solid])
+        normal, distance = np.split(self._planes[self._first_plane[solid][pair] + place], [3], 1)
+        left = distance[:, 0] + self._radius * np.hypot(normal[:, 0], normal[:, 1])
+        left -= (normal[:, :2] * xy[pair]).sum(axis=1)
+        nz = normal[:, 2]
+        steep = np.abs(nz) <= _VERTICAL
+        z = left / np.where(steep, 1.0, nz)
+        outside = steep & (left < -1e-9)
+        bottom = np.where(outside, np.inf, np.where(~steep & (nz < 0), z, -np.inf))
+        top = np.where(outside, -np.inf, np.where(~steep & (nz > 0), z, np.inf))
+        first = np.cumsum(self._num_planes[solid]) - self._num_planes[solid]
+        return np.maximum.reduceat(bottom, first), np.minimum.reduceat(top, first)
+
+    def _inside_cylinders(
+        self, xy: NDArray[np.float64], k: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the interval of z inside the infinite cylinders `k`; empty if top < bottom."""
+        axis, center = self._axes[k], self._cylinders[k, :3]
+        radius = self._cylinders[k, 3] + self._radius
+        # The distance from the axis of the point at height center_z + t is |q + t e|.
+        offset = np.column_stack([xy - center[:, :2], np.zeros(len(k))])
+        q = offset - axis * (axis * offset).sum(axis=1, keepdims=True)
+        e = np.array([0.0, 0.0, 1.0]) - axis * axis[:, 2:]
+        a, b = (e * e).sum(axis=1), (q * e).sum(axis=1)
+        c = (q * q).sum(axis=1) - radius**2
+        upright = a < _VERTICAL**2
+        root = np.sqrt(np.clip(b**2 - a * c, 0, None))
+        scale = np.where(upright, 1.0, a)
+        miss = np.where(upright, c > 0, b**2 < a * c)
+        low = np.where(upright, -np.inf, center[:, 2] - (b + root) / scale)
+        high = np.where(upright, np.inf, center[:, 2] - (b - root) / scale)
+        return np.where(miss, np.inf, low), np.where(miss, -np.inf, high)
+
+
+def _expand(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return index i `counts[i]` times for each i, and the position within each run."""
+    index = np.repeat(np.arange(len(counts)), counts)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the half-spaces of each solid.
+
+    Returns:
+        Unit normal n and distance d of each, shape (k, 4): the points p with n . p <= d; and the
+        number of half-spaces of each solid, shape (n,). Those of a cylinder are the sides of the
+        box around it. Widening the round side of a cylinder that lies on the ground would also
+        raise it; the box limits its height.
+    """
+    shapes = np.concatenate([solids.boxes, solids.cylinders])
+    normals = np.swapaxes(rotation_matrices(shapes[:, 6:]), 1, 2)
+    middle, half = np.einsum("nkj,nj->nk", normals, shapes[:, :3]), shapes[:, 3:6]
+    sides = [np.dstack([normals, middle + half]), np.dstack([-normals, half - middle])]
+    planes, counts = [np.concatenate(sides, axis=1).reshape(-1, 4)], [np.full(len(shapes), 6)]
+    equations = [convex_hull(vertices).equations.round(9) for vertices in solids.hulls()]
+    if equations:
+        hull = np.repeat(np.arange(len(equations)), [len(each) for each in equations])
+        # Coplanar facets of a hull repeat their plane.
+        unique = np.unique(np.column_stack([hull, np.concatenate(equations)]), axis=0)
+        planes.append(unique[:, 1:] * [1, 1, 1, -1])
+        counts.append(np.bincount(unique[:, 0].astype(np.int64)))
+    return np.concatenate(planes), np.concatenate(counts)

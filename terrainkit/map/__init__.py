@@ -1,0 +1,1 @@
+"""Maps: their configuration, generation, import, editing and validation."""

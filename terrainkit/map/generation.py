@@ -1,0 +1,236 @@
+"""Generate a TerrainMap from a MapConfig."""
+
+import itertools
+import warnings
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import TerrainkitWarning, listing
+from terrainkit.files.memory import check_memory
+from terrainkit.geometry.solids import Solids
+from terrainkit.map.config import MapConfig
+from terrainkit.map.layout import assign_patch, terrain_columns
+from terrainkit.map.patch import Patch, build_patch
+from terrainkit.map.seams import Seams, cliffs_text
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.terrain.patch_geometry import uniform_friction
+from terrainkit.terrain.sub_terrain import SubTerrain
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
+"""Wraps the iterator over the patches, given their number, to show a progress bar."""
+
+_BYTES_PER_PATCH = 2000
+"""Memory of the parameters, origin and difficulty of a patch [bytes]."""
+
+
+_MAX_TASKS = 64
+"""Largest number of tasks of an executor. A task of many patches has less overhead per patch."""
+
+
+def generate(
+    config: MapConfig, *, progress: Progress | None = None, executor: "Executor | None" = None
+) -> TerrainMap:
+    """Generate the map of `config`.
+
+    Args:
+        config: The configuration. The same config gives the same bytes on every machine.
+        progress: Wraps the iterator over the patches, for a progress bar.
+        executor: Builds the patches, such as a `ProcessPoolExecutor` or dask.distributed's
+            `Client.get_executor()`; None for this process. The map does not depend on it.
+
+    Returns:
+        The map.
+
+    Warns:
+        TerrainkitWarning: if a sub-terrain of a preset gets no column, if the cells are too coarse
+            or the patches too small for the requested parameters, if a spawn origin is not where
+            the terrain places it, or if patches meet at a cliff.
+
+    Raises:
+        ConfigError: if a terrain does not fit in a patch, or has no place to spawn.
+        MemoryLimitError: if the map would not fit in memory; nothing was allocated.
+    """
+    grid = config.grid
+    samples = grid.shape[0] * grid.shape[1]
+    check_memory(
+        samples * 4 + config.rows * config.cols * _BYTES_PER_PATCH,
+        f"a map of {grid.shape[0]} x {grid.shape[1]} samples",
+    )
+    builder = _MapBuilder(config)
+    indices = itertools.product(range(config.rows), range(config.cols))
+    with closing(_build_patches(config, terrain_columns(config), executor)) as patches:
+        for row, col in progress(indices, config.rows * config.cols) if progress else indices:
+            builder.add(row, col, *next(patches))
+    _warn(config, builder.deviations, +builder.moved_spawns)
+    terrain_map = builder.build()
+    _warn_about_map(terrain_map)
+    return terrain_map
+
+
+class _MapBuilder:
+    """A map whose patches are added one by one, so that they are in memory once."""
+
+    def __init__(self, config: MapConfig) -> None:
+        self.deviations: Counter[str] = Counter()
+        """Number of patches on which a parameter differs from the request, by parameter."""
+
+        self.moved_spawns: Counter[str] = Counter()
+        """Number of patches whose spawn origin was moved, by sub-terrain."""
+
+        grid, size = config.grid, (config.rows, config.cols)
+        self._config, self._grid = config, grid
+        self._heights = np.zeros(grid.shape, dtype=np.float32)
+        # A view of one number takes no memory, and most maps have one friction.
+        self._friction = uniform_friction(config.static_friction, grid.shape)
+        self._patch_friction = uniform_friction(config.static_friction, config.patch_shape)
+        self._terrain_types = np.empty(size, dtype=np.int32)
+        self._difficulty = np.empty(size, dtype=np.float32)
+        self._parameters = np.empty(size, dtype=object)
+        self._spawns = np.empty(size, dtype=object)
+        self._goals = np.empty(size, dtype=object)
+        self._solids: list[Solids] = []
+
+    def add(self, row: int, col: int, terrain_type: int, patch: Patch) -> None:
+        """Add a patch."""
+        config, sub_terrain = self._config, self._config.sub_terrains[terrain_type]
+        i, j = config.patch_start(row, col)
+        block = (slice(i, i + patch.grid.shape[0]), slice(j, j + patch.grid.shape[1]))
+        self._heights[block] = patch.heights
+        uniform = self._patch_friction
+        if patch.friction is not uniform and (patch.friction != uniform).any():
+            if not self._friction.flags.writeable:
+                self._friction = self._friction.copy()
+            self._friction[block] = patch.friction
+        self._terrain_types[row, col] = terrain_type
+        self._difficulty[row, col] = patch.difficulty
+        self._parameters[row, col] = patch.parameters
+        self._spawns[row, col], self._goals[row, col] = patch.spawns, patch.goals
+        self._solids.append(patch.solids)
+        self.deviations.update(_deviations(patch, sub_terrain, config.cell))
+        self.moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
+
+    def build(self) -> TerrainMap:
+        """Return the map of all patches."""
+        return TerrainMap(
+            config=self._config,
+            grid=self._grid,
+            heights=self._heights,
+            friction=self._friction,
+            spawns=pad_poses(self._spawns),
+            terrain_types=self._terrain_types,
+            terrain_names=tuple(each.name for each in self._config.sub_terrains),
+            difficulty=self._difficulty,
+            parameters=self._parameters,
+            solids=Solids.concatenate(self._solids),
+            goals=pad_poses(self._goals),
+        )
+
+
+def _build_patches(
+    config: MapConfig, columns: list[int], executor: "Executor | None"
+) -> Generator[tuple[int, Patch], None, None]:
+    """Yield terrain type and patch of each (row, col), row by row."""
+    indices = list(itertools.product(range(config.rows), range(config.cols)))
+    build = partial(_build_task, config, columns)
+    if executor is None:
+        for index in indices:
+            yield from build([index])
+        return
+    length = -(-len(indices) // _MAX_TASKS)
+    tasks = [indices[start : start + length] for start in range(0, len(indices), length)]
+    for patches in executor.map(build, tasks):
+        yield from patches
+
+
+def _build_task(
+    config: MapConfig, columns: list[int], indices: list[tuple[int, int]]
+) -> list[tuple[int, Patch]]:
+    """Return terrain type and patch of each (row, col) in `indices`."""
+    patches = []
+    for row, col in indices:
+        terrain_type, level = assign_patch(config, columns, row, col)
+        patch = build_patch(config, config.sub_terrains[terrain_type], level, row, col)
+        patches.append((terrain_type, patch))
+    return patches
+
+
+def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
+    """Return the poses (k, 4) of all patches, shape (rows, cols, k, 4), padded with NaN."""
+    lengths = {len(each) for each in poses.ravel().tolist()}
+    number = max(lengths)
+    if len(lengths) == 1:
+        return np.array(poses.tolist(), dtype=np.float32).reshape(*poses.shape, number, 4)
+    padded = np.full((*poses.shape, number, 4), np.nan, dtype=np.float32)
+    for row, col in np.ndindex(poses.shape):
+        padded[row, col, : len(poses[row, col])] = poses[row, col]
+    return padded
+
+
+def _deviations(patch: Patch, sub_terrain: SubTerrain, cell: float) -> list[str]:
+    """Return the parameters that differ from the request by more than the grid requires."""
+    declared, realized = sub_terrain.declarations, patch.parameters.realized
+    return [
+        f"{patch.terrain}.{name}"
+        for name, requested in patch.parameters.requested.items()
+        if requested != realized[name] and declared[name].deviates(requested, realized[name], cell)
+    ]
+
+
+def _warn(config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str]) -> None:
+    if deviations:
+        names = listing(f"{name} on {count} patches" for name, count in deviations.items())
+        warnings.warn(
+            f"cells of {config.cell:g} m, height steps or patches are too coarse or too small for "
+            f"the requested parameters: {names}; the map records the realized values",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+    if moved_spawns:
+        names = listing(f"{name} on {count} patches" for name, count in moved_spawns.items())
+        warnings.warn(
+            f"no flat disk of radius {config.spawn_radius:g} m at the preferred spawn position: "
+            f"{names}; the nearest flat disk is used; increase the platform or reduce spawn_radius",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+
+
+def _warn_about_map(terrain_map: TerrainMap) -> None:
+    config = terrain_map.config
+    if collapsed := list(_collapsed_ranges(terrain_map)):
+        warnings.warn(
+            f"cells of {config.cell:g} m or height steps are too coarse for a range: "
+            f"{listing(collapsed)} on every patch",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+    if cliffs := Seams(terrain_map=terrain_map).cliffs():
+        text = cliffs_text(cliffs, terrain_map.patch_names)
+        warnings.warn(
+            f"cliffs between patches: {text}; a robot cannot climb them",
+            TerrainkitWarning,
+            stacklevel=3,
+        )
+
+
+def _collapsed_ranges(terrain_map: TerrainMap) -> Iterator[str]:
+    """Yield the parameters that have several requested values but only one realized value."""
+    for terrain_type, sub_terrain in enumerate(terrain_map.config.sub_terrains):
+        patches = terrain_map.parameters[terrain_map.terrain_types == terrain_type].tolist()
+        for name in patches[0].requested if patches else ():
+            requested = {patch.requested[name] for patch in patches}
+            realized = {patch.realized[name] for patch in patches}
+            if len(requested) > 1 and len(realized) == 1:
+                yield (
+                    f"{sub_terrain.name}.{name} from {min(requested):g} to {max(requested):g} is "
+                    f"{realized.pop()}"
+                )

@@ -1,0 +1,296 @@
+"""Import a file of heights or a mesh as a map."""
+
+import hashlib
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError, HeightFileError
+from terrainkit.files.memory import check_memory
+from terrainkit.geometry.solids import Solids
+from terrainkit.importing.columns import Columns
+from terrainkit.importing.mesh_file import MeshSource
+from terrainkit.importing.options import ImportOptions
+from terrainkit.importing.overhangs import overhang_solids
+from terrainkit.importing.source import Source, fill_missing, open_source
+from terrainkit.map.config import MapConfig
+from terrainkit.map.edit import assign_solids, place_patch_spawns
+from terrainkit.map.generation import pad_poses
+from terrainkit.map.measured_difficulty import measured_difficulty
+from terrainkit.map.patch import Parameters
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.settings.type_hint import MAX_VALUE
+from terrainkit.terrain.parameter import MAX_TEXT_LENGTH
+from terrainkit.terrain.sub_terrain import SubTerrain
+
+DEFAULT_CELL = 0.1
+"""Distance between two samples of a map that is made from a mesh [m]."""
+
+_BYTES_PER_SAMPLE = 200
+
+_NO_GOALS = np.empty((0, 4), dtype=np.float32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportReport:
+    """What the map does not have in common with the file."""
+
+    num_missing: int
+    """Number of missing heights, which were filled."""
+
+    overhang_area: float = 0.0
+    """Area over which a part of the mesh hangs over the ground [m2]."""
+
+    lost_area: float = 0.0
+    """Part of that area where the map has no overhang [m2]: its ground is the top of the mesh, or
+    the sky is open."""
+
+    max_error: float = 0.0
+    """Largest difference in height between the map and the mesh where something hangs over the
+    ground [m]: of the ground, or of the lower or upper side of a solid."""
+
+    max_error_at: tuple[float, float] | None = None
+    """Where that is in the map, x and y [m]; None without overhangs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportedMap:
+    """A map and the differences from its file."""
+
+    terrain_map: TerrainMap
+    """The map, of mode custom."""
+
+    report: ImportReport
+    """The differences."""
+
+
+def import_map(path: str | Path, options: ImportOptions | None = None) -> ImportedMap:
+    """Return the map of a file of heights or a mesh.
+
+    The difficulty of a patch is its rank by :func:`.measured_difficulty`, from 0 for the easiest to
+    1 for the hardest; the patches stay where they are in the file.
+
+    Args:
+        path: The file: .png, .tif, .npy, .asc, .obj, .stl, .ply or .glb.
+        options: How it becomes a map.
+
+    Warns:
+        TerrainkitWarning: if an image has 8 bits only.
+
+    Raises:
+        HeightFileError: if the file cannot be read, or heights are missing.
+        ConfigError: if an option is invalid, the file is too small for the patches, or a patch has
+            no place to spawn.
+        MemoryLimitError: if the map would not fit in memory.
+    """
+    path, options = Path(path), options or ImportOptions()
+    source = open_source(path, options)
+    config, origin = _make_config(path, source, options)
+    return make_map(path, source, config, origin, options)
+
+
+def make_map(
+    path: Path,
+    source: Source,
+    config: MapConfig,
+    origin: NDArray[np.float64],
+    options: ImportOptions,
+    *,
+    spawn_xy: NDArray[np.float64] | None = None,
+    terrain_types: NDArray[np.int32] | None = None,
+) -> ImportedMap:
+    """Return the map of a source.
+
+    Args:
+        path: The file, for errors.
+        source: The ground.
+        config: Configuration of the map.
+        origin: Point of the source that becomes (0, 0, 0), shape (3,) [m].
+        options: `missing` and `solids` are used.
+        spawn_xy: Preferred spawn position of each patch in the map, shape (rows, cols, 2) [m]; by
+            default the center of the patch.
+        terrain_types: Sub-terrain of each patch, shape (rows, cols); by default the first.
+
+    Raises:
+        HeightFileError: if heights are missing.
+        ConfigError: if a patch has no place to spawn.
+        MemoryLimitError: if the map would not fit in memory.
+    """
+    grid = config.grid
+    samples = math.prod(grid.shape)
+    check_memory(samples * _BYTES_PER_SAMPLE, f"a map of {samples} samples")
+    x, y = (grid.axis(k) + origin[k] for k in (0, 1))
+    solids, columns = Solids.empty(), None
+    if isinstance(source, MeshSource):
+        columns = source.columns(x, y)
+        found = columns.floor if options.solids else columns.top
+        if options.solids:
+            solids = overhang_solids(
+                path,
+                source.vertices - origin,
+                source.faces,
+                _moved(columns, origin[2]),
+                grid,
+                config.wall_threshold,
+            )
+            solids = assign_solids(config, solids)
+    else:
+        if options.solids:
+            raise ConfigError(f"solids: got {path}; expected a mesh")
+        found = source.heights(x, y)
+    heights = (fill_missing(path, found, options.missing, x, y) - origin[2]).astype(np.float32)
+    if not (np.abs(heights) <= MAX_VALUE).all():
+        raise HeightFileError(f"{path}: got heights beyond {MAX_VALUE:g} m")
+    if spawn_xy is None:
+        centers = [config.patch_grid(*k).center for k in np.ndindex(config.rows, config.cols)]
+        spawn_xy = np.array(centers).reshape(config.rows, config.cols, 2)
+    if terrain_types is None:
+        terrain_types = np.zeros((config.rows, config.cols), dtype=np.int32)
+    terrain_map = _make_map(config, heights + np.float32(0), solids, spawn_xy, terrain_types)
+    num_missing = int(np.isnan(found).sum())
+    if columns is None:
+        report = ImportReport(num_missing=num_missing)
+    else:
+        report = _report(terrain_map, _moved(columns, origin[2]), num_missing)
+    return ImportedMap(terrain_map=terrain_map, report=report)
+
+
+def _make_config(
+    path: Path, source: Source, options: ImportOptions
+) -> tuple[MapConfig, NDArray[np.float64]]:
+    """Return the configuration of the map, and its origin in the file.
+
+    Raises:
+        ConfigError: if the patches do not fit in the file.
+    """
+    cell = options.cell or source.cell or DEFAULT_CELL
+    origin = np.array(options.origin or (*source.lower, 0.0))
+    counts, sizes = [], []
+    for k, count in enumerate((options.rows, options.cols)):
+        axis, extent = "xy"[k], source.upper[k] - float(origin[k])
+        if origin[k] < source.lower[k] - cell / 2 or extent < cell / 2:
+            raise ConfigError(
+                f"origin: got {axis} = {origin[k]:g} m; the file extends from "
+                f"{source.lower[k]:g} m to {source.upper[k]:g} m"
+            )
+        if options.patch_size:
+            size = options.patch_size[k]
+            count = count or math.floor(extent / size + 1e-6)
+        else:
+            count = count or 1
+            size = round(math.floor(extent / cell / count + 1e-6) * cell, 9)
+        if count < 1 or size < cell or count * size > extent + cell / 2:
+            raise ConfigError(
+                f"patches along {axis}: got {max(count, 1)} of {size or cell:g} m; {path} has "
+                f"{extent:g} m from the origin on"
+            )
+        counts.append(count)
+        sizes.append(size)
+    config = MapConfig(
+        rows=counts[0],
+        cols=counts[1],
+        patch_size=(sizes[0], sizes[1]),
+        cell=cell,
+        border=options.border,
+        terrains=(_sub_terrain(path, options),),
+        mode="custom",
+        **map_settings(options),
+    )
+    return config, origin
+
+
+def map_settings(options: ImportOptions) -> dict[str, Any]:
+    """Return the options that are settings of the map as well: walls and spawn positions."""
+    names = ("slope_threshold", "spawns_per_patch", "spawn_radius")
+    return {name: getattr(options, name) for name in (*names, "spawn_tolerance", "spawn_headroom")}
+
+
+def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
+    """Return the terrain that records the file and how it was read."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    low, high = options.height_range or (0.0, 0.0)
+    return SubTerrain(
+        terrain="imported",
+        name=path.stem,
+        parameters={
+            "file": path.name[:MAX_TEXT_LENGTH],
+            "sha256": digest,
+            "vertical_exaggeration": 1.0,
+            "file_cell": options.file_cell or 0.0,
+            "height_span": abs(high - low),
+            "scale": options.scale or 0.0,
+            "up": options.up,
+            "missing": options.missing,
+        },
+    )
+
+
+def _moved(columns: Columns, z: float) -> Columns:
+    return Columns(top=columns.top - z, floor=columns.floor - z, ceiling=columns.ceiling - z)
+
+
+def _make_map(
+    config: MapConfig,
+    heights: NDArray[np.float32],
+    solids: Solids,
+    spawn_xy: NDArray[np.float64],
+    terrain_types: NDArray[np.int32],
+) -> TerrainMap:
+    size = (config.rows, config.cols)
+    spawns, parameters = np.empty(size, dtype=object), np.empty(size, dtype=object)
+    measured = np.empty(size)
+    records = [each.at(0.0).requested() for each in config.sub_terrains]
+    for row, col in np.ndindex(size):
+        center = np.array([[*spawn_xy[row, col], 0.0, 0.0]], dtype=np.float32)
+        spawns[row, col] = place_patch_spawns(config, heights, solids, row, col, center, _NO_GOALS)
+        record = records[terrain_types[row, col]]
+        parameters[row, col] = Parameters(requested=record, realized=record)
+        (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
+        start = float(spawns[row, col][0, 2])
+        measured[row, col] = measured_difficulty(
+            heights[i : i + nx, j : j + ny], config.cell, start
+        )
+    rank = np.unique(measured.round(6), return_inverse=True)[1].reshape(size)
+    return TerrainMap(
+        config=config,
+        grid=config.grid,
+        heights=heights,
+        friction=np.broadcast_to(np.float32(config.static_friction), heights.shape),
+        spawns=pad_poses(spawns),
+        terrain_types=terrain_types,
+        terrain_names=tuple(each.name for each in config.sub_terrains),
+        difficulty=(rank / max(1, rank.max())).astype(np.float32),
+        parameters=parameters,
+        solids=solids,
+        goals=np.empty((*size, 0, 4), dtype=np.float32),
+    )
+
+
+def _report(terrain_map: TerrainMap, columns: Columns, num_missing: int) -> ImportReport:
+    """Compare the map with the mesh at the samples where something hangs over the ground."""
+    i, j = np.nonzero(~np.isnan(columns.ceiling))
+    if not len(i):
+        return ImportReport(num_missing=num_missing)
+    grid = terrain_map.grid
+    xy = np.column_stack([grid.axis(0)[i], grid.axis(1)[j]])
+    top, ground, ceiling = columns.top[i, j], columns.floor[i, j], columns.ceiling[i, j]
+    map_ground = terrain_map.height(xy)
+    map_ceiling = map_ground + terrain_map.clearance(xy)
+    map_top = terrain_map.scan(np.column_stack([xy, top + 1.0]))
+    is_kept = np.isfinite(map_ceiling)
+    error = np.abs(map_ground - ground)
+    for mine, theirs in ((map_ceiling, ceiling), (map_top, top)):
+        error = np.maximum(error, np.where(is_kept, np.abs(mine - theirs), 0.0))
+    worst = int(np.argmax(error))
+    return ImportReport(
+        num_missing=num_missing,
+        overhang_area=len(i) * grid.cell**2,
+        lost_area=int((~is_kept).sum()) * grid.cell**2,
+        max_error=float(error[worst]),
+        max_error_at=(float(xy[worst, 0]), float(xy[worst, 1])),
+    )

@@ -1,0 +1,324 @@
+"""Patch: one terrain, built on the grid of its place in a map."""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.map.config import MapConfig
+from terrainkit.map.layout import assign_patch, patch_rng, terrain_columns
+from terrainkit.map.spawn import find_spawn, sample_spawns
+from terrainkit.terrain import Terrain
+from terrainkit.terrain.overlay import Overlay
+from terrainkit.terrain.parameter import Realized, Value
+from terrainkit.terrain.patch_geometry import PatchGeometry, uniform_friction
+from terrainkit.terrain.sub_terrain import SubTerrain, overlay_path
+
+EDGE_TOLERANCE = 1e-3
+"""Distance by which a solid may extend beyond its patch [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """The parameters of a patch."""
+
+    requested: Mapping[str, Value]
+    """Values at the difficulty of the patch, by name."""
+
+    realized: Mapping[str, Realized]
+    """Values after snapping to the cells, by name; (x, y) where the two axes differ."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Patch:
+    """One patch of a map, in the frame of the map."""
+
+    terrain: str
+    """Name of the sub-terrain."""
+
+    difficulty: float
+    """Difficulty, 0 to 1."""
+
+    parameters: Parameters
+    """Requested and realized parameters."""
+
+    grid: Grid
+    """Positions of the samples."""
+
+    heights: NDArray[np.float32]
+    """Heights [m], shape `grid.shape`."""
+
+    friction: NDArray[np.float32]
+    """Friction of the ground in each cell, shape `grid.shape`."""
+
+    solids: Solids
+    """Solids of the patch, in the frame of the map."""
+
+    goals: NDArray[np.float32]
+    """Goals in their order: x, y, z [m] and heading [rad], shape (k, 4)."""
+
+    spawns: NDArray[np.float32]
+    """Spawn positions x, y, z [m] and headings [rad], shape (k, 4); the origin comes first."""
+
+    spawn_offset: float = 0.0
+    """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]. It is
+    known for a patch that has just been built; :meth:`TerrainMap.patch` returns 0."""
+
+    @property
+    def origin(self) -> NDArray[np.float32]:
+        """Spawn origin (x, y, z) [m], shape (3,)."""
+        return self.spawns[0, :3]
+
+    @property
+    def far_sides(self) -> NDArray[np.bool_]:
+        """Which sides are farthest from the spawn origin, up to 1.5 cells.
+
+        Shape (2, 2): the lower sides along x and y, then the upper ones.
+        """
+        origin = self.origin[:2].astype(np.float64)
+        away = np.stack([origin - self.grid.lower, self.grid.upper - origin])
+        return np.asarray(away >= away.max() - 1.5 * self.grid.cell)
+
+
+def make_patch(config: MapConfig, row: int, col: int) -> Patch:
+    """Build patch (row, col) of the map of `config` without generating the rest.
+
+    Raises:
+        IndexError: if there is no such patch.
+        ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
+    """
+    config.check_patch(row, col)
+    terrain_type, difficulty = assign_patch(config, terrain_columns(config), row, col)
+    return build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
+
+
+def build_patch(
+    config: MapConfig, sub_terrain: SubTerrain, difficulty: float, row: int, col: int
+) -> Patch:
+    """Build `sub_terrain` at `difficulty` on patch (row, col).
+
+    The random numbers depend only on the seed, the row and the column. The patch therefore has the
+    same bytes in any order and in any process.
+
+    Raises:
+        ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
+    """
+    terrain = sub_terrain.at(difficulty)
+    overlays = [overlay.at(difficulty) for overlay in sub_terrain.overlays]
+    _check_slopes(terrain, config)
+    grid, name = config.patch_grid(row, col), sub_terrain.name
+    child_rng = partial(_child_rng, config, terrain, row, col)
+    rng: Any = patch_rng(config, terrain, row, col) if terrain.has_random_heights else None
+    heights = terrain.build(grid, rng)
+    geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, heights, grid, child_rng)
+    spawn_offset = 0.0
+    if overlays:
+        geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
+    heights, position = geometry.heights, geometry.spawn
+    solids, goals = _finish(config, name, geometry, (row, col))
+    spawns = place_spawns(config, name, grid, heights, solids, position, partial(child_rng, 1))
+    x, y, _ = spawns[0].tolist()
+    requested, realized = terrain.requested(), terrain.realized(grid)
+    for k, overlay in enumerate(overlays):
+        requested |= {overlay_path(k, n): v for n, v in overlay.requested().items()}
+        realized |= {overlay_path(k, n): v for n, v in overlay.realized(grid).items()}
+    return Patch(
+        terrain=name,
+        difficulty=difficulty,
+        parameters=Parameters(requested=requested, realized=realized),
+        grid=grid,
+        heights=heights,
+        friction=geometry.friction,
+        solids=solids,
+        goals=goals,
+        spawns=with_headings(spawns, goals, geometry.heading),
+        spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
+    )
+
+
+def _child_rng(
+    config: MapConfig, terrain: Terrain, row: int, col: int, number: int
+) -> "np.random.Generator":
+    """Return a child of the generator of a patch, in its initial state.
+
+    Child 0 is for solids and goals, 1 for the spawn positions, and 2 + k for overlay k. The heights
+    of a terrain may use child 0, too, to have the layout of its solids.
+    """
+    return patch_rng(config, terrain, row, col).spawn(number + 1)[number]
+
+
+def _terrain_geometry(
+    config: MapConfig,
+    sub_terrain: SubTerrain,
+    terrain: Terrain,
+    difficulty: float,
+    heights: NDArray[np.float32],
+    grid: Grid,
+    child_rng: Callable[[int], "np.random.Generator"],
+) -> PatchGeometry:
+    """Return what a terrain puts on a patch, without overlays."""
+    solids, goals = _NO_SOLIDS, _NO_GOALS
+    # Solids and goals start with the same random numbers, so that both can sample one layout.
+    if type(terrain).solids is not Terrain.solids:
+        solids = terrain.solids(grid, heights, child_rng(0))
+    if type(terrain).goals is not Terrain.goals:
+        goals = np.array(terrain.goals(grid, heights, child_rng(0)), dtype=float).reshape(-1, 4)
+    friction = sub_terrain.friction_at(difficulty)
+    if friction is not None:
+        own = np.where(np.isnan(solids.friction), friction, solids.friction).astype(np.float32)
+        solids = dataclasses.replace(solids, friction=own)
+    else:
+        friction = config.static_friction
+    return PatchGeometry(
+        grid=grid,
+        heights=heights,
+        friction=uniform_friction(friction, grid.shape),
+        solids=solids,
+        goals=goals,
+        spawn=terrain.spawn(grid),
+        spawn_radius=config.spawn_radius,
+    )
+
+
+def _apply_overlays(
+    config: MapConfig,
+    name: str,
+    geometry: PatchGeometry,
+    overlays: Sequence[Overlay],
+    child_rng: Callable[[int], "np.random.Generator"],
+) -> tuple[PatchGeometry, float]:
+    """Return the geometry with overlays, and the spawn offset of the terrain without them [m].
+
+    The overlays keep the ground level at the spawn origin of the terrain without overlays.
+    """
+    grid, position = geometry.grid, geometry.spawn
+    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, position)
+    geometry = dataclasses.replace(geometry, spawn=(x, y))
+    for k, overlay in enumerate(overlays):
+        geometry = overlay.apply(geometry, child_rng(2 + k))
+        heights = np.asarray(geometry.heights, dtype=np.float32) + np.float32(0)
+        if heights.shape != grid.shape or not np.isfinite(heights).all():
+            raise ConfigError(
+                f"{overlay.kind()}: apply(): got heights of shape {heights.shape}; expected "
+                f"{grid.shape} with finite values"
+            )
+        geometry = dataclasses.replace(geometry, heights=heights)
+    return geometry, max(abs(x - position[0]), abs(y - position[1]))
+
+
+def place_spawns(
+    config: MapConfig,
+    name: str,
+    grid: Grid,
+    heights: NDArray[np.float32],
+    solids: Solids,
+    position: tuple[float, float],
+    rng: Callable[[], np.random.Generator],
+) -> NDArray[np.float64]:
+    """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.map.spawn`.
+
+    Args:
+        config: Configuration of the map.
+        name: Name of the patch in the error.
+        grid: Grid of the patch.
+        heights: Heights of the patch [m], shape `grid.shape`.
+        solids: Solids on the patch.
+        position: Preferred position of the first, x and y [m].
+        rng: Returns the random number generator of the others; slow, so called only if needed.
+
+    Raises:
+        ConfigError: if the patch has no place to spawn.
+    """
+    origin = _find_origin(config, name, grid, heights, solids, position)
+    if config.spawns_per_patch == 1:
+        return np.array([origin])
+    disk, number = config.spawn_disk, config.spawns_per_patch
+    return sample_spawns(heights, grid, origin, disk, number, solids=solids, rng=rng())
+
+
+def _find_origin(
+    config: MapConfig,
+    name: str,
+    grid: Grid,
+    heights: NDArray[np.float32],
+    solids: Solids,
+    position: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
+    disk = config.spawn_disk
+    origin = find_spawn(
+        heights, grid, position, disk, solids=solids, threshold=config.wall_threshold
+    )
+    if origin is None:
+        raise ConfigError(
+            f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
+            f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
+            f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
+            "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
+        )
+    return origin
+
+
+def _finish(
+    config: MapConfig, name: str, geometry: PatchGeometry, patch: tuple[int, int]
+) -> tuple[Solids, NDArray[np.float32]]:
+    """Return the solids with their patch, and the goals with their heights.
+
+    Raises:
+        ConfigError: if a solid extends beyond the patch, or a goal is not on it.
+    """
+    grid, solids, goals = geometry.grid, geometry.solids, geometry.goals
+    if len(solids):
+        lower, upper = (corner[:, :2] for corner in solids.bounds())
+        outside = np.maximum(grid.lower - lower, upper - grid.upper).max()
+        if outside > EDGE_TOLERANCE:
+            raise ConfigError(
+                f"{name}: solids(): got a solid {outside:.3f} m beyond its patch; expected solids "
+                "within it"
+            )
+        solids = dataclasses.replace(solids, patch=np.full((len(solids), 2), patch, np.int32))
+    if len(goals):
+        from terrainkit.geometry.surface import surface_at
+
+        index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
+        if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
+            raise ConfigError(f"{name}: goals(): got a goal outside of the patch")
+        ground = surface_at(geometry.heights, index, threshold=config.wall_threshold).height
+        goals = goals.copy()
+        goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
+    return solids, goals.astype(np.float32)
+
+
+_NO_SOLIDS = Solids.empty()
+_NO_GOALS = np.empty((0, 4))
+
+
+def with_headings(
+    positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
+) -> NDArray[np.float32]:
+    """Return spawn positions with headings, shape (k, 4): toward the first goal, else `default`."""
+    spawns = np.empty((len(positions), 4), dtype=np.float32)
+    spawns[:, :3], spawns[:, 3] = positions, default
+    if len(goals):
+        dx, dy = (goals[0, :2] - positions[:, :2]).T
+        spawns[:, 3] = np.arctan2(dy, dx)
+    return spawns
+
+
+def _check_slopes(terrain: Terrain, config: MapConfig) -> None:
+    """Raise ConfigError if a slope is so steep that the map would turn it into walls."""
+    values: Any = terrain.requested()
+    for name, parameter in terrain.declarations().items():
+        grade = values[name]
+        if parameter.is_grade and grade * config.cell > config.wall_threshold:
+            raise ConfigError(
+                f"{terrain.kind()}.{name}: got {grade:g}; expected at most slope_threshold "
+                f"({config.slope_threshold:g}), above which slopes become walls"
+            )

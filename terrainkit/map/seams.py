@@ -1,0 +1,141 @@
+"""Seams: height differences where two patches, or a patch and the border, meet."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.map.terrain_map import TerrainMap
+
+MIN_CLIFF_HEIGHT = 0.5
+"""Height difference that no leg bridges; a lower seam is never a cliff [m]."""
+
+Index = tuple[int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seam:
+    """The line along which two patches meet, or a patch and the border."""
+
+    height: float
+    """Largest height difference between neighboring samples across the line [m]."""
+
+    patches: tuple[Index | None, Index | None]
+    """Row and column of the two patches; None for the border."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seams:
+    """The seams of a map."""
+
+    terrain_map: TerrainMap
+    """The map."""
+
+    def largest(self) -> Seam | None:
+        """Return the seam with the largest height difference; None without seams."""
+        return max(self._above(-1.0), key=lambda seam: seam.height, default=None)
+
+    def cliffs(self) -> list[Seam]:
+        """Return the seams that are cliffs, the highest first.
+
+        A seam is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and than the sum of the largest
+        steps within the two patches. The holes of stepping stones, which end at the edge of their
+        patch, are therefore no cliffs; the side of a flight of stairs is one. There are no cliffs
+        where walls stand on both sides of the whole seam.
+        """
+        candidates = list(self._above(MIN_CLIFF_HEIGHT))
+        steps = {p: self._max_step(p) for p in {p for seam in candidates for p in seam.patches}}
+        cliffs = [
+            seam
+            for seam in candidates
+            if seam.height > sum(steps[p] for p in seam.patches) and not self._is_walled(seam)
+        ]
+        return sorted(cliffs, key=lambda seam: -seam.height)
+
+    def _above(self, limit: float) -> Iterator[Seam]:
+        for axis, heights in enumerate(self._seam_heights):
+            before, beside = (-1, 0) if axis == 0 else (0, -1)
+            for i, j in np.argwhere(heights > limit).tolist():
+                patches = self._patch(i + before, j + beside), self._patch(i, j)
+                yield Seam(height=float(heights[i, j]), patches=patches)
+
+    @cached_property
+    def _seam_heights(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Seams along x, shape (rows + 1, cols), and along y, shape (rows, cols + 1) [m].
+
+        Where the map ends at a patch, there is no seam, and the height is -inf.
+        """
+        config, heights = self.terrain_map.config, self.terrain_map.heights
+        nx, ny = config.patch_shape
+        border, (rows, cols) = config.border_cells, (config.rows, config.cols)
+        inner = slice(border, border + rows * nx), slice(border, border + cols * ny)
+        along_x = _line_heights(heights[:, inner[1]], border, nx, rows)
+        along_y = _line_heights(heights[inner[0]].T, border, ny, cols)
+        return (
+            along_x.reshape(rows + 1, cols, ny).max(axis=2),
+            along_y.reshape(cols + 1, rows, nx).max(axis=2).T,
+        )
+
+    def _patch(self, row: int, col: int) -> Index | None:
+        config = self.terrain_map.config
+        inside = 0 <= row < config.rows and 0 <= col < config.cols
+        return (row, col) if inside else None
+
+    def _max_step(self, patch: Index | None) -> float:
+        if patch is None:
+            return 0.0
+        config = self.terrain_map.config
+        (i, j), (nx, ny) = config.patch_start(*patch), config.patch_shape
+        heights = self.terrain_map.heights[i : i + nx, j : j + ny]
+        steps = heights[1:] - heights[:-1], heights[:, 1:] - heights[:, :-1]
+        return float(max(max(s.max(initial=0.0), -s.min(initial=0.0)) for s in steps))
+
+    def _is_walled(self, seam: Seam) -> bool:
+        """Return whether solids cover the samples on both sides of a seam between two patches."""
+        first, second = seam.patches
+        if first is None or second is None:
+            return False
+        config = self.terrain_map.config
+        (i, j), (nx, ny) = config.patch_start(*second), config.patch_shape
+        across_x = first[1] == second[1]
+        x = config.grid.axis(0)[slice(i - 1, i + 1) if across_x else slice(i, i + nx)]
+        y = config.grid.axis(1)[slice(j, j + ny) if across_x else slice(j - 1, j + 1)]
+        xy = np.stack(np.meshgrid(x, y), axis=-1)
+        return not self.terrain_map.clearance(xy).any()
+
+
+def _line_heights(
+    heights: NDArray[np.float32], border: int, cells: int, count: int
+) -> NDArray[np.float32]:
+    """Return the height differences across each line between patches, shape (count + 1, n)."""
+    lines = border + cells * np.arange(count + 1)
+    lines = lines[(lines > 0) & (lines < len(heights))]
+    found = np.full((count + 1, heights.shape[1]), -np.inf, dtype=np.float32)
+    found[(lines - border) // cells] = np.abs(heights[lines] - heights[lines - 1])
+    return found
+
+
+def seam_text(seam: Seam, names: NDArray[np.str_]) -> str:
+    """Return a seam as text, such as "1.61 m between stairs (9, 2) and the border".
+
+    Args:
+        seam: The seam.
+        names: Name of the sub-terrain of each patch, shape (rows, cols).
+    """
+    first, second = (
+        "the border" if patch is None else f"{names[patch]} ({patch[0]}, {patch[1]})"
+        for patch in sorted(seam.patches, key=lambda patch: patch is None)
+    )
+    return f"{seam.height:.2f} m between {first} and {second}"
+
+
+def cliffs_text(cliffs: list[Seam], names: NDArray[np.str_]) -> str:
+    """Return the number of cliffs and the highest of each pair of sub-terrains as text."""
+    highest: dict[frozenset[str], Seam] = {}
+    for seam in cliffs:
+        pair = frozenset(str(names[p]) if p is not None else "" for p in seam.patches)
+        highest.setdefault(pair, seam)
+    count = f"{len(cliffs)} seams" if len(cliffs) > 1 else "1 seam"
+    return f"{count}, up to " + ", ".join(seam_text(seam, names) for seam in highest.values())

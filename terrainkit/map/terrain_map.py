@@ -1,0 +1,367 @@
+"""TerrainMap: a generated map and the views of its surface."""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terrainkit.curriculum import (
+    Assignment,
+    assign_levels,
+    assign_spawns,
+    resample_columns,
+    update_levels,
+)
+from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit.geometry.free_space import Direction, clearance, first_surface, free_intervals
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solid_index import SolidIndex
+from terrainkit.geometry.solids import Solids
+from terrainkit.map.config import MapConfig
+from terrainkit.map.patch import Patch
+from terrainkit.settings.type_hint import convert
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from terrainkit.geometry.box_decomposition import BoxDecomposition
+    from terrainkit.geometry.mesh import TriMesh
+    from terrainkit.geometry.surface import SurfacePoints
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class TerrainMap:
+    """A map of rows x cols patches with a border."""
+
+    config: MapConfig
+    """The configuration that the map was generated from; in mode custom, it was not generated."""
+
+    grid: Grid
+    """Positions of the samples."""
+
+    heights: NDArray[np.float32]
+    """Heights [m], shape `grid.shape`: first index x, second y."""
+
+    friction: NDArray[np.float32]
+    """Friction of the ground in each cell, shape `grid.shape`. Read-only if it is the same in all
+    cells."""
+
+    spawns: NDArray[np.float32]
+    """Spawn positions of each patch: x, y, z [m] and heading [rad], shape (rows, cols, k, 4), NaN
+    where a patch has fewer than k. The first of each patch is its spawn origin."""
+
+    terrain_types: NDArray[np.int32]
+    """Terrain type of each patch as an index into `terrain_names`, shape (rows, cols)."""
+
+    terrain_names: tuple[str, ...]
+    """Names of the sub-terrains."""
+
+    difficulty: NDArray[np.float32]
+    """Difficulty of each patch, 0 to 1, shape (rows, cols)."""
+
+    parameters: NDArray[np.object_]
+    """:class:`~terrainkit.map.patch.Parameters` of each patch, shape (rows, cols)."""
+
+    solids: Solids
+    """Solids of all patches."""
+
+    goals: NDArray[np.float32]
+    """Goals of each patch in their order: x, y, z [m] and heading [rad], shape (rows, cols, k, 4),
+    NaN where a patch has fewer than k."""
+
+    def __repr__(self) -> str:
+        rows, cols = self.difficulty.shape
+        names = ", ".join(self.terrain_names)
+        return f"<TerrainMap {rows} x {cols} patches, {self.heights.shape} samples: {names}>"
+
+    @cached_property
+    def env_origins(self) -> NDArray[np.float32]:
+        """Spawn origin of each patch [m], shape (rows, cols, 3), a view of `spawns`."""
+        return self.spawns[:, :, 0, :3]
+
+    @cached_property
+    def has_one_friction(self) -> bool:
+        """Whether all of the ground and all solids have the friction of the map."""
+        static = np.float32(self.config.static_friction)
+        solids = self.solids.friction
+        return bool(
+            (self.friction == static).all() and (np.isnan(solids) | (solids == static)).all()
+        )
+
+    def height(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the height of the ground [m] at `xy`.
+
+        Args:
+            xy: Points [m], shape (..., 2). Beyond the map, the edge height applies.
+
+        Returns:
+            Heights [m], shape (...). On a wall, the height of one of its sides.
+        """
+        points, shape = _points("xy", xy, 2)
+        return self._surface_at(points).height.reshape(shape)
+
+    def normal(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the upward unit normal of the ground at `xy`.
+
+        Args:
+            xy: Points [m], shape (..., 2).
+
+        Returns:
+            Unit vectors, shape (..., 3). On a wall, the normal of the ground on one of its sides.
+        """
+        points, shape = _points("xy", xy, 2)
+        downhill = 0.0 - self._surface_at(points).gradient / self.grid.cell
+        normal = np.column_stack([downhill, np.ones(len(downhill))])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return normal.reshape(*shape, 3)
+
+    def scan(self, points: ArrayLike, direction: Direction = "down") -> NDArray[np.float64]:
+        """Return the z of the first surface above or below `points` [m]; NaN where there is none.
+
+        Rays hit the ground and the solids that are visible. A ray that starts inside a solid hits
+        the solid's far side, as MuJoCo's `mj_ray` does.
+
+        Args:
+            points: Starts of the rays [m], shape (..., 3).
+            direction: "down" or "up".
+
+        Raises:
+            ConfigError: if `points` or `direction` is invalid.
+        """
+        direction = convert("direction", direction, Direction)
+        starts, shape = _points("points", points, 3)
+        ground = self._surface_at(starts[:, :2]).height
+        spans = self._visible.spans(starts[:, :2])
+        return first_surface(ground, spans, starts[:, 2], direction).reshape(shape)
+
+    def clearance(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the free height above the ground at `xy` [m], below the solids that collide.
+
+        Args:
+            xy: Points [m], shape (..., 2).
+
+        Returns:
+            Clearance [m], shape (...): inf under the open sky, 0 where a solid covers the ground.
+        """
+        points, shape = _points("xy", xy, 2)
+        ground = self._surface_at(points).height
+        return clearance(ground, self._colliding.spans(points)).reshape(shape)
+
+    def intervals(self, xy: ArrayLike) -> NDArray[np.float64]:
+        """Return the free intervals above the ground at `xy`, between the solids that collide.
+
+        Args:
+            xy: Points [m], shape (..., 2).
+
+        Returns:
+            Floor and ceiling of each interval [m], shape (..., k, 2), upward, padded with NaN. The
+            ceiling of the last interval is inf.
+        """
+        points, shape = _points("xy", xy, 2)
+        ground = self._surface_at(points).height
+        intervals = free_intervals(ground, self._colliding.spans(points))
+        return intervals.reshape(*shape, *intervals.shape[1:])
+
+    def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
+        """Return the ground and the solids that collide as a triangle mesh.
+
+        The ground comes first; see :mod:`terrainkit.geometry.mesh`.
+
+        Args:
+            merged: Merge coplanar faces of the ground; otherwise two triangles per cell.
+            closed: Return one watertight solid: the ground with sides and a bottom, united with
+                the solids.
+        """
+        from terrainkit.geometry.mesh import closed_mesh
+        from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes, united
+
+        ground = self.ground_mesh(merged=merged)
+        if closed:
+            ground = closed_mesh(ground)
+        if not self.solids.collides.any():
+            return ground
+        meshes = [ground, *solid_meshes(self.solids.select(self.solids.collides))]
+        return united(meshes) if closed else concatenate_meshes(meshes)
+
+    def ground_mesh(self, *, merged: bool = True) -> "TriMesh":
+        """Return the ground as a triangle mesh, without the solids; see :meth:`mesh`."""
+        from terrainkit.geometry.mesh import full_mesh, merged_mesh
+
+        make_mesh = merged_mesh if merged else full_mesh
+        return make_mesh(self.heights, self.grid, self.config.wall_threshold)
+
+    def boxes(self) -> "BoxDecomposition":
+        """Return the level ground as boxes; see :mod:`terrainkit.geometry.box_decomposition`."""
+        from terrainkit.geometry.box_decomposition import decompose_boxes
+
+        config = self.config
+        threshold, edges = config.wall_threshold, self._patch_edges()
+        return decompose_boxes(self.heights, self.grid, threshold, edges, self.friction)
+
+    def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
+        """Return the heights in the format of Isaac Gym's `add_heightfield`.
+
+        Args:
+            vertical_scale: Height of one unit [m].
+
+        Returns:
+            Heights in units of `vertical_scale`, int16, shape (ny, nx): Isaac Gym's rows lie along
+            y and its columns along x. `nbRows` is `shape[0]`, `nbColumns` is `shape[1]`, and the
+            transform's x and y are `first_sample`. Its buffer is column-major: pass
+            `.ravel(order="F")`. legged_gym's own `height_samples` is `.T`.
+
+        Raises:
+            ConfigError: if `vertical_scale` is not above 0.
+            ExportError: if the map has solids, or a height does not fit in 16 bits at this scale.
+        """
+        from terrainkit.export.int16_heights import int16_heights
+        from terrainkit.export.requirements import require_no_solids
+
+        require_no_solids(self, "a heightfield")
+        return np.ascontiguousarray(int16_heights(self.heights.T, vertical_scale))
+
+    @property
+    def patch_names(self) -> NDArray[np.str_]:
+        """Name of the sub-terrain of each patch, shape (rows, cols)."""
+        return np.array(self.terrain_names)[self.terrain_types]
+
+    @property
+    def first_sample(self) -> tuple[float, float]:
+        """Position of `heights[0, 0]`, x and y [m]: half a cell inside the corner of the map."""
+        return self.grid.lower[0] + self.grid.cell / 2, self.grid.lower[1] + self.grid.cell / 2
+
+    def patch(self, row: int, col: int) -> Patch:
+        """Return patch (row, col); :func:`terrainkit.make_patch` builds one without a map.
+
+        Raises:
+            IndexError: if there is no such patch.
+        """
+        self.config.check_patch(row, col)
+        grid = self.config.patch_grid(row, col)
+        i, j = self.config.patch_start(row, col)
+        goals, spawns = self.goals[row, col], self.spawns[row, col]
+        return Patch(
+            terrain=self.terrain_names[self.terrain_types[row, col]],
+            difficulty=float(self.difficulty[row, col]),
+            parameters=self.parameters[row, col],
+            grid=grid,
+            heights=self.heights[i : i + grid.shape[0], j : j + grid.shape[1]],
+            friction=self.friction[i : i + grid.shape[0], j : j + grid.shape[1]],
+            solids=self.solids.select((self.solids.patch == (row, col)).all(axis=1)),
+            goals=goals[~np.isnan(goals[:, 0])],
+            spawns=spawns[~np.isnan(spawns).all(axis=1)],
+        )
+
+    def edited(self, *, heights: ArrayLike | None = None, solids: Solids | None = None) -> Self:
+        """Return the map with other heights or solids, as a map of mode custom.
+
+        Such a map is not compared with its config by :func:`terrainkit.map.validate.validate`, and
+        cannot be generated from it. Spawn positions and goals follow the height of the ground.
+        Where a spawn position of a patch is no longer flat and free, those of the patch are placed
+        again.
+
+        Args:
+            heights: Heights [m], shape `grid.shape`; None for those of the map.
+            solids: All solids of the map; None for those of the map. Each belongs to the patch of
+                its center.
+
+        Raises:
+            ConfigError: if the heights have another shape or are not finite, or a patch has no
+                place to spawn.
+        """
+        from terrainkit.map.edit import edit_map
+
+        return edit_map(self, heights, solids)
+
+    def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
+        """Assign patches to `num_envs` environments; see :mod:`terrainkit.curriculum`.
+
+        The environments of a patch are distributed over its spawn positions.
+
+        Warns:
+            TerrainkitWarning: if patches have several spawn positions, but too few for their
+                environments.
+        """
+        rows, cols = self.difficulty.shape
+        levels, columns = assign_levels(num_envs, rows, cols, max_init_level, seed)
+        spawns, num_shared = assign_spawns(self.spawns, levels, columns)
+        if num_shared and self.config.spawns_per_patch > 1:
+            warnings.warn(
+                f"{num_shared} of {num_envs} environments share a spawn position with another; "
+                "increase spawns_per_patch, rows or cols, or reduce spawn_radius",
+                TerrainkitWarning,
+                stacklevel=2,
+            )
+        return Assignment(
+            levels=levels,
+            columns=columns,
+            terrain_types=self.terrain_types[levels, columns],
+            env_origins=spawns[:, :3],
+            headings=spawns[:, 3],
+        )
+
+    def resample_columns(self, levels: Any, columns: Any, *, seed: int | Sequence[int]) -> Any:
+        """Return other columns at a reset; see :func:`terrainkit.curriculum.resample_columns`."""
+        return resample_columns(levels, columns, self.terrain_types, seed=seed)
+
+    def update_levels(
+        self,
+        levels: Any,
+        progress: Any,
+        *,
+        seed: int | Sequence[int],
+        top_levels: int = 3,
+    ) -> Any:
+        """Return the levels after an episode; see :func:`terrainkit.update_levels`."""
+        rows = len(self.difficulty)
+        return update_levels(levels, progress, rows=rows, seed=seed, top_levels=top_levels)
+
+    def save(self, path: "str | Path", *, overwrite: bool = False, **options: Any) -> "Path":
+        """Write the map in the format of the suffix of `path`; see :mod:`terrainkit.export`."""
+        from terrainkit.export import export
+
+        return export(self, path, overwrite=overwrite, **options)
+
+    @classmethod
+    def load(cls, path: "str | Path") -> Self:
+        """Load a map from a .npz file.
+
+        Raises:
+            MapFileError: if the file is missing, truncated, or not a map.
+        """
+        from terrainkit.export.npz import read_map
+
+        return read_map(cls, path)
+
+    @cached_property
+    def _visible(self) -> SolidIndex:
+        return SolidIndex(self.solids.select(self.solids.visible))
+
+    @cached_property
+    def _colliding(self) -> SolidIndex:
+        return SolidIndex(self.solids.select(self.solids.collides))
+
+    def _patch_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the first cell of each patch along x and y, and the end of the last patch."""
+        (rows, cols), border = self.difficulty.shape, self.config.border_cells
+        x, y = self.config.patch_shape
+        return border + x * np.arange(rows + 1), border + y * np.arange(cols + 1)
+
+    def _surface_at(self, points: NDArray[np.float64]) -> "SurfacePoints":
+        from terrainkit.geometry.surface import surface_at
+
+        index = (points - self.first_sample) / self.grid.cell
+        return surface_at(self.heights, index, threshold=self.config.wall_threshold)
+
+
+def _points(name: str, values: ArrayLike, size: int) -> tuple[NDArray[np.float64], tuple[int, ...]]:
+    points = np.asarray(values, dtype=np.float64)
+    if points.shape[-1:] != (size,) or not np.isfinite(points).all():
+        raise ConfigError(
+            f"{name}: got shape {points.shape}; expected finite values of shape (..., {size})"
+        )
+    return points.reshape(-1, size), points.shape[:-1]

@@ -1,0 +1,340 @@
+"""Validate a map: spawn disks, mesh, recorded parameters and difficulty.
+
+Everything is recomputed from the map alone. Spawn disks are sampled on the surface, the mesh is
+checked edge by edge and face by face, and each patch is compared with a second build of it.
+Imported and edited maps (mode custom) are not compared with their config.
+"""
+
+import dataclasses
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
+from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
+from terrainkit.geometry.solids import Solids
+from terrainkit.map.layout import assign_patch, terrain_columns
+from terrainkit.map.patch import Parameters, Patch, build_patch
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.terrain.parameter import format_value
+
+TOLERANCE = 1e-3
+"""Largest difference in position that is not an issue [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Issue:
+    """One violated guarantee of a map."""
+
+    check: str
+    """Check that found it: finite, difficulty, patches, realized, solids, goals, spawn or mesh."""
+
+    message: str
+    """What is wrong, where, and by how much."""
+
+
+def validate(terrain_map: TerrainMap, mesh: TriMesh | None = None) -> list[Issue]:
+    """Return the issues of a map; an empty list if it is valid.
+
+    Args:
+        terrain_map: The map.
+        mesh: The trimesh stored with the map. By default the mesh of the map is built and checked.
+    """
+    issues = _issues("finite", _check_finite(terrain_map, mesh))
+    if issues:
+        return issues  # the other checks need finite values
+    return [
+        *(_custom_issues if terrain_map.config.mode == "custom" else _config_issues)(terrain_map),
+        *_issues("spawn", _check_spawn(terrain_map)),
+        *_issues("mesh", _check_mesh(terrain_map, mesh or terrain_map.mesh())),
+    ]
+
+
+def _config_issues(terrain_map: TerrainMap) -> list[Issue]:
+    """Return the differences between a map and its config."""
+    return [
+        *_issues("difficulty", _check_difficulty(terrain_map)),
+        *_issues("patches", _check_patches(terrain_map)),
+        *_issues("realized", _check_realized(terrain_map)),
+    ]
+
+
+def _custom_issues(terrain_map: TerrainMap) -> list[Issue]:
+    """Return the issues of a map that was not generated."""
+    return [
+        *_issues("solids", _check_solids(terrain_map)),
+        *_issues("goals", _check_goals(terrain_map)),
+    ]
+
+
+def _issues(check: str, messages: Iterator[str]) -> list[Issue]:
+    return [Issue(check=check, message=message) for message in messages]
+
+
+def _check_finite(terrain_map: TerrainMap, mesh: TriMesh | None) -> Iterator[str]:
+    arrays = {name: getattr(terrain_map, name) for name in ("heights", "env_origins", "difficulty")}
+    if mesh is not None:
+        arrays["vertices"] = mesh.vertices
+    for name, values in arrays.items():
+        invalid = np.argwhere(~np.isfinite(values))
+        if len(invalid):
+            first = tuple(int(n) for n in invalid[0])
+            yield f"{name}: {len(invalid)} values are not finite, the first at {first}"
+
+
+def _check_difficulty(terrain_map: TerrainMap) -> Iterator[str]:
+    config, difficulty = terrain_map.config, terrain_map.difficulty
+    if config.mode != "curriculum":
+        return
+    low, high = config.difficulty_range
+    # A single row has the lowest difficulty, so row 0 comes last.
+    for row, expected in {len(difficulty) - 1: high, 0: low}.items():
+        values = difficulty[row][difficulty[row] != np.float32(expected)]
+        if len(values):
+            yield f"row {row}: got difficulty {values[0]:g}; expected exactly {expected:g}"
+    if config.difficulty_jitter == 0:
+        for row, col in np.argwhere(np.diff(difficulty, axis=0) < 0):
+            yield f"difficulty decreases from row {row} to row {row + 1} in column {col}"
+
+
+def _check_patches(terrain_map: TerrainMap) -> Iterator[str]:
+    """Compare each patch, and the border, with what its config generates."""
+    config = terrain_map.config
+    border = np.ones(terrain_map.heights.shape, dtype=bool)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TerrainkitWarning)
+        columns = terrain_columns(config)
+    for row, col in np.ndindex(terrain_map.difficulty.shape):
+        (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
+        border[i : i + nx, j : j + ny] = False
+        terrain_type, difficulty = assign_patch(config, columns, row, col)
+        try:
+            expected = build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
+        except TerrainkitError as error:
+            yield f"patch ({row}, {col}) cannot be generated from its config: {error}"
+            continue
+        yield from _compare(terrain_map.patch(row, col), expected, f"patch ({row}, {col})")
+    if (np.abs(terrain_map.heights[border]) > TOLERANCE).any():
+        yield "the border is not flat at height 0"
+
+
+def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
+    if patch.terrain != expected.terrain:
+        yield f"{location}: got terrain {patch.terrain}; expected {expected.terrain} by its config"
+    if abs(patch.difficulty - expected.difficulty) > 1e-6:
+        yield (
+            f"{location}: got difficulty {patch.difficulty:g}; expected {expected.difficulty:g} "
+            "by its config"
+        )
+    if patch.parameters != expected.parameters:
+        yield (
+            f"{location}: the recorded parameters differ from those of its config: "
+            f"{_different(patch.parameters, expected.parameters)}"
+        )
+    is_same = {
+        "friction coefficients": np.allclose(patch.friction, expected.friction, atol=1e-6),
+        "solids": _same_solids(patch.solids, expected.solids),
+        "goals": _same_poses(patch.goals, expected.goals),
+        "spawn positions": _same_poses(patch.spawns[1:], expected.spawns[1:]),
+    }
+    for what, same in is_same.items():
+        if not same:
+            yield f"{location}: the {what} differ from those of its config"
+    moved = float(np.abs(patch.origin[:2] - expected.origin[:2]).max())
+    if moved > TOLERANCE:
+        yield f"{location}: the spawn origin is {moved:.3f} m from that of its config"
+    if expected.spawn_offset > expected.grid.cell:
+        yield (
+            f"{location}: no flat disk at the spawn position of {expected.terrain}: the origin is "
+            f"{expected.spawn_offset:.3f} m away, where a robot may be beyond the obstacle"
+        )
+    error = float(np.abs(patch.heights - expected.heights).max())
+    if error > TOLERANCE:
+        yield (
+            f"{location}: heights differ by up to {error:.3f} m from the {expected.terrain} of its "
+            "config: edited, moved, or with axes swapped; TerrainMap.edited() makes a custom map"
+        )
+
+
+def _different(parameters: Parameters, expected: Parameters) -> str:
+    """Return the names of the parameters that differ."""
+    pairs = (
+        (parameters.requested, expected.requested),
+        (parameters.realized, expected.realized),
+    )
+    names = {n: None for a, b in pairs for n in {**a, **b} if a.get(n) != b.get(n)}
+    return listing(names)
+
+
+def _same_poses(poses: NDArray[np.float32], expected: NDArray[np.float32]) -> bool:
+    return poses.shape == expected.shape and np.allclose(poses, expected, atol=TOLERANCE)
+
+
+def _same_solids(solids: Solids, expected: Solids) -> bool:
+    return all(
+        values.shape == wanted.shape and np.allclose(values, wanted, atol=TOLERANCE, equal_nan=True)
+        for values, wanted in (
+            (getattr(solids, field.name), getattr(expected, field.name))
+            for field in dataclasses.fields(Solids)
+        )
+    )
+
+
+def _check_realized(terrain_map: TerrainMap) -> Iterator[str]:
+    """Compare the requested parameters with the realized ones."""
+    cell, sub_terrains = terrain_map.config.cell, terrain_map.config.sub_terrains
+    for row, col in np.ndindex(terrain_map.difficulty.shape):
+        patch = terrain_map.patch(row, col)
+        sub_terrain = sub_terrains[terrain_map.terrain_types[row, col]]
+        parameters = sub_terrain.declarations
+        for name, requested in patch.parameters.requested.items():
+            realized = patch.parameters.realized[name]
+            if parameters[name].deviates(requested, realized, cell):
+                yield (
+                    f"patch ({row}, {col}), {patch.terrain}: {name} is {realized}; "
+                    f"requested {format_value(requested)}"
+                )
+
+
+def _check_solids(terrain_map: TerrainMap) -> Iterator[str]:
+    grid = terrain_map.grid
+    lower, upper = (corner[:, :2] for corner in terrain_map.solids.bounds())
+    beyond = np.maximum(grid.lower - lower, upper - grid.upper).max(axis=1, initial=0.0)
+    for index in np.flatnonzero(beyond > TOLERANCE).tolist():
+        yield f"solid {index} extends {beyond[index]:.3f} m beyond the map"
+
+
+def _check_goals(terrain_map: TerrainMap) -> Iterator[str]:
+    for row, col in np.ndindex(terrain_map.difficulty.shape):
+        grid, goals = terrain_map.config.patch_grid(row, col), terrain_map.goals[row, col]
+        last = np.flatnonzero(~np.isnan(goals).all(axis=1)).max(initial=-1)
+        for k, goal in enumerate(goals[: last + 1].astype(np.float64)):
+            subject = f"patch ({row}, {col}): goal {k}"
+            if not np.isfinite(goal).all():
+                yield f"{subject} is not finite"
+                continue
+            xy, z = goal[:2], float(goal[2])
+            if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
+                yield f"{subject} is outside the patch"
+                continue
+            below = float(terrain_map.height(xy)) - z
+            floor, ceiling = terrain_map.intervals(xy).T
+            if below > TOLERANCE:
+                yield f"{subject} is {below:.3f} m below the ground"
+            elif not ((floor - TOLERANCE <= z) & (z <= ceiling + TOLERANCE)).any():
+                yield f"{subject} is inside a solid"
+
+
+def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
+    config = terrain_map.config
+    if 2 * config.spawn_radius > min(config.patch_size):
+        x, y = config.patch_size
+        yield f"no disk of radius {config.spawn_radius:g} m fits in a patch of {x:g} m x {y:g} m"
+        return
+    radius = config.spawn_radius * np.linspace(0, 1, max(3, round(config.spawn_radius / 0.05)))
+    angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    disk = (radius[:, None, None] * circle).reshape(-1, 2)
+    for row, col in np.ndindex(terrain_map.difficulty.shape):
+        spawns = terrain_map.patch(row, col).spawns.astype(np.float64)
+        for number, (*xy, z, _) in enumerate(spawns):
+            name = f"spawn {number}" if number else "the spawn origin"
+            subject = f"patch ({row}, {col}): {name}"
+            grid = config.patch_grid(row, col)
+            if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
+                yield f"{subject} is outside the patch"
+            ground = terrain_map.height(xy + disk)
+            free = terrain_map.clearance(xy + disk).min()
+            if free < config.spawn_headroom - TOLERANCE:
+                headroom = config.spawn_headroom
+                yield f"{subject} has {free:.3f} m of headroom; expected {headroom:g} m"
+            above = float(z - terrain_map.height(xy))
+            if abs(above) > TOLERANCE:
+                side = "above" if above > 0 else "below"
+                yield f"{subject} is {abs(above):.3f} m {side} the ground"
+            spread = float(ground.max() - ground.min())
+            if spread > config.spawn_tolerance + 1e-6:
+                yield (
+                    f"{subject} is not on flat ground: heights within {config.spawn_radius:g} m "
+                    f"differ by {spread:.3f} m; expected at most {config.spawn_tolerance:g} m"
+                )
+            others = np.hypot(*(spawns[:number, :2] - xy).T)
+            if others.min(initial=np.inf) < 2 * config.spawn_radius - TOLERANCE:
+                yield (
+                    f"{subject} is {others.min():.3f} m from spawn {others.argmin()}; expected at "
+                    f"least {2 * config.spawn_radius:g} m, two spawn radii"
+                )
+
+
+def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
+    grid = terrain_map.grid
+    solids = terrain_map.solids.select(terrain_map.solids.collides)
+    if len(solids):
+        expected_mesh = concatenate_meshes(solid_meshes(solids))
+        mesh, solid_part = _split(mesh, len(expected_mesh.vertices), len(expected_mesh.triangles))
+        if solid_part.triangles.tolist() != expected_mesh.triangles.tolist() or not np.allclose(
+            solid_part.vertices, expected_mesh.vertices, atol=TOLERANCE
+        ):
+            yield "the last faces of the mesh differ from the solids of the map"
+            return
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    normal = np.cross(b - a, c - a)
+    area = np.linalg.norm(normal, axis=1) / 2
+    if not len(area):
+        yield "the mesh has no faces"
+        return
+    if (area < 1e-12).any():
+        yield f"{int((area < 1e-12).sum())} faces have no area"
+    # Rounding can tilt a wall to either side.
+    vertical = np.abs(normal[:, 2]) < 1e-3 * 2 * area
+    if (normal[~vertical, 2] < 0).any():
+        yield f"{int((normal[~vertical, 2] < 0).sum())} faces point downward"
+    covered, expected = normal[~vertical, 2].sum() / 2, grid.size[0] * grid.size[1]
+    if abs(covered - expected) > 1e-4 * expected:
+        yield f"the mesh covers {covered:.1f} m2; expected the {expected:.1f} m2 of the map"
+    yield from _check_edges(terrain_map, mesh)
+    centroid = ((a + b + c) / 3)[~vertical]
+    error = np.abs(centroid[:, 2] - terrain_map.height(centroid[:, :2]))
+    if (error > TOLERANCE).any():
+        x, y, _ = centroid[np.argmax(error)]
+        yield (
+            f"the mesh differs from the heights by up to {error.max():.3f} m, "
+            f"most at ({x:.2f}, {y:.2f})"
+        )
+
+
+def _split(mesh: TriMesh, num_vertices: int, num_triangles: int) -> tuple[TriMesh, TriMesh]:
+    """Return the first part of a mesh, and its last vertices and triangles as a mesh."""
+    nv, nf = len(mesh.vertices) - num_vertices, len(mesh.triangles) - num_triangles
+    first, last = mesh.triangles[: max(nf, 0)], mesh.triangles[max(nf, 0) :]
+    return (
+        TriMesh(vertices=mesh.vertices[: max(nv, 0)], triangles=first),
+        TriMesh(vertices=mesh.vertices[max(nv, 0) :], triangles=last - np.int32(max(nv, 0))),
+    )
+
+
+def _check_edges(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
+    edges = mesh.edges()
+    directed = np.sort(edges[:, 0] * len(mesh.vertices) + edges[:, 1])
+    repeated = int((np.diff(directed) == 0).sum())
+    if repeated:
+        yield f"{repeated} edges are shared by more than two faces or by faces of opposite winding"
+    boundary = mesh.vertices[mesh.boundary()].astype(np.float64)
+    inside = ~_is_on_outline(boundary, terrain_map).any(axis=1)
+    if inside.any():
+        x, y = boundary[inside][0, 0, :2]
+        yield f"{int(inside.sum())} edges have only one face, for example at ({x:.2f}, {y:.2f})"
+
+
+def _is_on_outline(edges: NDArray[np.float64], terrain_map: TerrainMap) -> NDArray[np.bool_]:
+    """Return whether each edge lies on each of the four sides of the map, shape (n, 4)."""
+    sides = [
+        np.abs(edges[..., k] - line[k]).max(axis=1) < TOLERANCE
+        for line in (terrain_map.grid.lower, terrain_map.grid.upper)
+        for k in (0, 1)
+    ]
+    return np.stack(sides, axis=1)

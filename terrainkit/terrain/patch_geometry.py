@@ -1,0 +1,85 @@
+"""PatchGeometry: what a terrain puts on a patch, and what overlays change."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PatchGeometry:
+    """Ground, solids, goals and spawn of a patch, in the frame of the map."""
+
+    grid: Grid
+    """Positions of the samples."""
+
+    heights: NDArray[np.float32]
+    """Heights of the ground [m], shape `grid.shape`."""
+
+    friction: NDArray[np.float32]
+    """Friction of the ground in each cell, shape `grid.shape`. It may be read-only."""
+
+    solids: Solids
+    """Solids of the patch."""
+
+    goals: NDArray[np.float64]
+    """Goals in their order: x, y, z [m] and heading [rad], shape (k, 4). A z of NaN stands for the
+    height of the ground."""
+
+    spawn: tuple[float, float]
+    """Position where the robot is spawned, x and y [m]."""
+
+    spawn_radius: float
+    """Radius around `spawn` within which the ground has to stay level [m]."""
+
+    heading: float = 0.0
+    """Heading of a robot on a patch without goals [rad]."""
+
+    def transformed(self, matrix: ArrayLike) -> Self:
+        """Return the patch rotated or reflected about its center.
+
+        Args:
+            matrix: Signed permutation matrix that maps x and y, shape (2, 2). It may swap x and y
+                only on a square patch.
+        """
+        matrix = np.asarray(matrix)
+        center = np.array(self.grid.center)
+        rotation = np.eye(3)
+        rotation[:2, :2] = matrix
+        center3 = np.array([*center, 0.0])
+        goals = self.goals.copy()
+        goals[:, :2] = (goals[:, :2] - center) @ matrix.T + center
+        goals[:, 3] = _turn(goals[:, 3], matrix)
+        x, y = (matrix @ (self.spawn - center) + center).tolist()
+        return replace(
+            self,
+            heights=_permute(self.heights, matrix),
+            friction=_permute(self.friction, matrix),
+            solids=self.solids.transformed(rotation, center3 - rotation @ center3),
+            goals=goals,
+            spawn=(x, y),
+            heading=float(_turn(np.array(self.heading), matrix)),
+        )
+
+
+@lru_cache(maxsize=16)
+def uniform_friction(friction: float, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the same friction in all cells: a read-only view of one number."""
+    return np.broadcast_to(np.float32(friction), shape)
+
+
+def _permute(values: NDArray[np.float32], matrix: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return the values of all cells at their new positions."""
+    old_axis = np.abs(matrix).argmax(axis=1)
+    reversed_axes = tuple(np.flatnonzero(matrix.sum(axis=1) < 0).tolist())
+    return np.ascontiguousarray(np.flip(values.transpose(old_axis), reversed_axes))
+
+
+def _turn(heading: NDArray[np.float64], matrix: NDArray[np.int64]) -> NDArray[np.float64]:
+    x, y = np.tensordot(matrix, [np.cos(heading), np.sin(heading)], axes=1)
+    return np.asarray(np.arctan2(y, x))

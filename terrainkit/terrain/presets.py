@@ -1,0 +1,170 @@
+"""Presets: named lists of sub-terrains."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from terrainkit.errors import ConfigError
+from terrainkit.settings.text import expected_names
+from terrainkit.terrain import registry
+from terrainkit.terrain.parameter import parameters_of
+from terrainkit.terrain.sub_terrain import SubTerrain
+
+# The obstacles of Extreme Parkour and Robot Parkour Learning, one on a length of 2 m each. At the
+# hard end, the former climbs 0.5 m and leaps 0.8 m, and the latter crawls under 0.2 m and passes
+# openings of 0.28 m.
+_TILT = {"terrain": "side_ramps", "gap": (0.0, 0.2), "spacing": 1.2, "end": 0.4, "proportion": 0.5}
+
+_OBSTACLES: dict[str, list[dict[str, Any]]] = {
+    "hurdle": [{"terrain": "hurdles", "height": (0.05, 0.4)}],
+    "step": [
+        {
+            "terrain": "hurdles",
+            "height": (0.05, 0.5),
+            "min_thickness": 0.6,
+            "max_thickness": 1.0,
+        }
+    ],
+    "leap": [
+        {"terrain": "gap_track", "length": (0.1, 0.8), "min_spacing": 1.5, "max_spacing": 2.0}
+    ],
+    "tilt": [_TILT, {**_TILT, "first_side": "right"}],
+    "crawl": [{"terrain": "crawl", "spacing": 0.8}],
+    "squeeze": [{"terrain": "slit", "opening": (1.3, 0.8), "offset": 0.4}],
+}
+
+_COURSE = {"terrain": "course", "order": "random", "start": 1.5}
+
+_PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
+    # The columns of legged_gym in its order. Its "stairs up" are climbed from the platform outward,
+    # so they are the inverted pyramid here, and its "stairs down" the upright one.
+    "legged_gym": {
+        "pyramid_slope_inverted": {},
+        "pyramid_slope": {},
+        "rough_slope": {},
+        "pyramid_stairs_inverted": {"proportion": 2.0},
+        "pyramid_stairs": {},
+        "obstacles": {},
+        "stepping_stones": {},
+        "gap": {},
+        "pit": {},
+    },
+    # `terrain_proportions` of legged_gym: slopes .1, rough slopes .1, stairs up .35 and down .25,
+    # obstacles .2. With 20 columns, as there, each terrain has whole columns.
+    "legged_gym_rough": {
+        "pyramid_slope_inverted": {"proportion": 0.05},
+        "pyramid_slope": {"proportion": 0.05},
+        "rough_slope": {"proportion": 0.1},
+        "pyramid_stairs_inverted": {"proportion": 0.35},
+        "pyramid_stairs": {"proportion": 0.25},
+        "obstacles": {"proportion": 0.2},
+    },
+    # ROUGH_TERRAINS_CFG of Isaac Lab 2.3. Its rough ground is 0.02 to 0.10 m high at every
+    # difficulty.
+    "isaaclab": {
+        "pyramid_stairs": {"proportion": 2.0, "step_width": 0.3},
+        "pyramid_stairs_inverted": {"proportion": 2.0, "step_width": 0.3},
+        "random_grid": {"proportion": 2.0, "height": (0.05, 0.2), "block": 0.45},
+        "rough": {"proportion": 2.0, "amplitude": 0.04, "step": 0.02, "spacing": 0.1},
+        "pyramid_slope": {"platform": 2.0},
+        "pyramid_slope_inverted": {"platform": 2.0},
+    },
+    # ROUGH_TERRAINS_CFG of mjlab 1.6, with slopes up to 0.7: its slope of 1 is a wall here.
+    "mjlab": {
+        "flat": {"proportion": 2.0},
+        "pyramid_stairs": {"proportion": 2.0, "step_height": (0.0, 0.1), "step_width": 0.3},
+        "pyramid_stairs_inverted": {
+            "proportion": 2.0,
+            "step_height": (0.0, 0.1),
+            "step_width": 0.3,
+        },
+        "pyramid_slope": {"grade": (0.0, 0.7), "platform": 2.0},
+        "pyramid_slope_inverted": {"grade": (0.0, 0.7), "platform": 2.0},
+        "rough": {"amplitude": 0.04, "step": 0.02, "spacing": 0.1},
+        "wave": {},
+    },
+    # Courses of one obstacle as in the training of both, and mixed ones as in their distillation.
+    "parkour_course": {
+        **{
+            f"{name}_course": {**_COURSE, "elements": obstacles}
+            for name, obstacles in _OBSTACLES.items()
+        },
+        "mixed_course": {
+            **_COURSE,
+            "proportion": 4.0,
+            "elements": [each for obstacles in _OBSTACLES.values() for each in obstacles],
+        },
+    },
+}
+"""Terrain (its name by default), proportion (1 by default) and parameters of each sub-terrain, by
+preset."""
+
+_EQUAL_PARTS = {
+    "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),
+    "stairs": ("stairs", "pyramid_stairs", "pyramid_stairs_inverted"),
+    "hard": ("gap", "stepping_stones", "pit", "boxes", "rails"),
+    "parkour": (
+        "boxes",
+        "hurdles",
+        "gap_track",
+        "side_ramps",
+        "stepping_beams",
+        "crawl",
+        "slit",
+    ),
+    "sparse": (
+        "stepping_stones",
+        "stone_rows",
+        "stones_everywhere",
+        "stakes",
+        "beams",
+        "stepping_beams",
+        "star",
+        "rings",
+        "floating_islands",
+    ),
+    "confined": ("crawl", "tunnel", "ceiling", "slit", "poles", "rooms", "maze"),
+    "natural": ("rough", "rough_slope", "perlin", "fractal", "eroded", "contour", "rocks"),
+}
+"""Sub-terrains of the presets whose proportions are 1 and whose parameters are the defaults."""
+
+
+def preset_names() -> tuple[str, ...]:
+    """Return the names of the presets."""
+    return (*_PRESETS, *_EQUAL_PARTS, "all")
+
+
+def get_preset(name: str) -> tuple[SubTerrain, ...]:
+    """Return the sub-terrains of a preset.
+
+    The preset "all" has every terrain once, and once more inverted where that exists; but no
+    course, which consists of the others.
+
+    Raises:
+        ConfigError: if there is no such preset.
+    """
+    if name not in preset_names():
+        raise ConfigError(f"no preset {name!r}; {expected_names(name, preset_names())}")
+    if name in _PRESETS:
+        return tuple(_sub_terrain(each, **values) for each, values in _PRESETS[name].items())
+    names = _all_names() if name == "all" else _EQUAL_PARTS[name]
+    return tuple(_sub_terrain(each) for each in names)
+
+
+def _sub_terrain(
+    name: str, terrain: str = "", proportion: float = 1.0, **parameters: Any
+) -> SubTerrain:
+    if name.endswith(registry.INVERTED):
+        parameters["inverted"] = True
+    terrain = terrain or name.removesuffix(registry.INVERTED)
+    return SubTerrain(terrain=terrain, name=name, proportion=proportion, parameters=parameters)
+
+
+def _all_names() -> list[str]:
+    names = []
+    for name in registry.terrain_names():
+        if name == "course":
+            continue
+        names.append(name)
+        if "inverted" in parameters_of(registry.get_terrain(name)):
+            names.append(name + registry.INVERTED)
+    return names

@@ -1,0 +1,241 @@
+"""The registry of terrains and overlays.
+
+Each module in `terrainkit/terrains` is one terrain, named after its file, and each module in
+`terrainkit/overlays` one overlay. Other packages add their own as entry points of the groups
+`terrainkit.terrains` and `terrainkit.overlays`, and a program or notebook registers its classes.
+"""
+
+import importlib
+import inspect
+import pkgutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from terrainkit.errors import ConfigError
+from terrainkit.settings.text import closest_names
+from terrainkit.terrain import Terrain
+from terrainkit.terrain.overlay import Overlay
+from terrainkit.terrain.parameter import check_names, parameters_of
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+INVERTED = "_inverted"
+"""Suffix of the name of an inverted terrain in presets and maps."""
+
+_Terrain = TypeVar("_Terrain", bound=type[Terrain])
+_Overlay = TypeVar("_Overlay", bound=type[Overlay])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Group:
+    """The classes of one parent."""
+
+    noun: str
+    """What a class is called in errors: terrain or overlay."""
+
+    parent: Any
+    """Their parent class."""
+
+    package: str
+    """Name of the package of the built-in ones, which is also the group of the entry points of
+    other packages."""
+
+
+_TERRAINS = _Group(noun="terrain", parent=Terrain, package="terrainkit.terrains")
+_OVERLAYS = _Group(noun="overlay", parent=Overlay, package="terrainkit.overlays")
+
+_registered: dict[tuple[str, str], type[Any]] = {}
+"""The classes that this process has registered, by noun and name."""
+
+
+@cache
+def terrain_names() -> tuple[str, ...]:
+    """Return the names of the built-in terrains in alphabetical order, without importing them."""
+    return _module_names(_TERRAINS)
+
+
+@cache
+def overlay_names() -> tuple[str, ...]:
+    """Return the names of the built-in overlays in alphabetical order, without importing them."""
+    return _module_names(_OVERLAYS)
+
+
+def _module_names(group: _Group) -> tuple[str, ...]:
+    package = importlib.import_module(group.package)
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__)))
+
+
+def plugin_terrains() -> dict[str, "EntryPoint"]:
+    """Return the entry points of terrains from other installed packages, by name."""
+    return _plugins(_TERRAINS)
+
+
+def plugin_overlays() -> dict[str, "EntryPoint"]:
+    """Return the entry points of overlays from other installed packages, by name."""
+    return _plugins(_OVERLAYS)
+
+
+def _plugins(group: _Group) -> dict[str, "EntryPoint"]:
+    from importlib.metadata import entry_points
+
+    return {point.name: point for point in entry_points(group=group.package)}
+
+
+def registered_terrains() -> tuple[str, ...]:
+    """Return the names of the terrains that this process has registered."""
+    return _registered_names(_TERRAINS)
+
+
+def registered_overlays() -> tuple[str, ...]:
+    """Return the names of the overlays that this process has registered."""
+    return _registered_names(_OVERLAYS)
+
+
+def _registered_names(group: _Group) -> tuple[str, ...]:
+    return tuple(name for noun, name in _registered if noun == group.noun)
+
+
+def register_terrain(terrain: _Terrain) -> _Terrain:
+    """Register a terrain class, so that its name can be used in TOML and in maps.
+
+    The name is that of the class in snake_case, `my_terrain` for `MyTerrain`. A class that is
+    defined again, as in a notebook, replaces the previous one. Use it as a decorator above
+    `@dataclass`, or as a function.
+
+    Args:
+        terrain: The class. Nothing changes if it is built in, or that of an installed package.
+
+    Returns:
+        `terrain`.
+
+    Raises:
+        ConfigError: if it is not a terrain, or another terrain has the name.
+    """
+    _register(_TERRAINS, terrain)
+    return terrain
+
+
+def register_overlay(overlay: _Overlay) -> _Overlay:
+    """Register an overlay class, as :func:`register_terrain` does a terrain.
+
+    Raises:
+        ConfigError: if it is not an overlay, or another overlay has the name.
+    """
+    _register(_OVERLAYS, overlay)
+    return overlay
+
+
+def _register(group: _Group, item: Any) -> None:
+    if not _is_subclass(item, group):
+        raise ConfigError(
+            f"{group.noun}: got {item!r}; expected a subclass of {group.parent.__name__}"
+        )
+    name = item.kind()
+    if inspect.isabstract(item):
+        missing = ", ".join(sorted(item.__abstractmethods__))
+        raise ConfigError(f"{item.__name__}: got no method {missing}; expected one")
+    if "__dataclass_fields__" not in vars(item):
+        raise ConfigError(f"{item.__name__} lacks @dataclass(frozen=True, kw_only=True)")
+    parameters_of(item)
+    existing: Any = _registered.get((group.noun, name))
+    if existing is None and (name in _module_names(group) or name in _plugins(group)):
+        existing = _get(group, name)
+    if existing is None or _path(existing) == _path(item):
+        if existing is not item:
+            _registered[group.noun, name] = item
+            _get.cache_clear()
+    elif existing is not item:
+        raise ConfigError(
+            f"the name {name!r} of {_path(item)} is that of {_path(existing)}; expected another "
+            "class name"
+        )
+
+
+def _is_subclass(item: object, group: _Group) -> bool:
+    return isinstance(item, type) and issubclass(item, group.parent)
+
+
+def _path(item: type[Any]) -> str:
+    return f"{item.__module__}.{item.__qualname__}"
+
+
+def get_terrain(name: str) -> type[Terrain]:
+    """Return the terrain class `name`: a built-in or registered one, or that of a plugin.
+
+    Raises:
+        ConfigError: if there is no such terrain, or a plugin cannot be loaded.
+    """
+    return _get(_TERRAINS, name)  # type: ignore[no-any-return]
+
+
+def get_overlay(name: str) -> type[Overlay]:
+    """Return the overlay class `name`: a built-in or registered one, or that of a plugin.
+
+    Raises:
+        ConfigError: if there is no such overlay, or a plugin cannot be loaded.
+    """
+    return _get(_OVERLAYS, name)  # type: ignore[no-any-return]
+
+
+@cache
+def _get(group: _Group, name: str) -> Any:
+    if name in _module_names(group):
+        return _load_class(group, name)
+    if (group.noun, name) in _registered:
+        return _registered[group.noun, name]
+    plugins = _plugins(group)
+    if name not in plugins:
+        raise _unknown_name(group, name, plugins)
+    try:
+        found = plugins[name].load()
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(f"{name} ({plugins[name].value}) cannot be loaded: {error}") from error
+    if not _is_subclass(found, group):
+        raise ConfigError(
+            f"{name} ({plugins[name].value}): got {found!r}; expected a subclass of "
+            f"{group.parent.__name__}"
+        )
+    return found
+
+
+def _unknown_name(group: _Group, name: str, plugins: Mapping[str, Any]) -> ConfigError:
+    base = name.removesuffix(INVERTED)
+    if (
+        base != name
+        and base in _module_names(group)
+        and "inverted" in parameters_of(_get(group, base))
+    ):
+        return ConfigError(f"no {group.noun} {name!r}; use {base} with inverted = true")
+    near = closest_names(name, [*_module_names(group), *plugins, *_registered_names(group)])
+    hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
+    return ConfigError(
+        f"no {group.noun} {name!r} is built in, installed, or registered with "
+        f"terrainkit.register_{group.noun}; {hint}terrainkit list prints all"
+    )
+
+
+def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
+    """Return the overlay `name` with these parameters: values, or ranges (easy, hard).
+
+    Raises:
+        ConfigError: if there is no such overlay, or a parameter is unknown or invalid.
+    """
+    overlay = get_overlay(name)
+    check_names(name, parameters, parameters_of(overlay))
+    return overlay(**parameters)
+
+
+def _load_class(group: _Group, name: str) -> type[Any]:
+    """Return the class in module `name` of the package of a group."""
+    module = importlib.import_module(f"{group.package}.{name}")
+    found: list[Any] = [value for value in vars(module).values() if inspect.isclass(value)]
+    classes = [each for each in found if issubclass(each, group.parent) and each.kind() == name]
+    if len(classes) != 1:
+        raise ConfigError(
+            f"{module.__file__}: got {len(classes)} subclasses of {group.parent.__name__} named "
+            "like the file; expected one"
+        )
+    return classes[0]  # type: ignore[no-any-return]

@@ -1,0 +1,159 @@
+"""SubTerrain: a terrain type of a map, with its proportion and parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Annotated, Any, Self
+
+from msgspec import Meta
+
+from terrainkit.errors import ConfigError
+from terrainkit.settings.schema import Config, field_keys
+from terrainkit.settings.text import closest
+from terrainkit.settings.type_hint import MAX_VALUE, convert, show
+from terrainkit.terrain import Terrain, registry
+from terrainkit.terrain.overlay import Overlay
+from terrainkit.terrain.parameter import Parameter, convert_range, parameters_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class SubTerrain(Config):
+    """A terrain type of a map.
+
+    In Python, `terrain` may be a subclass of :class:`~terrainkit.terrain.Terrain`, which is
+    registered and replaced by its name. The classes of `overlays` are registered, too.
+
+    Raises:
+        ConfigError: if there is no such terrain, or a parameter is unknown or invalid.
+    """
+
+    terrain: Annotated[Any, Meta(description="a string")]
+    """Name of the terrain; `terrainkit list` prints all of them."""
+
+    proportion: Annotated[float, Meta(ge=0, le=MAX_VALUE)] = 1.0
+    """Share of the columns, relative to the sum of all proportions."""
+
+    name: str = ""
+    """Name in the map; defaults to the name of the terrain."""
+
+    overlays: tuple[Overlay, ...] = ()
+    """Changes to the patches, in their order. In TOML, each is a `[[terrains.overlays]]` table."""
+
+    friction: Annotated[Any, Meta(description="a number >= 0, or a pair (easy, hard)")] | None = (
+        None
+    )
+    """Friction coefficient of the patches; none for `static_friction` of the map."""
+
+    parameters: Mapping[str, Annotated[Any, Meta(description="a finite value or a range")]] = field(
+        default_factory=dict
+    )
+    """Parameters that replace the defaults: a value, or a range (easy, hard). In TOML they are keys
+    of the table itself."""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.terrain, type):
+            terrain: type[Terrain] = registry.register_terrain(self.terrain)
+            object.__setattr__(self, "terrain", terrain.kind())
+        convert("terrain", self.terrain, str)
+        try:
+            super().__post_init__()
+        except ConfigError as error:
+            message = str(error).removeprefix("parameters.")  # they are keys of the table itself
+            raise ConfigError(f"{self.terrain}.{message}") from None
+        for overlay in self.overlays:
+            registry.register_overlay(type(overlay))
+        if self.friction is not None:
+            friction = convert_range(self.terrain, "friction", self.friction, _FRICTION)
+            object.__setattr__(self, "friction", friction)
+        own: Any = type(self)  # mypy does not take it as hashable
+        if reserved := field_keys(own).keys() & parameters_of(self.terrain_class).keys():
+            raise ConfigError(
+                f"{self.terrain}: got parameters with the names {', '.join(sorted(reserved))}; "
+                "expected others, since they are keys of [[terrains]]"
+            )
+        for name, declared in parameters_of(self.terrain_class).items():
+            if declared.table and name in self.parameters:
+                tables = convert_range(self.terrain, name, self.parameters[name], declared)
+                object.__setattr__(self, "parameters", {**self.parameters, name: tables})
+        if not self.name:
+            object.__setattr__(self, "name", self.terrain)
+        for difficulty in (0.0, 1.0):
+            self.at(difficulty)
+
+    @classmethod
+    def from_table(
+        cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
+    ) -> Self:
+        """Return the sub-terrain of a `[[terrains]]` table; its other keys are parameters."""
+        kind: Any = cls
+        keys = field_keys(kind).keys() - {"parameters"}
+        own = {key: table[key] for key in table if key in keys}
+        parameters = {key: value for key, value in table.items() if key not in own}
+        try:
+            if "terrain" not in own and (near := closest("terrain", parameters)):
+                raise ConfigError(f"got the key {near!r}; did you mean 'terrain'?")
+            if isinstance(parameters.get("elements"), Mapping):
+                raise ConfigError("elements: got a table; expected [[terrains.elements]]")
+            if "overlays" in own:
+                own["overlays"] = _read_overlays(own["overlays"])
+            return super().from_table({**own, "parameters": parameters}, default)
+        except ConfigError as error:
+            raise ConfigError(f"{path.removesuffix('.')}: {error}") from error
+
+    def to_table(self) -> dict[str, Any]:
+        """Return the keys of a `[[terrains]]` table."""
+        optional = {
+            "name": self.name if self.name != self.terrain else "",
+            "friction": self.friction,
+            "overlays": self.overlays,
+        }
+        raw = {key: value for key, value in optional.items() if value not in ("", None, ())}
+        return {"terrain": self.terrain, "proportion": self.proportion, **raw, **self.parameters}
+
+    @cached_property
+    def terrain_class(self) -> type[Terrain]:
+        """The class of the terrain. It is looked up once, and pickled with the instance."""
+        return registry.get_terrain(self.terrain)
+
+    def at(self, difficulty: float) -> Terrain:
+        """Return the terrain at `difficulty`, 0 to 1."""
+        return self.terrain_class.at(difficulty, self.parameters)
+
+    def friction_at(self, difficulty: float) -> float | None:
+        """Return the friction of the patches at `difficulty`, 0 to 1; None for the map's."""
+        if self.friction is None:
+            return None
+        friction: float = _FRICTION.value_at(self.friction, difficulty)  # type: ignore[assignment]
+        return friction
+
+    @cached_property
+    def declarations(self) -> dict[str, Parameter]:
+        """The parameters of the terrain by name, and those of its overlays by path."""
+        declared = self.at(1.0).declarations()
+        for k, overlay in enumerate(self.overlays):
+            for name, parameter in parameters_of(type(overlay)).items():
+                declared[overlay_path(k, name)] = parameter
+        return declared
+
+
+_FRICTION = Parameter(easy=1.0, hard=1.0)
+
+
+def overlay_path(number: int, name: str) -> str:
+    """Return the name of a parameter of overlay `number` among those of a patch."""
+    return f"overlays[{number}].{name}"
+
+
+def _read_overlays(tables: Any) -> tuple[Overlay, ...]:
+    """Return the overlays that `[[terrains.overlays]]` tables describe."""
+    if not isinstance(tables, list) or not all(isinstance(each, Mapping) for each in tables):
+        raise ConfigError(f"overlays: got {show(tables)}; expected [[terrains.overlays]] tables")
+    overlays = []
+    for k, table in enumerate(tables):
+        parameters = dict(table)
+        try:
+            name = convert("overlay", parameters.pop("overlay", None), str)
+            overlays.append(registry.make_overlay(name, parameters))
+        except ConfigError as error:
+            raise ConfigError(f"overlays[{k}]: {error}") from error
+    return tuple(overlays)

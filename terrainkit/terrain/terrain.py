@@ -1,0 +1,158 @@
+"""Terrain: the abstract class of all terrains."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import ConfigError
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.solids import Solids
+from terrainkit.terrain.parameter import (
+    Range,
+    Value,
+    check_names,
+    convert_parameter,
+    convert_range,
+    parameters_of,
+)
+from terrainkit.terrain.parameterized import Parameterized
+
+
+@dataclass(frozen=True, kw_only=True)
+class Terrain(Parameterized, ABC):
+    r"""A type of ground with fixed parameters.
+
+    A terrain is a frozen dataclass with the method :meth:`heights`, and :meth:`solids` and
+    :meth:`goals` where it has any. It does not depend on a difficulty: :meth:`at` interpolates
+    every range,
+
+    .. math:: p(d) = (1 - d)\, p_\text{easy} + d\, p_\text{hard},
+
+    and returns a terrain with plain numbers. Fields are declared with the functions of
+    :mod:`terrainkit.parameter`; the docstring of a field is its help text. A terrain that is
+    constructed directly takes the hard end of each range by default.
+    """
+
+    has_column_seed: ClassVar[bool] = False
+    """Whether the rows of a column have the same random numbers in mode curriculum.
+
+    Set it where single random objects decide how hard a patch is. Otherwise a row could be easier
+    than the one before.
+    """
+
+    has_random_heights: ClassVar[bool] = True
+    """Whether :meth:`heights` takes random numbers. Where it does not, maps save the time of
+    creating a generator, which is that of a small patch, and pass None."""
+
+    def __post_init__(self) -> None:
+        for name, parameter in parameters_of(type(self)).items():
+            raw: Any = getattr(self, name)
+            value = parameter.hard if raw is parameter.default else raw
+            if not parameter.is_plain(value):
+                value = convert_parameter(self.kind(), name, value, parameter)
+            if value is not raw:
+                object.__setattr__(self, name, value)
+
+    @classmethod
+    def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
+        """Return the terrain at `difficulty`, 0 to 1.
+
+        Args:
+            difficulty: 0 is the easy end of every range, 1 the hard end.
+            values: Parameters that replace the defaults: a value, or a range (easy, hard).
+
+        Raises:
+            ConfigError: if a parameter is unknown or its value is invalid.
+        """
+        if not 0 <= difficulty <= 1:
+            raise ConfigError(
+                f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
+            )
+        known, values = parameters_of(cls), values or {}
+        fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
+        if values:
+            check_names(cls.kind(), values, known)
+        for name, value in values.items():
+            result: Any = convert_range(cls.kind(), name, value, known[name])
+            fixed[name] = known[name].value_at(result, difficulty)
+        return cls(**fixed)
+
+    def build(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
+        """Return the heights of the patch on `grid` [m], float32, shape `grid.shape`.
+
+        The same terrain, grid and state of `rng` give the same bytes on every machine.
+
+        Raises:
+            ConfigError: if the grid is too small or its cells are too large for the terrain.
+        """
+        self.check_fit(grid)
+        # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
+        heights = np.asarray(self.heights(grid, rng), dtype=np.float32) + np.float32(0)
+        if heights.shape != grid.shape or not np.isfinite(heights).all():
+            raise ConfigError(
+                f"{self.kind()}: heights(): got shape {heights.shape}; expected {grid.shape} with "
+                "finite values"
+            )
+        return heights
+
+    def check_fit(self, grid: Grid) -> None:
+        """Raise ConfigError if a centered square of this terrain does not fit on `grid`."""
+        for name, parameter in parameters_of(type(self)).items():
+            if parameter.snap == "centered":
+                self._check_centered(name, getattr(self, name), grid)
+
+    def _check_centered(self, name: str, value: float, grid: Grid) -> None:
+        counts, (x, y) = grid.centered(value), grid.size
+        if value > min(x, y) + grid.cell / 2:
+            raise ConfigError(
+                f"{self.kind()}: {name} {value:g} m does not fit in a patch of {x:g} m x {y:g} m"
+            )
+        if counts[0] >= grid.shape[0] and counts[1] >= grid.shape[1]:
+            raise ConfigError(
+                f"{self.kind()}: {name} {value:g} m fills the whole patch of {x:g} m x {y:g} m"
+            )
+        if min(counts) == 0:
+            raise ConfigError(
+                f"{self.kind()}: {name} {value:g} m is smaller than a cell; "
+                f"expected at least {grid.cell:g} m"
+            )
+
+    def spawn(self, grid: Grid) -> tuple[float, float]:
+        """Return the preferred spawn position, x and y [m]; by default the center of the patch."""
+        return grid.center
+
+    @abstractmethod
+    def heights(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.floating]:
+        """Return the heights on `grid` [m], shape `grid.shape`.
+
+        Take random numbers only from `rng`. Sample first and scale afterward, so that the pattern
+        stays the same at every difficulty. Leave a flat disk where a robot can be spawned; see
+        :mod:`terrainkit.map.spawn`.
+        """
+
+    def solids(
+        self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator"
+    ) -> Solids:
+        """Return the solids on `grid`, in its frame; by default none.
+
+        Args:
+            grid: Grid of the patch; solids must not extend beyond it.
+            heights: Heights of the ground [m], shape `grid.shape`.
+            rng: Generator in the same state as the one of :meth:`goals`, so that both can start
+                by sampling the same layout.
+        """
+        return Solids.empty()
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator"
+    ) -> NDArray[np.floating]:
+        """Return the goals in their order, x, y, z [m] and heading [rad], shape (k, 4).
+
+        A z of NaN stands for the height of the ground. By default there are none. The arguments
+        are those of :meth:`solids`.
+        """
+        return np.empty((0, 4))

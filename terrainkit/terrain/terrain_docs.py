@@ -1,0 +1,96 @@
+"""Descriptions of terrains, overlays and their parameters, read from their docstrings."""
+
+import inspect
+from dataclasses import dataclass
+from typing import Any
+
+from terrainkit.settings.field_docs import field_docs
+from terrainkit.terrain import registry
+from terrainkit.terrain.parameter import Parameter, format_value, parameters_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterDoc:
+    """The documentation of one parameter."""
+
+    name: str
+    """Name of the parameter."""
+
+    easy: str
+    """Default at difficulty 0."""
+
+    hard: str
+    """Default at difficulty 1; empty if it equals `easy`."""
+
+    text: str
+    """Description with unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TerrainDoc:
+    """The documentation of one terrain or overlay."""
+
+    name: str
+    """Name of the terrain or overlay."""
+
+    text: str
+    """Description, one paragraph or more."""
+
+    parameters: tuple[ParameterDoc, ...]
+    """Its parameters, in order."""
+
+
+def terrain_summaries() -> dict[str, str]:
+    """Return the first line of each terrain's description, by name."""
+    return {name: _summary(registry.get_terrain(name)) for name in registry.terrain_names()}
+
+
+def overlay_summaries() -> dict[str, str]:
+    """Return the first line of each overlay's description, by name."""
+    return {name: _summary(registry.get_overlay(name)) for name in registry.overlay_names()}
+
+
+def terrain_doc(name: str) -> TerrainDoc:
+    """Return the documentation of the terrain `name`.
+
+    Raises:
+        ConfigError: if there is no such terrain.
+    """
+    return _class_doc(name, registry.get_terrain(name))
+
+
+def overlay_doc(name: str) -> TerrainDoc:
+    """Return the documentation of the overlay `name`.
+
+    Raises:
+        ConfigError: if there is no such overlay.
+    """
+    return _class_doc(name, registry.get_overlay(name))
+
+
+def _summary(kind: Any) -> str:
+    return (inspect.getdoc(kind) or "").partition("\n")[0]
+
+
+def _class_doc(name: str, kind: Any) -> TerrainDoc:
+    texts = field_docs(kind)
+    return TerrainDoc(
+        name=name,
+        text=inspect.getdoc(kind) or "",
+        parameters=tuple(
+            ParameterDoc(
+                name=name,
+                easy=format_value(parameter.easy),
+                hard=format_value(parameter.hard) if parameter.hard != parameter.easy else "",
+                text=_text(texts.get(name, ""), parameter),
+            )
+            for name, parameter in parameters_of(kind).items()
+        ),
+    )
+
+
+def _text(text: str, parameter: Parameter) -> str:
+    """Return the docstring of a parameter, and its choices if it has any."""
+    if not parameter.choices:
+        return text
+    return f"{text} One of: {', '.join(map(str, parameter.choices))}.".strip()

@@ -1,0 +1,1 @@
+"""Views: pictures, the viewer in the browser, and what a map costs."""

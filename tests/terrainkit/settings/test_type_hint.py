@@ -1,0 +1,126 @@
+import datetime
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+import pytest
+from msgspec import Meta
+
+from terrainkit.errors import ConfigError
+from terrainkit.settings.type_hint import (
+    UNIQUE,
+    Interval,
+    PositiveFloat,
+    PositiveInt,
+    convert,
+    describe,
+)
+
+Mode = Literal["a", "b"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motor:
+    """A table in TOML."""
+
+    effort: float = 1.0
+
+
+MOTOR = Motor(effort=2.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "annotation", "result"),
+    [
+        (3, int, 3),
+        (0.5, float, 0.5),
+        (8, float, 8.0),
+        (True, bool, True),
+        ("8", str, "8"),
+        ("b", Mode, "b"),
+        (None, float | None, None),
+        (1, float | None, 1.0),
+        ([8, 4], tuple[float, float], (8.0, 4.0)),
+        ((8, 4.5), tuple[float, float], (8.0, 4.5)),
+        ([1, 2, 3], tuple[float, ...], (1.0, 2.0, 3.0)),
+        ([], tuple[float, ...], ()),
+        ([MOTOR], tuple[Motor, ...], (MOTOR,)),
+        (2**63 - 1, int, 2**63 - 1),
+        (np.int64(3), int, 3),
+        (np.int8(8), float, 8.0),
+        (np.float32(0.5), float, 0.5),
+        (np.float64(0.5), float | None, 0.5),
+        (np.True_, bool, True),
+        (np.str_("b"), Mode, "b"),
+    ],
+)
+def test_convert_returns_the_annotated_type(value, annotation, result):
+    converted = convert("key", value, annotation)
+    assert converted == result
+    assert type(converted) is type(result)
+
+
+def test_convert_makes_floats_of_integers_in_lists():
+    items = convert("key", [8, np.float32(4)], tuple[float, float])
+    assert [type(item) for item in items] == [float, float]
+
+
+@pytest.mark.parametrize(
+    ("value", "annotation", "message"),
+    [
+        ("3", int, "key: got '3'; expected an integer"),
+        (3.0, int, r"key: got 3\.0; expected an integer"),
+        (True, int, "key: got True; expected an integer"),
+        ("0.5", float, r"key: got '0\.5'; expected a number"),
+        (False, float, "key: got False; expected a number"),
+        (None, float, "key: got None; expected a number"),
+        (math.nan, float, "key: got nan; expected a number"),
+        (-math.inf, float | None, "key: got -inf; expected a number, or none"),
+        (datetime.date(2000, 1, 1), float, r"key: got datetime\.date.*; expected a number"),
+        (np.float64(3), int, r"key: got 3\.0; expected an integer"),
+        (np.True_, float, "key: got True; expected a number"),
+        (2**63, int, "key: got an integer beyond 64 bits"),
+        pytest.param(10**400, float, "key: got an integer beyond 64 bits", id="10**400"),
+        pytest.param(-(10**400), float | None, "key: got an integer beyond", id="-10**400"),
+        (1, bool, "key: got 1; expected true or false"),
+        ("true", bool, "key: got 'true'; expected true or false"),
+        (3, str, "key: got 3; expected a string"),
+        ("c", Mode, "key: got 'c'; expected one of: a, b"),
+        (["a"], Mode, r"key: got \['a'\]; expected one of: a, b"),
+        ("x", float | None, "key: got 'x'; expected a number"),
+        (8.0, tuple[float, float], r"key: got 8\.0; expected 2 values, each a number"),
+        ("84", tuple[float, float], "key: got '84'; expected 2 values"),
+        ([8.0], tuple[float, float], r"key: got \[8\.0\]; expected 2 values"),
+        ([8.0, "4"], tuple[float, float], r"key: got \[8\.0, '4'\]; expected 2 values"),
+        ([1.0, None], tuple[float, ...], "key: got .*; expected a list, each value a number"),
+        ([2, 1], Interval, r"key: got \[2, 1\]; expected .*, the lower one first"),
+        (["pit"], tuple[Motor, ...], r"key\[0\]: got 'pit'; expected a table \(Motor\)"),
+        ({"effort": 1.0}, Motor, r"key: got a table; expected a table \(Motor\)"),
+        ({"a": 1}, Mapping[str, Interval], r"key\.a: got 1; expected 2 values"),
+        ({"a.b": 1}, Mapping[str, str], r'key\."a\.b": got 1; expected a string'),
+        ({"a": 1}, float, "key: got a table; expected a number"),
+        ("ab", Mapping[str, str], "key: got 'ab'; expected a table, each value a string"),
+    ],
+)
+def test_convert_rejects_other_types(value, annotation, message):
+    with pytest.raises(ConfigError, match=message):
+        convert("key", value, annotation)
+
+
+@pytest.mark.parametrize(
+    ("annotation", "text"),
+    [
+        (Annotated[int, Meta(ge=1, le=10)], "an integer from 1 to 10"),
+        (PositiveFloat, "a number > 0"),
+        (PositiveInt | None, "an integer >= 1, or none"),
+        (Mode, "one of: a, b"),
+        (Annotated[tuple[str, ...], UNIQUE], "a list, each value a string, each one once"),
+        (Annotated[tuple[int, ...], Meta(min_length=1)], "a non-empty list, each value an integer"),
+        (Annotated[float, Meta(ge=0, extra={"unit": "N m"})], "a number >= 0 [N m]"),
+        (Annotated[str, Meta(description="a name")], "a name"),
+    ],
+)
+def test_describe_states_type_and_range(annotation, text):
+    assert describe(annotation) == text

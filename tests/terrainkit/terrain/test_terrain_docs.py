@@ -1,0 +1,67 @@
+from dataclasses import dataclass
+
+import pytest
+
+from terrainkit.errors import ConfigError
+from terrainkit.terrain import parameter, registry
+from terrainkit.terrain.parameter import parameters_of
+from terrainkit.terrain.terrain_docs import (
+    overlay_doc,
+    overlay_summaries,
+    terrain_doc,
+    terrain_summaries,
+)
+
+
+@pytest.mark.parametrize("name", registry.terrain_names())
+def test_terrain_doc_has_text_and_unit(name):
+    about = terrain_doc(name)
+    assert about.text.partition("\n")[0].endswith(".")
+    requested = registry.get_terrain(name).at(0).requested()
+    assert [p.name for p in about.parameters] == [each for each in requested if "." not in each]
+    unitless = {"grade", "number", "layers", "octaves", "opening", "opened", "iterations"}
+    unitless |= {"vertical_exaggeration", "scale", "elements"}
+    declared = parameters_of(registry.get_terrain(name))
+    unitless |= {each for each, p in declared.items() if isinstance(p.easy, str | bool)}
+    for each in about.parameters:
+        assert each.text.endswith(".")
+        has_unit = "[m]" in each.text or "[rad]" in each.text
+        assert has_unit != (each.name in unitless)
+
+
+@pytest.mark.parametrize("name", registry.overlay_names())
+def test_overlay_doc_has_text_and_parameters(name):
+    about = overlay_doc(name)
+    assert about.text.partition("\n")[0] == overlay_summaries()[name]
+    assert about.text.partition("\n")[0].endswith(".")
+    assert [p.name for p in about.parameters] == list(registry.get_overlay(name)().requested())
+    assert all(each.text.endswith(".") for each in about.parameters)
+
+
+def test_terrain_doc_range_has_two_ends():
+    step_height, step_width, *_ = terrain_doc("pyramid_stairs").parameters
+    assert (step_height.easy, step_height.hard) == ("0.05", "0.23")
+    assert (step_width.easy, step_width.hard) == ("0.31", "")
+
+
+def test_terrain_doc_inherits_parameter_text(monkeypatch):
+    @dataclass(frozen=True, kw_only=True)
+    class Hurdles(registry.get_terrain("stairs")):
+        """Hurdles."""
+
+        number: int = parameter.count(3)
+
+    monkeypatch.setattr(registry, "get_terrain", lambda _: Hurdles)
+    words = {each.name: each.text for each in terrain_doc("hurdles").parameters}
+    assert words["step_height"] == "Rise of a step [m]."
+    assert words["number"] == ""
+
+
+def test_terrain_summaries_are_one_sentence():
+    assert list(terrain_summaries()) == list(registry.terrain_names())
+    assert all(text.count(". ") == 0 for text in terrain_summaries().values())
+
+
+def test_terrain_doc_unknown_name_is_rejected():
+    with pytest.raises(ConfigError, match=r"no terrain 'moon' .*; terrainkit list prints all"):
+        terrain_doc("moon")
