@@ -18,7 +18,7 @@ from terrainkit_cli.terrain_commands import Output, written
 if TYPE_CHECKING:
     from typing import Self
 
-    from terrainkit.importing import ImportReport
+    from terrainkit import ImportReport
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +48,7 @@ class Import(ConfigCommand):
 
     def run(self) -> int:
         """Import the file, write the map, and print the report."""
-        from terrainkit import export
-        from terrainkit.importing import import_map
+        from terrainkit import export, import_map
 
         options: ImportOptions = self.changed_config()
         export.check_export(self.output, 0, overwrite=self.overwrite)

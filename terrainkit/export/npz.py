@@ -125,7 +125,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             difficulty=archive.array("difficulty", "f4", size),
             parameters=_all_parameters(archive, config, terrain_types),
             solids=_read_solids(archive, size),
-            goals=_read_goals(archive, size),
+            goals=_read_poses(archive, "goals", size, MAX_GOALS),
         )
 
 
@@ -168,10 +168,8 @@ def _compact(friction: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _read_friction(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
-    """Return the friction of all cells; maps of terrainkit 0.1 have one."""
+    """Return the friction of all cells, which is stored once if it is the same."""
     shape = config.grid.shape
-    if "ground_friction" not in archive.names():
-        return np.broadcast_to(np.float32(config.static_friction), shape)
     friction = archive.array("ground_friction", "f4", (None, None), limit=4 * math.prod(shape))
     if friction.shape not in (shape, (1, 1)):
         raise MapFileError(
@@ -186,9 +184,7 @@ def _read_friction(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
 
 
 def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
-    """Return the solids of a map of `size` patches; maps of terrainkit 0.1 have none."""
-    if "solid_patch" not in archive.names():
-        return Solids.empty()
+    """Return the solids of a map of `size` patches."""
 
     def read(key: str, kind: str, *shape: int | None) -> NDArray[Any]:
         return archive.array(key, kind, shape, limit=MAX_SOLID_BYTES)
@@ -228,19 +224,10 @@ def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
     return solids
 
 
-def _read_goals(archive: Archive, size: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the goals of a map of `size` patches; maps of terrainkit 0.1 have none."""
-    if "goals" not in archive.names():
-        return np.empty((*size, 0, 4), dtype=np.float32)
-    return _read_poses(archive, "goals", size, MAX_GOALS)
-
-
 def _read_spawns(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
-    """Return the spawn positions; maps of terrainkit 0.1 have one per patch."""
+    """Return the spawn positions, of which the first of each patch is its origin."""
     size = (config.rows, config.cols)
     origins = archive.array("env_origins", "f4", (*size, 3))
-    if "spawns" not in archive.names():
-        return np.pad(origins, ((0, 0), (0, 0), (0, 1)))[:, :, None]
     spawns = _read_poses(archive, "spawns", size, math.prod(config.patch_shape))
     if not spawns.shape[2]:
         raise MapFileError(f"{archive.path}: spawns: got none; expected one or more for each patch")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit import ImportedMap, ImportOptions, import_terrain_mesh
 from terrainkit.export.mjcf import Collision
-from terrainkit.importing import ImportedMap, ImportOptions, import_terrain_mesh
 from terrainkit.integrations import missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
 from terrainkit.map.terrain_map import TerrainMap

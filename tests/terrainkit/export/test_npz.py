@@ -29,10 +29,6 @@ def arrays(path):
         return dict(archive)
 
 
-NEW_KEYS = ("ground_friction", "solid_", "hull_", "cylinders", "goals", "spawns")
-"""Prefixes of the keys that maps of version 0.1 lack."""
-
-
 # ---- what is in it -----------------------------------------------------------------------------
 
 
@@ -444,19 +440,6 @@ def test_npz_degenerate_hull_is_rejected(solid_map, bad, tmp_path):
     flat = solid_map.solids.hull_vertices * np.float32([1, 1, 0])
     repack(good, bad, {"hull_vertices": npy(flat)})
     assert "hull: got points in one plane; expected points with a volume" in refusal(bad)
-
-
-def test_npz_without_solids_is_readable(good, tmp_path):
-    """Maps of version 0.1 have an empty array of boxes, and no other key of solids."""
-    old = tmp_path / "old.npz"
-    with np.load(good) as archive:
-        keys = [k for k in archive if not k.startswith(NEW_KEYS)]
-        np.savez(old, **{key: archive[key] for key in keys})
-    read = TerrainMap.load(old)
-    assert len(read.solids) == 0
-    assert read.goals.shape == (*read.difficulty.shape, 0, 4)
-    assert read.spawns.shape == (*read.difficulty.shape, 1, 4)
-    assert read.env_origins.tobytes() == TerrainMap.load(good).env_origins.tobytes()
 
 
 def test_npz_spawns_round_trip(tmp_path):
