@@ -9,8 +9,8 @@ import pytest
 from hypothesis import settings
 
 from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.files import isolated
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
-from terrainkit.importing import child_process, isolated
 
 # Before torch is imported: its threads would otherwise spin while they wait for one another, which
 # takes half of the time of training where other tests keep the cores busy.
@@ -101,11 +101,11 @@ def ray_down():
 
 @pytest.fixture
 def import_in_process(monkeypatch):
-    """Run child_process.py in this process: trimesh takes most of a second to import."""
+    """Read files in this process: trimesh takes most of a second to import."""
 
     def run(command, **_options):
         try:
-            child_process.main(*command[3:])
+            isolated.main(*command[-2:])
         except SystemExit as error:
             stderr = str(error.code).encode()
             raise subprocess.CalledProcessError(1, command, stderr=stderr) from None

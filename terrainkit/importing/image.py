@@ -5,11 +5,13 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from terrainkit.errors import ConfigError, HeightFileError, TerrainkitWarning
 from terrainkit.importing.geotiff import GeoTags, read_geo_tags
-from terrainkit.importing.isolated import run_isolated
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
+from terrainkit.importing.source import decode
 from terrainkit.settings.toml_text import read_text
 
 _TIFF_SUFFIXES = (".tif", ".tiff")
@@ -27,7 +29,7 @@ def read(path: Path, options: ReadOptions) -> Raster:
         HeightFileError: if the file cannot be read.
         ConfigError: if an option is missing, or the cells of a GeoTIFF are not squares in meters.
     """
-    pixels = run_isolated("read_image", path)["pixels"]
+    pixels = decode(_read_pixels, path)["pixels"]
     tags = read_geo_tags(path) if path.suffix.lower() in _TIFF_SUFFIXES else GeoTags()
     stated = _sidecar(path.with_suffix(".json"))
     cell, (x, y) = stated.get("cell"), stated.get("first_sample", (0.0, 0.0))
@@ -60,6 +62,15 @@ def read(path: Path, options: ReadOptions) -> Raster:
             stacklevel=2,
         )
     return raster
+
+
+def _read_pixels(path: Path) -> dict[str, Any]:
+    import cv2
+
+    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None:
+        raise ValueError("not an image, or truncated")
+    return {"pixels": pixels}
 
 
 def _sidecar(path: Path) -> dict[str, Any]:

@@ -2,16 +2,17 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
 from terrainkit.importing.columns import Columns, make_columns
-from terrainkit.importing.isolated import run_isolated
 from terrainkit.importing.options import MAX_POSITION, ReadOptions
-from terrainkit.importing.source import Array
+from terrainkit.importing.source import Array, decode
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb")
 
@@ -69,7 +70,7 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     Raises:
         HeightFileError: if it has no triangles, or a vertex is invalid.
     """
-    arrays = run_isolated("read_mesh", path, path.suffix.lower().removeprefix("."))
+    arrays = decode(_read_mesh, path)
     vertices, faces = np.asarray(arrays["vertices"], float), np.asarray(arrays["faces"], np.int64)
     if not len(faces) or vertices.ndim != 2 or faces.ndim != 2:
         raise HeightFileError(f"{path}: got a file without triangles; expected a mesh")
@@ -82,3 +83,13 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     if options.up == "y":
         vertices = vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
     return MeshSource(vertices=vertices, faces=index.reshape(faces.shape))
+
+
+def _read_mesh(path: Path) -> dict[str, Any]:
+    import trimesh
+
+    # Without a path, no other files are opened.
+    file_type = path.suffix.lower().removeprefix(".")
+    data = BytesIO(path.read_bytes())
+    mesh = trimesh.load(data, file_type=file_type, force="mesh", process=False)
+    return {"vertices": np.asarray(mesh.vertices, float), "faces": np.asarray(mesh.faces, np.int64)}

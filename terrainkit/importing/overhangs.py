@@ -1,7 +1,5 @@
 """Convex solids of the parts of a mesh that hang over the ground."""
 
-import json
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
+from terrainkit.files.isolated import IsolatedError
+from terrainkit.geometry.convex_decomposition import convex_decomposition
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh import closed_mesh, merged_mesh
 from terrainkit.geometry.solids import MAX_HULL_VERTICES, Solids, make_hulls
 from terrainkit.importing.columns import MIN_GAP, Columns
-from terrainkit.importing.isolated import run_isolated
 
 PARAMETERS = {
     "threshold": 0.03,
@@ -140,12 +139,12 @@ def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float)
 
 def _decompose(path: Path, part: Any) -> list[NDArray[np.float64]]:
     """Return the vertices of the convex parts of a manifold."""
-    with tempfile.TemporaryDirectory(prefix="terrainkit-") as folder:
-        source = Path(folder) / "mesh.npz"
-        np.savez(source, vertices=_points(part), faces=part.to_mesh64().tri_verts.astype(np.int32))
-        subject = f"{path}: solids: CoACD failed"
-        found = run_isolated("convex_parts", source, json.dumps(PARAMETERS), subject=subject)
-    return [np.asarray(points, float) for points in found.values()]
+    faces = part.to_mesh64().tri_verts.astype(np.int32)
+    try:
+        found = convex_decomposition(_points(part), faces, PARAMETERS)
+    except IsolatedError as error:
+        raise HeightFileError(f"{path}: solids: CoACD failed: {error}") from None
+    return [vertices for vertices, _ in found]
 
 
 def _points(manifold: Any) -> NDArray[np.float64]:

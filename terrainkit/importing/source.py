@@ -3,21 +3,25 @@
 Positions are those of the file: x to the right and y up for images, east and north for grids.
 """
 
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from pkgutil import iter_modules
 from types import ModuleType
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError, listing
-from terrainkit.importing.isolated import check_file
+from terrainkit.files.isolated import IsolatedError, run_isolated
 from terrainkit.importing.options import Missing, ReadOptions
 
 Array = NDArray[np.float64]
+
+MAX_FILE_BYTES = 1 << 30
+"""Largest file that is read [bytes]."""
 
 
 class Source(Protocol):
@@ -65,6 +69,36 @@ def readers_by_suffix() -> dict[str, ModuleType]:
     folder = [str(Path(__file__).parent)]
     modules = (import_module(f"{package}.{module.name}") for module in iter_modules(folder))
     return {suffix: module for module in modules for suffix in getattr(module, "SUFFIXES", ())}
+
+
+def check_file(path: Path) -> None:
+    """Raise HeightFileError if `path` is no regular file, or is empty or too large."""
+    try:
+        if not path.exists():
+            raise HeightFileError(f"no file {path}")
+        if not path.is_file():
+            raise HeightFileError(f"{path}: got a special file or folder; expected a file")
+        size = path.stat().st_size
+    except (OSError, ValueError) as error:
+        raise HeightFileError(f"cannot read {path}: {error}") from error
+    if not size:
+        raise HeightFileError(f"{path}: got an empty file")
+    if size > MAX_FILE_BYTES:
+        raise HeightFileError(f"{path}: got {size} bytes; expected at most {MAX_FILE_BYTES}")
+
+
+def decode(
+    function: Callable[..., Mapping[str, Any]], path: Path, *arguments: Any
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays that a decoder reads from `path` in a child process.
+
+    Raises:
+        HeightFileError: if the file cannot be decoded within the limits.
+    """
+    try:
+        return run_isolated(function, path, *arguments)
+    except IsolatedError as error:
+        raise HeightFileError(f"{path}: cannot be read: {error}") from None
 
 
 def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Array) -> Array:

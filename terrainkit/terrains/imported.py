@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.gradient_noise import faded_relief
 from terrainkit.geometry.grid import Grid
-from terrainkit.importing.isolated import check_file
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, read_raster
+from terrainkit.importing.source import check_file
 from terrainkit.terrain import Terrain, parameter
 from terrainkit.terrain.parameter import Range, Realized, Value
 

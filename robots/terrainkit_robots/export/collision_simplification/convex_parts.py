@@ -1,14 +1,7 @@
-"""Decompose a mesh into convex parts with CoACD.
-
-Xinyue Wei and others, "Approximate Convex Decomposition for 3D Meshes with Collision-Aware
-Concavity and Tree Search", ACM Transactions on Graphics 41 (2022).
-"""
+"""Convex parts of a mesh from CoACD, cached on disk."""
 
 import hashlib
 import json
-import subprocess
-import sys
-import tempfile
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
@@ -16,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from terrainkit.errors import TerrainkitError
+from terrainkit.files.isolated import IsolatedError
+from terrainkit.geometry.convex_decomposition import convex_decomposition
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
     DecompositionCache,
-    from_npz,
-    to_npz,
+    is_valid,
 )
 from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.surface import MeshError, Surface
@@ -42,9 +36,6 @@ which fits the shells of robots equally well within a few percent, in seconds in
 
 _MAX_FACES = 50_000
 """Larger meshes are decimated first."""
-
-_MAX_SECONDS = 300.0
-"""Time limit of a decomposition [s]; the slowest known mesh takes 40 s."""
 
 
 def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
@@ -88,28 +79,11 @@ def _version() -> str:
 
 
 def _decompose(surface: Surface) -> tuple[Surface, ...]:
-    with tempfile.TemporaryDirectory(prefix="terrainkit-") as folder:
-        source, target = Path(folder) / "mesh.npz", Path(folder) / "parts.npz"
-        source.write_bytes(to_npz([surface]))
-        process = Path(__file__).with_name("coacd_process.py")
-        # -P: modules are not imported from the folder of the script
-        command = [sys.executable, "-P", *map(str, (process, source, target))]
-        try:
-            subprocess.run(
-                [*command, json.dumps(dict(PARAMETERS))],
-                check=True,
-                capture_output=True,
-                timeout=_MAX_SECONDS,
-            )
-            parts = from_npz(target.read_bytes())
-        except subprocess.TimeoutExpired:
-            raise MeshError(f"exceeds the CoACD time limit of {_MAX_SECONDS:g} s") from None
-        except subprocess.CalledProcessError as error:
-            error_lines = error.stderr.decode(errors="replace").strip().splitlines()
-            reason = error_lines[-1] if error_lines else f"exit code {error.returncode}"
-            raise MeshError(f"makes CoACD fail: {reason}") from None
-        except OSError as error:
-            raise MeshError(f"makes CoACD fail: {error}") from None
-    if parts is None:
+    try:
+        found = convex_decomposition(surface.points, surface.faces, PARAMETERS)
+    except IsolatedError as error:
+        raise MeshError(f"makes CoACD fail: {error}") from None
+    parts = tuple(Surface(points=points, faces=faces) for points, faces in found)
+    if not parts or not all(map(is_valid, parts)):
         raise MeshError("has no convex decomposition")
     return parts

@@ -86,10 +86,11 @@ def from_npz(data: bytes) -> tuple[Surface, ...] | None:
             )
     except _NPZ_ERRORS:
         return None
-    return parts if parts and all(map(_is_valid, parts)) else None
+    return parts if parts and all(map(is_valid, parts)) else None
 
 
-def _is_valid(part: Surface) -> bool:
+def is_valid(part: Surface) -> bool:
+    """Return whether a part is a mesh of finite vertices and existing ones."""
     points, faces = part.points, part.faces
     shaped = points.ndim == faces.ndim == 2 and points.shape[1] == faces.shape[1] == 3
     return (

@@ -1,4 +1,3 @@
-import subprocess
 from importlib import metadata
 
 import numpy as np
@@ -6,6 +5,8 @@ import pytest
 import trimesh
 
 from terrainkit.errors import TerrainkitError
+from terrainkit.files.isolated import Limits
+from terrainkit.geometry import convex_decomposition
 from terrainkit_robots.export.collision_simplification import convex_parts as module
 from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts
 from terrainkit_robots.mesh.surface import MeshError, Surface, signed_volume
@@ -25,14 +26,14 @@ ANGLE = surface_of(
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Return the commands that were run."""
-    made, run = [], subprocess.run
+    """Return the surfaces that CoACD was called with."""
+    made, decompose = [], module.convex_decomposition
 
-    def counted(command, **options):
-        made.append(command)
-        return run(command, **options)
+    def counted(*arguments):
+        made.append(arguments)
+        return decompose(*arguments)
 
-    monkeypatch.setattr(module.subprocess, "run", counted)
+    monkeypatch.setattr(module, "convex_decomposition", counted)
     return made
 
 
@@ -87,8 +88,8 @@ def test_damaged_cache_file_is_replaced(tmp_path, calls):
 
 class TestFailures:
     def test_time_limit(self, monkeypatch, tmp_path):
-        monkeypatch.setattr(module, "_MAX_SECONDS", 0.01)
-        with pytest.raises(MeshError, match=r"exceeds the CoACD time limit of 0\.01 s"):
+        monkeypatch.setattr(convex_decomposition, "LIMITS", Limits(seconds=0.01))
+        with pytest.raises(MeshError, match=r"^makes CoACD fail: takes more than 0\.01 s$"):
             convex_parts(ANGLE, tmp_path)
         assert not list(tmp_path.iterdir())
 

@@ -1,0 +1,98 @@
+"""Call a function in a child process with limits of time and memory.
+
+Image decoders, mesh readers and CoACD are native code, which may crash, run for hours, or trust the
+sizes that a file claims.
+"""
+
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.errors import TerrainkitError
+from terrainkit.settings.text import truncate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """What a child process may use."""
+
+    seconds: float = 120.0
+    """Time limit [s]; a mesh of a million triangles takes a few seconds."""
+
+    memory: int = 8 << 30
+    """Largest address space [bytes], where the operating system supports it."""
+
+
+class IsolatedError(TerrainkitError):
+    """The function failed, crashed, or exceeded a limit; the message is the reason in one line."""
+
+
+def run_isolated(
+    function: Callable[..., Mapping[str, Any]], *arguments: Any, limits: Limits | None = None
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays that a function returns by name, called in a child process.
+
+    The result is read without pickle, since the child handles files of strangers.
+
+    Args:
+        function: A function of a module.
+        *arguments: Its arguments, which are pickled.
+        limits: Limits of the child process.
+
+    Raises:
+        IsolatedError: if the function fails, crashes, or exceeds a limit.
+    """
+    limits = limits or Limits()
+    with tempfile.TemporaryDirectory(prefix="terrainkit-") as folder:
+        request, result = Path(folder) / "request", Path(folder) / "result.npz"
+        request.write_bytes(pickle.dumps((function, arguments, limits.memory)))
+        # -P: no module is imported from the current folder, which may be a stranger's.
+        start = f"import sys; from {__name__} import main; main(*sys.argv[1:])"
+        command = [sys.executable, "-P", "-c", start, str(request), str(result)]
+        paths = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path if entry)
+        try:
+            subprocess.run(
+                command,
+                check=True,
+                capture_output=True,
+                timeout=limits.seconds,
+                env={**os.environ, "PYTHONPATH": paths},
+            )
+            with np.load(result, allow_pickle=False) as arrays:
+                return dict(arrays)
+        except subprocess.TimeoutExpired:
+            raise IsolatedError(f"takes more than {limits.seconds:g} s") from None
+        except subprocess.CalledProcessError as error:
+            lines = error.stderr.decode(errors="replace").strip().splitlines()
+            reason = lines[-1] if lines and error.returncode > 0 else "the process crashed"
+            raise IsolatedError(truncate(reason, 200)) from None
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+            raise IsolatedError(f"the result cannot be read: {error}") from None
+
+
+def main(request: str, result: str) -> None:
+    """Call the function of a request in this process, and write what it returns to `result`."""
+    function, arguments, memory = pickle.loads(Path(request).read_bytes())
+    try:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    except (ImportError, ValueError, OSError):  # Windows, or a lower limit of the system
+        pass
+    try:
+        np.savez(result, **function(*arguments))
+    except MemoryError:
+        sys.exit(f"needs more than {memory / 2**30:g} GB of memory")
+    except Exception as error:
+        sys.exit(" ".join(str(error).split()) or type(error).__name__)

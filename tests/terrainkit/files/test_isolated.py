@@ -1,0 +1,46 @@
+import os
+import time
+
+import numpy as np
+import pytest
+
+from terrainkit.files.isolated import IsolatedError, Limits, run_isolated
+
+pytestmark = pytest.mark.usefixtures("real_child")
+
+
+def test_isolated_returns_arrays():
+    heights = np.arange(6.0).reshape(2, 3)
+    arrays = run_isolated(dict, [("heights", heights)])
+    assert list(arrays) == ["heights"]
+    assert np.array_equal(arrays["heights"], heights)
+
+
+def test_isolated_imports_nothing_from_the_current_folder(tmp_path, monkeypatch):
+    (tmp_path / "numpy.py").write_text("raise SystemExit('stranger')")
+    monkeypatch.chdir(tmp_path)
+    assert run_isolated(dict, [("a", np.ones(1))])["a"].tolist() == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "limits", "reason"),
+    [
+        (time.sleep, (60,), Limits(seconds=0.01), r"^takes more than 0\.01 s$"),
+        (np.zeros, (1 << 31,), Limits(memory=1 << 32), r"^needs more than 4 GB of memory$"),
+        (os.abort, (), Limits(), "^the process crashed$"),
+        (
+            int,
+            ("two\nlines",),
+            Limits(),
+            r"^invalid literal for int\(\) with base 10: 'two\\nlines'$",
+        ),
+    ],
+)
+def test_isolated_failure_is_one_line(function, arguments, limits, reason):
+    with pytest.raises(IsolatedError, match=reason):
+        run_isolated(function, *arguments, limits=limits)
+
+
+def test_isolated_result_is_read_without_pickle():
+    with pytest.raises(ValueError, match="allow_pickle=False"):
+        run_isolated(dict, [("a", np.array([print], dtype=object))])
