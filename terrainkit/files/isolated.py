@@ -9,6 +9,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
+import textwrap
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping
@@ -20,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.settings.text import truncate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +76,7 @@ def run_isolated(
         except subprocess.CalledProcessError as error:
             lines = error.stderr.decode(errors="replace").strip().splitlines()
             reason = lines[-1] if lines and error.returncode > 0 else "the process crashed"
-            raise IsolatedError(truncate(reason, 200)) from None
+            raise IsolatedError(textwrap.shorten(reason, 200, placeholder="...")) from None
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise IsolatedError(f"the result cannot be read: {error}") from None
 

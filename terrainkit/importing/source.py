@@ -87,16 +87,14 @@ def check_file(path: Path) -> None:
         raise HeightFileError(f"{path}: got {size} bytes; expected at most {MAX_FILE_BYTES}")
 
 
-def decode(
-    function: Callable[..., Mapping[str, Any]], path: Path, *arguments: Any
-) -> dict[str, NDArray[Any]]:
+def decode(function: Callable[[Path], Mapping[str, Any]], path: Path) -> dict[str, NDArray[Any]]:
     """Return the arrays that a decoder reads from `path` in a child process.
 
     Raises:
         HeightFileError: if the file cannot be decoded within the limits.
     """
     try:
-        return run_isolated(function, path, *arguments)
+        return run_isolated(function, path)
     except IsolatedError as error:
         raise HeightFileError(f"{path}: cannot be read: {error}") from None
 
