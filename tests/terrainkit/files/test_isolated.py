@@ -42,5 +42,5 @@ def test_isolated_failure_is_one_line(function, arguments, limits, reason):
 
 
 def test_isolated_result_is_read_without_pickle():
-    with pytest.raises(IsolatedError, match="^the result cannot be read: .*allow_pickle=False"):
+    with pytest.raises(IsolatedError, match=r"^the result cannot be read: .*allow_pickle=False"):
         run_isolated(dict, [("a", np.array([print], dtype=object))])
