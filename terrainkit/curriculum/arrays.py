@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.settings.type_hint import show
 
+Seed = int | Sequence[int]
+"""Seed of random numbers, such as (seed, iteration)."""
+
 
 def to_numpy(name: str, values: Any) -> NDArray[Any]:
     """Return an array, a list or a tensor as a numpy array; torch is not imported."""
@@ -61,7 +64,7 @@ def to_progress(values: Any, number: int) -> NDArray[np.float64]:
     return progress
 
 
-def make_rng(seed: int | Sequence[int]) -> np.random.Generator:
+def make_rng(seed: Seed) -> np.random.Generator:
     """Return the generator of a seed; numpy would accept None, and warn of nothing."""
     try:
         values = np.asarray(seed)

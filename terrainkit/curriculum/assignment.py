@@ -1,6 +1,5 @@
 """The patches that environments start on: levels, columns and spawn positions."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -8,7 +7,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from terrainkit.curriculum.arrays import like, make_rng, to_indices, to_numpy
+from terrainkit.curriculum.arrays import Seed, like, make_rng, to_indices, to_numpy
 from terrainkit.settings.type_hint import PositiveInt, convert
 
 
@@ -92,7 +91,7 @@ def resample_columns(
     columns: Any,
     terrain_types: NDArray[np.int32],
     *,
-    seed: int | Sequence[int],
+    seed: Seed,
 ) -> Any:
     """Return a random column with the same terrain type in the same row for each environment.
 

@@ -1,11 +1,10 @@
 """The game-inspired curriculum: environments move to harder rows when they succeed."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from terrainkit.curriculum.arrays import like, make_rng, to_indices, to_progress
+from terrainkit.curriculum.arrays import Seed, like, make_rng, to_indices, to_progress
 from terrainkit.curriculum.sampler import FloatArray, IntArray, PatchSampler
 from terrainkit.settings.type_hint import PositiveInt, convert
 
@@ -15,7 +14,7 @@ def update_levels(
     progress: Any,
     *,
     rows: int,
-    seed: int | Sequence[int],
+    seed: Seed,
     top_levels: int = 3,
 ) -> Any:
     """Return the level of each environment after an episode.

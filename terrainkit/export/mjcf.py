@@ -186,9 +186,7 @@ def _patch_edges(terrain_map: "TerrainMap") -> list[NDArray[np.int64]]:
 
     The first and the last patch include `_RINGS` samples of the border.
     """
-    config, counts = terrain_map.config, terrain_map.difficulty.shape
-    start = config.border_cells + _RINGS
-    edges = [start + n * np.arange(k + 1) for n, k in zip(config.patch_shape, counts, strict=True)]
+    edges = [each + _RINGS for each in terrain_map.config.patch_edges]
     for each in edges:
         each[0] -= _RINGS
         each[-1] += _RINGS

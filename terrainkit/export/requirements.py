@@ -9,6 +9,13 @@ from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import MAX_VALUE
 
 
+def has_one_friction(terrain_map: TerrainMap) -> bool:
+    """Return whether all of the ground and all solids have the friction of the map."""
+    static, solids = np.float32(terrain_map.config.static_friction), terrain_map.solids.friction
+    is_map_friction = np.isnan(solids) | (solids == static)
+    return bool((terrain_map.friction == static).all() and is_map_friction.all())
+
+
 def require_finite(terrain_map: TerrainMap) -> None:
     """Raise ExportError if a height or an origin is not finite or out of range."""
     for name in ("heights", "env_origins"):
@@ -41,7 +48,7 @@ def require_one_ground_friction(terrain_map: TerrainMap, what: str) -> None:
 
 def require_one_friction(terrain_map: TerrainMap, what: str) -> None:
     """Raise ExportError if the map has several friction coefficients; `what` has one."""
-    if not terrain_map.has_one_friction:
+    if not has_one_friction(terrain_map):
         raise ExportError(
             f"got a map with several friction coefficients, which {what} cannot represent; "
             "expected no friction of sub-terrains, friction patches or solids"
@@ -66,7 +73,7 @@ def warn_about_losses(terrain_map: TerrainMap, what: str) -> None:
             TerrainkitWarning,
             stacklevel=5,
         )
-    if not terrain_map.has_one_friction:
+    if not has_one_friction(terrain_map):
         warnings.warn(
             f"{what} has one friction, {terrain_map.config.static_friction:g}: the friction of "
             "sub-terrains, friction patches and solids is not in the file; use .npz or .xml",

@@ -19,6 +19,12 @@ class SurfacePoints:
     gradient: NDArray[np.float64]
     """Height difference per cell along x and y [m], shape (n, 2)."""
 
+    def normals(self, cell: float) -> NDArray[np.float64]:
+        """Return the upward unit normals for cells of `cell` [m], shape (n, 3)."""
+        downhill = 0.0 - self.gradient / cell
+        normals = np.column_stack([downhill, np.ones(len(downhill))])
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
 
 def surface_at(
     heights: NDArray[np.float32], points: NDArray[np.float64], *, threshold: float

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
+import numpy as np
 from msgspec import Meta
+from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.geometry.grid import Grid, whole_cells
@@ -192,6 +194,12 @@ class MapConfig(Config):
             raise IndexError(
                 f"no patch ({row}, {col}) in a map of {self.rows} rows and {self.cols} columns"
             )
+
+    @property
+    def patch_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First cell of each patch along x and along y, and the end of the last patch."""
+        (x, y), border = self.patch_shape, self.border_cells
+        return border + x * np.arange(self.rows + 1), border + y * np.arange(self.cols + 1)
 
     def patch_start(self, row: int, col: int) -> tuple[int, int]:
         """Return the first cell of patch (row, col) in the grid of the map."""

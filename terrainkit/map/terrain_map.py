@@ -1,7 +1,6 @@
 """TerrainMap: a generated map and the views of its surface."""
 
 import warnings
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
@@ -16,6 +15,7 @@ from terrainkit.curriculum import (
     resample_columns,
     update_levels,
 )
+from terrainkit.curriculum.arrays import Seed
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.geometry.free_space import Direction, clearance, first_surface, free_intervals
 from terrainkit.geometry.grid import Grid
@@ -83,15 +83,6 @@ class TerrainMap:
         """Spawn origin of each patch [m], shape (rows, cols, 3), a view of `spawns`."""
         return self.spawns[:, :, 0, :3]
 
-    @cached_property
-    def has_one_friction(self) -> bool:
-        """Whether all of the ground and all solids have the friction of the map."""
-        static = np.float32(self.config.static_friction)
-        solids = self.solids.friction
-        return bool(
-            (self.friction == static).all() and (np.isnan(solids) | (solids == static)).all()
-        )
-
     def height(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the height of the ground [m] at `xy`.
 
@@ -114,10 +105,7 @@ class TerrainMap:
             Unit vectors, shape (..., 3). On a wall, the normal of the ground on one of its sides.
         """
         points, shape = _points("xy", xy, 2)
-        downhill = 0.0 - self._surface_at(points).gradient / self.grid.cell
-        normal = np.column_stack([downhill, np.ones(len(downhill))])
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        return normal.reshape(*shape, 3)
+        return self._surface_at(points).normals(self.grid.cell).reshape(*shape, 3)
 
     def scan(self, points: ArrayLike, direction: Direction = "down") -> NDArray[np.float64]:
         """Return the z of the first surface above or below `points` [m]; NaN where there is none.
@@ -180,12 +168,10 @@ class TerrainMap:
         from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes, united
 
         ground = self.ground_mesh(merged=merged)
+        meshes = solid_meshes(self.solids.select(self.solids.collides))
         if closed:
-            ground = closed_mesh(ground)
-        if not self.solids.collides.any():
-            return ground
-        meshes = [ground, *solid_meshes(self.solids.select(self.solids.collides))]
-        return united(meshes) if closed else concatenate_meshes(meshes)
+            return united([closed_mesh(ground), *meshes])
+        return concatenate_meshes([ground, *meshes])
 
     def ground_mesh(self, *, merged: bool = True) -> "TriMesh":
         """Return the ground as a triangle mesh, without the solids; see :meth:`mesh`."""
@@ -198,8 +184,7 @@ class TerrainMap:
         """Return the level ground as boxes; see :mod:`terrainkit.geometry.box_decomposition`."""
         from terrainkit.geometry.box_decomposition import decompose_boxes
 
-        config = self.config
-        threshold, edges = config.wall_threshold, self._patch_edges()
+        threshold, edges = self.config.wall_threshold, self.config.patch_edges
         return decompose_boxes(self.heights, self.grid, threshold, edges, self.friction)
 
     def height_field_raw(self, vertical_scale: float = 0.005) -> NDArray[np.int16]:
@@ -304,18 +289,11 @@ class TerrainMap:
             headings=spawns[:, 3],
         )
 
-    def resample_columns(self, levels: Any, columns: Any, *, seed: int | Sequence[int]) -> Any:
+    def resample_columns(self, levels: Any, columns: Any, *, seed: Seed) -> Any:
         """Return other columns at a reset; see :func:`terrainkit.curriculum.resample_columns`."""
         return resample_columns(levels, columns, self.terrain_types, seed=seed)
 
-    def update_levels(
-        self,
-        levels: Any,
-        progress: Any,
-        *,
-        seed: int | Sequence[int],
-        top_levels: int = 3,
-    ) -> Any:
+    def update_levels(self, levels: Any, progress: Any, *, seed: Seed, top_levels: int = 3) -> Any:
         """Return the levels after an episode; see :func:`terrainkit.update_levels`."""
         rows = len(self.difficulty)
         return update_levels(levels, progress, rows=rows, seed=seed, top_levels=top_levels)
@@ -344,12 +322,6 @@ class TerrainMap:
     @cached_property
     def _colliding(self) -> SolidIndex:
         return SolidIndex(self.solids.select(self.solids.collides))
-
-    def _patch_edges(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the first cell of each patch along x and y, and the end of the last patch."""
-        (rows, cols), border = self.difficulty.shape, self.config.border_cells
-        x, y = self.config.patch_shape
-        return border + x * np.arange(rows + 1), border + y * np.arange(cols + 1)
 
     def _surface_at(self, points: NDArray[np.float64]) -> "SurfacePoints":
         from terrainkit.geometry.surface import surface_at

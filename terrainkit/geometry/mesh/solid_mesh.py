@@ -34,6 +34,8 @@ def solid_meshes(solids: Solids) -> list[TriMesh]:
 
 def concatenate_meshes(meshes: list[TriMesh]) -> TriMesh:
     """Return one mesh with the faces of all `meshes`."""
+    if len(meshes) == 1:
+        return meshes[0]
     counts = [len(mesh.vertices) for mesh in meshes]
     starts = np.cumsum([0, *counts])
     triangles = [m.triangles + np.int32(start) for m, start in zip(meshes, starts, strict=False)]
@@ -49,6 +51,8 @@ def united(meshes: list[TriMesh]) -> TriMesh:
     Raises:
         ExportError: if the union fails.
     """
+    if len(meshes) == 1:
+        return meshes[0]
     import manifold3d
 
     parts = [

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.errors import MapFileError, MemoryLimitError
 from terrainkit.export.npz import read_mesh
+from terrainkit.export.requirements import has_one_friction
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.validate import validate
 
@@ -588,13 +589,13 @@ def test_npz_has_friction_of_each_cell(icy_map, tmp_path):
     loaded = TerrainMap.load(path)
     assert loaded.friction.tobytes() == expected.tobytes()
     assert set(loaded.solids.friction.tolist()) == {np.float32(0.8), np.float32(0.2)}
-    assert not loaded.has_one_friction
+    assert not has_one_friction(loaded)
 
 
 def test_npz_has_one_friction_of_a_uniform_map(terrain_map, path, arrays):
     assert arrays["ground_friction"].tolist() == [[np.float32(0.8)]]
     loaded = TerrainMap.load(path)
-    assert loaded.has_one_friction
+    assert has_one_friction(loaded)
     assert loaded.friction.shape == loaded.heights.shape == terrain_map.friction.shape
 
 
