@@ -23,7 +23,8 @@ class SurfacePoints:
         """Return the upward unit normals for cells of `cell` [m], shape (n, 3)."""
         downhill = 0.0 - self.gradient / cell
         normals = np.column_stack([downhill, np.ones(len(downhill))])
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        return normals
 
 
 def surface_at(
