@@ -24,7 +24,7 @@ from terrainkit.errors import TerrainkitError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class ProcessLimits:
     """What a child process may use."""
 
     seconds: float = 120.0
@@ -39,7 +39,7 @@ class IsolatedError(TerrainkitError):
 
 
 def run_isolated(
-    function: Callable[..., Mapping[str, Any]], *arguments: Any, limits: Limits | None = None
+    function: Callable[..., Mapping[str, Any]], *arguments: Any, limits: ProcessLimits | None = None
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays that a function returns by name, called in a child process.
 
@@ -48,12 +48,12 @@ def run_isolated(
     Args:
         function: A function of a module.
         *arguments: Its arguments, which are pickled.
-        limits: Limits of the child process.
+        limits: ProcessLimits of the child process.
 
     Raises:
         IsolatedError: if the function fails, crashes, or exceeds a limit.
     """
-    limits = limits or Limits()
+    limits = limits or ProcessLimits()
     with tempfile.TemporaryDirectory(prefix="terrainkit-") as folder:
         request, result = Path(folder) / "request", Path(folder) / "result.npz"
         request.write_bytes(pickle.dumps((function, arguments, limits.memory)))

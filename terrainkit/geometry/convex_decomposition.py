@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.files.isolated import Limits, run_isolated
+from terrainkit.files.isolated import ProcessLimits, run_isolated
 
-LIMITS = Limits(seconds=300.0)
-"""Limits of a decomposition; the slowest known mesh takes 40 s."""
+LIMITS = ProcessLimits(seconds=300.0)
+"""ProcessLimits of a decomposition; the slowest known mesh takes 40 s."""
 
 
 def convex_decomposition(

@@ -4,7 +4,7 @@ import time
 import numpy as np
 import pytest
 
-from terrainkit.files.isolated import IsolatedError, Limits, run_isolated
+from terrainkit.files.isolated import IsolatedError, ProcessLimits, run_isolated
 
 pytestmark = pytest.mark.usefixtures("real_child")
 
@@ -25,13 +25,13 @@ def test_isolated_imports_nothing_from_the_current_folder(tmp_path, monkeypatch)
 @pytest.mark.parametrize(
     ("function", "arguments", "limits", "reason"),
     [
-        (time.sleep, (60,), Limits(seconds=0.01), r"^takes more than 0\.01 s$"),
-        (np.zeros, (1 << 31,), Limits(memory=1 << 32), r"^needs more than 4 GB of memory$"),
-        (os.abort, (), Limits(), "^the process crashed$"),
+        (time.sleep, (60,), ProcessLimits(seconds=0.01), r"^takes more than 0\.01 s$"),
+        (np.zeros, (1 << 31,), ProcessLimits(memory=1 << 32), r"^needs more than 4 GB of memory$"),
+        (os.abort, (), ProcessLimits(), "^the process crashed$"),
         (
             int,
             ("two\nlines",),
-            Limits(),
+            ProcessLimits(),
             r"^invalid literal for int\(\) with base 10: 'two\\nlines'$",
         ),
     ],

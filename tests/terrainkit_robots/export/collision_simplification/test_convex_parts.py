@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.files.isolated import Limits
+from terrainkit.files.isolated import ProcessLimits
 from terrainkit.geometry import convex_decomposition
 from terrainkit_robots.export.collision_simplification import convex_parts as module
 from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts
@@ -88,7 +88,7 @@ def test_damaged_cache_file_is_replaced(tmp_path, calls):
 
 class TestFailures:
     def test_time_limit(self, monkeypatch, tmp_path):
-        monkeypatch.setattr(convex_decomposition, "LIMITS", Limits(seconds=0.01))
+        monkeypatch.setattr(convex_decomposition, "LIMITS", ProcessLimits(seconds=0.01))
         with pytest.raises(MeshError, match=r"^makes CoACD fail: takes more than 0\.01 s$"):
             convex_parts(ANGLE, tmp_path)
         assert not list(tmp_path.iterdir())
