@@ -21,7 +21,7 @@ RETIRED = {
     "Film": "VideoSpec",
     "Given": "SpecOverride",
     "Ground": "Terrain",
-    "IdleComment": "UnusedSuppression",
+    "IdleComment": "unused suppression",
     "Ignored": "Suppressed",
     "Limits": "msgspec.Meta",
     "Onboarded": "RobotFiles",

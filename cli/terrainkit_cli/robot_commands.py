@@ -229,7 +229,6 @@ class _Check:
 def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
     """Write the fixed files, and return the report with the fixed findings."""
     from terrainkit_robots.lint.fixes.apply import write_fixes
-    from terrainkit_robots.lint.report.fixed_report import FixedReport
 
     write_fixes(result)
     safeties = ("safe", "unsafe") if unsafe else ("safe",)
@@ -238,15 +237,7 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
         for each in result.unfixed
         if each.finding.fix is not None and each.finding.fix.safety in safeties
     )
-    report = result.report
-    return FixedReport(
-        facts=report.facts,
-        findings=report.findings,
-        skipped=report.skipped,
-        simulated=report.simulated,
-        fixed=result.fixed,
-        unfixed=unfixed,
-    )
+    return replace(result.report, fixed=result.fixed, unfixed=unfixed)
 
 
 def _check_output(output: Path, inputs: Sequence[Path]) -> None:

@@ -1,7 +1,7 @@
 """Format names, counts and paths for messages."""
 
 import re
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Sequence
 from pathlib import Path
 
 from terrainkit.settings.text import truncate
@@ -12,6 +12,17 @@ def names(items: Iterable[str], max_count: int = 6, sep: str = ", ") -> str:
     items = list(items)
     shown = [truncate(word) for word in items[:max_count]]
     return sep.join(shown + ["..."] * (len(items) > max_count))
+
+
+def conjunction(items: Sequence[str]) -> str:
+    """Return words as `a, b and c`."""
+    *first, last = items
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def numbers(values: Iterable[float], spec: str = "g", sep: str = " ") -> str:
+    """Return numbers in the format `spec`, without the sign of a negative zero."""
+    return sep.join(f"{value + 0.0:{spec}}" for value in values)
 
 
 def count(number: int, word: str) -> str:

@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit_robots.text import contrast, count, free_name, names, one_line
+from terrainkit_robots.text import conjunction, contrast, count, free_name, names, numbers, one_line
 
 
 @pytest.mark.parametrize(
@@ -27,6 +27,18 @@ def test_names_lists_the_first_words():
     assert names((name for name in "abc"), 2) == "a, b, ..."
     assert names("abc", sep=" > ") == "a > b > c"
     assert names(["x" * 1000, "y"]) == "x" * 97 + "..., y"
+
+
+@pytest.mark.parametrize(
+    ("items", "text"), [(["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "a, b and c")]
+)
+def test_conjunction_joins_the_last_word(items, text):
+    assert conjunction(items) == text
+
+
+def test_numbers_have_no_negative_zero():
+    assert numbers([-0.0, 0.5, -1.0]) == "0 0.5 -1"
+    assert numbers((0.12345, 2.0), ".3g", ", ") == "0.123, 2"
 
 
 def test_count_uses_plural():

@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Callable, Mapping
-from functools import cached_property
-from typing import TYPE_CHECKING
+from functools import cached_property, wraps
+from typing import TYPE_CHECKING, TypeVar
 
 from terrainkit_robots.analysis.bodies.bodies import Body, merge_bodies, physical_parent
 from terrainkit_robots.analysis.bodies.bounds import BodyBounds
@@ -17,6 +17,7 @@ from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg, detect_legs
 from terrainkit_robots.analysis.legs.limbs import Limb, detect_limbs
 from terrainkit_robots.analysis.legs.stance import Stance, compute_stance
+from terrainkit_robots.analysis.meshes.uses import UsedMesh, meshes_by_file, meshes_by_name
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import fixed_joints
 from terrainkit_robots.analysis.simulator_conventions.joint_order import (
     SimulatorOrder,
@@ -33,11 +34,14 @@ from terrainkit_robots.analysis.symmetry.mirror_pairs import (
     outlier_first,
 )
 from terrainkit_robots.description.model import Joint, Link, RobotModel
+from terrainkit_robots.description.xml.unparsed import UnparsedNumbers
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.spec.robot_spec import MirrorJoint, RobotSpec
+
+_T = TypeVar("_T")
 
 
 class Facts:
@@ -65,6 +69,12 @@ class Facts:
 
         self.meshes: Meshes = meshes or Meshes()
         """The mesh files. Each file is opened on first use, and only once."""
+
+    @property
+    def required_spec(self) -> "RobotSpec":
+        """The robot.toml, for rules that only run with one."""
+        assert self.spec is not None
+        return self.spec
 
     # Bodies
 
@@ -110,6 +120,11 @@ class Facts:
         return tuple(joint for joint in joints if joint.name in names) if names else joints
 
     @cached_property
+    def actuated_hinges(self) -> tuple[Joint, ...]:
+        """The actuated joints that turn."""
+        return tuple(joint for joint in self.actuated if joint.kind != "prismatic")
+
+    @cached_property
     def actuator_order(self) -> tuple[str, ...]:
         """Names of the joints in the order of their first actuators. Empty without actuators."""
         known = {joint.name for joint in self.joints}
@@ -150,6 +165,23 @@ class Facts:
     def is_wheel(self, body: Body) -> bool:
         """Return whether a body is a wheel or a propeller."""
         return is_wheel(body, self._parents)
+
+    # Files
+
+    @cached_property
+    def unparsed(self) -> UnparsedNumbers:
+        """The numbers that could not be read."""
+        return UnparsedNumbers(self.model)
+
+    @cached_property
+    def mesh_names(self) -> list[UsedMesh]:
+        """The meshes, one for each name in the file."""
+        return meshes_by_name(self.model, self.meshes)
+
+    @cached_property
+    def mesh_files(self) -> list[UsedMesh]:
+        """The meshes, one for each file, without the files that MSH001 reports."""
+        return meshes_by_file(self.model, self.meshes)
 
     # Legs
 
@@ -265,3 +297,18 @@ class Facts:
     def simulator_orders(self) -> tuple[SimulatorOrder, ...]:
         """The order of joints and bodies in each simulator."""
         return simulator_orders(self.model, self.tree, self.bodies, self.fixed_joints)
+
+
+def cached_fact(function: Callable[[Facts], _T]) -> Callable[[Facts], _T]:
+    """Cache the result of a function in the facts that it takes, as a `cached_property` of them.
+
+    For facts of the layers above `analysis`, which cannot be properties of `Facts`.
+    """
+    fact = cached_property(function)
+    fact.__set_name__(Facts, f"{function.__module__}.{function.__qualname__}")
+
+    @wraps(function)
+    def cached(facts: Facts) -> _T:
+        return fact.__get__(facts)
+
+    return cached

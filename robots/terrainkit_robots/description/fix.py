@@ -1,6 +1,6 @@
 """Fixes as data: edits of XML elements, and new files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -77,3 +77,14 @@ class Fix:
     """What the fix does, as a sentence."""
 
     edits: tuple[Edit, ...]
+
+
+def make_fix(
+    safety: Literal["safe", "unsafe"], description: str, edits: Iterable[Edit] | None
+) -> Fix | None:
+    """Return a fix, or None if there are no edits or one of the elements cannot be edited."""
+    edits = tuple(edits or ())
+    sources = (edit.source for edit in edits if not isinstance(edit, WriteFile))
+    if not edits or any(source.element is None for source in sources):
+        return None
+    return Fix(safety=safety, description=description, edits=edits)

@@ -5,7 +5,7 @@ docstring of the function is its page in docs/rules.md. It consists of a title, 
 rule, and the sections `Fix:` and `Source:`.
 
     @rule("INR002", "negative-mass", "error")
-    def negative_mass(robot: Facts) -> Iterator[Violation]:
+    def negative_mass(robot: Facts) -> Violations:
         '''A mass is negative.
 
         What goes wrong with a negative mass, and in which tools.
@@ -23,7 +23,7 @@ import inspect
 import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, Literal
 
@@ -97,7 +97,9 @@ class Violation:
     """The edits that correct it, if it can be corrected automatically."""
 
 
-Check = Callable[["Facts"], Iterator[Violation]]
+Violations = Iterator[Violation]
+
+Check = Callable[["Facts"], Violations]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,8 +196,8 @@ def rules() -> tuple[Rule, ...]:
     """Return all rules, sorted by family in the order of FAMILIES, then by number."""
     from terrainkit_robots.lint import rules as package
 
-    for module in pkgutil.iter_modules(package.__path__):
-        importlib.import_module(f"{package.__name__}.{module.name}")
+    for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        importlib.import_module(module.name)
     order = list(FAMILIES)
     return tuple(sorted(_RULES.values(), key=lambda r: (order.index(r.family), r.code)))
 
@@ -216,3 +218,13 @@ def get_rule(code_or_name: str) -> Rule:
         code_or_name, names or FAMILIES, prefix, closest(code_or_name, known)
     )
     raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")
+
+
+def violations(robot: "Facts", *codes: str) -> Violations:
+    """Yield the violations of the rules with these codes, with their severities.
+
+    For rules that depend on what other rules report.
+    """
+    for rule in map(get_rule, codes):
+        for violation in rule.check(robot):
+            yield replace(violation, severity=violation.severity or rule.severity)

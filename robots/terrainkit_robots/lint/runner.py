@@ -1,6 +1,6 @@
 """Run rules on a robot and collect their findings in a report."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -13,6 +13,7 @@ from terrainkit_robots.lint.rule import (
     IMPORTANCE,
     Certainty,
     Measured,
+    Need,
     Rule,
     Severity,
     Violation,
@@ -22,8 +23,23 @@ from terrainkit_robots.lint.rule import (
 Verdict = Literal["pass", "warn", "fail"]
 
 
+SkipKind = Literal[
+    "cannot-check", "no-legs", "no-input", "truncated", "crashed", "ignored", "suppressed", "unused"
+]
+"""Why a rule or a finding is not in the report:
+
+- `cannot-check`: the rule cannot be evaluated for this robot.
+- `no-legs`: the rule only applies to legged robots.
+- `no-input`: the user did not provide a second file, a spec, or permission to simulate.
+- `truncated`: only the first findings of the rule are reported.
+- `crashed`: the rule raised an unexpected exception.
+- `ignored`: the settings ignore the rule.
+- `suppressed`: a comment in the file suppresses the finding.
+- `unused`: a suppression comment has no effect.
+"""
+
 INTERNAL_ERROR = "internal error, please report it"
-"""Start of the reason of a rule that raised an unexpected exception."""
+"""Description of an unexpected exception."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +83,9 @@ class Skipped:
     code: str
     """Code of the rule."""
 
+    kind: SkipKind
     reason: str
+    """What was missing, as a sentence."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +102,16 @@ class Report:
     simulated: bool = False
     """Whether rules were allowed to simulate the robot."""
 
+    fixed: tuple[Finding, ...] = ()
+    """Findings that were fixed before this report."""
+
+    unfixed: tuple[tuple[Finding, str], ...] = ()
+    """Findings with a fix that was not applied, and the reasons."""
+
     @property
     def crashed(self) -> tuple[Skipped, ...]:
         """The rules that raised an unexpected exception."""
-        return tuple(each for each in self.skipped if each.reason.startswith(INTERNAL_ERROR))
+        return tuple(each for each in self.skipped if each.kind == "crashed")
 
     @property
     def verdict(self) -> Verdict:
@@ -130,21 +154,23 @@ def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool
         try:
             _require_complete(rule, facts)
             missing = _missing_need(rule, facts, simulate=simulate)
-            if missing:
-                raise CannotCheckError(missing)
+            if missing is not None:
+                kind: SkipKind = "no-legs" if missing == "legs" else "no-input"
+                skipped.append(Skipped(code=rule.code, kind=kind, reason=_MISSING[missing]))
+                continue
             violations = list(islice(rule.check(facts), MAX_FINDINGS + 1))
             findings += [_finding(rule, violation) for violation in violations[:MAX_FINDINGS]]
             if len(violations) > MAX_FINDINGS:
                 reason = f"more than {MAX_FINDINGS} findings; only the first are reported"
-                skipped.append(Skipped(code=rule.code, reason=reason))
+                skipped.append(Skipped(code=rule.code, kind="truncated", reason=reason))
         except CannotCheckError as error:
-            skipped.append(Skipped(code=rule.code, reason=str(error)))
+            skipped.append(Skipped(code=rule.code, kind="cannot-check", reason=str(error)))
         except MemoryError:
             raise
         except Exception as error:
             # A bug in one rule must not hide the findings of the others. Tests assert on `crashed`.
             reason = f"{INTERNAL_ERROR}: {type(error).__name__}: {error}"
-            skipped.append(Skipped(code=rule.code, reason=reason))
+            skipped.append(Skipped(code=rule.code, kind="crashed", reason=reason))
     findings.sort(key=_importance)
     return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped), simulated=simulate)
 
@@ -167,29 +193,27 @@ def _importance(finding: Finding) -> tuple[int, int, str, str, int]:
 
 def is_applicable(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
     """Return whether the user provided the inputs of a rule: other file, spec, simulation."""
-    missing = _missing_need(rule, facts, simulate=simulate)
-    return missing not in (_NO_AGAINST, _NO_SPEC, _NO_SIMULATION)
+    return _missing_need(rule, facts, simulate=simulate) in (None, "legs")
 
 
-NO_LEGS = "no legs detected"
-"""Reason of a rule that only applies to legged robots."""
+_MISSING: dict[Need, str] = {
+    "simulation": "simulation is disabled",
+    "against": "no second file to compare with; use --against FILE",
+    "spec": "no robot.toml to compare with; use --spec FILE",
+    "legs": "no legs detected",
+}
+"""Reason for not running a rule that lacks an input."""
 
-_NO_AGAINST = "no second file to compare with; use --against FILE"
-_NO_SPEC = "no robot.toml to compare with; use --spec FILE"
-_NO_SIMULATION = "simulation is disabled"
 
-
-def _missing_need(rule: Rule, facts: Facts, *, simulate: bool) -> str:
-    """Return which input a rule lacks, as a reason. Empty if it can run."""
-    if "simulation" in rule.needs and not simulate:
-        return _NO_SIMULATION
-    if "against" in rule.needs and facts.against is None:
-        return _NO_AGAINST
-    if "spec" in rule.needs and facts.spec is None:
-        return _NO_SPEC
-    if "legs" in rule.needs and not facts.legs:
-        return NO_LEGS
-    return ""
+def _missing_need(rule: Rule, facts: Facts, *, simulate: bool) -> Need | None:
+    """Return the first input that a rule lacks, or None if it can run."""
+    lacks: dict[Need, Callable[[], bool]] = {
+        "simulation": lambda: not simulate,
+        "against": lambda: facts.against is None,
+        "spec": lambda: facts.spec is None,
+        "legs": lambda: not facts.legs,
+    }
+    return next((need for need in rule.needs if lacks[need]()), None)
 
 
 def _finding(rule: Rule, violation: Violation) -> Finding:

@@ -23,11 +23,6 @@ class Suppressed(Skipped):
     comment: SuppressionComment
 
 
-@dataclass(frozen=True, kw_only=True)
-class UnusedSuppression(Skipped):
-    """A suppression comment without effect. `reason` contains its location."""
-
-
 def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
     """Return the rules that the settings select, and the ignored ones with their reasons.
 
@@ -41,7 +36,7 @@ def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, .
     candidates = [rule for rule in rules() if rule in named or not settings.select]
     selected = tuple(rule for rule in candidates if rule.code not in reasons)
     ignored = tuple(
-        Skipped(code=rule.code, reason=f"ignored: {reasons[rule.code]}")
+        Skipped(code=rule.code, kind="ignored", reason=f"ignored: {reasons[rule.code]}")
         for rule in candidates
         if rule.code in reasons
     )
@@ -99,14 +94,20 @@ def _apply_suppressions(
         target = f"{finding.subject} ({location})" if finding.subject else location
         reason = f"suppressed for {target}: {comment.reason}"
         suppressed.append(
-            Suppressed(code=finding.code, reason=reason, finding=finding, comment=comment)
+            Suppressed(
+                code=finding.code,
+                kind="suppressed",
+                reason=reason,
+                finding=finding,
+                comment=comment,
+            )
         )
     return kept, suppressed
 
 
 def _unused_suppressions(
     comments: Sequence[SuppressionComment], completed: Set[str], suppressed: Sequence[Suppressed]
-) -> Iterator[UnusedSuppression]:
+) -> Iterator[Skipped]:
     """Yield the comments that suppress nothing although their rule ran."""
     used = {id(each.comment) for each in suppressed}
     for comment in comments:
@@ -115,4 +116,4 @@ def _unused_suppressions(
             error = f"unused suppression: {comment.code} has no finding here"
         if error is not None:
             reason = f"comment at {display_path(comment.file)}:{comment.line}: {error}"
-            yield UnusedSuppression(code=comment.code, reason=reason)
+            yield Skipped(code=comment.code, kind="unused", reason=reason)

@@ -14,8 +14,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from terrainkit_robots.analysis.cached_fact import cached_fact
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.simulation.gain import Gain, GainSet
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
 from terrainkit_robots.simulation.stiffness import (

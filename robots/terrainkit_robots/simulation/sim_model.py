@@ -15,9 +15,8 @@ import numpy as np
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.tree import build_tree
-from terrainkit_robots.analysis.cached_fact import cached_fact
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.description.model import Geometry, Inertial, Link, RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.actuator import ActuatorConfig

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import lint
@@ -198,3 +198,18 @@ def test_facts_and_rules_survive_extreme_numbers(value, attribute):
     robot = facts(text[:begin] + " ".join([value] * count) + text[end:])
     report = lint(robot)
     assert report.crashed == ()
+
+
+def test_cached_fact_is_computed_once_for_each_robot():
+    computed = []
+
+    @cached_fact
+    def number_of_links(robot):
+        """Return the number of links."""
+        computed.append(robot)
+        return len(robot.links)
+
+    robots = [facts(f'<robot name="r">{"".join(map(link, names))}</robot>') for names in ("a", "b")]
+    assert [number_of_links(robot) for robot in (*robots, *robots)] == [1, 1, 1, 1]
+    assert computed == robots
+    assert number_of_links.__doc__ == "Return the number of links."

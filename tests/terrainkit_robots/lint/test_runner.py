@@ -9,7 +9,7 @@ from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.rule import Rule, Violation, rules
-from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, lint
+from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, Skipped, is_applicable, lint
 
 FILE = Path("/robots/robot.urdf")
 
@@ -113,16 +113,35 @@ def test_cannot_check_is_skipped_with_reason():
 
     made = report(rule(check))
     assert made.findings == ()
-    assert [(s.code, s.reason) for s in made.skipped] == [("INR099", "no data")]
+    assert made.skipped == (Skipped(code="INR099", kind="cannot-check", reason="no data"),)
     assert made.crashed == ()
 
 
 def test_leg_rules_need_legs():
     made = report(rule([violation()], needs=("legs",)))
     assert made.findings == ()
-    assert made.skipped[0].reason == "no legs detected"
+    assert made.skipped == (Skipped(code="INR099", kind="no-legs", reason="no legs detected"),)
     robot = Facts(load_robot(bundled.urdf_path("biped")))
     assert len(report(rule([violation()], needs=("legs",)), robot=robot).findings) == 1
+
+
+@pytest.mark.parametrize(
+    ("needs", "reason"),
+    [
+        (("simulation", "legs"), "simulation is disabled"),
+        (("against",), "no second file to compare with; use --against FILE"),
+        (("spec", "legs"), "no robot.toml to compare with; use --spec FILE"),
+    ],
+)
+def test_rules_need_their_input(needs, reason):
+    asked = rule([violation()], needs=needs)
+    made = lint(facts(), [asked], simulate=False)
+    assert made.skipped == (Skipped(code="INR099", kind="no-input", reason=reason),)
+    assert not is_applicable(asked, facts(), simulate=False)
+
+
+def test_rules_of_legged_robots_are_applicable_without_legs():
+    assert is_applicable(rule([], needs=("legs",)), facts(), simulate=False)
 
 
 @pytest.mark.parametrize("family", ["LEG", "SYM", "DYN"])
@@ -166,6 +185,7 @@ def test_findings_of_a_rule_are_limited():
 
     made = report(rule(endless))
     assert [each.line for each in made.findings] == list(range(1, MAX_FINDINGS + 1))
+    assert [each.kind for each in made.skipped] == ["truncated"]
     assert str(MAX_FINDINGS) in made.skipped[0].reason
     exactly = report(rule([violation(line=k) for k in range(MAX_FINDINGS)]))
     assert exactly.skipped == ()

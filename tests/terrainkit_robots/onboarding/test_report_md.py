@@ -256,8 +256,8 @@ def test_report_lists_findings_and_skipped_rules(quadruped):
         facts=quadruped.robot.facts,
         findings=(finding(severity="warning"),),
         skipped=(
-            Skipped(code="SYM001", reason="no legs"),
-            Skipped(code="SYM002", reason="no legs"),
+            Skipped(code="SYM001", kind="cannot-check", reason="no legs"),
+            Skipped(code="SYM002", kind="cannot-check", reason="no legs"),
         ),
     )
     text = section(report_markdown(replace(quadruped, report=report)), "Findings")
@@ -279,7 +279,7 @@ def test_report_escapes_names(quadruped):
     report = Report(
         facts=robot.facts,
         findings=(finding(subject=NASTY, message=NASTY, hint=NASTY, file=Path(NASTY)),),
-        skipped=(Skipped(code="SYM001", reason=NASTY),),
+        skipped=(Skipped(code="SYM001", kind="cannot-check", reason=NASTY),),
     )
     verification = Verification(
         equivalences=(equivalence(NASTY, link=NASTY),),

@@ -105,6 +105,11 @@ class Body(BodyFrame):
         """Its visual shapes."""
         return tuple(self._shapes("visuals"))
 
+    @property
+    def has_contacts(self) -> bool:
+        """Whether one of its collision shapes can collide with anything."""
+        return any(shape.geometry.contacts for shape in self.collisions)
+
     def _parts(self) -> Iterator[tuple[float, Matrix, Matrix]]:
         """Yield mass, inertial frame and inertia of each link with mass."""
         for link, pose in zip(self.links, self.poses, strict=True):

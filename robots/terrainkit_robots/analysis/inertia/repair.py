@@ -20,6 +20,7 @@ from terrainkit_robots.analysis.inertia.physical import (
 from terrainkit_robots.analysis.symmetry.mirror import Mirror
 from terrainkit_robots.description.fix import Edit, Fix, RemoveAttribute, SetAttribute
 from terrainkit_robots.description.model import Inertial, Link
+from terrainkit_robots.description.xml.number_text import number_text
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
@@ -111,9 +112,7 @@ class InertiaRepair:
             return None
         if abs(mass - other_mass) > _MAX_MASS_DIFFERENCE * other_mass:
             return None
-        normal = self.mirror.normal
-        reflection = np.eye(3) - 2 * np.outer(normal, normal)
-        transform = self._axes(link).T @ reflection @ self._axes(other)
+        transform = self._axes(link).T @ self.mirror.reflection @ self._axes(other)
         return np.asarray(transform @ inertia @ transform.T)
 
     def _axes(self, link: Link) -> Matrix:
@@ -179,4 +178,4 @@ def _edits(inertial: Inertial, inertia: Matrix) -> Iterator[Edit]:
 def _format(inertia: Matrix) -> list[str]:
     """Return the six elements in the order of `_ATTRIBUTES`."""
     elements = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    return [f"{inertia[element] + 0.0:.10g}" for element in elements]
+    return [number_text(inertia[element]) for element in elements]

@@ -62,6 +62,11 @@ class Leg:
         return next((j for j, r in zip(self.joints, self.roles, strict=True) if r == role), None)
 
 
+def mean_length(legs: Sequence[Leg]) -> float:
+    """Return the mean length of at least one leg [m]."""
+    return sum(leg.length for leg in legs) / len(legs)
+
+
 def detect_legs(limbs: Sequence[Limb], bodies: Sequence[Body]) -> tuple[Leg, ...]:
     """Return the legs of a robot in the order of its bodies.
 

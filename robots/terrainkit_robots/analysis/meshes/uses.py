@@ -70,6 +70,11 @@ class UsedMesh:
         return tuple(use for use in self.uses if use.is_collision)
 
     @property
+    def label(self) -> str:
+        """Return its name and its use, as messages show them."""
+        return f"{self.name} ({self.role})"
+
+    @property
     def role(self) -> str:
         """Return a description of its use, such as `collision mesh of FL_calf, FR_calf`."""
         kind, uses = ("collision", self.collisions) if self.collisions else ("visual", self.uses)

@@ -78,6 +78,11 @@ class Mirror:
         """Return mirrored vectors, shape (..., 3)."""
         return np.asarray(vectors - 2 * (vectors @ self.normal)[..., None] * self.normal)
 
+    @property
+    def reflection(self) -> Matrix:
+        """Return the matrix that mirrors vectors, shape (3, 3)."""
+        return np.eye(3) - 2 * np.outer(self.normal, self.normal)
+
     @cached_property
     def image_index(self) -> Mapping[int, int]:
         """Index of the mirror image of each body that has one, by index."""

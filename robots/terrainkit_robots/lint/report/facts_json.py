@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit_robots.analysis.legs.legs import mean_length
+
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.analysis.legs.legs import Leg
@@ -38,7 +40,7 @@ def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
         "joint_names": [joint.name for joint in facts.joints],
         "legs": [_leg(leg) for leg in legs],
         "feet": [leg.foot for leg in legs],
-        "leg_length": number(sum(leg.length for leg in legs) / len(legs)) if legs else None,
+        "leg_length": number(mean_length(legs)) if legs else None,
         "joint_orders": _joint_orders(facts),
         "mirror_plane": {
             "normal": [number(float(x)) for x in facts.mirror.normal],

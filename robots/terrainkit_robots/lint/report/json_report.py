@@ -7,7 +7,6 @@ from typing import Any
 
 from terrainkit_robots.lint.report.escape import escape_surrogates
 from terrainkit_robots.lint.report.facts_json import facts_json
-from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
 from terrainkit_robots.lint.runner import Finding, Report
 from terrainkit_robots.text import display_path
 
@@ -40,8 +39,8 @@ def report_json(report: Report) -> dict[str, Any]:
         "verdict": report.verdict,
         "facts": facts_json(report.facts, simulated=report.simulated),
         "findings": [finding_json(finding) for finding in report.findings],
-        "fixed": [finding_json(finding) for finding in fixed_findings(report)],
-        "unfixed": [{**finding_json(f), "reason": why} for f, why in unfixed_findings(report)],
+        "fixed": [finding_json(finding) for finding in report.fixed],
+        "unfixed": [{**finding_json(f), "reason": why} for f, why in report.unfixed],
         "skipped": [{"code": s.code, "reason": s.reason} for s in report.skipped],
     }
 

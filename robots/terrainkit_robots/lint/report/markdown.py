@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterator, Sequence
 
 from terrainkit_robots.lint.report.escape import escape_control
-from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.report.summary import (
@@ -33,9 +32,9 @@ def _section(report: Report) -> Iterator[str]:
     for label, text in robot_summary(report):
         yield f"| {label.strip()} | {cell(text)} |"
     yield ""
-    fixed = group_findings(model, fixed_findings(report))
+    fixed = group_findings(model, report.fixed)
     yield from titled_list("Fixed", [(g.first.code, f"{g.first.name}: {_text(g)}") for g in fixed])
-    unfixed = [(f.code, f"{f.subject or f.name}: {why}") for f, why in unfixed_findings(report)]
+    unfixed = [(f.code, f"{f.subject or f.name}: {why}") for f, why in report.unfixed]
     yield from titled_list("Not fixed", unfixed)
     yield from findings_table(group_findings(model, report.findings))
     skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from terrainkit_robots.lint.report.facts_json import facts_json
-from terrainkit_robots.text import count
+from terrainkit_robots.text import count, numbers
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.runner import Report
@@ -88,7 +88,7 @@ def _gains(data: Mapping[str, Any], names: Sequence[str]) -> Iterator[str]:
     for key, label in (("stiffness", "kp"), ("damping", "kd")):
         values = sorted({gain[key] for gain in gains} - {None})
         if values:
-            yield f"{label} {' and '.join(f'{value:g}' for value in values)}"
+            yield f"{label} {numbers(values, sep=' and ')}"
 
 
 def _values(numbers: Sequence[float | None]) -> str:

@@ -8,16 +8,15 @@ from urllib.parse import quote_from_bytes
 
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import to_json
-from terrainkit_robots.lint.rule import FAMILIES, Rule, Severity, rules
+from terrainkit_robots.lint.report.summary import SEVERITY_LABELS
+from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
-from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
+from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import display_path
 
 SCHEMA = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 )
-
-_LEVELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def to_text(reports: Sequence[Report]) -> str:
@@ -65,7 +64,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "shortDescription": {"text": rule.title},
         "fullDescription": {"text": rule.why},
         "help": {"text": "\n\n".join(paragraphs)},
-        "defaultConfiguration": {"level": _LEVELS[rule.severity]},
+        "defaultConfiguration": {"level": SEVERITY_LABELS[rule.severity]},
         "properties": {"tags": ["robot", FAMILIES[rule.family]], "fixes": rule.fixes},
     }
 
@@ -74,7 +73,7 @@ def _result(finding: Finding, index: dict[str, int]) -> dict[str, Any]:
     return {
         "ruleId": finding.code,
         "ruleIndex": index[finding.code],
-        "level": _LEVELS[finding.severity],
+        "level": SEVERITY_LABELS[finding.severity],
         "message": _message(f"{finding.message}\n{finding.hint}".strip()),
         "locations": [_location(finding.file, finding.line, finding.subject)],
         "properties": dict(_properties(finding)),
@@ -95,7 +94,7 @@ def _suppressed_result(suppressed: Suppressed, index: dict[str, int]) -> dict[st
 
 
 def _notification(skipped: Skipped, file: Path) -> dict[str, Any]:
-    unused = isinstance(skipped, UnusedSuppression)
+    unused = skipped.kind == "unused"
     notification: dict[str, Any] = {
         "level": "warning" if unused else "note",
         "message": _message(f"{skipped.code}: {skipped.reason}"),

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 
 from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.rule import Severity
-from terrainkit_robots.lint.runner import NO_LEGS, Finding, Report, Skipped
-from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
+from terrainkit_robots.lint.runner import Finding, Report, SkipKind, Skipped
+from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import count, display_path, names
 
 SEVERITY_LABELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
-"""Label of each severity, in the order of reports."""
+"""Label of each severity, in the order of reports; the level of SARIF has the same names."""
 
 _MAX_CODES = 6
 """Maximum number of rules that are listed for one reason."""
@@ -61,26 +61,25 @@ def group_skipped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
     An unused suppression comment is a warning. The findings that one comment suppresses are one
     entry.
     """
-    reasons: dict[tuple[bool, str], dict[str, None]] = {}
+    reasons: dict[tuple[SkipKind, str], dict[str, None]] = {}
     suppressed: dict[object, list[Suppressed]] = {}
     for each in skipped:
         if isinstance(each, Suppressed):
             suppressed.setdefault(each.comment, []).append(each)
         else:
-            is_warning = isinstance(each, UnusedSuppression)
-            reasons.setdefault((is_warning, each.reason), {})[each.code] = None
+            reasons.setdefault((each.kind, each.reason), {})[each.code] = None
     for members in suppressed.values():
         subjects = names(each.finding.subject for each in members)
         reason = f"suppressed for {subjects}: {members[0].comment.reason}"
         reason = members[0].reason if len(members) == 1 else reason
-        reasons.setdefault((False, reason), {})[members[0].code] = None
+        reasons.setdefault(("suppressed", reason), {})[members[0].code] = None
     entries = []
-    for (is_warning, reason), codes in reasons.items():
+    for (kind, reason), codes in reasons.items():
         listed = ", ".join(codes)
-        if reason == NO_LEGS:
+        if kind == "no-legs":
             does = "rule does" if len(codes) == 1 else "rules do"
             listed, reason = "", f"not a legged robot: {len(codes)} {does} not apply"
         elif len(codes) > _MAX_CODES:
             listed = f"{len(codes)} rules"
-        entries.append((is_warning, listed, reason))
+        entries.append((kind == "unused", listed, reason))
     return entries

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from terrainkit.settings.text import truncate
 from terrainkit_robots.lint.report.escape import escape_control
-from terrainkit_robots.lint.report.fixed_report import fixed_findings, unfixed_findings
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.report.summary import (
@@ -79,7 +78,7 @@ def _robot(report: Report, width: int, *, verbose: bool) -> Iterator[Line]:
         first = f"  {label:<9} "
         yield from _wrap(Span(first, "dim"), escape_control(text), width, indent=len(first))
     yield ()
-    fixed = group_findings(model, fixed_findings(report), _fix_description)
+    fixed = group_findings(model, report.fixed, _fix_description)
     if fixed:
         yield (Span("fixed", "bold green"),)
         for group in fixed:
@@ -166,7 +165,7 @@ def _help(findings: Sequence[Finding], *, verbose: bool) -> Iterator[Line]:
 
 def _skipped(report: Report, width: int) -> Iterator[Line]:
     """Yield what was not fixed, not checked or ignored, with the reasons."""
-    for finding, reason in unfixed_findings(report):
+    for finding, reason in report.unfixed:
         text = escape_control(f"{finding.code} {finding.subject}: {reason}")
         yield from _wrap(Span("not fixed: ", _STYLES["warning"]), text, width, indent=11)
     for is_warning, codes, reason in group_skipped(report.skipped):

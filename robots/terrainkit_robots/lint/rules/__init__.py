@@ -1,1 +1,1 @@
-"""Lint rules: one module per family. A function with the decorator `rule` is a rule."""
+"""Lint rules: one package per family, one module per concept. Functions decorated with `rule`."""

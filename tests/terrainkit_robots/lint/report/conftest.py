@@ -7,9 +7,8 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import RobotModel, Source
-from terrainkit_robots.lint.report.fixed_report import FixedReport
 from terrainkit_robots.lint.runner import Finding, Report, Skipped
-from terrainkit_robots.lint.selection import Suppressed, UnusedSuppression
+from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.lint.suppressions import read_comments
 
 NASTY = 'a,b:c%d|e{0}<b>@me`*_\x1b[31m\r\n::error::x\u202e\udc80"'
@@ -59,10 +58,16 @@ def report(model, finding):
             finding("LEG001", "legs", "info", line=1, measured={"legs": 4}),
         ),
         skipped=(
-            Skipped(code="SYM001", reason="no legs detected"),
-            Skipped(code="SYM002", reason="no legs detected"),
-            Suppressed(code="INR002", reason="suppressed: so", comment=comment, finding=quiet),
-            UnusedSuppression(code="INR999", reason="comment at robot.urdf:3: unknown rule"),
+            Skipped(code="SYM001", kind="no-legs", reason="no legs detected"),
+            Skipped(code="SYM002", kind="no-legs", reason="no legs detected"),
+            Suppressed(
+                code="INR002",
+                kind="suppressed",
+                reason="suppressed: so",
+                comment=comment,
+                finding=quiet,
+            ),
+            Skipped(code="INR999", kind="unused", reason="comment at robot.urdf:3: unknown rule"),
         ),
     )
 
@@ -81,7 +86,7 @@ def nasty(model, finding):
     return Report(
         facts=Facts(model(NASTY, str(path))),
         findings=(bad,),
-        skipped=(Skipped(code="SYM001", reason=NASTY),),
+        skipped=(Skipped(code="SYM001", kind="cannot-check", reason=NASTY),),
     )
 
 
@@ -91,6 +96,6 @@ def fixed_report(model, finding):
     fix = Fix(safety="safe", description="name it", edits=())
     done = finding("XML003", "unnamed-robot", "warning", fix=fix)
     left = finding("JNT009", "unit-axis", "warning", fix=fix)
-    return FixedReport(
+    return Report(
         facts=Facts(model()), findings=(left,), fixed=(done,), unfixed=((left, "no space"),)
     )

@@ -8,7 +8,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule
-from terrainkit_robots.lint.rules import dyn
+from terrainkit_robots.lint.rules.dyn import stability
 
 GRIPPER = """
 <robot name="gripper">
@@ -72,7 +72,7 @@ def test_unstable_drop_units_of_sliding_joint(robot):
 )
 def test_does_not_stand_severity(monkeypatch, stood, tilt, lifted, severity):
     standing_with = replace(stood, tilt=math.radians(tilt), lifted_feet=lifted)
-    monkeypatch.setattr(dyn, "stand_test", lambda *_, **__: standing_with)
+    monkeypatch.setattr(stability, "stand_test", lambda *_, **__: standing_with)
     violations = check("DYN002", bundled.urdf_path("quadruped"))
     assert [violation.severity for violation in violations] == ([severity] if severity else [])
     assert all("tilts by" in violation.message for violation in violations)

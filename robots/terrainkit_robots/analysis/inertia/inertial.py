@@ -1,0 +1,28 @@
+"""Check the inertials of links."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA, MIN_INERTIA
+from terrainkit_robots.description.model import Link
+
+
+def max_inertia(link: Link) -> float:
+    """Return the largest absolute element of an inertia [kg m2]; 0 if there is none."""
+    inertia = link.inertial.inertia if link.inertial else None
+    return 0.0 if inertia is None else float(np.abs(inertia).max())
+
+
+def has_valid_mass(body: Body) -> bool:
+    """Return whether all masses of the body are declared, nonnegative and below the limit."""
+    masses = [link.inertial.mass for link in body.links if link.inertial is not None]
+    return all(mass is not None and 0 <= mass < MAX_INERTIA for mass in masses)
+
+
+def bodies_with_mass(bodies: Iterable[Body]) -> Iterator[Body]:
+    """Yield the bodies with a valid mass above zero, without virtual ones."""
+    for body in bodies:
+        if not body.virtual and has_valid_mass(body) and body.mass > MIN_INERTIA:
+            yield body

@@ -1,0 +1,1 @@
+"""Rules on collision shapes (COL)."""

@@ -1,0 +1,214 @@
+"""Rules on differences between collision and visual shapes."""
+
+import math
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
+from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Geometry
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.text import numbers
+from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
+
+_MAX_OFFSET = 0.005
+"""Allowed distance between a mesh as visual and as collision shape [m]."""
+
+_MAX_ANGLE = math.radians(3)
+"""Allowed angle between them [rad]."""
+
+_MAX_SIZE_RATIO = 1.5
+"""Allowed ratio of the sizes of a primitive as collision and as visual shape."""
+
+_MIN_SHARE_INSIDE = 0.5
+"""Share of a collision shape's bounding box that has to be inside of the visible robot around
+it."""
+
+_MAX_ELONGATION = 1.5
+"""Ratio of the two longest sides of a shape that is between its joints however it is turned."""
+
+_VISUAL_MARGIN = 0.01
+"""Margin of the visible robot [m]."""
+
+
+@rule("COL009", "displaced-collision-mesh", "warning")
+def displaced_collision_mesh(robot: Facts) -> Violations:
+    """A mesh has another pose or scale as collision shape than as visual shape of the same link.
+
+    The origin or the scale was changed in one of the two elements only. The robot collides where
+    it cannot be seen, for example with its own thighs. A primitive that is larger than the one that
+    is drawn at the same place is reported as well, such as a sphere with its diameter as radius.
+
+    Fix:
+        Copy <origin> and scale from the correct element to the other one.
+
+    Source:
+        Issue 184 of OrbbecSDK_ROS2 and issue 2969 of realsense-ros.
+    """
+    for link in robot.links:
+        for collision in link.collisions:
+            same = [v for v in link.visuals if _is_same_file(collision, v)]
+            if not same or collision.fit_to_mesh:
+                continue
+            differences = [_difference(collision, visual) for visual in same]
+            if not all(differences):
+                continue
+            assert collision.mesh is not None
+            yield Violation(
+                subject=link.name,
+                source=collision.source,
+                message=f"collision mesh {Path(collision.mesh.filename).name} of link {link.name}: "
+                f"got {differences[0]} the same mesh of the visual; expected the same pose and "
+                "scale",
+            )
+    yield from _resized_primitives(robot)
+
+
+def _resized_primitives(robot: Facts) -> Violations:
+    """Yield collision primitives that are larger than the same primitive of the visual.
+
+    If several links agree in the ratio, it is intended: the feet of many quadrupeds.
+    """
+    found: list[tuple[str, Geometry, Geometry, float]] = []
+    for link in robot.links:
+        for collision in link.collisions:
+            same = [v for v in link.visuals if _is_same_place(collision, v)]
+            ratios = [max(a / b for a, b in zip(collision.size, v.size, strict=True)) for v in same]
+            if ratios and min(ratios) > _MAX_SIZE_RATIO:
+                visual = same[ratios.index(min(ratios))]
+                found.append((link.name, collision, visual, round(min(ratios), 2)))
+    counts = Counter(ratio for _, _, _, ratio in found)
+    for name, collision, visual, ratio in found:
+        if counts[ratio] == 1:
+            yield Violation(
+                subject=name,
+                source=collision.size_source or collision.source,
+                certainty="likely",
+                message=f"size of the collision {collision.shape} of link {name}: got "
+                f"{numbers(collision.size)} m, {ratio:g} times the "
+                f"{numbers(visual.size)} m of the visual at the same place (half "
+                "lengths); expected the same size",
+                measured={"ratio": ratio},
+            )
+
+
+def _is_same_place(a: Geometry, b: Geometry) -> bool:
+    """Return whether two primitives of a kind have the same pose and comparable sizes."""
+    is_primitive = a.mesh is None and a.shape == b.shape and len(a.size) == len(b.size) > 0
+    return (
+        is_primitive
+        and min(*a.size, *b.size, 1.0) > 0
+        and float(np.abs(a.origin - b.origin).max()) < _MAX_OFFSET
+    )
+
+
+def _is_same_file(a: Geometry, b: Geometry) -> bool:
+    return (
+        a.mesh is not None and b.mesh is not None and a.mesh.path == b.mesh.path
+    ) and a.shape == b.shape == "mesh"
+
+
+def _difference(a: Geometry, b: Geometry) -> str:
+    """Return how the poses and scales of two shapes with the same mesh differ."""
+    assert a.mesh is not None
+    assert b.mesh is not None
+    scales = np.array(a.mesh.scale), np.array(b.mesh.scale)
+    if np.abs(scales[0] - scales[1]).max() > 0.02 * np.abs(scales[1]).max():
+        return f"scale {numbers(scales[0])} instead of {numbers(scales[1])} of"
+    distance, angle = map(float, pose_error(a.origin, b.origin))
+    if distance > _MAX_OFFSET:
+        return f"a distance of {1000 * distance:.3g} mm to"
+    return f"an angle of {math.degrees(angle):.3g} deg to" if angle > _MAX_ANGLE else ""
+
+
+@rule("COL010", "collision-outside-visual", "warning", needs=("legs",))
+def collision_outside_visual(robot: Facts) -> Violations:
+    """Most of a collision shape is outside of the visible robot.
+
+    The shape is turned, or on the wrong side of the joint: an origin was lost, has a wrong sign, or
+    is in degrees. The visible part passes through obstacles and invisible air hits them.
+
+    Fix:
+        Correct the <origin> of the <collision>. Show collision shapes in a viewer.
+
+    Source:
+        Bounding boxes at position 0 of the shape and of the visual shapes of its body and of the
+        bodies next to it. Checked are the legs and the trunk of robots with visual shapes on most
+        bodies, without meshes and spheres, which have no direction.
+    """
+    drawn = [body for body in robot.bodies if body.visuals]
+    if 2 * len(drawn) < len(robot.bodies):
+        return
+    for body in robot.bodies:
+        if not body.visuals or body.index not in robot.leg_bodies | {0}:
+            continue
+        suspects = [shape for shape in body.collisions if _needs_check(robot, body, shape)]
+        for shape in suspects:
+            box = bounds([shape], robot.meshes)
+            visible = _visible_box(robot, body)
+            if box is None or visible is None:
+                continue
+            share = _share_inside(box, visible)
+            if share < _MIN_SHARE_INSIDE:
+                yield Violation(
+                    subject=shape.link,
+                    source=shape.geometry.source,
+                    certainty="likely",
+                    message=f"part of the collision {shape.geometry.shape} of link {shape.link} "
+                    f"inside of the visible robot: got {share:.0%}; expected at least "
+                    f"{_MIN_SHARE_INSIDE:.0%}",
+                    measured={"share": share},
+                )
+
+
+def _needs_check(robot: Facts, body: Body, shape: BodyShape) -> bool:
+    """Return whether a primitive is not between the joints of its body.
+
+    Opening visual meshes is slow, and the segment between the joints settles most shapes.
+    """
+    if shape.geometry.shape in ("mesh", "plane", "sphere", "unknown"):
+        return False
+    if not has_bounds(shape.geometry, robot.meshes):
+        return False
+    box = bounds([shape], robot.meshes)
+    points = [np.zeros(3), *(b.origin[:3, 3] for b in robot.bodies if b.parent == body.index)]
+    points += [pose[:3, 3] for pose in body.poses]
+    joints = np.array([np.min(points, axis=0), np.max(points, axis=0)])
+    size = 0.15 * float(np.linalg.norm(joints[1] - joints[0])) + _VISUAL_MARGIN
+    joints += np.array([[-size], [size]])
+    if box is None or _share_inside(box, joints) >= _MIN_SHARE_INSIDE:
+        return False
+    center, sides = box.mean(axis=0), np.sort(box[1] - box[0])
+    is_between = bool((joints[0] <= center).all() and (center <= joints[1]).all())
+    is_compact = sides[2] <= _MAX_ELONGATION * sides[1]  # its rotation does not matter
+    return not (is_between and is_compact and sides[2] <= float((joints[1] - joints[0]).max()))
+
+
+def _visible_box(robot: Facts, body: Body) -> Matrix | None:
+    """Return the bounding box of the visuals of a body, its parent and its children.
+
+    None if one of them cannot be read. Shape (2, 3), in the frame of the body [m].
+    """
+    near = [
+        b for b in robot.bodies if b.parent == body.index or b.index in (body.index, body.parent)
+    ]
+    inverse = invert_poses(body.zero_pose)
+    shapes = [
+        BodyShape(geometry=v.geometry, link=v.link, pose=inverse @ b.zero_pose @ v.pose)
+        for b in near
+        for v in b.visuals
+    ]
+    if not all(has_bounds(shape.geometry, robot.meshes) for shape in shapes):
+        return None
+    box = bounds(shapes, robot.meshes)
+    return None if box is None else box + np.array([[-_VISUAL_MARGIN], [_VISUAL_MARGIN]])
+
+
+def _share_inside(box: Matrix, outer: Matrix) -> float:
+    """Return the share of the volume of a box that is inside of another one."""
+    size = box[1] - box[0]
+    inside = np.minimum(box[1], outer[1]) - np.maximum(box[0], outer[0])
+    return float(np.prod(np.clip(inside, 0, None) / np.maximum(size, 1e-9)))

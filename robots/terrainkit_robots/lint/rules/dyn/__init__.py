@@ -1,0 +1,1 @@
+"""Rules that simulate the robot in MuJoCo (DYN)."""

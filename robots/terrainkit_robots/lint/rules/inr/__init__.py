@@ -1,0 +1,1 @@
+"""Rules on masses and inertias (INR)."""

@@ -1,0 +1,145 @@
+"""Rules on inertias that do not fit the size of the body."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.bounds import half_diagonal
+from terrainkit_robots.analysis.bodies.element_source import inertia_source
+from terrainkit_robots.analysis.facts import Facts, cached_fact
+from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, max_inertia
+from terrainkit_robots.analysis.inertia.physical import (
+    MAX_INERTIA,
+    MIN_INERTIA,
+    gyration_radius,
+    is_in_range,
+)
+from terrainkit_robots.analysis.inertia.placeholder import placeholder_inertias
+from terrainkit_robots.export.canonical import has_floating_base
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule, violations
+from terrainkit_robots.transforms import Matrix
+
+_MAX_GYRATION, _MAX_GYRATION_ERROR = 1.05, 3.0
+"""Radius of gyration divided by half the diagonal of the body: limits of the warning and the error.
+Mass inside a box cannot exceed 1; the margin is for shapes that omit a small part of the body."""
+
+_MIN_GYRATION = 0.05
+"""The same ratio for a body that is nearly a point mass. Solid parts have 0.3 to 0.6; a heavy motor
+in a light shell five times as long has 0.1."""
+
+
+@rule("INR006", "inertia-too-large", "warning")
+def inertia_too_large(robot: Facts) -> Violations:
+    """An inertia is larger than the size of the body allows.
+
+    Mass inside a body is at most half the body's diagonal away from its center, which limits the
+    radius of gyration sqrt(I / m). A larger value is usually a wrong unit (g mm2) or a wrong
+    reference point (the origin of the robot). The joint then moves an inertia that the real robot
+    does not have. It is a note for a base that is fixed to the ground.
+
+    Fix:
+        Give the inertia in kg m2 about the center of mass, and the mass in kg.
+
+    Source:
+        I <= m r^2 if all mass is within r of the center of mass. A ratio above 3 is an error; it
+        occurs in a published UR5 (wrists) and Baxter (fingers), whose values are those of other
+        parts or in other units.
+    """
+    for link in robot.model.links:
+        inertia = max_inertia(link)
+        if inertia >= MAX_INERTIA:
+            yield Violation(
+                subject=link.name,
+                source=inertia_source(link),
+                severity="error",
+                message=f"inertia of link {link.name}: got {inertia:.3g} kg m2; expected less than "
+                f"{MAX_INERTIA:.0e} kg m2",
+                measured={"inertia": inertia},
+            )
+    body_bounds, candidates = robot.body_bounds, []
+    for body, radius in _body_radii(robot):
+
+        def is_invalid(box: Matrix, radius: float = radius) -> bool:
+            return radius > _MAX_GYRATION * half_diagonal(box)
+
+        box = body_bounds.box_if(body, is_invalid)
+        if box is not None:
+            candidates.append((body, radius, box))
+    reported = _invalid_bodies(robot) if candidates else set()
+    for body, radius, box in candidates:
+        if body.name not in reported:
+            is_error = radius > _MAX_GYRATION_ERROR * half_diagonal(box)
+            is_fixed = body.index == 0 and not has_floating_base(robot)
+            severity: Severity = "info" if is_fixed else "error" if is_error else "warning"
+            limit = f"at most {_MAX_GYRATION:g}"
+            yield _report_radius(body, radius, box, limit, severity)
+
+
+@rule("INR007", "inertia-too-small", "warning")
+def inertia_too_small(robot: Facts) -> Violations:
+    """An inertia is much smaller than the size of the body suggests.
+
+    The radius of gyration is below 5 % of half the body's diagonal, as if the body were a point
+    mass. Small torques then cause large accelerations: the simulation becomes stiff or unstable,
+    and the torques that a policy learns are too small for the real robot. The usual
+    causes are wrong units and placeholders.
+
+    Fix:
+        Give the inertia in kg m2 about the center of mass, and the mass in kg.
+
+    Source:
+        The ratio is 0.58 for a rod, 0.47 for a cube, and 0.36 for a sphere.
+    """
+    body_bounds, candidates = robot.body_bounds, []
+    for whole, _ in _body_radii(robot):
+        index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
+        part = slice(index, index + 1)
+        main = replace(whole, links=whole.links[part], poses=whole.poses[part])
+        for body in (whole, main):
+            radius = gyration_radius(body.principal, body.mass)
+
+            def needs_mesh(length: float, radius: float = radius) -> bool:
+                return radius < _MIN_GYRATION * length
+
+            box = body_bounds.shape_box(body, needs_mesh) if radius > 0 else None
+            if box is not None and radius < _MIN_GYRATION * half_diagonal(box):
+                candidates.append((body, radius, box))
+                break
+    reported = _invalid_bodies(robot) if candidates else set()
+    for body, radius, box in candidates:
+        if body.name not in reported:
+            limit = f"at least {_MIN_GYRATION:g}"
+            yield _report_radius(body, radius, box, limit, "warning")
+
+
+def _report_radius(
+    body: Body, radius: float, box: Matrix, limit: str, severity: Severity
+) -> Violation:
+    half = half_diagonal(box)
+    return Violation(
+        subject=body.name,
+        source=inertia_source(body.main_link),
+        severity=severity,
+        message=f"radius of gyration of body {body.name}: got {radius:.3g} m (mass "
+        f"{body.mass:.4g} kg, largest principal moment {body.principal[2]:.3g} kg m2); expected "
+        f"{limit} times half the diagonal of the body, which is {half:.3g} m",
+        measured={"radius": radius, "half_diagonal": half},
+    )
+
+
+@cached_fact
+def _invalid_bodies(robot: Facts) -> set[str]:
+    """Return the bodies whose mass or inertia is reported by another rule."""
+    reported = {link.name for links in placeholder_inertias(robot.bodies) for link in links}
+    reported |= {v.subject for v in violations(robot, "INR003", "INR004") if v.severity == "error"}
+    return reported | {violation.subject for violation in violations(robot, "INR010", "INR008")}
+
+
+def _body_radii(robot: Facts) -> Iterator[tuple[Body, float]]:
+    """Yield each body with a valid inertia, and its radius of gyration [m]."""
+    for body in bodies_with_mass(robot.bodies):
+        main = body.main_link.inertial
+        if main is None or main.inertia is None or not is_in_range(main.inertia):
+            continue
+        if body.principal[0] > MIN_INERTIA:
+            yield body, gyration_radius(body.principal, body.mass)

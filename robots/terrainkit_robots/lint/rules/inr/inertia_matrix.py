@@ -1,0 +1,198 @@
+"""Rules on the values of inertia matrices."""
+
+from collections.abc import Container, Mapping
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.element_source import inertia_source
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.inertia.physical import (
+    MAX_INERTIA,
+    MIN_INERTIA,
+    is_in_range,
+    is_zero,
+    principal_moments,
+    triangle_ratio,
+)
+from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholder_inertias
+from terrainkit_robots.description.model import Link
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.text import names, numbers
+from terrainkit_robots.transforms import Matrix
+
+_MIN_TRIANGLE_RATIO = 0.99
+"""Ratio (I1 + I2) / I3 of the principal moments below which rounding cannot explain the
+violation."""
+
+_MIN_ROUNDED_RATIO = 0.999
+"""The same ratio for a flat part whose moments are rounded to four digits, each with an error of at
+most 1/2000."""
+
+_MIN_EXACT_RATIO = 1 - 1e-12
+"""The same ratio below which floating-point errors cannot explain the violation."""
+
+_INERTIA_ATTRIBUTES = (
+    "ixx",
+    "ixy",
+    "ixz",
+    "iyy",
+    "iyz",
+    "izz",
+    "diaginertia",
+    "fullinertia",
+)
+"""Attributes of URDF and MJCF that hold an inertia."""
+
+
+@rule("INR003", "not-positive-definite", "error", fixes="unsafe")
+def not_positive_definite(robot: Facts) -> Violations:
+    """An inertia is missing, zero, or not positive definite.
+
+    All principal moments of a rigid body are positive. If one of them is not, MuJoCo rejects the
+    file; in other simulators, the rotation of the body is unstable and its state becomes NaN. The
+    usual cause is that the products ixy, ixz, iyz are too large compared with ixx, iyy, izz. A zero
+    inertia is allowed on a small link that is fixed to a body with an inertia.
+
+    Fix:
+        Take the six numbers from CAD, about the center of mass, in kg m2. The unsafe fix writes the
+        nearest physically valid inertia, or that of a solid box of the size of the body.
+
+    Source:
+        MuJoCo 4.0: "inertia must have positive eigenvalues", "missing element: 'inertia'".
+    """
+    main = {id(body.main_link) for body in robot.bodies}
+    for link in robot.model.links:
+        if not _has_finite_mass(link) or robot.unparsed.has(link.name, *_INERTIA_ATTRIBUTES):
+            continue
+        assert link.inertial is not None
+        inertia = link.inertial.inertia
+        if inertia is None:
+            if robot.model.kind != "mjcf" or _needs_inertia(robot, link, main):
+                yield _missing_inertia(robot, link)
+            continue
+        zero = is_zero(inertia)
+        if not is_in_range(inertia) or (zero and not _needs_inertia(robot, link, main)):
+            continue
+        moments = principal_moments(inertia)
+        if zero or moments[0] <= MIN_INERTIA:
+            yield Violation(
+                subject=link.name,
+                source=inertia_source(link),
+                message=f"principal moments of link {link.name}: got "
+                f"{numbers(moments, '.4g', ', ')} kg m2 "
+                f"({'zero' if zero else 'not positive definite'}); expected all above 0 kg m2",
+                measured=_measured(moments),
+                fix=robot.inertia_repair.fix(link),
+            )
+
+
+def _missing_inertia(robot: Facts, link: Link) -> Violation:
+    assert link.inertial is not None
+    got, expected = "no <inertia>", "<inertia>"
+    if robot.model.kind == "mjcf":
+        got, expected = "neither diaginertia nor fullinertia", "one of them"
+    elif link.inertial.inertia_source is not None:
+        got = f"<inertia> without {', '.join(link.inertial.missing) or 'numbers'}"
+        expected = "ixx, iyy and izz"
+    return Violation(
+        subject=link.name,
+        source=inertia_source(link),
+        message=f"inertia of link {link.name} (mass {link.inertial.mass:.4g} kg): got {got}; "
+        f"expected {expected}",
+    )
+
+
+def _needs_inertia(robot: Facts, link: Link, main: Container[int]) -> bool:
+    """Return whether a link is the main link of a moving body.
+
+    In URDF, the inertias of small parts fixed to the link do not replace its own. In MJCF, a link
+    without an inertia is assumed to be part of its parent on purpose.
+    """
+    body = robot.body_of.get(link.name) if id(link) in main else None
+    if body is None or body.virtual or body.mass <= MIN_INERTIA:
+        return False
+    moving = body.parent is not None or bool(robot.legs)
+    return moving and (robot.model.kind != "mjcf" or float(body.principal[0]) <= MIN_INERTIA)
+
+
+@rule("INR004", "triangle-inequality", "error", fixes="unsafe")
+def triangle_inequality(robot: Facts) -> Violations:
+    """The principal moments violate the triangle inequality.
+
+    The sum of the two smaller principal moments equals the largest one for a flat plate and exceeds
+    it for every other body. A smaller sum means that a number was mistyped, or that the inertia was
+    taken about the wrong point or in the wrong frame. MuJoCo rejects the file; in other simulators,
+    the simulated body gains energy.
+
+    Fix:
+        Take the inertia from CAD about the center of mass. The unsafe fix writes the nearest
+        physically valid inertia; MuJoCo's balanceinertia uses that of a sphere instead.
+
+    Source:
+        MuJoCo 4.0: "inertia must satisfy A + B >= C", without a tolerance. Rounding to four digits
+        can reduce the ratio (A + B) / C of a flat part to 0.999. A ratio from 0.99 to 0.999 is
+        therefore a warning, and a larger ratio is a note.
+    """
+    for link in robot.model.links:
+        inertia = link.inertial.inertia if link.inertial else None
+        if inertia is None or not _has_finite_mass(link) or not is_in_range(inertia):
+            continue
+        moments = principal_moments(inertia)
+        if moments[0] <= MIN_INERTIA or triangle_ratio(moments) >= _MIN_EXACT_RATIO:
+            continue
+        ratio = triangle_ratio(moments)
+        severity: Severity = "warning" if ratio < _MIN_ROUNDED_RATIO else "info"
+        text = f"1 - {1 - ratio:.1g}" if ratio > 0.9999 else f"{ratio:.4g}"
+        yield Violation(
+            subject=link.name,
+            source=inertia_source(link),
+            severity="error" if ratio < _MIN_TRIANGLE_RATIO else severity,
+            message=f"principal moments of link {link.name}: got "
+            f"{numbers(moments, '.4g', ', ')} kg m2 with (I1 + I2) / I3 = {text}; expected "
+            "at least 1",
+            measured={"ratio": ratio, **_measured(moments)},
+            fix=robot.inertia_repair.fix(link),
+        )
+
+
+@rule("INR005", "placeholder-inertia", "warning")
+def placeholder_inertia(robot: Facts) -> Violations:
+    """An inertia is the identity matrix, or the same for at least half of the links.
+
+    A mass of 1 kg with an inertia of 1 kg m2 has a radius of gyration of 1 m. Such a link resists
+    rotation like a flywheel, and gains tuned on it fail on the real robot. Identical parts, such as
+    four wheels, may have the same inertia; a thigh and a shank do not.
+
+    Fix:
+        Take the inertia from CAD, or compute it from the mesh at a uniform density.
+
+    Source:
+        Exporters and tutorials use the identity matrix or 0.001 as defaults.
+    """
+    massive = sum(body.mass > MIN_INERTIA for body in robot.bodies)
+    for links in placeholder_inertias(robot.bodies):
+        first = links[0]
+        assert first.inertial is not None
+        assert first.inertial.inertia is not None
+        got, expected = "the identity matrix", "the inertia of the part"
+        if not is_identity(first):
+            got = f"the same diagonal {numbers(np.diag(first.inertial.inertia), '.4g', ', ')} kg m2"
+            expected = "an inertia for each of these different parts"
+        listed = names(link.name for link in links)
+        bodies = f"{len(links)} of {massive} bodies ({listed})"
+        yield Violation(
+            subject=first.name,
+            source=inertia_source(first),
+            message=f"inertia of {bodies if len(links) > 1 else f'body {listed}'}: got {got}; "
+            f"expected {expected}",
+            measured={"links": len(links)},
+        )
+
+
+def _has_finite_mass(link: Link) -> bool:
+    mass = link.inertial.mass if link.inertial else None
+    return mass is not None and 0 <= mass < MAX_INERTIA
+
+
+def _measured(moments: Matrix) -> Mapping[str, float]:
+    return {f"e{k}": float(moment) for k, moment in enumerate(moments)}

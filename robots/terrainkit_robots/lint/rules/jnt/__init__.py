@@ -1,0 +1,1 @@
+"""Rules on joints and actuators (JNT)."""

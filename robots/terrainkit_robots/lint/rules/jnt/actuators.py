@@ -1,0 +1,144 @@
+"""Rules on actuators and safety controllers."""
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.joint_roles import robot_joints
+from terrainkit_robots.lint.problems import problem_violations
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.text import count, names
+
+_MAX_COMMAND_RATIO = 4.0
+"""Allowed ratio of the two ends of the control range of a motor."""
+
+
+@rule("JNT016", "missing-actuator", "warning")
+def missing_actuator(robot: Facts) -> Violations:
+    """A joint of an MJCF file has no actuator.
+
+    The joint is passive, and an environment made from the file has one action less. Joints that
+    mimic others, joints that carry the trunk of a planar model, and files with tendons or other
+    transmissions are not checked. A robot without legs may be passive by design, and mjlab and
+    Genesis add actuators to a file without any: both are only notes.
+
+    Fix:
+        Add a <motor> or <position> actuator for the joint.
+
+    Source:
+        MuJoCo: nu is the number of actuators, not of joints.
+    """
+    if robot.model.kind != "mjcf":
+        return
+    if not robot.model.actuators:
+        if robot.joints:
+            yield Violation(
+                subject=robot.model.title,
+                source=robot.model.source,
+                severity="info",
+                message=f"actuators of the file: got 0 for {count(len(robot.joints), 'joint')}; "
+                "expected one for each joint, unless the framework adds them",
+                measured={"joints": len(robot.joints)},
+            )
+        return
+    actuated = {actuator.joint for actuator in robot.model.actuators}
+    if "" in actuated:
+        return
+    for joint in robot_joints(robot.bodies):
+        if joint.name not in actuated and joint.mimic is None:
+            yield Violation(
+                subject=joint.name,
+                source=joint.source,
+                severity="warning" if robot.legs else "info",
+                message=f"actuators of joint {joint.name}: got 0; expected 1",
+            )
+
+
+@rule("JNT024", "zero-gear", "error")
+def zero_gear(robot: Facts) -> Violations:
+    """The gear of an actuator is zero.
+
+    The actuator then has no effect on the joint, and MuJoCo does not warn about it. The
+    mechanicalReduction of a URDF <transmission> is a gear as well. Only ROS tools read it, so a
+    ratio of zero or one that is not a number is a warning there.
+
+    Fix:
+        Set the gear to 1, or to the ratio of the transmission. A negative ratio inverts the
+        direction.
+
+    Source:
+        MuJoCo's XML reference, actuator: gear scales the length and the force of the actuator;
+        wiki.ros.org/urdf/XML/Transmission.
+    """
+    yield from problem_violations(robot, "JNT024", "warning")
+    for actuator in robot.model.actuators:
+        if actuator.joint and actuator.gear == 0:
+            yield Violation(
+                subject=actuator.joint,
+                source=actuator.source,
+                message=f"gear of the actuator of joint {actuator.joint}: got 0; expected 1 or "
+                "another ratio",
+            )
+
+
+@rule("JNT025", "one-sided-motor", "warning")
+def one_sided_motor(robot: Facts) -> Violations:
+    """A motor can push a hinge in one direction only.
+
+    Its control range starts or ends at zero, usually because a sign is missing. The joint cannot
+    brake or return. A range with one end several times larger than the other one is reported as
+    well: a digit is missing.
+
+    Fix:
+        Give both ends of ctrlrange: "-23.7 23.7".
+
+    Source:
+        MuJoCo's XML reference, actuator: ctrlrange. Joints that several actuators pull, such as
+        muscles, are not checked.
+    """
+    joints = {joint.name: joint for joint in robot_joints(robot.bodies)}
+    used = [actuator.joint for actuator in robot.model.actuators]
+    for actuator in robot.model.actuators:
+        if actuator.commands is None or used.count(actuator.joint) != 1:
+            continue
+        joint = joints.get(actuator.joint)
+        lower, upper = actuator.commands
+        hinge = joint is not None and joint.kind == "revolute"
+        ends = sorted((abs(lower), abs(upper)))
+        is_one_sided = lower >= 0 or upper <= 0 or ends[1] > _MAX_COMMAND_RATIO * ends[0]
+        if hinge and lower < upper and is_one_sided:
+            yield Violation(
+                subject=actuator.joint,
+                source=actuator.source,
+                severity=None if robot.legs else "info",
+                message=f"control range of the motor of joint {actuator.joint}: got {lower:g} to "
+                f"{upper:g}; expected both signs with similar values",
+                measured={"lower": lower, "upper": upper},
+            )
+
+
+@rule("JNT014", "safety-controller", "info")
+def safety_controller(robot: Facts) -> Violations:
+    """A joint has a safety_controller, which Genesis treats as a position controller.
+
+    The k_position of a <safety_controller> was meant for the controllers of ROS 1. Genesis uses it
+    as the stiffness of the joint, so that a robot without gains is held in place.
+
+    Fix:
+        Remove the <safety_controller>, or set the gains after loading.
+
+    Source:
+        Genesis' URDF parser, which uses the value for dofs_kp.
+    """
+    controllers = [
+        (joint.name, controller)
+        for joint in robot.model.joints
+        if joint.moves and (controller := joint.safety_controller) is not None
+        if controller.k_position is not None
+    ]
+    if controllers:
+        first, controller = controllers[0]
+        yield Violation(
+            subject=first,
+            source=controller.source,
+            message=f"safety_controller of {names(name for name, _ in controllers)}: Genesis uses "
+            "k_position as the stiffness of a position controller",
+            measured={"joints": len(controllers)},
+        )

@@ -1,0 +1,141 @@
+"""Rules on damping, friction and armature."""
+
+from terrainkit_robots.analysis.bodies.element_source import dynamics_source
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+
+_MAX_FRICTION, _MAX_LEG_FRICTION = 0.99, 0.3
+"""Allowed friction as a share of the effort, of all joints and of those of legs. Harmonic drives
+need up to 20 %."""
+
+_MIN_TOP_SPEED, _MIN_LEG_SPEED = 0.4, 3.0
+"""Smallest plausible speed at which damping consumes the whole effort, of all joints and of those
+of legs [rad/s]."""
+
+_MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 60.0
+"""Smallest plausible share of its velocity limit that a leg joint reaches against its damping, and
+the limit above which it is a placeholder [rad/s]."""
+
+_MIN_ACCELERATION = 20.0
+"""Smallest plausible ratio of effort to armature [rad/s2]. Motors with a high gear ratio reach
+200."""
+
+
+@rule("JNT020", "negative-loss", "error")
+def negative_loss(robot: Facts) -> Violations:
+    """The damping, friction or armature of a joint is negative.
+
+    Negative damping and friction add energy in each step, so that the joint accelerates without
+    end. MuJoCo accepts negative damping.
+
+    Fix:
+        Remove the sign of the number.
+
+    Source:
+        http://wiki.ros.org/urdf/XML/joint: dynamics.
+    """
+    for joint in robot.model.joints:
+        for name in ("damping", "friction", "armature"):
+            value = getattr(joint, name)
+            if value < 0:
+                yield Violation(
+                    subject=joint.name,
+                    source=dynamics_source(joint),
+                    message=f"{name} of joint {joint.name}: got {value:g}; expected 0 or more",
+                    measured={name: value},
+                )
+
+
+@rule("JNT021", "excessive-friction", "warning")
+def excessive_friction(robot: Facts) -> Violations:
+    """The friction of a joint consumes most of its effort.
+
+    The motor cannot overcome friction above the effort limit, and the joint is locked in simulators
+    that apply it. Effort limits are sometimes written to `friction` by mistake.
+
+    Fix:
+        Use the friction torque of the real joint, which is a few percent of the effort.
+
+    Source:
+        Issue 19 of Universal_Robots_ROS2_Gazebo_Simulation. Published legged robots have at most
+        15 %.
+    """
+    legs = {joint.name for joint in robot.leg_joints}
+    for joint in robot.actuated:
+        effort = robot.effort_limit(joint)
+        limit = _MAX_LEG_FRICTION if joint.name in legs else _MAX_FRICTION
+        if effort is None or effort <= 0 or joint.friction <= limit * effort:
+            continue
+        share, unit = joint.friction / effort, joint.effort_unit
+        yield Violation(
+            subject=joint.name,
+            source=dynamics_source(joint),
+            severity="error" if share > 1 else None,
+            message=f"friction of joint {joint.name}: got {joint.friction:g} {unit}, {share:.0%} "
+            f"of its effort limit of {effort:g} {unit}; expected at most {limit:.0%}",
+            measured={"friction": joint.friction, "effort": effort},
+        )
+
+
+@rule("JNT022", "excessive-damping", "warning")
+def excessive_damping(robot: Facts) -> Violations:
+    """The damping of a joint holds it almost still at full effort.
+
+    At the top speed, damping consumes the whole effort. A gain of a controller that was written to
+    `damping`, or damping per degree, makes the robot move as if in tar.
+
+    Fix:
+        Use the viscous damping of the real joint in N m s/rad, and give gains to the controller.
+
+    Source:
+        Top speed = effort / damping. The legs of published robots have 4.6 rad/s and more, and at
+        least their velocity limit if that is no placeholder.
+    """
+    legs = {joint.name for joint in robot.leg_joints}
+    for joint in robot.actuated_hinges:
+        effort = robot.effort_limit(joint)
+        if effort is None or effort <= 0 or joint.damping <= 0:
+            continue
+        speed = effort / joint.damping
+        limit = _MIN_LEG_SPEED if joint.name in legs else _MIN_TOP_SPEED
+        velocity = joint.limit.velocity if joint.limit and joint.name in legs else None
+        if velocity is not None and 0 < velocity <= _MAX_LEG_VELOCITY:
+            limit = max(min(limit, velocity), _MIN_SPEED_SHARE * velocity)
+        if speed < limit:
+            yield Violation(
+                subject=joint.name,
+                source=dynamics_source(joint),
+                message=f"damping of joint {joint.name}: got {joint.damping:g} N m s/rad, which "
+                f"limits it to {speed:.3g} rad/s at its effort limit of {effort:g} N m; expected "
+                f"at least {limit:g} rad/s",
+                measured={"damping": joint.damping, "speed": speed},
+            )
+
+
+@rule("JNT023", "excessive-armature", "warning")
+def excessive_armature(robot: Facts) -> Violations:
+    """The armature of a joint is too large for its effort.
+
+    Armature is the inertia of the rotor times the square of the gear ratio. An excessive one makes
+    the joint too slow to balance with.
+
+    Fix:
+        Compute the armature of the real motor; typical values are 0.005 to 0.2 kg m2.
+
+    Source:
+        Acceleration = effort / armature. Published legged robots have 300 rad/s2 and more.
+    """
+    for joint in robot.actuated_hinges:
+        effort = robot.effort_limit(joint)
+        if effort is None or effort <= 0 or joint.armature <= 0:
+            continue
+        acceleration = effort / joint.armature
+        if acceleration < _MIN_ACCELERATION:
+            yield Violation(
+                subject=joint.name,
+                source=joint.source,
+                message=f"armature of joint {joint.name}: got {joint.armature:g} kg m2, which "
+                f"limits it to {acceleration:.3g} rad/s2 at its effort limit of {effort:g} N m; "
+                f"expected at least {_MIN_ACCELERATION:g} rad/s2",
+                measured={"armature": joint.armature, "acceleration": acceleration},
+            )

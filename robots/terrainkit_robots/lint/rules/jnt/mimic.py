@@ -1,0 +1,64 @@
+"""Rule on mimic joints."""
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Joint
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+
+
+@rule("JNT013", "invalid-mimic", "error")
+def invalid_mimic(robot: Facts) -> Violations:
+    """A joint mimics a joint that is missing or fixed, or mimics itself.
+
+    MuJoCo ignores the <mimic>, so that the joint stays limp, and rejects a joint that mimics
+    itself. The positions of joints that mimic each other in a cycle are not defined. With a
+    multiplier of 0, which is a warning, the joint never moves.
+
+    Fix:
+        Name the joint that is driven, and give the ratio of the two positions as the multiplier.
+
+    Source:
+        Tested with MuJoCo 4.0: "<mimic> on joint ignored".
+    """
+    joints = {joint.name: joint for joint in reversed(robot.model.joints)}
+    checked: set[str] = set()
+    for joint in robot.model.joints:
+        if joint.mimic is None or not joint.moves or joint.name in checked:
+            continue
+        target = joints.get(joint.mimic.joint)
+        cycle = _mimic_cycle(joint, joints)
+        checked.update(cycle)
+        if target is None:
+            got = f"{joint.mimic.joint!r}, which does not exist"
+        elif not target.moves:
+            got = f"{target.name}, which is {target.kind or 'without a type'}"
+        elif cycle == [joint.name]:
+            got = "the joint itself"
+        elif cycle:
+            got = f"{target.name}, in the cycle {' -> '.join(cycle[:10])}"
+        elif joint.mimic.multiplier == 0 and not robot.unparsed.has(joint.name, "multiplier"):
+            yield Violation(
+                subject=joint.name,
+                source=joint.mimic.source,
+                severity="warning",
+                message=f"multiplier of the mimic of joint {joint.name}: got 0, which holds the "
+                "joint still; expected another ratio, or a fixed joint",
+            )
+            continue
+        else:
+            continue
+        yield Violation(
+            subject=joint.name,
+            source=joint.mimic.source,
+            message=f"mimic target of joint {joint.name}: got {got}; expected a joint that is "
+            "driven",
+        )
+
+
+def _mimic_cycle(joint: Joint, joints: dict[str, Joint]) -> list[str]:
+    """Return the joints that mimic each other in a cycle with `joint`; empty without a cycle."""
+    path: dict[str, None] = {}
+    current: Joint | None = joint
+    while current is not None and current.mimic is not None and current.name not in path:
+        path[current.name] = None
+        current = joints.get(current.mimic.joint)
+    return list(path) if current is not None and current.name == joint.name else []

@@ -1,0 +1,225 @@
+"""Rules on effort and velocity limits."""
+
+from collections.abc import Iterator
+
+from terrainkit_robots.analysis.bodies.element_source import limit_source
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.stance import GRAVITY
+from terrainkit_robots.description.model import Actuator, Joint
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+
+_MAX_EFFORT = 1000.0
+"""Torque [N m] or force [N] from which a limit may be a placeholder."""
+
+_MAX_WEIGHTS = 10.0
+"""Plausible force of a sliding joint in multiples of the robot's weight: 3000 N for 30 kg."""
+
+_MAX_VELOCITY = 100.0
+"""Largest plausible velocity [rad/s] or [m/s]; geared motors reach 60."""
+
+_MAX_SPIN_VELOCITY = 1500.0
+"""The same for continuous joints [rad/s]; the propellers of small drones reach 1000."""
+
+_MAX_UNIT_COMMAND = 5.0
+"""Largest command of a motor that may be a normalized action instead of a torque."""
+
+_MAX_LEG_EFFORT = 5.0
+"""Plausible effort of a leg joint, over the weight of the robot times its leg length. Published
+legged robots have 0.2 to 1.5."""
+
+_MAX_GEARED_EFFORT = 2.0
+"""The same if a gear multiplies a control range in N m, which is rarely intended."""
+
+_MIN_LEG_VELOCITY = 0.2
+"""Smallest plausible velocity limit of a leg joint [rad/s]. A yaw joint of Romeo has 0.32."""
+
+
+@rule("JNT009", "missing-effort", "error")
+def missing_effort(robot: Facts) -> Violations:
+    """The effort limit of a joint is zero or missing.
+
+    Isaac Gym, Isaac Lab and Genesis clip torques to the effort of the URDF. With an effort of 0 the
+    joint stays limp, whereas MuJoCo treats 0 as no limit. If the number is missing, simulators
+    apply no limit or a default, and the policy learns with torques that the motor does not have.
+
+    Fix:
+        Give the peak torque of the motor after the gear [N m], or the force [N].
+
+    Source:
+        http://wiki.ros.org/urdf/XML/joint: effort is required.
+    """
+    for joint in _joints_with_limit(robot):
+        assert joint.limit is not None
+        effort = joint.limit.effort
+        if effort is None and robot.unparsed.has(joint.name, "effort"):
+            continue
+        if effort is None or effort <= 0:
+            unit = joint.effort_unit
+            yield Violation(
+                subject=joint.name,
+                source=joint.limit.source,
+                severity="warning" if effort is None else None,
+                message=f"effort limit of joint {joint.name}: got "
+                f"{'no number' if effort is None else f'{effort:g} {unit}'}; expected the peak "
+                f"{'force' if unit == 'N' else 'torque'} of the motor [{unit}]",
+                measured={} if effort is None else {"effort": effort},
+            )
+
+
+def _joints_with_limit(robot: Facts) -> Iterator[Joint]:
+    """Yield the moving joints of a URDF whose <limit> has a number other than zero."""
+    if robot.model.kind == "mjcf":
+        return  # MJCF has effort limits on actuators, and no velocity limits
+    for joint in robot.model.joints:
+        limit = joint.limit
+        if not joint.moves or limit is None:
+            continue
+        numbers = (limit.lower, limit.upper, limit.effort, limit.velocity)
+        if joint.kind == "continuous" or any(numbers):  # JNT006 reports the others
+            yield joint
+
+
+@rule("JNT010", "missing-velocity", "warning")
+def missing_velocity(robot: Facts) -> Violations:
+    """The velocity limit of a joint is zero or missing.
+
+    PhysX clips the velocity of a joint to this number; with 0 the joint does not move. If the
+    number is missing, a policy learns velocities that the motor does not reach, and legged_gym's
+    soft velocity limit is not defined.
+
+    Fix:
+        Give the no-load speed of the motor after the gear [rad/s], or the speed [m/s].
+
+    Source:
+        http://wiki.ros.org/urdf/XML/joint: velocity is required.
+    """
+    for joint in _joints_with_limit(robot):
+        assert joint.limit is not None
+        velocity, unit = joint.limit.velocity, joint.speed_unit
+        if velocity is None and robot.unparsed.has(joint.name, "velocity"):
+            continue
+        if velocity is None or velocity <= 0:
+            yield Violation(
+                subject=joint.name,
+                source=joint.limit.source,
+                message=f"velocity limit of joint {joint.name}: got "
+                f"{'no number' if velocity is None else f'{velocity:g} {unit}'}; expected the "
+                f"no-load speed of the motor [{unit}]",
+            )
+
+
+@rule("JNT011", "placeholder-limit", "warning")
+def placeholder_limit(robot: Facts) -> Violations:
+    """An effort or velocity limit is a placeholder.
+
+    An effort of 1000 N m on a quadruped of 15 kg limits nothing: the policy learns jumps that
+    overload the motor. An effort that can hold the whole robot at arm's length is not checked, nor
+    a force of up to ten times the robot's weight.
+
+    Fix:
+        Give the peak torque and the no-load speed of the motor after the gear.
+
+    Source:
+        Motors of legged robots have 20 to 400 N m and 10 to 60 rad/s; those of Atlas have 900 N m.
+    """
+    weight = max(robot.total_mass, 0.0) * GRAVITY
+    max_effort = {
+        "N": max(_MAX_EFFORT, _MAX_WEIGHTS * weight),
+        "N m": max(_MAX_EFFORT, weight * robot.body_bounds.robot_size),
+    }
+    for joint in _joints_with_limit(robot):
+        assert joint.limit is not None
+        max_velocity = _MAX_SPIN_VELOCITY if joint.kind == "continuous" else _MAX_VELOCITY
+        limits = {
+            "effort": (joint.limit.effort, max_effort[joint.effort_unit], joint.effort_unit),
+            "velocity": (joint.limit.velocity, max_velocity, joint.speed_unit),
+        }
+        too_large = {
+            name: (value, most, unit)
+            for name, (value, most, unit) in limits.items()
+            if value is not None and (value > most or (name == "effort" and value == most))
+        }
+        if too_large:
+            got = " and ".join(f"{value:g} {unit}" for value, _, unit in too_large.values())
+            expected = " and ".join(f"{most:.4g} {unit}" for _, most, unit in too_large.values())
+            yield Violation(
+                subject=joint.name,
+                source=joint.limit.source,
+                message=f"{' and '.join(too_large)} limit of joint {joint.name}: got {got}; "
+                f"expected less than {expected} for a robot of {robot.total_mass:.4g} kg",
+                measured={name: value for name, (value, _, _) in too_large.items()},
+            )
+
+
+@rule("JNT026", "oversized-effort", "warning", needs=("legs",))
+def oversized_effort(robot: Facts) -> Violations:
+    """The effort limit of a leg joint is far too large for the robot.
+
+    The number is in another unit, such as kg cm, or is a placeholder. A policy learns to jump with
+    torques that the motor does not have.
+
+    Fix:
+        Give the peak torque of the motor after the gear, in N m.
+
+    Source:
+        Effort over weight times leg length: published legged robots have 0.2 to 1.5. In MJCF this
+        is only a note, since benchmark models such as the ant of Gymnasium have 57, unless a gear
+        multiplies a control range that is a torque of the joint already.
+    """
+    weight = robot.total_mass * GRAVITY
+    length = max(leg.length for leg in robot.legs)
+    for joint in robot.leg_joints:
+        effort = robot.effort_limit(joint)
+        geared = _geared_torque(robot, joint)
+        share = _MAX_GEARED_EFFORT if geared else _MAX_LEG_EFFORT
+        limit = share * weight * length
+        if effort is None or joint.kind != "revolute" or not effort > limit > 0:
+            continue
+        if effort >= max(1000.0, weight * robot.body_bounds.robot_size):
+            continue  # reported by JNT011
+        yield Violation(
+            subject=joint.name,
+            source=geared.source if geared else limit_source(joint),
+            severity="info" if robot.model.kind == "mjcf" and not geared else None,
+            certainty="likely",
+            message=f"effort limit of joint {joint.name}: got {effort:g} N m, "
+            f"{effort / (weight * length):.3g} times the weight times the leg length; expected at "
+            f"most {share:g} times ({limit:.4g} N m)"
+            + (f"; the gear of its motor is {geared.gear:g}" if geared else ""),
+            measured={"effort": effort, "most": limit},
+        )
+
+
+def _geared_torque(robot: Facts, joint: Joint) -> Actuator | None:
+    """Return the motor of a joint if it has a gear although it commands a torque."""
+    for motor in robot.model.actuators:
+        if motor.joint == joint.name and motor.commands is not None and abs(motor.gear) > 1:
+            return motor if max(map(abs, motor.commands)) > _MAX_UNIT_COMMAND else None
+    return None
+
+
+@rule("JNT027", "low-velocity-limit", "warning", needs=("legs",))
+def low_velocity_limit(robot: Facts) -> Violations:
+    """The velocity limit of a leg joint is too low to walk.
+
+    PhysX clips the velocity of the joint to this number. A velocity in turns per second, or that
+    was converted from degrees twice, holds the leg almost still.
+
+    Fix:
+        Give the no-load speed of the motor after the gear [rad/s].
+
+    Source:
+        Published legged robots have 4 rad/s and more.
+    """
+    for joint in robot.leg_joints:
+        velocity = joint.limit.velocity if joint.limit else None
+        if velocity is None or joint.kind == "prismatic":
+            continue
+        if 0 < velocity < _MIN_LEG_VELOCITY:
+            yield Violation(
+                subject=joint.name,
+                source=limit_source(joint),
+                message=f"velocity limit of leg joint {joint.name}: got {velocity:g} rad/s; "
+                f"expected at least {_MIN_LEG_VELOCITY:g} rad/s",
+                measured={"velocity": velocity},
+            )

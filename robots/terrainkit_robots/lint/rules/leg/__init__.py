@@ -1,0 +1,1 @@
+"""Rules on legs and the standing pose (LEG)."""

@@ -1,0 +1,181 @@
+"""Rules on the number of legs and joints that were detected."""
+
+from collections import Counter
+
+import numpy as np
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.legs.legs import mean_length
+from terrainkit_robots.analysis.legs.limbs import Limb
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.text import names
+
+_LEG_COUNTS = (2, 4, 6, 8)
+
+_MAX_MASS_DIFFERENCE = 0.02
+"""Allowed relative difference between the masses of two equal limbs."""
+
+_MAX_RISE = 0.3
+"""A leg points up if its end is higher than its start by this share of the distance."""
+
+
+def _inverted_legs(robot: Facts) -> list[Limb]:
+    """Return the limbs that have the joints of a leg, but end above their start."""
+    legs = [leg.limb for leg in robot.legs]
+    leg_types = {_joint_types(limb) for limb in legs}
+    inverted = []
+    for limb in robot.limbs:
+        start = limb.points[0]
+        rise = float(limb.tip[2] - start[2])
+        if limb in legs or rise < _MAX_RISE * float(np.linalg.norm(limb.tip - start)):
+            continue
+        at_leg_height = any(abs(float(leg.points[0][2] - start[2])) < rise / 2 for leg in legs)
+        if limb.has_leg_names and _joint_types(limb) in leg_types and at_leg_height:
+            inverted.append(limb)
+    return inverted
+
+
+def _joint_types(limb: Limb) -> tuple[str, ...]:
+    return tuple(joint.kind for joint in limb.joints)
+
+
+@rule("LEG001", "detected-legs", "info", needs=("legs",))
+def detected_legs(robot: Facts) -> Violations:
+    """Lists the legs that were detected and the roles of their joints.
+
+    All findings on legs, feet and the standing pose depend on this detection. If it is wrong,
+    ignore those findings.
+
+    Fix:
+        No action if the legs are correct. If a leg is missing, check its joints and its last link.
+
+    Source:
+        Leaves of the tree that end near the ground, have a mirror image, and have names of legs.
+    """
+    roles = {leg.foot: " ".join(leg.roles) for leg in robot.legs}
+    if len(set(roles.values())) == 1:
+        listed = f"feet {', '.join(roles)}; joints of each leg: {roles[robot.legs[0].foot]}"
+    else:
+        listed = "; ".join(f"{foot}: {each}" for foot, each in roles.items())
+    yield Violation(
+        subject=robot.model.title,
+        source=robot.model.source,
+        message=f"{len(robot.legs)} legs with a length of {mean_length(robot.legs):.3f} m; "
+        f"{listed}",
+        certainty="likely",
+        measured={"legs": len(robot.legs)},
+    )
+
+
+@rule("LEG002", "leg-count", "warning", needs=("legs",))
+def leg_count(robot: Facts) -> Violations:
+    """The number of legs is not 2, 4, 6 or 8.
+
+    A leg that is not detected usually has a joint that is misnamed or fixed, or ends at another
+    height than the other legs. Limbs that equal the legs but are not counted are reported as well:
+    a robot whose z axis does not point up stands on two of its four legs. A robot with a single
+    limb is a hopper.
+
+    Fix:
+        Compare the missing leg with the others, from the trunk to the foot.
+
+    Source:
+        All legged robots in simulation suites have an even number of legs.
+    """
+    count = len(robot.legs)
+    uncounted = _uncounted_legs(robot)
+    if uncounted:
+        yield Violation(
+            subject=robot.model.title,
+            source=robot.model.source,
+            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
+            f"expected {count + len(uncounted)}, since {names(uncounted)} have the joints and "
+            "masses of a leg, but do not end near the ground; check that z points up",
+            certainty="likely",
+            measured={"legs": count, "uncounted": len(uncounted)},
+        )
+    elif len(robot.limbs) > 1 and count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
+        yield Violation(
+            subject=robot.model.title,
+            source=robot.model.source,
+            message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
+            "expected 2, 4, 6 or 8",
+            certainty="likely",
+            measured={"legs": count},
+        )
+
+
+def _uncounted_legs(robot: Facts) -> list[str]:
+    """Return the last bodies of limbs that have the joints and the masses of a leg."""
+    legs = [leg.limb for leg in robot.legs]
+    used = robot.leg_bodies
+    inverted = _inverted_legs(robot)
+    return [
+        robot.bodies[limb.chain[-1]].name
+        for limb in robot.limbs
+        if limb not in inverted and used.isdisjoint(limb.chain)
+        if any(_is_equal_limb(robot, limb, leg) for leg in legs)
+    ]
+
+
+def _is_equal_limb(robot: Facts, limb: Limb, leg: Limb) -> bool:
+    if _joint_types(limb) != _joint_types(leg) or len(limb.chain) != len(leg.chain):
+        return False
+    own, other = ([robot.bodies[index].mass for index in each.chain] for each in (limb, leg))
+    return min(own) > 0 and bool(np.allclose(own, other, rtol=_MAX_MASS_DIFFERENCE))
+
+
+@rule("LEG003", "missing-leg-joint", "warning", needs=("legs",))
+def missing_leg_joint(robot: Facts) -> Violations:
+    """A leg has fewer joints than the others.
+
+    A joint that is fixed or missing makes the leg stiff. The policy learns to limp, and one motor
+    of the real robot has no joint.
+
+    Fix:
+        Give the leg the joints of the other legs; look for a joint of type fixed.
+
+    Source:
+        Comparison with the number of joints that most legs have.
+    """
+    counts = Counter(len(leg.joints) for leg in robot.legs)
+    usual, _ = max(counts.items(), key=lambda item: (item[1], item[0]))
+    for leg in robot.legs:
+        if len(leg.joints) < usual:
+            yield Violation(
+                subject=leg.foot,
+                source=robot.tree.links[leg.foot].source,
+                message=f"moving joints of the leg with foot {leg.foot}: got {len(leg.joints)}; "
+                f"expected {usual}, as in the other legs",
+                certainty="likely",
+                measured={"joints": len(leg.joints), "usual": usual},
+            )
+
+
+@rule("LEG007", "leg-points-up", "error", needs=("legs",))
+def leg_points_up(robot: Facts) -> Violations:
+    """A leg points up, unlike the others.
+
+    A sign or a rotation in the origin of one of its joints is wrong, and the robot stands on the
+    other legs.
+
+    Fix:
+        Compare the origins of the first joints of the leg with those of the others.
+
+    Source:
+        Comparison of the ends of limbs with the same joint types, all joints at zero.
+    """
+    for limb in _inverted_legs(robot):
+        start, first = limb.points[0], limb.joints[0]
+        leaf = robot.bodies[limb.chain[-1]]
+        rise = float(limb.tip[2] - start[2])
+        reach = float(np.linalg.norm(limb.tip - start))
+        yield Violation(
+            subject=leaf.name,
+            source=first.source,
+            message=f"height of the end of leg {leaf.name} above joint {first.name}, all joints at "
+            f"zero: got {rise:.3f} m, {rise / reach:.0%} of their distance of {reach:.3f} m; "
+            f"expected less than {_MAX_RISE:.0%}, and below 0 as for the other legs",
+            certainty="likely",
+            measured={"rise": round(rise, 4), "reach": round(reach, 4)},
+        )

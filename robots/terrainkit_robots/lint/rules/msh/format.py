@@ -1,0 +1,137 @@
+"""Rules on the formats of mesh files."""
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.meshes.replacement import binary_copy, has_hull, stl_or_hull
+from terrainkit_robots.analysis.meshes.uses import UsedMesh, replace_edits
+from terrainkit_robots.description.fix import make_fix
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
+from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
+
+
+@rule("MSH005", "unsupported-format", "error", fixes="unsafe")
+def unsupported_format(robot: Facts) -> Violations:
+    """A collision mesh is in a format that MuJoCo cannot read.
+
+    MuJoCo reads STL, OBJ and its own MSH, depending on the suffix. It cannot load a robot with
+    COLLADA (.dae) meshes, which are common in ROS. Visual meshes of a URDF are not checked, because
+    MuJoCo discards them.
+
+    Fix:
+        Convert the mesh. --unsafe-fixes writes an STL file beside it, or its convex hull if it has
+        more than 20,000 faces. As in RViz and MoveIt, the up axis of COLLADA is ignored; inspect
+        the result.
+
+    Source:
+        Observed in MuJoCo 4.0: "no decoder found for mesh file".
+    """
+    for used in robot.mesh_files:
+        suffix = used.mesh.path.suffix.lower()
+        if not used.strict or suffix in MUJOCO_SUFFIXES or used.header.state != "fine":
+            continue
+        uses = used.uses if robot.model.kind == "mjcf" else used.collisions
+        edits = None
+        if has_hull(robot.meshes, uses):
+            edits = replace_edits(robot.model, robot.meshes, uses, ".stl", stl_or_hull(used))
+        yield Violation(
+            subject=used.name,
+            source=used.source,
+            message=f"format of {used.label}: got {suffix or 'no suffix'}; expected "
+            f"{', '.join(MUJOCO_SUFFIXES)} for MuJoCo",
+            fix=make_fix("unsafe", "Convert it to STL.", edits),
+        )
+
+
+@rule("MSH006", "malformed-mesh", "error")
+def malformed_mesh(robot: Facts) -> Violations:
+    """A mesh file is empty, truncated or in another format than its suffix.
+
+    A binary STL has 84 bytes plus 50 per face. Any other size means that the file was truncated in
+    a copy or download. Readers reject it, or read triangles from invalid memory.
+
+    Fix:
+        Copy or download the file again, or export it again.
+
+    Source:
+        Observed in MuJoCo 4.0: "STL file has wrong size", "is empty", "vertex coordinate is not
+        finite".
+    """
+    for used in robot.mesh_files:
+        problem, severity = _file_problem(robot.meshes, used)
+        if problem:
+            yield Violation(
+                subject=used.name,
+                source=used.source,
+                message=f"{used.label} {problem}",
+                severity=severity,
+                measured={"bytes": used.header.size},
+            )
+
+
+def _file_problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
+    """Return what is wrong with a file and the severity, unless another rule reports it."""
+    if used.header.state in ("lfs", "missing"):
+        return "", "info"
+    if used.header.problem:
+        # All readers except MuJoCo read the faces and ignore the rest.
+        is_harmless = not used.strict and used.header.faces is not None
+        return used.header.problem, "warning" if is_harmless else "error"
+    if used.header.format != "other":
+        for use in used.collisions:
+            try:
+                meshes.vertices(use.mesh)
+            except TooLargeError as error:
+                return f"was not checked: it {error}", "info"
+            except MeshError as error:
+                return str(error), "error"
+    return "", "info"
+
+
+@rule("MSH007", "ascii-stl", "error", fixes="safe")
+def ascii_stl(robot: Facts) -> Violations:
+    """A mesh is an ASCII STL file.
+
+    MuJoCo reads binary STL only, and interprets the text as the number of faces. Other readers
+    support both formats, so a visual mesh of a URDF is only a note.
+
+    Fix:
+        Save it as binary STL. --fix writes one beside it.
+
+    Source:
+        Observed in MuJoCo 4.0: "perhaps this is an ASCII file?".
+    """
+    for used in robot.mesh_files:
+        if used.header.format == "ascii-stl" and used.header.state == "fine":
+            content = binary_copy(used)
+            edits = replace_edits(robot.model, robot.meshes, used.uses, "_binary.stl", content)
+            yield Violation(
+                subject=used.name,
+                source=used.source,
+                message=f"format of {used.label}: got ASCII STL of {used.header.size:,} "
+                "bytes; expected binary STL for MuJoCo",
+                severity="error" if used.strict else "info",
+                fix=make_fix("safe", "Convert it to binary STL.", edits),
+            )
+
+
+@rule("MSH013", "lfs-pointer", "error")
+def lfs_pointer(robot: Facts) -> Violations:
+    """A mesh file is a Git LFS pointer.
+
+    The repository was cloned without Git LFS, or downloaded as an archive. Each large file is
+    replaced by three lines of text with its hash, which no simulator can read.
+
+    Fix:
+        Run `git lfs install` and `git lfs pull` in the repository.
+
+    Source:
+        Git LFS, "Specification": pointer files start with the word version.
+    """
+    for used in robot.mesh_files:
+        if used.header.state == "lfs":
+            yield Violation(
+                subject=used.name,
+                source=used.source,
+                message=f"{used.label} {used.header.problem}",
+                measured={"bytes": used.header.size},
+            )

@@ -1,0 +1,1 @@
+"""Rules on how simulators load the robot (SIM)."""

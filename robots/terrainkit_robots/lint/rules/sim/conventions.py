@@ -1,0 +1,135 @@
+"""Rules on the conventions of simulators: joint order, merged feet and armature."""
+
+from collections.abc import Sequence
+
+from terrainkit_robots.analysis.bodies.joint_order import permutation
+from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.simulator_conventions.armature import (
+    GENESIS_ARMATURE,
+    inertia_without_armature,
+)
+from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
+    KEEP_LINK_OPTIONS,
+    SIMULATORS,
+    find_merged_feet,
+)
+from terrainkit_robots.analysis.simulator_conventions.joint_order import SimulatorOrder
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.text import conjunction
+
+_MAX_JOINTS = 40
+"""Maximum number of joints for which the message contains the permutation."""
+
+
+@rule("SIM001", "joint-order", "info")
+def joint_order(robot: Facts) -> Violations:
+    """A simulator orders the joints differently from the file.
+
+    The observations and actions of a policy are ordered by joint. A policy that was trained in one
+    simulator fails in another one, or on the real robot, unless they are reordered. Isaac Lab
+    traverses the tree breadth-first, the other simulators depth-first.
+
+    Fix:
+        Address joints by name, or reorder by the printed list: `there = [here[i] for i in order]`,
+        where `here` is in the order of the file. The JSON report contains all orders under
+        `joint_orders`.
+
+    Source:
+        Compared with MuJoCo's compiler, genesis-world 1.4.5, Isaac Sim's URDF importer, and
+        published joint lists for Isaac Lab and Isaac Gym. An order that these do not confirm is
+        marked as unverified.
+    """
+    file = robot.file_order
+    others = [order for order in robot.simulator_orders if order.joints != file]
+    if not others:
+        return
+    same = [name for name in SIMULATORS if name not in {order.simulator for order in others}]
+    orders = "; ".join(_format_order(order, file) for order in others)
+    rest = f"; {conjunction(same)}: same as the file" if same else ""
+    yield Violation(
+        subject=robot.model.title,
+        source=robot.model.source,
+        message=f"joint order, as indices into the file's order: {orders}{rest}",
+        certainty="proven" if all(order.certain for order in others) else "likely",
+        measured={"joints": len(file)},
+    )
+
+
+def _format_order(order: SimulatorOrder, file: Sequence[str]) -> str:
+    unverified = "" if order.certain else " (unverified)"
+    indices = permutation(file, order.joints)
+    if indices is None:
+        raise CannotCheckError("two joints have the same name")
+    if len(indices) > _MAX_JOINTS:
+        return f"{order.simulator}{unverified}: different ({len(indices)} joints)"
+    return f"{order.simulator}{unverified}: {indices}"
+
+
+@rule("SIM002", "merged-feet", "info", needs=("legs",))
+def merged_feet(robot: Facts) -> Violations:
+    """A simulator merges the feet into the shanks by default.
+
+    A foot on a fixed joint is then not a separate body: its name does not exist, and contact forces
+    are reported for the shank. Each simulator has its own option to keep it.
+
+    Fix:
+        MuJoCo: `<mujoco><compiler fusestatic="false"/></mujoco>` in the URDF. Isaac Gym and Isaac
+        Lab: `dont_collapse="true"` on the fixed joint. Genesis: name the feet in `links_to_keep` of
+        `gs.morphs.URDF`.
+
+    Source:
+        MuJoCo's `fusestatic`, which is enabled for URDF; legged_gym's `collapse_fixed_joints`;
+        Isaac Lab's `merge_fixed_joints`; `merge_fixed_links` of genesis-world 1.4.5.
+    """
+    merges = find_merged_feet(robot.tree, robot.bodies, robot.legs, robot.fixed_joints)
+    if not merges:
+        return
+    first = merges[0]
+    by = [s for s in SIMULATORS if any(s in merge.merged_body for merge in merges)]
+    into = next(iter(first.merged_body.values()))
+    example = f"{first.foot} into {into}" + (", ..." if len(merges) > 1 else "")
+    yield Violation(
+        subject=first.foot,
+        source=first.joint.source,
+        message=(
+            f"{conjunction(by)} merge{'s' * (len(by) == 1)} {len(merges)} feet into their parent "
+            f"links by default ({example})"
+        ),
+        hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
+        measured={"feet": len(merges)},
+    )
+
+
+@rule("SIM003", "genesis-armature", "info")
+def genesis_armature(robot: Facts) -> Violations:
+    """The default armature of Genesis exceeds the inertia that a joint moves.
+
+    Genesis sets the armature of a joint without one to 0.1 kg m2, ten times that of a small legged
+    robot. The joint accelerates much more slowly than in other simulators, and a policy trained
+    with it does not transfer.
+
+    Fix:
+        Set `default_armature` of gs.morphs.URDF or gs.morphs.MJCF to that of your motor: rotor
+        inertia times the square of the gear ratio.
+
+    Source:
+        `default_armature` in genesis-world 1.4.5 is 0.1 unless MuJoCo compatibility is enabled. It
+        is compared with the inertia about the joint axis of all links below, at joint positions 0.
+    """
+    moved = inertia_without_armature(robot.bodies, robot.actuated)
+    slowed = [each for each in moved if each.inertia < GENESIS_ARMATURE]
+    if not slowed:
+        return
+    worst = min(slowed, key=lambda each: each.inertia)
+    unit = "kg" if worst.joint.kind == "prismatic" else "kg m2"
+    yield Violation(
+        subject=worst.joint.name,
+        source=worst.joint.source,
+        message=(
+            f"default armature of Genesis: {GENESIS_ARMATURE} {unit} exceeds the moved inertia of "
+            f"{len(slowed)} of {len(robot.actuated)} joints; smallest: {worst.joint.name} with "
+            f"{worst.inertia:.2g} {unit}"
+        ),
+        measured={"inertia": worst.inertia, "joints": len(slowed)},
+    )

@@ -1,0 +1,1 @@
+"""Rules on the symmetry of left and right (SYM)."""

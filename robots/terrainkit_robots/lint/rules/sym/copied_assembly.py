@@ -1,0 +1,55 @@
+"""Rule on assemblies that are mounted twice instead of mirrored."""
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.symmetry.asymmetry import limits_match
+from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
+    com_error,
+    has_valid_masses,
+    max_com_error,
+)
+from terrainkit_robots.lint.rule import Violation, Violations, rule
+
+
+@rule("SYM008", "copied-assembly", "info")
+def copied_assembly(robot: Facts) -> Violations:
+    """The left and the right side are the same assembly, mounted twice.
+
+    Two arms of one product are equal in their own frames, and are not mirror images of each other.
+    The other rules on symmetry do not apply to them, and a policy cannot be mirrored by swapping
+    joints with a sign.
+
+    Fix:
+        No action if the real robot is built like this. Otherwise mirror one side: centers of mass,
+        products of inertia, origins and limits.
+
+    Source:
+        Both sides have the same meshes, inertials, joint axes, origins and limits, and at least one
+        center of mass or range is not mirrored.
+    """
+    copied = robot.copied_pairs
+    differing = [
+        pair
+        for pair in copied
+        if (has_valid_masses(pair) and com_error(robot.mirror, pair) > max_com_error(pair))
+        or (
+            pair.sign != 0
+            and (a := pair.left.joint.range) is not None
+            and (b := pair.right.joint.range) is not None
+            and not limits_match(a, b, pair.sign)
+        )
+    ]
+    if differing:
+        first = copied[0]
+        yield Violation(
+            subject=first.left.body.name,
+            source=first.left.body.top.source,
+            certainty="likely",
+            message=f"assemblies on both sides: got {len(copied)} equal pairs of bodies, from "
+            f"{first.left.body.name} and {first.right.body.name} on; {len(differing)} of them are "
+            "not mirror images",
+            measured={
+                "pairs": len(copied),
+                "differing": len(differing),
+                "mirror_image": first.right.body.name,
+            },
+        )

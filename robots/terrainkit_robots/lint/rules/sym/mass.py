@@ -1,0 +1,157 @@
+"""Rules on the symmetry of masses and centers of mass."""
+
+from collections import Counter
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.element_source import mass_source
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
+    MAX_COM_ERROR,
+    MAX_MASS_DIFFERENCE,
+    com_error,
+    has_valid_masses,
+    is_merged,
+    max_com_error,
+)
+from terrainkit_robots.lint.compare.body_mass import relative_difference
+from terrainkit_robots.lint.rule import Violation, Violations, rule, violations
+from terrainkit_robots.lint.rules.sym.other_rules import OtherRules, check_joint_types
+from terrainkit_robots.text import contrast, numbers
+from terrainkit_robots.transforms import Matrix
+
+_MAX_TRUNK_OFFSET, _TRUNK_OFFSET_SHARE = 0.02, 0.25
+"""Allowed distance of the trunk's center of mass from the mirror plane: at least this distance [m]
+and this share of that of the legs. Of 143 published legged robots, none exceeds 0.11."""
+
+
+@rule("SYM001", "mass-asymmetry", "warning")
+def mass_asymmetry(robot: Facts) -> Violations:
+    """The mass of a body differs from that of its mirror image.
+
+    A number was mistyped, or changed on one side only. The robot leans, and a policy learns to
+    compensate for a lean that the real robot does not have.
+
+    Fix:
+        Give both bodies the same mass; ignore the rule if the real masses differ.
+
+    Source:
+        The masses of tested robots without defects agree to four digits.
+    """
+    check_joint_types(robot)
+    other_rules = OtherRules(robot, "INR010", "INR009", "INR001")
+    for pair in robot.uncopied_pairs:
+        left, right = pair.left, pair.right
+        difference = relative_difference(left.body.mass, right.body.mass)
+        if not has_valid_masses(pair) or difference <= MAX_MASS_DIFFERENCE:
+            continue
+        if other_rules.report(pair):
+            continue
+        odd, other = robot.outlier_first(left, right, lambda body: np.array([body.mass]))
+        yield Violation(
+            subject=odd.body.name,
+            source=mass_source(odd.body.main_link),
+            certainty="likely",
+            message=f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
+            f"{contrast(difference, MAX_MASS_DIFFERENCE, '.1%')[0]} from the "
+            f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
+            f"{MAX_MASS_DIFFERENCE:.0%}",
+            measured={
+                "mass": odd.body.mass,
+                "other": other.body.mass,
+                "mirror_image": other.body.name,
+            },
+        )
+
+
+@rule("SYM002", "com-asymmetry", "warning")
+def com_asymmetry(robot: Facts) -> Violations:
+    """A center of mass is not at the mirrored position of its mirror image.
+
+    Usually a sign was lost when one side was copied from the other, or the frame of one link is
+    rotated. As with a wrong mass, the weight shifts to one side. The center of mass of the trunk
+    has to be close to the mirror plane.
+
+    Fix:
+        Mirror the origin of the <inertial>, in the frame of its own link.
+
+    Source:
+        The centers of mass of tested robots without defects agree to 0.1 mm; the tolerance is 2 mm
+        plus 10 % of the radius of gyration.
+    """
+    check_joint_types(robot)
+    _, displaced = robot.misalignments
+    other_rules = OtherRules(robot, "INR008")
+    for pair in robot.uncopied_pairs:
+        left, right = pair.left, pair.right
+        if pair.indices & displaced or not has_valid_masses(pair):
+            continue
+        difference = relative_difference(left.body.mass, right.body.mass)
+        if is_merged(pair) and difference > MAX_MASS_DIFFERENCE:
+            continue  # a heavier part shifts the center of mass of the merged body
+        error, limit = com_error(robot.mirror, pair), max_com_error(pair)
+        if error <= limit or other_rules.report(pair):
+            continue
+        if _is_same_part(robot, left.body, right.body):
+            continue
+        odd, other = robot.outlier_first(left, right, lambda body: body.center)
+        centers = [numbers(1000 * side.body.center, ".1f", ", ") for side in (odd, other)]
+        got, expected = contrast(1000 * error, 1000 * limit, ".3g")
+        yield Violation(
+            subject=odd.body.name,
+            source=mass_source(odd.body.main_link),
+            certainty="likely",
+            message=f"center of mass of body {odd.body.name}: got ({centers[0]}) mm, and "
+            f"({centers[1]}) mm for its mirror image {other.body.name}, each in its own "
+            f"frame: {got} mm from mirrored; expected at most {expected} mm",
+            measured={"gap": error, "allowed": limit, "mirror_image": other.body.name},
+        )
+    if len(robot.legs) > 1 and robot.uncopied_pairs:
+        yield from _trunk_offset(robot)
+
+
+def _trunk_offset(robot: Facts) -> Violations:
+    """Yield a violation if the center of mass of the trunk is far from the mirror plane."""
+    trunk, mirror = robot.bodies[0], robot.mirror
+    starts = [abs(float(leg.limb.points[0] @ mirror.normal) - mirror.offset) for leg in robot.legs]
+    limit = max(_MAX_TRUNK_OFFSET, _TRUNK_OFFSET_SHARE * max(starts))
+    distance = abs(float(trunk.center @ mirror.normal) - mirror.offset)
+    reported = {violation.subject for violation in violations(robot, "INR008")}
+    if trunk.mass > 0 and distance > limit and trunk.name not in reported:
+        got, expected = contrast(1000 * distance, 1000 * limit, ".3g")
+        yield Violation(
+            subject=trunk.name,
+            source=mass_source(trunk.main_link),
+            certainty="likely",
+            message=f"distance of the center of mass of trunk {trunk.name} from the mirror plane: "
+            f"got {got} mm; expected at most {expected} mm",
+            measured={"gap": distance, "allowed": limit},
+        )
+
+
+def _is_same_part(robot: Facts, a: Body, b: Body) -> bool:
+    """Return whether both sides use the same part without mirroring it.
+
+    The center of mass, the shapes and the child bodies are then at the same places of the frame.
+    """
+    return (
+        bool(np.abs(a.center - b.center).max() < MAX_COM_ERROR)
+        and bool(a.collisions or a.visuals)
+        and _signature(robot, a) == _signature(robot, b)
+    )
+
+
+def _signature(robot: Facts, body: Body) -> Counter[tuple[object, ...]]:
+    """Return the shapes and child bodies of a body with their poses, key to 1 mm."""
+
+    def key(pose: Matrix) -> tuple[float, ...]:
+        return tuple(float(x) for x in np.round(pose[:3], 3).ravel() + 0.0)
+
+    shapes = [
+        (g.shape, g.size, (g.mesh.filename, g.mesh.scale) if g.mesh else None, key(placed.pose))
+        for placed in (*body.collisions, *body.visuals)
+        for g in (placed.geometry,)
+    ]
+    mounts = [key(other.origin) for other in robot.bodies if other.parent == body.index]
+    return Counter([*shapes, *mounts])

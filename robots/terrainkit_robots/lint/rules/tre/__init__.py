@@ -1,0 +1,1 @@
+"""Rules on the kinematic tree of links and joints (TRE)."""

@@ -1,0 +1,1 @@
+"""Rules on the text of the file (XML). The readers detect these problems while parsing."""

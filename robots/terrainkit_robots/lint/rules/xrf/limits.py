@@ -1,0 +1,161 @@
+"""Rules that compare position, velocity and effort limits."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.model import Joint
+from terrainkit_robots.lint.compare.body_mass import relative_difference
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rules.xrf.joints import (
+    MAX_RELATIVE_DIFFERENCE,
+    limit_tolerance,
+    matching_joints,
+)
+from terrainkit_robots.lint.rules.xrf.other_robot import (
+    JointPair,
+    joint_name,
+    other_name,
+    other_robot,
+)
+from terrainkit_robots.text import names
+
+
+@rule("XRF003", "joint-limits-differ", "warning", needs=("against",))
+def compare_limits(robot: Facts) -> Violations:
+    """The limits of a joint differ between the files.
+
+    Limits clip targets, end episodes, and define penalties. A policy trained with one file reaches
+    limits in the other file that it does not know.
+
+    Fix:
+        Find out the limits of the real robot, and write them into both files.
+
+    Source:
+        MuJoCo reads both formats; the tolerance is 0.002 rad, 0.5 mm, and 1 % of a velocity.
+    """
+    there = other_name(robot)
+    pairs = matching_joints(robot)
+    for group in _grouped(pairs, _range_difference):
+        one, other = group[0]
+        unit = one.unit
+        yield _report_group(
+            group,
+            "limits",
+            f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
+            f"difference of at most {limit_tolerance(one)} {unit}",
+        )
+    for group in _grouped(pairs, _velocity_difference):
+        one, other = group[0]
+        assert one.limit is not None
+        assert other.limit is not None
+        yield _report_group(
+            group,
+            "velocity limit",
+            f"{one.limit.velocity:.6g} {one.speed_unit} here and {other.limit.velocity:.6g} "
+            f"{one.speed_unit} in {there}; expected a difference of at most "
+            f"{MAX_RELATIVE_DIFFERENCE:.0%}",
+        )
+
+
+def _range_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
+    """Return the ranges of two joints if they differ."""
+    a, b = one.range, other.range
+    if a == b or (a and b and np.abs(np.subtract(a, b)).max() <= limit_tolerance(one)):
+        return None
+    return one.kind == "prismatic", a, b
+
+
+def _velocity_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
+    """Return the velocities of two joints if both are given and they differ."""
+    a = one.limit.velocity if one.limit else None
+    b = other.limit.velocity if other.limit else None
+    if not a or not b or relative_difference(a, b) <= MAX_RELATIVE_DIFFERENCE:
+        return None
+    return one.kind == "prismatic", a, b
+
+
+def _format_range(joint: Joint) -> str:
+    if joint.range is None:
+        return "none"
+    return f"({joint.range[0]:.6g}, {joint.range[1]:.6g}) {joint.unit}"
+
+
+def _grouped(
+    pairs: Sequence[JointPair], key: Callable[[Joint, Joint], tuple[object, ...] | None]
+) -> Iterator[list[JointPair]]:
+    """Yield groups of pairs with the same difference, without the pairs that agree."""
+    groups: dict[tuple[object, ...], list[JointPair]] = {}
+    for one, other in pairs:
+        difference = key(one, other)
+        if difference is not None:
+            groups.setdefault(difference, []).append((one, other))
+    yield from groups.values()
+
+
+def _report_group(
+    group: Sequence[JointPair], label: str, difference: str, severity: Severity | None = None
+) -> Violation:
+    one, other = group[0]
+    listed = names(joint_name(a, b) for a, b in group)
+    joints = f"{len(group)} joints ({listed})" if len(group) > 1 else f"joint {listed}"
+    return Violation(
+        subject=one.name,
+        source=(one.limit or one).source,
+        severity=severity,
+        message=f"{label} of {joints}: got {difference} "
+        f"(line {(other.limit or other).source.line} there)",
+        measured={"joints": len(group)},
+    )
+
+
+@rule("XRF006", "effort-differs", "warning", needs=("against",))
+def compare_effort(robot: Facts) -> Violations:
+    """The effort limit of a joint differs between the files.
+
+    The robot is stronger in one simulator than in the other. Motions learned in one of them fail in
+    the other, or on the real robot.
+
+    Fix:
+        Look up the torque of the motor after gear and linkage, and write it into both files.
+
+    Source:
+        effort in URDF; in MJCF the largest force of the joint's actuators, and actuatorfrcrange.
+    """
+    other, there = other_robot(robot), other_name(robot)
+    pairs = matching_joints(robot)
+    efforts = {a.name: (robot.effort_limit(a), other.effort_limit(b)) for a, b in pairs}
+
+    def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
+        a, b = efforts[one.name]
+        if not a or not b or relative_difference(a, b) <= MAX_RELATIVE_DIFFERENCE:
+            return None
+        return one.kind == "prismatic", a, b
+
+    def missing(one: Joint, _: Joint) -> tuple[object, ...] | None:
+        a, b = efforts[one.name]
+        return None if bool(a) == bool(b) else (bool(a),)
+
+    for group in _grouped(pairs, difference):
+        one, unit = group[0][0], group[0][0].effort_unit
+        a, b = (effort or 0.0 for effort in efforts[one.name])
+        yield _report_group(
+            group,
+            "effort limit",
+            f"{a:.5g} {unit} here and {b:.5g} {unit} in {there}, "
+            f"{relative_difference(a, b):.1%} apart; expected at most "
+            f"{MAX_RELATIVE_DIFFERENCE:.0%}",
+        )
+    for group in _grouped(pairs, missing):
+        limited = bool(efforts[group[0][0].name][0])
+        bare = other if limited else robot
+        has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
+        without, note = there if limited else "this file", ", which has no actuators"
+        yield _report_group(
+            group,
+            "effort limit",
+            f"none in {without}{'' if has_actuators else note}; expected the limit of "
+            f"{'this file' if limited else there}",
+            severity=None if has_actuators else "info",
+        )
