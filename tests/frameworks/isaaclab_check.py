@@ -6,8 +6,6 @@ Needs the wheel of Isaac Lab without its dependencies; `make integrations` runs 
 import importlib.util
 import sys
 from dataclasses import field
-from importlib.abc import Loader, MetaPathFinder
-from importlib.machinery import ModuleSpec
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
@@ -15,28 +13,13 @@ from unittest.mock import MagicMock
 
 import numpy as np
 import torch
+from stand_ins import StandIns
 
 STAND_INS = ("carb", "flatdict", "gymnasium", "hid", "isaacsim", "omni", "prettytable", "pxr")
 STAND_INS += ("einops", "toml", "transformers", "warp", "yaml")
 
 
-class StandIns(MetaPathFinder, Loader):
-    """Imports the packages of the simulator as mocks."""
-
-    def find_spec(self, name, path, target=None):
-        del path, target
-        return ModuleSpec(name, self, is_package=True) if name.split(".")[0] in STAND_INS else None
-
-    def create_module(self, spec):
-        module = MagicMock(name=spec.name)
-        module.__spec__, module.__path__, module.__name__ = spec, [], spec.name
-        return module
-
-    def exec_module(self, module):
-        pass
-
-
-sys.meta_path.insert(0, StandIns())
+sys.meta_path.insert(0, StandIns(STAND_INS))
 source = Path(importlib.util.find_spec("isaaclab").origin).parent / "source" / "isaaclab"
 if source.exists():  # the wheel has the package inside of a package of the same name
     sys.modules.pop("isaaclab", None)

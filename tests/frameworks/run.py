@@ -17,7 +17,7 @@ PACKAGES = {
     "pybullet": [["pybullet==3.2.7"]],
     "warp": [["newton==1.8.0", "mujoco-warp==4.0.0"]],
     "mjx": [["mujoco-mjx==3.17.0"]],
-    "isaaclab": [["torch", "packaging"], ["--no-deps", "isaaclab==2.3.2.post1"]],
+    "isaaclab": [["torch", "packaging", "gymnasium"], ["--no-deps", "isaaclab==2.3.2.post1"]],
     "genesis": [["torch"], ["genesis-world==1.4.5"]],
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
     "drake": [["drake==1.51.1"]],
@@ -39,7 +39,8 @@ def main() -> None:
         for packages in [["-e", FOLDER.parents[1]], *PACKAGES[name]]:
             subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
         with tempfile.TemporaryDirectory() as folder:
-            checks = [subprocess.run([python, FOLDER / f"{name}_check.py", folder])]
+            scripts = sorted(FOLDER.glob(f"{name}*_check.py"))
+            checks = [subprocess.run([python, script, folder]) for script in scripts]
         if name == "mjlab":  # trains onboarded robots
             test = FOLDER.parent / "terrainkit_robots/onboarding/frameworks/test_mjlab.py"
             variables = os.environ | {"TERRAINKIT_MJLAB_PYTHON": str(python.absolute())}

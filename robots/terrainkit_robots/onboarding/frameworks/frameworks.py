@@ -5,7 +5,6 @@ Each framework is a module of this package with a flag `LEGGED_ONLY` and a funct
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -42,44 +41,19 @@ def config_file_name(name: str) -> str:
     return f"{name}_config.py"  # a file with the name of the framework would shadow it
 
 
-def config_text(
-    name: str,
-    spec: RobotSpec,
-    *,
-    bodies: Sequence[str] = (),
-    limits: Mapping[str, tuple[float, float]] | None = None,
-    passive_joints: Sequence[str] = (),
-    roles: Mapping[str, str] | None = None,
-) -> str:
+def config_text(name: str, robot: ConfigRobot) -> str:
     """Return the configuration of a robot, a Python file for the folder of its robot.toml.
-
-    Args:
-        name: The name of a framework.
-        spec: The spec of the robot.
-        bodies: Names of all bodies after fixed joints are merged, by default those in the spec.
-            legged_gym finds bodies by substrings, which must not match other bodies.
-        limits: Lower and upper limit of each joint in the URDF. Without limits, the default
-            factor of the soft limits is used.
-        passive_joints: Movable joints of the URDF without an actuator.
-        roles: Role of each joint of the legs, such as hip, knee or ankle.
 
     Raises:
         ConfigError: if the framework is unknown, or does not support the robot.
     """
     config_file_name(name)
-    robot = ConfigRobot(
-        spec=spec,
-        bodies=bodies,
-        limits=limits,
-        passive_joints=passive_joints,
-        roles=roles or {},
-    )
     module = _get_module(name)
     if module.LEGGED_ONLY:
         others = [other for other in framework_names() if not _get_module(other).LEGGED_ONLY]
         check_legs(robot, name, others)
-    make_text: Callable[[ConfigRobot], str] = module.config_text
-    return make_text(robot)
+    text: str = module.config_text(robot)
+    return text
 
 
 def robot_config_text(name: str, facts: "Facts", spec: RobotSpec) -> str:
@@ -94,14 +68,14 @@ def robot_config_text(name: str, facts: "Facts", spec: RobotSpec) -> str:
         ConfigError: if the framework is unknown, or does not support the robot.
     """
     joints = facts.model.joints
-    return config_text(
-        name,
-        spec,
+    robot = ConfigRobot(
+        spec=spec,
         bodies=(*(body_name(body) for body in facts.bodies), *spec.feet),
         limits={joint.name: joint.range for joint in joints if joint.range is not None},
         passive_joints=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
         roles={name: role for leg in facts.legs for name, role in _roles(leg).items()},
     )
+    return config_text(name, robot)
 
 
 def _roles(leg: "Leg") -> dict[str, str]:

@@ -53,6 +53,8 @@ def dofs(robot, joints=JOINTS):
 
 def configure(robot):
     """Set gains, limits and pose of the robot after its scene is built."""
+    if not JOINTS:
+        return
     robot.set_dofs_kp(list(STIFFNESS.values()), dofs(robot, STIFFNESS))
     robot.set_dofs_kv(list(DAMPING.values()), dofs(robot, DAMPING))
     if EFFORT:
@@ -75,12 +77,7 @@ def build(scene, n_envs=0):
     configure(robot)
     return robot
 '''
-"""The functions of the configuration, the same for every robot with joints."""
-
-_CONFIGURE_WITHOUT_JOINTS = '''
-def configure(robot):
-    """Do nothing, since the robot has no actuated joints."""
-'''
+"""The functions of the configuration, the same for every robot."""
 
 
 def config_text(robot: ConfigRobot) -> str:
@@ -100,7 +97,7 @@ def config_text(robot: ConfigRobot) -> str:
             format_collection("JOINTS = ", format_strings(spec.joint_order)),
             *(["", *_table(robot, name, field)] for name, field in _TABLES.items()),
             *_scales(robot),
-            ["", *_functions(robot).rstrip().split("\n")],
+            ["", *_FUNCTIONS.rstrip().split("\n")],
         ]
     )
 
@@ -157,11 +154,3 @@ def _scales(robot: ConfigRobot) -> Iterator[list[str]]:
     ):
         yield ["", f"# Change of the {target} target for an action of 1.", *comment]
         yield format_collection(f"{name} = ", dict_entries(robot.action_scales(joints)), "{}")
-
-
-def _functions(robot: ConfigRobot) -> str:
-    if robot.spec.joint_order:
-        return _FUNCTIONS
-    start = _FUNCTIONS.index("\ndef dofs(")
-    end = _FUNCTIONS.index("\ndef build(")
-    return _FUNCTIONS[:start] + _CONFIGURE_WITHOUT_JOINTS + "\n" + _FUNCTIONS[end:]

@@ -18,6 +18,7 @@ from terrainkit_robots.onboarding.frameworks.source import (
     assignment,
     dict_entries,
     docstring,
+    fill,
     float_literal,
     format_collection,
     format_floats,
@@ -48,6 +49,102 @@ _MAX_PART_LENGTH = 20
 """Longest name of an actuator that is made of the names of its joints."""
 
 
+_CONFIG = """
+$about
+
+from pathlib import Path
+
+import isaaclab.sim as sim_utils
+from isaaclab.actuators import $kinds
+from isaaclab.assets import ArticulationCfg
+$task_imports
+
+$urdf
+
+$name = ArticulationCfg(
+    spawn=sim_utils.UrdfFileCfg(
+        asset_path=str(ROBOT_URDF),
+        fix_base=$fix_base,
+        # Feet on fixed joints with dont_collapse remain separate bodies.
+        merge_fixed_joints=True,
+        activate_contact_sensors=True,
+        # Gains are set by the actuators below.
+        joint_drive=sim_utils.UrdfConverterCfg.JointDriveCfg(
+            gains=sim_utils.UrdfConverterCfg.JointDriveCfg.PDGainsCfg(
+                stiffness=0.0,
+                damping=0.0,
+            ),
+        ),
+        rigid_props=sim_utils.RigidBodyPropertiesCfg(max_depenetration_velocity=1.0),
+        articulation_props=sim_utils.ArticulationRootPropertiesCfg(
+            # URDF cannot exclude contacts between bodies that overlap at the default pose.
+            enabled_self_collisions=False,
+            solver_position_iteration_count=4,
+            solver_velocity_iteration_count=0,
+        ),
+    ),
+    init_state=ArticulationCfg.InitialStateCfg(
+        $init_state
+    ),
+    $soft_limit
+    soft_joint_pos_limit_factor=$factor,
+    actuators={
+        $actuators
+    },
+)
+$scales
+"""
+
+_REGISTER = """
+    gymnasium.register(
+        id="Isaac-Velocity-Rough-$robot-v0",
+        entry_point="isaaclab.envs:ManagerBasedRLEnv",
+        disable_env_checker=True,
+        kwargs={
+            "env_cfg_entry_point": "$package.isaaclab_config:RoughEnvCfg",
+            "rsl_rl_cfg_entry_point": (
+                "isaaclab_tasks.manager_based.locomotion.velocity.config.go2.agents."
+                "rsl_rl_ppo_cfg:UnitreeGo2RoughPPORunnerCfg"
+            ),
+        },
+    )
+"""
+
+_TASK_IMPORTS = [
+    "from isaaclab.utils import configclass",
+    "from isaaclab_tasks.manager_based.locomotion.velocity import velocity_env_cfg",
+]
+
+_TASK = '''
+
+# Bodies after fixed joints are merged.
+$bodies
+
+
+@configclass
+class RoughEnvCfg(velocity_env_cfg.LocomotionVelocityRoughEnvCfg):
+    """Isaac Lab's rough-terrain velocity task for this robot."""
+
+    def __post_init__(self):
+        super().__post_init__()
+        self.scene.robot = $name.replace(
+            prim_path="{ENV_REGEX_NS}/Robot",
+        )
+        self.scene.height_scanner.prim_path = "{ENV_REGEX_NS}/Robot/" + BASE
+        $actions
+        # Range of the factor on the default pose at a reset.
+        reset = self.events.reset_robot_joints.params
+        reset["position_range"] = ($low, $high)
+        # Not all of these events exist in every version of Isaac Lab.
+        for event in ("add_base_mass", "base_com", "base_external_force_torque"):
+            term = getattr(self.events, event, None)
+            if term is not None:
+                term.params["asset_cfg"].body_names = BASE
+        self.rewards.feet_air_time.params["sensor_cfg"].body_names = FEET
+        $contacts
+'''
+
+
 def config_text(robot: ConfigRobot) -> str:
     """Return the text of `isaaclab_config.py`.
 
@@ -56,22 +153,28 @@ def config_text(robot: ConfigRobot) -> str:
     """
     if not robot.spec.joint_order:
         raise ConfigError(f"{robot.title} has no joints, which Isaac Lab requires")
-    name = f"{constant_name(robot.spec.name)}_CFG"
-    actuators = ", ".join(sorted(set(_actuators(robot).values())))
-    is_legged = bool(robot.spec.feet) and robot.spec.floating
-    return join_lines(
-        [
-            docstring(_about(robot, name, is_legged)),
-            ["", "from pathlib import Path", "", "import isaaclab.sim as sim_utils"],
-            [f"from isaaclab.actuators import {actuators}"],
-            ["from isaaclab.assets import ArticulationCfg", ""],
-            sum_assignment("ROBOT_URDF", PARENT_FOLDER, "/", string_literal(robot.spec.urdf)),
-            [""],
-            _articulation(robot, name),
-            _scales(robot),
-            _task(robot, name) if is_legged else [],
-        ]
+    spec, actuators = robot.spec, _actuators(robot)
+    name = f"{constant_name(spec.name)}_CFG"
+    is_legged = bool(spec.feet) and spec.floating
+    config = fill(
+        _CONFIG,
+        about=docstring(_about(robot, name, is_legged)),
+        kinds=", ".join(sorted(set(actuators.values()))),
+        task_imports=_TASK_IMPORTS if is_legged else [],
+        urdf=sum_assignment("ROBOT_URDF", PARENT_FOLDER, "/", string_literal(spec.urdf)),
+        name=name,
+        fix_base=str(not spec.floating),
+        init_state=initial_state(robot, usd_patterns(robot.all_joints), depth=2),
+        soft_limit=robot.soft_limit_comment(depth=1),
+        factor=float_literal(robot.soft_limit_factor),
+        actuators=[
+            line
+            for (part, joints), kind in actuators.items()
+            for line in _actuator(robot, part, kind, joints)
+        ],
+        scales=_scales(robot),
     )
+    return join_lines([config, _task(robot, name) if is_legged else []])
 
 
 def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
@@ -86,21 +189,9 @@ def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
         f'    robot = {name}.replace(prim_path="{{ENV_REGEX_NS}}/Robot")',
     ]
     if is_legged:
-        paragraphs += [
-            "or register the task:",
-            "\n".join(
-                [
-                    "    gymnasium.register(",
-                    f'        id="Isaac-Velocity-Rough-{class_name(robot.spec.name)}-v0",',
-                    '        entry_point="isaaclab.envs:ManagerBasedRLEnv",',
-                    "        disable_env_checker=True,",
-                    "        kwargs={",
-                    f'            "env_cfg_entry_point": "{package}.isaaclab_config:rough_env_cfg"',
-                    "        },",
-                    "    )",
-                ]
-            ),
-        ]
+        register = fill(_REGISTER, robot=class_name(robot.spec.name), package=package)
+        paragraphs += ["or register the task, with Isaac Lab's PPO of the Go2:"]
+        paragraphs += ["\n".join(register)]
     if robot.velocity_joints:
         paragraphs.append(
             "Joints without stiffness have velocity targets: use a JointVelocityActionCfg with "
@@ -109,56 +200,6 @@ def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
     return [
         *paragraphs,
         "Isaac Lab orders joints breadth-first, which may differ from the order of robot.toml.",
-    ]
-
-
-def _articulation(robot: ConfigRobot, name: str) -> list[str]:
-    lines = [
-        "spawn=sim_utils.UrdfFileCfg(",
-        *indent(_spawn(robot)),
-        "),",
-        "init_state=ArticulationCfg.InitialStateCfg(",
-        *indent(initial_state(robot, usd_patterns(robot.all_joints), depth=2)),
-        "),",
-        *robot.soft_limit_comment(depth=1),
-        f"soft_joint_pos_limit_factor={float_literal(robot.soft_limit_factor)},",
-        "actuators={",
-        *(
-            line
-            for (name, joints), kind in _actuators(robot).items()
-            for line in indent(_actuator(robot, name, kind, joints))
-        ),
-        "},",
-    ]
-    return [f"{name} = ArticulationCfg(", *indent(lines), ")"]
-
-
-def _spawn(robot: ConfigRobot) -> list[str]:
-    spec = robot.spec
-    return [
-        "asset_path=str(ROBOT_URDF),",
-        f"fix_base={not spec.floating},",
-        "# Feet on fixed joints with dont_collapse remain separate bodies.",
-        "merge_fixed_joints=True,",
-        "replace_cylinders_with_capsules=False,",
-        "activate_contact_sensors=True,",
-        "# Gains are set by the actuators below.",
-        "joint_drive=sim_utils.UrdfConverterCfg.JointDriveCfg(",
-        "    gains=sim_utils.UrdfConverterCfg.JointDriveCfg.PDGainsCfg(",
-        "        stiffness=0.0,",
-        "        damping=0.0,",
-        "    ),",
-        "),",
-        "rigid_props=sim_utils.RigidBodyPropertiesCfg(",
-        "    disable_gravity=False,",
-        "    max_depenetration_velocity=1.0,",
-        "),",
-        "articulation_props=sim_utils.ArticulationRootPropertiesCfg(",
-        "    # URDF cannot exclude contacts between bodies that overlap at the default pose.",
-        "    enabled_self_collisions=False,",
-        "    solver_position_iteration_count=4,",
-        "    solver_velocity_iteration_count=0,",
-        "),",
     ]
 
 
@@ -246,66 +287,48 @@ def _value(
 
 
 def _task(robot: ConfigRobot, name: str) -> list[str]:
-    """Return the names of bodies, and a function that configures the velocity task."""
+    """Return the names of bodies, and the class of the velocity task."""
     low, high = format_floats(robot.spec.reset_range)
-    return [
-        "",
-        "# Bodies after fixed joints are merged.",
-        *_bodies(robot),
-        "",
-        "",
-        "def rough_env_cfg():",
-        '    """Return Isaac Lab\'s rough-terrain velocity task for this robot."""',
-        *["    from isaaclab.envs.mdp import JointVelocityActionCfg"] * bool(robot.velocity_joints),
-        "    from isaaclab_tasks.manager_based.locomotion.velocity.velocity_env_cfg import (",
-        "        LocomotionVelocityRoughEnvCfg,",
-        "    )",
-        "",
-        "    cfg = LocomotionVelocityRoughEnvCfg()",
-        f"    cfg.scene.robot = {name}.replace(",
-        '        prim_path="{ENV_REGEX_NS}/Robot",',
-        "    )",
-        '    cfg.scene.height_scanner.prim_path = "{ENV_REGEX_NS}/Robot/" + BASE',
-        *_actions(robot),
-        "    # Range of the factor on the default pose at a reset.",
-        "    reset = cfg.events.reset_robot_joints.params",
-        f'    reset["position_range"] = ({low}, {high})',
-        "    # Not all of these events exist in every version of Isaac Lab.",
-        '    for event in ("add_base_mass", "base_com", "base_external_force_torque"):',
-        "        term = getattr(cfg.events, event, None)",
-        "        if term is not None:",
-        '            term.params["asset_cfg"].body_names = BASE',
-        '    cfg.rewards.feet_air_time.params["sensor_cfg"].body_names = FEET',
-        *_contact_term("rewards.undesired_contacts", "PENALIZED", robot.spec.penalized_contacts),
-        *_contact_term("terminations.base_contact", "TERMINATION", robot.spec.termination_contacts),
-        "    return cfg",
-    ]
+    return fill(
+        _TASK,
+        bodies=_bodies(robot),
+        name=name,
+        actions=_actions(robot),
+        low=low,
+        high=high,
+        contacts=[
+            _contact_term("rewards.undesired_contacts", "PENALIZED", robot.spec.penalized_contacts),
+            _contact_term(
+                "terminations.base_contact", "TERMINATION", robot.spec.termination_contacts
+            ),
+        ],
+    )
 
 
 def _actions(robot: ConfigRobot) -> list[str]:
     """Return the source of the actions with position targets and velocity targets."""
-    lines = ["cfg.actions.joint_pos.scale = ACTION_SCALE"] if robot.position_joints else []
+    lines = ["self.actions.joint_pos.scale = ACTION_SCALE"] if robot.position_joints else []
     if robot.velocity_joints or robot.passive_joints:
         lines += [
-            "cfg.actions.joint_pos.joint_names = JOINTS"
+            "self.actions.joint_pos.joint_names = JOINTS"
             if robot.position_joints
-            else "cfg.actions.joint_pos = None"
+            else "self.actions.joint_pos = None"
         ]
     if robot.velocity_joints:
         lines += [
-            "cfg.actions.joint_vel = JointVelocityActionCfg(",
+            "self.actions.joint_vel = velocity_env_cfg.mdp.JointVelocityActionCfg(",
             '    asset_name="robot",',
             "    joint_names=WHEELS,",
             "    scale=SPEED_SCALE,",
             ")",
         ]
-    return indent(lines)
+    return lines
 
 
-def _contact_term(term: str, name: str, bodies: Sequence[str]) -> list[str]:
+def _contact_term(term: str, name: str, bodies: Sequence[str]) -> str:
     if not bodies:
-        return [f"    cfg.{term} = None"]
-    return [f'    cfg.{term}.params["sensor_cfg"].body_names = {name}']
+        return f"self.{term} = None"
+    return f'self.{term}.params["sensor_cfg"].body_names = {name}'
 
 
 def _bodies(robot: ConfigRobot) -> list[str]:

@@ -16,6 +16,7 @@ from terrainkit_robots.onboarding.frameworks.source import (
     PARENT_FOLDER,
     dict_entries,
     docstring,
+    fill,
     float_literal,
     format_collection,
     format_strings,
@@ -38,7 +39,37 @@ _FIELDS = {
 """Fields of BuiltinPositionActuatorCfg, and the corresponding fields of the spec.
 BuiltinVelocityActuatorCfg has the same fields except for the stiffness."""
 
-_ROBOT_CFG = '''
+_ENTITY = '''
+$about
+
+$dataclasses
+from pathlib import Path
+
+import mujoco
+$actuators
+from mjlab.entity import EntityArticulationInfoCfg, EntityCfg
+$task_imports
+
+$robot_xml
+
+
+def get_spec() -> mujoco.MjSpec:
+    """Return the robot without actuators and keyframes, which mjlab adds."""
+    spec = mujoco.MjSpec.from_file(str(ROBOT_XML))
+    actuator = mujoco.mjtObj.mjOBJ_ACTUATOR
+    sensors = [sensor for sensor in spec.sensors if sensor.objtype == actuator]
+    for element in [*sensors, *spec.keys, *spec.actuators]:
+        spec.delete(element)
+    return spec
+
+
+INIT_STATE = EntityCfg.InitialStateCfg(
+    $init_state
+)
+
+$articulation
+$scales
+
 
 def get_robot_cfg() -> EntityCfg:
     """Return a new configuration of the robot."""
@@ -70,24 +101,18 @@ def config_text(robot: ConfigRobot) -> str:
     patterns = mjlab_patterns(robot.all_joints)
     has_task = bool(train_arguments(robot.spec))
     kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
-    return join_lines(
-        [
-            docstring(_about(robot, has_task=has_task)),
-            ["", "from pathlib import Path", "", "import mujoco"],
-            [f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
-            ["from mjlab.entity import EntityArticulationInfoCfg, EntityCfg"],
-            mjlab_task.imports(robot) if has_task else [],
-            [""],
-            sum_assignment("ROBOT_XML", PARENT_FOLDER, "/", string_literal(robot.spec.mjcf)),
-            _get_spec(),
-            ["", "INIT_STATE = EntityCfg.InitialStateCfg("],
-            [*indent(initial_state(robot, patterns, depth=1)), ")"],
-            _articulation(robot, patterns),
-            _scales(robot, patterns),
-            _ROBOT_CFG.rstrip().split("\n"),
-            mjlab_task.task(robot) if has_task else [],
-        ]
+    entity = fill(
+        _ENTITY,
+        about=docstring(_about(robot, has_task=has_task)),
+        dataclasses=["from dataclasses import replace"] * has_task,
+        actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
+        task_imports=mjlab_task.IMPORTS.split("\n") if has_task else [],
+        robot_xml=sum_assignment("ROBOT_XML", PARENT_FOLDER, "/", string_literal(robot.spec.mjcf)),
+        init_state=initial_state(robot, patterns, depth=1),
+        articulation=_articulation(robot, patterns),
+        scales=_scales(robot, patterns),
     )
+    return join_lines([entity, mjlab_task.task(robot) if has_task else []])
 
 
 def _about(robot: ConfigRobot, *, has_task: bool) -> list[str]:
@@ -110,22 +135,6 @@ def _about(robot: ConfigRobot, *, has_task: bool) -> list[str]:
             "ACTION_SCALE."
         )
     return paragraphs
-
-
-def _get_spec() -> list[str]:
-    return [
-        "",
-        "",
-        "def get_spec() -> mujoco.MjSpec:",
-        '    """Return the robot without actuators and keyframes, which mjlab adds."""',
-        "    spec = mujoco.MjSpec.from_file(str(ROBOT_XML))",
-        "    actuator = mujoco.mjtObj.mjOBJ_ACTUATOR",
-        "    sensors = [sensor for sensor in spec.sensors if sensor.objtype == actuator]",
-        "    for element in [*sensors, *spec.keys, *spec.actuators]:",
-        "        spec.delete(element)",
-        "    return spec",
-        "",
-    ]
 
 
 def _training(robot: ConfigRobot) -> list[str]:
@@ -167,7 +176,6 @@ def _articulation(robot: ConfigRobot, patterns: Mapping[str, str]) -> list[str]:
     ]
     block = ["    actuators=(", *indent(actuators, 2), "    ),"]
     return [
-        "",
         *origins,
         "ARTICULATION = EntityArticulationInfoCfg(",
         *(block if actuators else ["    actuators=(),"]),

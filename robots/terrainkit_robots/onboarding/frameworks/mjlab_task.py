@@ -1,7 +1,6 @@
-"""Write the velocity task of a robot for mjlab: flat and rough ground, and a PPO runner."""
+"""Write mjlab's velocity task for a robot: what depends on the robot, and two registered tasks."""
 
 import re
-from collections.abc import Mapping
 
 from terrainkit_robots.export.mjcf import COLLISION_SUFFIX
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
@@ -13,34 +12,24 @@ from terrainkit_robots.onboarding.frameworks.patterns import (
 )
 from terrainkit_robots.onboarding.frameworks.source import (
     assignment,
-    comment,
     dict_entries,
+    fill,
     format_collection,
     format_strings,
     string_literal,
 )
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
-IMPORTS = """
+IMPORTS = """\
 from mjlab.envs import ManagerBasedRlEnvCfg
-from mjlab.envs import mdp as envs_mdp
-{actions}from mjlab.managers.event_manager import EventTermCfg
-from mjlab.managers.reward_manager import RewardTermCfg
-from mjlab.managers.termination_manager import TerminationTermCfg
-from mjlab.rl import (
-    RslRlModelCfg,
-    RslRlOnPolicyRunnerCfg,
-    RslRlPpoAlgorithmCfg,
-)
+from mjlab.managers import RewardTermCfg, TerminationTermCfg
 from mjlab.sensor import ContactMatch, ContactSensorCfg, ObjRef, RingPatternCfg
 from mjlab.tasks.registry import register_mjlab_task
 from mjlab.tasks.velocity import mdp
+from mjlab.tasks.velocity.config.go1.rl_cfg import unitree_go1_ppo_runner_cfg
 from mjlab.tasks.velocity.rl import VelocityOnPolicyRunner
-from mjlab.tasks.velocity.velocity_env_cfg import make_velocity_env_cfg
-"""
+from mjlab.tasks.velocity.velocity_env_cfg import make_velocity_env_cfg"""
 """Imports of the task."""
-
-_ACTIONS_IMPORT = "from mjlab.envs.mdp.actions import JointVelocityActionCfg\n"
 
 _POSE_STD = {
     "hip": (0.3, 0.5),
@@ -61,178 +50,99 @@ _MAX_CLEARANCE = 0.1
 """Target height of a swinging foot in mjlab [m]."""
 
 _TASK = '''
-def contact_sensor(name, bodies, mode, **options) -> ContactSensorCfg:
+$names
+
+
+def ground_contact(name, bodies, mode="body", **options) -> ContactSensorCfg:
     """Return a sensor of the contacts of some bodies with the ground."""
     return ContactSensorCfg(
         name=name,
         primary=ContactMatch(mode=mode, pattern=bodies, entity="robot"),
         secondary=ContactMatch(mode="body", pattern="terrain"),
-        fields=("found", "force"),
-        num_slots=1,
         **options,
     )
 
 
-def rough_env_cfg(play: bool = False) -> ManagerBasedRlEnvCfg:
-    """Return mjlab's velocity task on rough ground for this robot."""
+def velocity_env_cfg(rough: bool, play: bool = False) -> ManagerBasedRlEnvCfg:
+    """Return mjlab's velocity task for this robot, on rough or flat ground."""
     cfg = make_velocity_env_cfg()
-    cfg.sim.mujoco.ccd_iterations = 500
-    cfg.sim.contact_sensor_maxmatch = 500
-    cfg.sim.nconmax = 100
-    cfg.viewer.body_name = BASE
     cfg.scene.entities = {"robot": get_robot_cfg()}
-    cfg.scene.terrain.terrain_generator.curriculum = True
-
-    # Sensors.
-    for sensor in cfg.scene.sensors:
-        if sensor.name == "terrain_scan":
-            sensor.frame.name = BASE
-        if sensor.name == "foot_height_scan":
-            sensor.frame = tuple(ObjRef("site", foot, "robot") for foot in FEET)
-            sensor.pattern = RingPatternCfg.single_ring(radius=0.04, num_samples=4)
-    body = ContactMatch(mode="subtree", pattern=BASE, entity="robot")
-    cfg.scene.sensors += (
-        contact_sensor(
-            "feet_ground_contact",
-            FEET,
-            "subtree",
-            reduce="netforce",
-            track_air_time=True,
-        ),
-        ContactSensorCfg(
-            name="self_collision",
-            primary=body,
-            secondary=body,
-            fields=("found", "force"),
-            reduce="none",
-            num_slots=1,
-            history_length=4,
-        ),
-    )
-    for terms in (cfg.observations["actor"].terms, cfg.observations["critic"].terms):
-        terms["base_lin_vel"].params["sensor_name"] = "robot/linear_velocity"
-        terms["base_ang_vel"].params["sensor_name"] = "robot/angular_velocity"
-
-    # Actions.
-{actions}
-    # Randomization.
+    cfg.viewer.body_name = BASE
+    $actions
+    for group in cfg.observations.values():
+        group.terms["base_lin_vel"].params["sensor_name"] = "robot/linear_velocity"
+        group.terms["base_ang_vel"].params["sensor_name"] = "robot/angular_velocity"
     cfg.events["foot_friction"].params["asset_cfg"].geom_names = FOOT_GEOMS
     cfg.events["base_com"].params["asset_cfg"].body_names = (BASE,)
 
-    # Rewards. The file has no sensor of the angular momentum.
-    del cfg.rewards["angular_momentum"]
-    cfg.rewards["pose"].params["std_standing"] = {".*": 0.05}
-    cfg.rewards["pose"].params["std_walking"] = WALKING_STD
-    cfg.rewards["pose"].params["std_running"] = RUNNING_STD
-    cfg.rewards["upright"].params["asset_cfg"].body_names = (BASE,)
-    cfg.rewards["upright"].params["terrain_sensor_names"] = ("terrain_scan",)
-    cfg.rewards["body_ang_vel"].params["asset_cfg"].body_names = (BASE,)
-    for name in ("foot_clearance", "foot_slip"):
-        cfg.rewards[name].params["asset_cfg"].site_names = FEET
-    for name in ("foot_clearance", "foot_swing_height"):
-        cfg.rewards[name].params["target_height"] = FOOT_CLEARANCE
-    cfg.rewards["self_collisions"] = RewardTermCfg(
-        func=mdp.self_collision_cost,
-        weight=-0.1,
-        params={"sensor_name": "self_collision"},
-    )
+    sensors = {sensor.name: sensor for sensor in cfg.scene.sensors}
+    sensors["terrain_scan"].frame.name = BASE
+    foot_scan = sensors["foot_height_scan"]
+    foot_scan.frame = tuple(ObjRef("site", foot, "robot") for foot in FEET)
+    foot_scan.pattern = RingPatternCfg.single_ring(radius=0.04, num_samples=4)
+    feet = ground_contact("feet_ground_contact", FEET, "subtree", reduce="netforce")
+    feet.track_air_time = True
+    own_bodies = ContactMatch(mode="subtree", pattern=BASE, entity="robot")
+    substeps = {"reduce": "none", "history_length": cfg.decimation}
+    contacts = [ContactSensorCfg("self_collision", own_bodies, own_bodies, **substeps)]
     if PENALIZED:
-        cfg.scene.sensors += (
-            contact_sensor(
-                "undesired_contact",
-                PENALIZED,
-                "body",
-                reduce="none",
-                history_length=4,
-            ),
-        )
-        cfg.rewards["undesired_contacts"] = RewardTermCfg(
+        contacts.append(ground_contact("undesired_contact", PENALIZED, **substeps))
+    for sensor in contacts:
+        cfg.rewards[f"{sensor.name}s"] = RewardTermCfg(
             func=mdp.self_collision_cost,
             weight=-0.1,
-            params={"sensor_name": "undesired_contact"},
+            params={"sensor_name": sensor.name},
         )
-
-    # Terminations.
     if TERMINATION:
-        cfg.scene.sensors += (
-            contact_sensor(
-                "illegal_contact",
-                TERMINATION,
-                "body",
-                reduce="none",
-                history_length=4,
-            ),
-        )
+        contacts.append(ground_contact("illegal_contact", TERMINATION, **substeps))
         cfg.terminations["illegal_contact"] = TerminationTermCfg(
             func=mdp.illegal_contact,
             params={"sensor_name": "illegal_contact"},
         )
+    sensors |= {sensor.name: sensor for sensor in (feet, *contacts)}
 
+    for name in ("upright", "body_ang_vel"):
+        cfg.rewards[name].params["asset_cfg"].body_names = (BASE,)
+    for name in ("foot_clearance", "foot_slip"):
+        cfg.rewards[name].params["asset_cfg"].site_names = FEET
+    for name in ("foot_clearance", "foot_swing_height"):
+        cfg.rewards[name].params["target_height"] = FOOT_CLEARANCE
+    cfg.rewards["pose"].params["std_standing"] = {".*": 0.05}
+    cfg.rewards["pose"].params["std_walking"] = WALKING_STD
+    cfg.rewards["pose"].params["std_running"] = RUNNING_STD
+
+    if rough:
+        cfg.sim.nconmax = 100
+        cfg.sim.contact_sensor_maxmatch = cfg.sim.mujoco.ccd_iterations = 500
+        cfg.scene.terrain.terrain_generator.curriculum = True
+        cfg.rewards["upright"].params["terrain_sensor_names"] = ("terrain_scan",)
+    else:
+        cfg.sim.nconmax, cfg.sim.njmax = None, 500
+        cfg.scene.terrain.terrain_type = "plane"
+        cfg.scene.terrain.terrain_generator = None
+        del sensors["terrain_scan"]
+        for group in cfg.observations.values():
+            del group.terms["height_scan"]
+        del cfg.curriculum["terrain_levels"], cfg.terminations["out_of_terrain_bounds"]
     if play:
         cfg.episode_length_s = 1e9
         cfg.observations["actor"].enable_corruption = False
-        cfg.events.pop("push_robot")
-        cfg.terminations.pop("out_of_terrain_bounds")
+        del cfg.events["push_robot"]
         cfg.curriculum = {}
-        cfg.events["randomize_terrain"] = EventTermCfg(
-            func=envs_mdp.randomize_terrain,
-            mode="reset",
-        )
-        generator = cfg.scene.terrain.terrain_generator
-        generator.curriculum = False
-        generator.num_rows = generator.num_cols = 5
+        cfg.scene.terrain.max_init_terrain_level = None  # robots on all levels
+    cfg.scene.sensors = tuple(sensors.values())
     return cfg
-
-
-def flat_env_cfg(play: bool = False) -> ManagerBasedRlEnvCfg:
-    """Return mjlab's velocity task on flat ground for this robot."""
-    cfg = rough_env_cfg(play)
-    cfg.sim.nconmax = None
-    cfg.sim.njmax = 500
-    cfg.sim.mujoco.ccd_iterations = 50
-    cfg.sim.contact_sensor_maxmatch = 64
-    cfg.scene.terrain.terrain_type = "plane"
-    cfg.scene.terrain.terrain_generator = None
-    cfg.scene.sensors = tuple(
-        sensor for sensor in cfg.scene.sensors if sensor.name != "terrain_scan"
-    )
-    del cfg.observations["actor"].terms["height_scan"]
-    del cfg.observations["critic"].terms["height_scan"]
-    del cfg.rewards["upright"].params["terrain_sensor_names"]
-    cfg.terminations.pop("out_of_terrain_bounds", None)
-    cfg.curriculum.pop("terrain_levels", None)
-    cfg.events.pop("randomize_terrain", None)
-    return cfg
-
-
-def runner_cfg() -> RslRlOnPolicyRunnerCfg:
-    """Return the configuration of PPO."""
-    hidden_dims = (512, 256, 128)
-    return RslRlOnPolicyRunnerCfg(
-        actor=RslRlModelCfg(
-            hidden_dims=hidden_dims,
-            obs_normalization=True,
-            distribution_cfg={
-                "class_name": "GaussianDistribution",
-                "init_std": 1.0,
-                "std_type": "scalar",
-            },
-        ),
-        critic=RslRlModelCfg(hidden_dims=hidden_dims, obs_normalization=True),
-        algorithm=RslRlPpoAlgorithmCfg(entropy_coef=0.01),
-        experiment_name=EXPERIMENT,
-        max_iterations=10_000,
-    )
 
 
 def register_tasks() -> None:
-    """Register the tasks, once per process."""
-    for task_id, make_cfg in ((FLAT_TASK, flat_env_cfg), (ROUGH_TASK, rough_env_cfg)):
+    """Register the tasks, with the PPO of mjlab's Go1."""
+    runner = replace(unitree_go1_ppo_runner_cfg(), experiment_name=EXPERIMENT)
+    for task_id, rough in ((FLAT_TASK, False), (ROUGH_TASK, True)):
         register_mjlab_task(
             task_id=task_id,
-            env_cfg=make_cfg(),
-            play_env_cfg=make_cfg(play=True),
-            rl_cfg=runner_cfg(),
+            env_cfg=velocity_env_cfg(rough),
+            play_env_cfg=velocity_env_cfg(rough, play=True),
+            rl_cfg=runner,
             runner_cls=VelocityOnPolicyRunner,
         )
 
@@ -244,25 +154,19 @@ if __name__ == "__main__":
     main()
 '''
 
-_POSITION_ACTIONS = """\
-    cfg.actions["joint_pos"].scale = ACTION_SCALE
-"""
+_POSITION_ACTIONS = 'cfg.actions["joint_pos"].scale = ACTION_SCALE'
 
-_NAMED_POSITION_ACTIONS = """\
-    cfg.actions["joint_pos"].actuator_names = tuple(ACTION_SCALE)
-"""
+_NAMED_POSITION_ACTIONS = 'cfg.actions["joint_pos"].actuator_names = tuple(ACTION_SCALE)'
 
-_NO_POSITION_ACTIONS = """\
-    del cfg.actions["joint_pos"]
-"""
+_NO_POSITION_ACTIONS = 'del cfg.actions["joint_pos"]'
 
-_VELOCITY_ACTIONS = """\
-    cfg.actions["joint_vel"] = JointVelocityActionCfg(
-        entity_name="robot",
-        actuator_names=tuple(SPEED_SCALE),
-        scale=SPEED_SCALE,
-    )
-"""
+_VELOCITY_ACTIONS = [
+    'cfg.actions["joint_vel"] = mdp.JointVelocityActionCfg(',
+    '    entity_name="robot",',
+    "    actuator_names=tuple(SPEED_SCALE),",
+    "    scale=SPEED_SCALE,",
+    ")",
+]
 
 
 def task_id(spec: RobotSpec, terrain: str) -> str:
@@ -270,21 +174,18 @@ def task_id(spec: RobotSpec, terrain: str) -> str:
     return f"Mjlab-Velocity-{terrain}-{class_name(spec.name)}"
 
 
-def imports(robot: ConfigRobot) -> list[str]:
-    """Return the imports of the task."""
-    actions = _ACTIONS_IMPORT * bool(robot.velocity_joints)
-    return IMPORTS.format(actions=actions).strip().split("\n")
-
-
 def task(robot: ConfigRobot) -> list[str]:
     """Return the names that the task needs, its functions, and the command that trains it."""
+    return ["", "", *fill(_TASK, names=_names(robot), actions=_actions(robot))]
+
+
+def _names(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     base = mjlab_patterns(robot.check_bodies([spec.base], "base"))[spec.base]
     # Feet are listed, since sites, sensors and rewards have to agree on their order.
     feet = [name.rsplit("/", maxsplit=1)[-1] for name in robot.check_bodies(spec.feet, "feet")]
-    lines = [
-        "",
-        "",
+    geoms = [rf"{re.escape(foot)}{COLLISION_SUFFIX}\d*" for foot in feet]
+    return [
         *assignment("FLAT_TASK", string_literal(task_id(spec, "Flat"))),
         *assignment("ROUGH_TASK", string_literal(task_id(spec, "Rough"))),
         f"EXPERIMENT = {string_literal(package_name(spec.name))}",
@@ -292,28 +193,22 @@ def task(robot: ConfigRobot) -> list[str]:
         "# Names in robot.xml; a pattern matches a whole name.",
         *assignment("BASE", string_literal(base)),
         *format_collection("FEET = ", format_strings(feet), "()"),
-        *_foot_geoms(feet),
-        *comment("Bodies whose contacts with the ground are penalized, or end an episode."),
-        *_names(robot, "PENALIZED", "penalized_contacts"),
-        *_names(robot, "TERMINATION", "termination_contacts"),
-        *comment("Target height of a swinging foot [m]."),
+        *format_collection("FOOT_GEOMS = ", format_strings(geoms), "()"),
+        "# Bodies whose contacts with the ground are penalized, or end an episode.",
+        *_bodies(robot, "PENALIZED", "penalized_contacts"),
+        *_bodies(robot, "TERMINATION", "termination_contacts"),
+        "# Target height of a swinging foot [m].",
         f"FOOT_CLEARANCE = {_foot_clearance(spec.leg_length)}",
-        *_pose_std(robot),
-        "",
+        "# Standard deviation of the pose reward, by joint [rad].",
+        *_pose_std(robot, "WALKING_STD", 0),
+        *_pose_std(robot, "RUNNING_STD", 1),
     ]
-    functions = _TASK.replace("{actions}\n", _actions(robot))
-    return [*lines, *functions.rstrip().split("\n")]
 
 
-def _names(robot: ConfigRobot, name: str, field: str) -> list[str]:
+def _bodies(robot: ConfigRobot, name: str, field: str) -> list[str]:
     bodies = robot.check_bodies(getattr(robot.spec, field), field)
     patterns = merge_names(bodies, mjlab_patterns(robot.all_bodies))
     return format_collection(f"{name} = ", format_strings(patterns), "()")
-
-
-def _foot_geoms(feet: list[str]) -> list[str]:
-    geoms = [rf"{re.escape(foot)}{COLLISION_SUFFIX}\d*" for foot in feet]
-    return format_collection("FOOT_GEOMS = ", format_strings(geoms), "()")
 
 
 def _foot_clearance(leg_length: float | None) -> float:
@@ -321,25 +216,19 @@ def _foot_clearance(leg_length: float | None) -> float:
     return max(0.01, round(min(height, _MAX_CLEARANCE), 2))
 
 
-def _pose_std(robot: ConfigRobot) -> list[str]:
-    """Return the standard deviations of the pose reward of all joints."""
+def _pose_std(robot: ConfigRobot, name: str, index: int) -> list[str]:
     joints = robot.all_joints
-    std = {joint: _POSE_STD.get(robot.roles.get(joint, ""), _DEFAULT_POSE_STD) for joint in joints}
-    patterns = mjlab_patterns(joints)
-    lines = comment("Standard deviation of the pose reward, by joint [rad].")
-    for name, index in (("WALKING_STD", 0), ("RUNNING_STD", 1)):
-        values = {joint: both[index] for joint, both in std.items()}
-        lines += _table(name, values, patterns)
-    return lines
+    stds = {
+        joint: _POSE_STD.get(robot.roles.get(joint, ""), _DEFAULT_POSE_STD)[index]
+        for joint in joints
+    }
+    entries = dict_entries(merge_patterns(stds, mjlab_patterns(joints)))
+    return format_collection(f"{name} = ", entries, "{}")
 
 
-def _table(name: str, values: Mapping[str, float], patterns: Mapping[str, str]) -> list[str]:
-    return format_collection(f"{name} = ", dict_entries(merge_patterns(values, patterns)), "{}")
-
-
-def _actions(robot: ConfigRobot) -> str:
-    has_positions, has_velocities = bool(robot.position_joints), bool(robot.velocity_joints)
-    if not has_positions:
-        return _NO_POSITION_ACTIONS + _VELOCITY_ACTIONS
-    names = _NAMED_POSITION_ACTIONS * has_velocities
-    return _POSITION_ACTIONS + names + _VELOCITY_ACTIONS * has_velocities
+def _actions(robot: ConfigRobot) -> list[str]:
+    """Return the source of the actions with position targets and velocity targets."""
+    velocity = _VELOCITY_ACTIONS if robot.velocity_joints else []
+    if not robot.position_joints:
+        return [_NO_POSITION_ACTIONS, *velocity]
+    return [_POSITION_ACTIONS, *[_NAMED_POSITION_ACTIONS] * bool(velocity), *velocity]

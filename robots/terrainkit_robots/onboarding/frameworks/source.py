@@ -7,6 +7,7 @@ of links and joints cannot inject code.
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from string import Template
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.text import one_line
@@ -123,6 +124,23 @@ def docstring(paragraphs: Iterable[str]) -> list[str]:
 def indent(lines: Iterable[str], depth: int = 1) -> list[str]:
     """Return the lines with an indentation of `depth` steps of four spaces."""
     return [" " * 4 * depth + line if line else line for line in lines]
+
+
+def fill(template: str, **values: str | Sequence[str]) -> list[str]:
+    """Return the lines of a template with the values of its names, such as `$name`.
+
+    A name with a list of lines stands on a line of its own, whose indentation the lines get. Values
+    are not searched for names.
+    """
+    lines: list[str] = []
+    for line in template.removeprefix("\n").removesuffix("\n").split("\n"):
+        before, _, name = line.partition("$")
+        value = values.get(name, "")
+        if isinstance(value, str):
+            lines.append(Template(line).substitute(values))
+        else:
+            lines += [before + each if each else "" for each in value]
+    return lines
 
 
 def join_lines(parts: Iterable[Sequence[str]]) -> str:

@@ -8,6 +8,7 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, config_text
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
 
@@ -159,6 +160,18 @@ def refusing(title, *required, **defaults):
     return type(title, (), {"__init__": init})
 
 
+def recording(title, **nested):
+    """Return a class that stores its keyword arguments.
+
+    The real frameworks check the names of the fields (tests/frameworks, mjlab_probe.py).
+    """
+
+    def init(self, **given):
+        vars(self).update(given)
+
+    return type(title, (), {"__init__": init, **nested})
+
+
 class Described:
     """A class of legged_gym's configuration whose subclasses can only set existing fields."""
 
@@ -191,7 +204,7 @@ def load(tmp_path, monkeypatch):
         for name, stand_in in stand_ins.items():
             monkeypatch.setitem(sys.modules, name, stand_in)
         path = tmp_path / config_file_name(framework)
-        path.write_text(config_text(framework, spec, **known), encoding="utf-8")
+        path.write_text(config_text(framework, ConfigRobot(spec=spec, **known)), encoding="utf-8")
         located = importlib.util.spec_from_file_location("loaded_config", path)
         loaded = importlib.util.module_from_spec(located)
         located.loader.exec_module(loaded)
@@ -220,7 +233,12 @@ def robots():
 def stand_in():
     """Return functions that make stub modules."""
     return SimpleNamespace(
-        module=module, refusing=refusing, part=part, Strict=Strict, Described=Described
+        module=module,
+        refusing=refusing,
+        recording=recording,
+        part=part,
+        Strict=Strict,
+        Described=Described,
     )
 
 

@@ -11,6 +11,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.onboarding import frameworks as package
 from terrainkit_robots.onboarding.frameworks import frameworks
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.frameworks import (
     config_file_name,
     config_text,
@@ -30,9 +31,9 @@ def test_framework_names_include_added_module(tmp_path, monkeypatch, robots):
     frameworks.framework_names.cache_clear()
     try:
         assert set(framework_names()) - {"brand_new"} == {*LEGGED, "isaaclab", "mjlab", "genesis"}
-        assert config_text("brand_new", robots.quadruped()) == "# quad 4"
+        assert config_text("brand_new", ConfigRobot(spec=robots.quadruped())) == "# quad 4"
         with pytest.raises(ConfigError, match="other frameworks: brand_new, genesis"):
-            config_text("legged_gym", robots.plain(()))
+            config_text("legged_gym", ConfigRobot(spec=robots.plain(())))
     finally:
         frameworks.framework_names.cache_clear()
 
@@ -64,13 +65,13 @@ def test_framework_names_are_sorted():
 )
 def test_config_text_rejects_robot_in_one_line(robots, framework, changes, message):
     with pytest.raises(ConfigError, match=message) as caught:
-        config_text(framework, robots.quadruped(**changes), bodies=robots.bodies)
+        config_text(framework, ConfigRobot(spec=robots.quadruped(**changes), bodies=robots.bodies))
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("framework", ["isaaclab", "mjlab", "genesis"])
 def test_config_text_of_robot_without_legs(robots, framework):
-    text = config_text(framework, robots.plain(("shoulder", "elbow")))
+    text = config_text(framework, ConfigRobot(spec=robots.plain(("shoulder", "elbow"))))
     compile(text, "config", "exec")
     assert '"shoulder"' in text
 
@@ -78,25 +79,27 @@ def test_config_text_of_robot_without_legs(robots, framework):
 def test_config_text_of_robot_without_joints(robots):
     spec = robots.plain(())
     for framework in ("mjlab", "genesis"):
-        compile(config_text(framework, spec), "config", "exec")
+        compile(config_text(framework, ConfigRobot(spec=spec)), "config", "exec")
     with pytest.raises(ConfigError, match="no joints"):
-        config_text("isaaclab", spec)
+        config_text("isaaclab", ConfigRobot(spec=spec))
 
 
 @pytest.mark.parametrize("framework", framework_names())
 def test_config_text_prevents_code_injection(robots, framework):
     """A robot with hostile names yields the same statements as a harmless one."""
-    hostile = config_text(framework, robots.hostile())
+    hostile = config_text(framework, ConfigRobot(spec=robots.hostile()))
     harmless = config_text(
         framework,
-        robots.plain(
-            tuple(f"joint_{number}" for number in range(len(robots.HOSTILE))),
-            floating=True,
-            feet=("l_foot", "r_foot"),
-            penalized_contacts=("p", "q"),
-            termination_contacts=("t",),
-            spawn_height=0.5,
-            base_height_target=0.45,
+        ConfigRobot(
+            spec=robots.plain(
+                tuple(f"joint_{number}" for number in range(len(robots.HOSTILE))),
+                floating=True,
+                feet=("l_foot", "r_foot"),
+                penalized_contacts=("p", "q"),
+                termination_contacts=("t",),
+                spawn_height=0.5,
+                base_height_target=0.45,
+            )
         ),
     )
     assert _shape(hostile) == _shape(harmless)
@@ -133,8 +136,8 @@ def test_config_text_is_formatted_and_deterministic(robots, framework, tmp_path)
     if framework in ("mjlab", "genesis"):
         specs["none"] = robots.plain(())
     for name, spec in specs.items():
-        text = config_text(framework, spec)
-        assert text == config_text(framework, spec)
+        text = config_text(framework, ConfigRobot(spec=spec))
+        assert text == config_text(framework, ConfigRobot(spec=spec))
         assert text.isascii() or name == "hostile"
         (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
     ruff = [sys.executable, "-m", "ruff"]
@@ -147,15 +150,18 @@ def test_config_text_is_formatted_and_deterministic(robots, framework, tmp_path)
 
 def test_config_text_soft_limit_factor(robots):
     ranges = {f"{leg}_calf_joint": (-2.75, -0.75) for leg in ("FL", "FR", "RL", "RR")}
-    text = config_text("mjlab", robots.quadruped(), limits=ranges)
+    spec = robots.quadruped()
+    text = config_text("mjlab", ConfigRobot(spec=spec, limits=ranges))
     assert "soft_joint_pos_limit_factor=0.75," in text
-    assert "soft_joint_pos_limit_factor=0.9," in config_text("mjlab", robots.quadruped())
+    assert "soft_joint_pos_limit_factor=0.9," in config_text(
+        "mjlab", ConfigRobot(spec=robots.quadruped())
+    )
 
 
 @pytest.mark.parametrize("framework", LEGGED)
 def test_legged_frameworks_reject_unactuated_joints(robots, framework):
     with pytest.raises(ConfigError, match=f"tail_joint of .* have no actuator, but {framework}"):
-        config_text(framework, robots.quadruped(), passive_joints=["tail_joint"])
+        config_text(framework, ConfigRobot(spec=robots.quadruped(), passive_joints=["tail_joint"]))
 
 
 def test_robot_config_text_finds_unactuated_joints(robots, bundled_xml):
@@ -173,9 +179,11 @@ def test_robot_config_text_uses_bodies_and_limits(robots, bundled_xml):
     text = robot_config_text("legged_gym", facts, spec)
     assert "soft_dof_pos_limit = 0.8\n" in text
     ranges = {joint.name: joint.range for joint in facts.model.joints if joint.moves}
-    assert text == config_text("legged_gym", spec, bodies=robots.bodies, limits=ranges)
+    assert text == config_text(
+        "legged_gym", ConfigRobot(spec=spec, bodies=robots.bodies, limits=ranges)
+    )
 
 
 @pytest.mark.parametrize("framework", LEGGED)
 def test_legged_configs_parse_with_python_3_8(robots, framework):
-    ast.parse(config_text(framework, robots.hostile()), feature_version=(3, 8))
+    ast.parse(config_text(framework, ConfigRobot(spec=robots.hostile())), feature_version=(3, 8))

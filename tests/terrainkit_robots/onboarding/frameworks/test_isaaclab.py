@@ -10,82 +10,35 @@ import pytest
 @pytest.fixture
 def modules(stand_in):
     """Return stub modules of Isaac Lab 2."""
-    refusing = stand_in.refusing
-    actuator = refusing(
-        "ImplicitActuatorCfg",
-        "joint_names_expr",
-        **dict.fromkeys(("effort_limit", "velocity_limit", "effort_limit_sim", "armature")),
-        **dict.fromkeys(("velocity_limit_sim", "stiffness", "damping", "friction")),
-    )
-    motor = refusing(
-        "DCMotorCfg",
-        *("joint_names_expr", "effort_limit", "velocity_limit", "saturation_effort"),
-        **dict.fromkeys(("stiffness", "damping", "armature", "friction")),
-    )
-    articulation = refusing(
-        "ArticulationCfg",
-        spawn=None,
-        init_state=None,
-        actuators={},
-        soft_joint_pos_limit_factor=1.0,
-        prim_path="",
-    )
-    articulation.InitialStateCfg = refusing(
-        "InitialStateCfg", pos=(0.0, 0.0, 0.0), rot=(1.0, 0.0, 0.0, 0.0), joint_pos={}, joint_vel={}
-    )
+    recording = stand_in.recording
+    articulation = recording("ArticulationCfg", InitialStateCfg=recording("InitialStateCfg"))
     articulation.replace = lambda self, **more: articulation(**(vars(self) | more))
-    drive = refusing("JointDriveCfg", "gains", drive_type="force", target_type="position")
-    drive.PDGainsCfg = refusing("PDGainsCfg", "stiffness", damping=None)
-    urdf = (
-        refusing(
-            "UrdfFileCfg",
-            "asset_path",
-            "fix_base",
-            "joint_drive",
-            merge_fixed_joints=True,
-            replace_cylinders_with_capsules=False,
-            activate_contact_sensors=False,
-            rigid_props=None,
-            articulation_props=None,
-        ),
-    )[0]
+    drive = recording("JointDriveCfg", PDGainsCfg=recording("PDGainsCfg"))
     sim = stand_in.module(
         "isaaclab.sim",
-        UrdfFileCfg=urdf,
+        UrdfFileCfg=recording("UrdfFileCfg"),
         UrdfConverterCfg=SimpleNamespace(JointDriveCfg=drive),
-        RigidBodyPropertiesCfg=refusing(
-            "RigidBodyPropertiesCfg", disable_gravity=None, max_depenetration_velocity=None
-        ),
-        ArticulationRootPropertiesCfg=refusing(
-            "ArticulationRootPropertiesCfg",
-            enabled_self_collisions=None,
-            solver_position_iteration_count=None,
-            solver_velocity_iteration_count=None,
-        ),
+        RigidBodyPropertiesCfg=recording("RigidBodyPropertiesCfg"),
+        ArticulationRootPropertiesCfg=recording("ArticulationRootPropertiesCfg"),
     )
-    task = "isaaclab_tasks.manager_based.locomotion.velocity.velocity_env_cfg"
+    actuators = ("ImplicitActuatorCfg", "DCMotorCfg")
+    package = "isaaclab_tasks.manager_based.locomotion.velocity"
+    task = stand_in.module(
+        "velocity_env_cfg",
+        LocomotionVelocityRoughEnvCfg=velocity_task(stand_in),
+        mdp=SimpleNamespace(JointVelocityActionCfg=recording("JointVelocityActionCfg")),
+    )
     made = {
         "isaaclab": stand_in.module("isaaclab", sim=sim),
         "isaaclab.sim": sim,
         "isaaclab.actuators": stand_in.module(
-            "actuators", ImplicitActuatorCfg=actuator, DCMotorCfg=motor
+            "actuators", **{name: recording(name) for name in actuators}
         ),
         "isaaclab.assets": stand_in.module("assets", ArticulationCfg=articulation),
-        task: stand_in.module(task, LocomotionVelocityRoughEnvCfg=lambda: velocity_task(stand_in)),
+        package: stand_in.module(package, velocity_env_cfg=task),
+        "isaaclab.utils": stand_in.module("utils", configclass=lambda made: made),
     }
-    made["isaaclab.envs"] = stand_in.module("envs")
-    made["isaaclab.envs.mdp"] = stand_in.module(
-        "mdp",
-        JointVelocityActionCfg=refusing(
-            "JointVelocityActionCfg",
-            "asset_name",
-            "joint_names",
-            scale=1.0,
-            preserve_order=False,
-            use_default_offset=True,
-        ),
-    )
-    parents = task.split(".")[:-1]
+    parents = package.split(".")[:-1]
     for place in range(len(parents)):
         name = ".".join(parents[: place + 1])
         made[name] = stand_in.module(name)
@@ -93,23 +46,35 @@ def modules(stand_in):
 
 
 def velocity_task(stand_in):
-    """Return a stub of Isaac Lab's velocity task."""
+    """Return a stub of the class of Isaac Lab's velocity task."""
     strict = stand_in.Strict
 
     def term(key):
         return strict(params={key: strict(body_names="base")})
 
-    return strict(
-        scene=strict(robot=None, height_scanner=strict(prim_path="")),
-        actions=SimpleNamespace(joint_pos=strict(scale=0.5, joint_names=[".*"])),
-        events=strict(
-            add_base_mass=term("asset_cfg"),
-            base_external_force_torque=term("asset_cfg"),
-            reset_robot_joints=strict(params={"position_range": (0.5, 1.5)}),
-        ),
-        rewards=strict(feet_air_time=term("sensor_cfg"), undesired_contacts=term("sensor_cfg")),
-        terminations=strict(base_contact=term("sensor_cfg")),
-    )
+    class Task(strict):
+        """The base class; `__post_init__` runs when the task is made."""
+
+        def __init__(self):
+            super().__init__(
+                scene=strict(robot=None, height_scanner=strict(prim_path="")),
+                actions=SimpleNamespace(joint_pos=strict(scale=0.5, joint_names=[".*"])),
+                events=strict(
+                    add_base_mass=term("asset_cfg"),
+                    base_external_force_torque=term("asset_cfg"),
+                    reset_robot_joints=strict(params={"position_range": (0.5, 1.5)}),
+                ),
+                rewards=strict(
+                    feet_air_time=term("sensor_cfg"), undesired_contacts=term("sensor_cfg")
+                ),
+                terminations=strict(base_contact=term("sensor_cfg")),
+            )
+            self.__post_init__()
+
+        def __post_init__(self):
+            pass
+
+    return Task
 
 
 def driven_by(actuators, names):
@@ -184,7 +149,7 @@ def test_isaaclab_actuators_of_biped(load, modules, robots):
 def test_isaaclab_velocity_task(load, modules, robots):
     spec = robots.quadruped()
     loaded = load("isaaclab", spec, modules, bodies=robots.bodies)
-    task = loaded.rough_env_cfg()
+    task = loaded.RoughEnvCfg()
     assert task.scene.robot.prim_path == "{ENV_REGEX_NS}/Robot"
     assert task.scene.height_scanner.prim_path == "{ENV_REGEX_NS}/Robot/base"
     scale = resolved(task.actions.joint_pos.scale, spec.joint_order)
@@ -199,7 +164,7 @@ def test_isaaclab_velocity_task(load, modules, robots):
 
 def test_isaaclab_velocity_task_without_contacts(load, modules, robots):
     spec = robots.quadruped(penalized_contacts=(), termination_contacts=())
-    task = load("isaaclab", spec, modules).rough_env_cfg()
+    task = load("isaaclab", spec, modules).RoughEnvCfg()
     assert task.rewards.undesired_contacts is None
     assert task.terminations.base_contact is None
 
@@ -211,10 +176,10 @@ def test_isaaclab_config_of_arm(load, modules, robots):
     assert loaded.ARM_CFG.spawn.fix_base is True
     assert loaded.ARM_CFG.init_state.pos == (0.0, 0.0, 0.0)
     assert actuator.effort_limit_sim == {"joint1": 5.0}
-    assert actuator.velocity_limit_sim is None  # unknown: the limit of the URDF is used
+    assert not hasattr(actuator, "velocity_limit_sim")  # unknown: the limit of the URDF is used
     assert actuator.stiffness == {"joint1": 0.5, "joint10": 1.5}
     assert loaded.ACTION_SCALE == 0.25
-    assert not hasattr(loaded, "rough_env_cfg")
+    assert not hasattr(loaded, "RoughEnvCfg")
 
 
 def test_isaaclab_config_of_wheels(load, modules, robots):
@@ -229,20 +194,20 @@ def test_isaaclab_config_of_wheels(load, modules, robots):
     assert (actuators["joints"].damping, actuators["wheels"].damping) == (0.5, 0.75)
     assert resolved(actuators["wheels"].effort_limit_sim, wheels) == dict.fromkeys(wheels, 45.43)
     assert (loaded.ACTION_SCALE, loaded.SPEED_SCALE) == (0.25, 5.0)
-    actions = loaded.rough_env_cfg().actions
+    actions = loaded.RoughEnvCfg().actions
     assert actions.joint_pos.joint_names == [".*_hip_joint", ".*_thigh_joint"]
     assert actions.joint_vel.joint_names == [".*_calf_joint"]
     assert (actions.joint_vel.asset_name, actions.joint_vel.scale) == ("robot", 5.0)
     text = Path(loaded.__file__).read_text()
     assert "[rad/s or m/s]; suggested: a share\nSPEED_SCALE = 5.0\n" in text
-    task = load("isaaclab", robots.quadruped(), modules).rough_env_cfg()
+    task = load("isaaclab", robots.quadruped(), modules).RoughEnvCfg()
     assert task.actions.joint_pos.joint_names == [".*"]
     assert not hasattr(task.actions, "joint_vel")
 
 
 def test_isaaclab_actions_exclude_unactuated_joints(load, modules, robots):
     spec = robots.quadruped()
-    task = load("isaaclab", spec, modules, passive_joints=["tail_joint"]).rough_env_cfg()
+    task = load("isaaclab", spec, modules, passive_joints=["tail_joint"]).RoughEnvCfg()
     names = (*spec.joint_order, "tail_joint")
     actions = SimpleNamespace(joint_names_expr=task.actions.joint_pos.joint_names)
     assert set(driven_by({"actions": actions}, names)) == set(spec.joint_order)

@@ -4,20 +4,23 @@ import os
 import re
 import shutil
 import subprocess
+from dataclasses import make_dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import mujoco
 import pytest
 
 from terrainkit_robots.description import bundled
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.frameworks import config_text
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 PROBE = Path(__file__).with_name("mjlab_probe.py")
 
-SENSOR_FIELDS = ("primary", "secondary", "fields", "reduce", "num_slots", "history_length")
+SENSOR_FIELDS = ("primary", "secondary", "reduce", "track_air_time", "history_length")
 
 
 def velocity_env_cfg():
@@ -31,7 +34,7 @@ def velocity_env_cfg():
         terms = {name: SimpleNamespace(params={}) for name in names}
         return SimpleNamespace(terms=terms, enable_corruption=True)
 
-    rewards = ("pose", "upright", "body_ang_vel", "angular_momentum")
+    rewards = ("pose", "upright", "body_ang_vel")
     rewards += ("foot_clearance", "foot_slip", "foot_swing_height")
     return SimpleNamespace(
         sim=SimpleNamespace(mujoco=SimpleNamespace()),
@@ -43,6 +46,7 @@ def velocity_env_cfg():
                 SimpleNamespace(name="foot_height_scan"),
             ),
         ),
+        decimation=4,
         observations={"actor": group(), "critic": group()},
         actions={"joint_pos": SimpleNamespace(actuator_names=(".*",), scale=0.5)},
         events={"foot_friction": term("asset_cfg"), "base_com": term("asset_cfg"), "push_robot": 0},
@@ -60,65 +64,31 @@ def registered():
 
 @pytest.fixture
 def modules(stand_in, registered):
-    refusing, module = stand_in.refusing, stand_in.module
-    actuator = refusing(
-        "BuiltinPositionActuatorCfg",
-        "target_names_expr",
-        "stiffness",
-        "damping",
-        **dict.fromkeys(("effort_limit", "armature", "frictionloss", "viscous_damping")),
-    )
-    rolling = refusing(
-        "BuiltinVelocityActuatorCfg",
-        "target_names_expr",
-        "damping",
-        **dict.fromkeys(("effort_limit", "armature", "frictionloss", "viscous_damping")),
-    )
-    entity = refusing(
-        "EntityCfg", init_state=None, spec_fn=None, articulation=None, sort_actuators=False
-    )
-    entity.InitialStateCfg = refusing(
-        "InitialStateCfg",
-        pos=(0.0, 0.0, 0.0),
-        rot=(1.0, 0.0, 0.0, 0.0),
-        joint_pos={},
-        joint_vel={},
-    )
-    articulation = refusing(
-        "EntityArticulationInfoCfg", actuators=(), soft_joint_pos_limit_factor=1.0
-    )
-    term = {"func": None, "params": None}
+    recording, module = stand_in.recording, stand_in.module
+    actuators = ("BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg")
+    entity = recording("EntityCfg", InitialStateCfg=recording("InitialStateCfg"))
+    articulation = recording("EntityArticulationInfoCfg")
     ring = SimpleNamespace(single_ring=lambda **options: options)
-    sensor = refusing(
-        "ContactSensorCfg", "name", **dict.fromkeys((*SENSOR_FIELDS, "track_air_time"))
+    sensor = make_dataclass("ContactSensorCfg", ["name", *((f, Any, None) for f in SENSOR_FIELDS)])
+    runner = make_dataclass("RslRlOnPolicyRunnerCfg", [("experiment_name", str, "go1_velocity")])
+    velocity_mdp = SimpleNamespace(
+        self_collision_cost=0,
+        illegal_contact=0,
+        JointVelocityActionCfg=recording("JointVelocityActionCfg"),
     )
     made = {
         "mjlab": module("mjlab"),
-        "actuator": module(
-            "actuator", BuiltinPositionActuatorCfg=actuator, BuiltinVelocityActuatorCfg=rolling
-        ),
+        "actuator": module("actuator", **{name: recording(name) for name in actuators}),
         "entity": module("entity", EntityCfg=entity, EntityArticulationInfoCfg=articulation),
-        "envs": module("envs", ManagerBasedRlEnvCfg=None, mdp=SimpleNamespace(randomize_terrain=0)),
-        "envs.mdp": module("mdp"),
-        "envs.mdp.actions": module(
-            "actions",
-            JointVelocityActionCfg=refusing("Action", "entity_name", "actuator_names", "scale"),
-        ),
-        "managers": module("managers"),
-        "managers.event_manager": module("m", EventTermCfg=refusing("Event", **term, mode="")),
-        "managers.reward_manager": module("m", RewardTermCfg=refusing("R", **term, weight=0.0)),
-        "managers.termination_manager": module("m", TerminationTermCfg=refusing("T", **term)),
-        "rl": module(
-            "rl",
-            RslRlModelCfg=refusing("Model", hidden_dims=0, obs_normalization=0, distribution_cfg=0),
-            RslRlPpoAlgorithmCfg=refusing("Ppo", entropy_coef=0.0),
-            RslRlOnPolicyRunnerCfg=refusing(
-                "Runner", *("actor", "critic", "algorithm", "experiment_name", "max_iterations")
-            ),
+        "envs": module("envs", ManagerBasedRlEnvCfg=None),
+        "managers": module(
+            "managers",
+            RewardTermCfg=recording("RewardTermCfg"),
+            TerminationTermCfg=recording("TerminationTermCfg"),
         ),
         "sensor": module(
             "sensor",
-            ContactMatch=refusing("ContactMatch", "mode", "pattern", entity=None),
+            ContactMatch=recording("ContactMatch"),
             ContactSensorCfg=sensor,
             ObjRef=lambda *words: words,
             RingPatternCfg=ring,
@@ -128,9 +98,10 @@ def modules(stand_in, registered):
             "registry",
             register_mjlab_task=lambda task_id, **parts: registered.update({task_id: parts}),
         ),
-        "tasks.velocity": module(
-            "velocity", mdp=SimpleNamespace(self_collision_cost=0, illegal_contact=0)
-        ),
+        "tasks.velocity": module("velocity", mdp=velocity_mdp),
+        "tasks.velocity.config": module("config"),
+        "tasks.velocity.config.go1": module("go1"),
+        "tasks.velocity.config.go1.rl_cfg": module("r", unitree_go1_ppo_runner_cfg=runner),
         "tasks.velocity.rl": module("rl", VelocityOnPolicyRunner="runner"),
         "tasks.velocity.velocity_env_cfg": module("v", make_velocity_env_cfg=velocity_env_cfg),
     }
@@ -190,7 +161,6 @@ def test_mjlab_tasks_of_quadruped(load, modules, robots, registered):
     pose = rough.rewards["pose"].params
     assert resolved(pose["std_walking"], spec.joint_order)["FL_hip_joint"] == 0.15
     assert rough.rewards["foot_clearance"].params["target_height"] == 0.05
-    assert "angular_momentum" not in rough.rewards
     assert rough.terminations["illegal_contact"].params == {"sensor_name": "illegal_contact"}
     assert flat.scene.terrain.terrain_type == "plane"
     assert "terrain_scan" not in [sensor.name for sensor in flat.scene.sensors]
@@ -218,7 +188,7 @@ def test_mjlab_names_are_in_robot_xml(onboarded, load, modules, format_name):
         assert [geom for geom in geoms if re.fullmatch(pattern, geom)]
     for patterns in (loaded.PENALIZED, loaded.TERMINATION):
         assert all(any(re.fullmatch(p, name) for name in body) for p in patterns)
-    for terms in loaded.flat_env_cfg().observations.values():
+    for terms in loaded.velocity_env_cfg(rough=False).observations.values():
         names = [
             terms.terms[name].params["sensor_name"] for name in ("base_lin_vel", "base_ang_vel")
         ]
@@ -239,12 +209,12 @@ def test_mjlab_config_of_wheels(load, modules, robots):
     assert resolved(loaded.SPEED_SCALE, spec.joint_order) == dict.fromkeys(wheels, 5.0)
     text = Path(loaded.__file__).read_text()
     assert "# For JointVelocityActionCfg.scale.\n# [rad/s or m/s]; suggested: a share\n" in text
-    actions = loaded.flat_env_cfg().actions
+    actions = loaded.velocity_env_cfg(rough=False).actions
     assert actions["joint_pos"].actuator_names == (".*_hip_joint", ".*_thigh_joint")
     assert actions["joint_vel"].actuator_names == (".*_calf_joint",)
     plain = load("mjlab", robots.quadruped(), modules)
     assert "SPEED_SCALE" not in Path(plain.__file__).read_text()
-    assert plain.flat_env_cfg().actions["joint_pos"].actuator_names == (".*",)
+    assert plain.velocity_env_cfg(rough=False).actions["joint_pos"].actuator_names == (".*",)
 
 
 def test_mjlab_config_with_only_wheels(load, modules, robots):
@@ -276,7 +246,7 @@ def test_mjlab_config_of_arm_without_limits(load, modules, robots):
     loaded = load("mjlab", spec, modules)
     actuators = loaded.ARTICULATION.actuators
     assert [a.target_names_expr for a in actuators] == [("joint1$",), ("joint10",), ("wrist",)]
-    assert all(a.effort_limit is None and a.armature is None for a in actuators)
+    assert not any(vars(a).keys() & {"effort_limit", "armature"} for a in actuators)
     assert loaded.INIT_STATE.joint_pos == {"joint1$": 0.1, "joint10": 0.1, "wrist": 0.1}
 
 
@@ -297,7 +267,7 @@ def mjlab_python():
 @pytest.mark.parametrize("which", ["quadruped", "wheeled"])
 def test_mjlab_config_in_mjlab(robots, tmp_path, bundled_xml, mjlab_python, which):
     shutil.copy(bundled_xml, tmp_path / "robot.xml")
-    text = config_text("mjlab", getattr(robots, which)(), bodies=robots.bodies)
+    text = config_text("mjlab", ConfigRobot(spec=getattr(robots, which)(), bodies=robots.bodies))
     (tmp_path / "mjlab_config.py").write_text(text)
     command = [mjlab_python, PROBE, tmp_path, which]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
