@@ -304,8 +304,8 @@ def written(name: str) -> str:
 
 
 def words(text: str) -> list[str]:
-    # Ignore frames and line breaks, since the next version of tyro may change them.
-    return re.findall(r"[\w.:/*-]*\w", text)
+    # Ignore line breaks, and the metavar that argparse repeats before Python 3.13.
+    return re.findall(r"[\w.:/*-]*\w", re.sub(r"^( +-[\w-]+) \w+(, --)", r"\1\2", text, flags=re.M))
 
 
 def main() -> int:

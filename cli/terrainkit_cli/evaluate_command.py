@@ -1,25 +1,16 @@
 """The command that evaluates a policy."""
 
-import dataclasses
 import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
+from msgspec import Meta
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import (
-    UNSET,
-    Checkpoint,
-    Flag,
-    Output,
-    RobotName,
-    optional_number,
-    text_option,
-)
+from terrainkit_cli.argument_types import Checkpoint, Device, OutputPath, RobotName, TerrainName
+from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import (
@@ -32,52 +23,42 @@ if TYPE_CHECKING:
 DEFAULT_REPETITIONS, MAX_REPETITIONS = 10, 100
 """Default and largest number of robots on each patch of a suite."""
 
-_NO_COMMAND = (-math.inf, -math.inf, -math.inf)
-"""Value of --command if it is not given; with None, tyro's errors name the types of a union."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyCommand(Command):
     """A command that rolls out a policy."""
 
-    source: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="RUN", help_behavior_hint="")
-    ] = ""
+    source: Annotated[str, positional("RUN")] = ""
     """A folder written by terrainkit train, a checkpoint in one, or a robot with a bundled
     policy."""
 
-    policy: Annotated[str, text_option("FILE.onnx")] = ""
+    policy: Annotated[Path, option("FILE.onnx")] | None = None
     """In place of RUN: an exported policy, with policy.json beside it or in its metadata."""
 
     robot: RobotName = ""
     """The robot of --policy: a robot's name, or a folder written by terrainkit onboard."""
 
-    terrain: Annotated[str, text_option("TERRAIN")] = ""
+    terrain: TerrainName = ""
     """plane, a map (.npz), or a map config (.toml); by default, the terrain of the training, and
     plane with --policy."""
 
-    command: Annotated[
-        tuple[float, float, float],
-        tyro.conf.arg(metavar="VX VY YAW", help_behavior_hint=""),
-    ] = _NO_COMMAND
+    command: Annotated[tuple[float, float, float], option("VX VY YAW")] | None = None
     """The same command for all robots: forward and left velocity [m/s], yaw velocity [rad/s]."""
 
-    random_commands: Flag = False
+    random_commands: bool = False
     """Sample commands as in training."""
 
-    num_envs: Annotated[
-        int, tyro.conf.arg(metavar="INT", help_behavior_hint="(default: depends on the terrain)")
-    ] = UNSET
-    """Number of simulated robots."""
+    num_envs: Annotated[int, option("INT")] | None = None
+    """Number of simulated robots; the default depends on the terrain."""
 
-    checkpoint: Checkpoint = UNSET
-    """The checkpoint to load."""
+    checkpoint: Checkpoint | None = None
+    """The checkpoint to load; by default, the last one."""
 
     seed: int = 1
     """Seed of the initial positions and of random commands."""
 
-    device: Annotated[str, text_option("DEVICE")] = "cpu"
-    """Device of the policy: cpu (the default), cuda, cuda:1."""
+    device: Device = "cpu"
+    """Device of the policy: cpu, cuda, cuda:1."""
 
     def load_spec(self) -> "PolicySpec":
         """Return the run, or the policy of --policy.
@@ -96,16 +77,16 @@ class PolicyCommand(Command):
             raise ConfigError("--robot: missing; expected the robot of --policy")
         if not self.policy and self.robot:
             raise ConfigError("--robot: got a value; expected none without --policy")
-        if self.policy and self.checkpoint != UNSET:
+        if self.policy and self.checkpoint is not None:
             raise ConfigError("--checkpoint: got a value; expected none with --policy")
         require_training()
         if self.policy:
             from terrainkit_robots.policy.onnx_policy import open_onnx
 
-            return open_onnx(Path(self.policy), self.robot)
+            return open_onnx(self.policy, self.robot)
         from terrainkit_robots.rl.run import open_run
 
-        return open_run(self.source, optional_number(self.checkpoint))
+        return open_run(self.source, self.checkpoint)
 
     def eval_config(self, seconds: float) -> "EvaluationConfig":
         """Return the settings of the rollout.
@@ -118,8 +99,8 @@ class PolicyCommand(Command):
         return EvaluationConfig(
             seconds=seconds,
             terrain=self.terrain or None,
-            num_envs=optional_number(self.num_envs),
-            command=None if self.command == _NO_COMMAND else self.command,
+            num_envs=self.num_envs,
+            command=self.command,
             random_commands=self.random_commands,
             seed=self.seed,
             device=self.device,
@@ -143,25 +124,25 @@ class Evaluate(PolicyCommand):
     format: Literal["table", "json"] = "table"
     """Format of the printed result."""
 
-    suite: Annotated[str, text_option("SUITE|MAP.npz")] = ""
+    suite: Annotated[str, option("SUITE|MAP.npz")] = ""
     """Measure how often robots cross the patches of this suite (terrainkit suite list) or map,
     along their goals or to a far side, and print a report card."""
 
-    limits: Flag = False
+    limits: bool = False
     """Measure the highest step, widest gap, steepest slope and narrowest passage that all robots
     cross."""
 
-    repetitions: Annotated[int, tyro.conf.arg(metavar="N")] = DEFAULT_REPETITIONS
+    repetitions: Annotated[int, Meta(ge=1, le=MAX_REPETITIONS), option("N")] = DEFAULT_REPETITIONS
     """With --suite or --limits: robots on each patch."""
 
-    output: Output = ""
+    output: OutputPath | None = None
     """Write the result to this file, as JSON. With --suite also as Markdown and as a picture, to
     files with the suffixes .json, .md and .png."""
 
-    diagram: Annotated[str, text_option("PNG")] = ""
+    diagram: Annotated[Path, option("PNG")] | None = None
     """Draw the contacts of the feet over 2 s in this picture."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace existing files."""
 
     def run(self) -> int:
@@ -172,8 +153,7 @@ class Evaluate(PolicyCommand):
             return self._report_card()
         if self.repetitions != DEFAULT_REPETITIONS:
             raise ConfigError("--repetitions: got a value; expected none without --suite, --limits")
-        output, diagram = (Path(each) if each else None for each in (self.output, self.diagram))
-        for target in filter(None, (output, diagram)):
+        for target in filter(None, (self.output, self.diagram)):
             check_target(target, overwrite=self.overwrite)  # before the rollout
         spec = self.load_spec()
         from terrainkit_robots.policy.evaluate import evaluate
@@ -189,15 +169,15 @@ class Evaluate(PolicyCommand):
         else:
             render.result("\n".join([summary_line(result), *gait_lines(result)]))
             render.table(result_rows(result))
-        if output is not None:
-            with atomic_write(output, overwrite=self.overwrite) as path:
+        if self.output is not None:
+            with atomic_write(self.output, overwrite=self.overwrite) as path:
                 path.write_text(result.as_json(), encoding="utf-8")
-        if diagram is not None:
+        if self.diagram is not None:
             from terrainkit_cli.contact_diagram import draw_contacts
 
-            with atomic_write(diagram, overwrite=self.overwrite) as path:
+            with atomic_write(self.diagram, overwrite=self.overwrite) as path:
                 path.write_bytes(draw_contacts(result.contacts, result.dt))
-        for target in filter(None, (output, diagram)):
+        for target in filter(None, (self.output, self.diagram)):
             if self.format == "table":
                 render.result(f"wrote {target}")
         return 0
@@ -210,17 +190,13 @@ class Evaluate(PolicyCommand):
 
         if self.suite and self.limits:
             raise ConfigError("--suite, --limits: got both; expected one of them")
-        default = {field.name: field.default for field in dataclasses.fields(self)}
         unused = "terrain command random_commands num_envs seconds format diagram"
         for name in unused.split():
-            if getattr(self, name) != default[name]:
+            if getattr(self, name) != getattr(type(self), name):
                 option = f"--{name}".replace("_", "-")
                 raise ConfigError(f"{option}: got a value; expected none with --suite or --limits")
-        if not 1 <= self.repetitions <= MAX_REPETITIONS:
-            got = f"--repetitions: got {self.repetitions}"
-            raise ConfigError(f"{got}; expected 1 to {MAX_REPETITIONS}")
-        targets = report_card.targets(Path(self.output), is_card=bool(self.suite))
-        for target in targets if self.output else ():
+        targets = report_card.targets(self.output, is_card=bool(self.suite)) if self.output else []
+        for target in targets:
             check_target(target, overwrite=self.overwrite)
         if self.suite and not report_card.is_map(self.suite):
             get_suite(self.suite)  # an unknown name is reported before the run is loaded
@@ -229,7 +205,7 @@ class Evaluate(PolicyCommand):
             contents = report_card.report_suite(spec, self.suite, config, self.repetitions)
         else:
             contents = report_card.report_limits(spec, config, self.repetitions)
-        if self.output:
+        if targets:
             report_card.write_files(targets, contents)
         return 0
 

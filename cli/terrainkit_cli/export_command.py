@@ -5,16 +5,14 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated, Literal
 
-import tyro
-
 from terrainkit.errors import ConfigError
 from terrainkit.export import export_files
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import UNSET, Checkpoint, Flag, optional_number, text_option
-from terrainkit_cli.terrain_commands import written
+from terrainkit_cli.argument_types import Checkpoint, OutputPath
+from terrainkit_cli.map_text import written
+from terrainkit_cli.parse import Command, option, positional
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,46 +31,40 @@ class Export(Command):
     exported policies are verified against the checkpoint.
     """
 
-    source: Annotated[
-        str,
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="MAP.npz|RUN", help_behavior_hint=""),
-    ] = ""
+    source: Annotated[str, positional("MAP.npz|RUN")] = ""
     """The map or the run."""
 
-    output: Annotated[str, text_option("PATH", "-o")] = ""
+    output: OutputPath | None = None
     """For a map: the file to write. For a policy: the folder to write, by default `exported` in
     the folder of the run, or ROBOT_policy for a bundled policy."""
 
-    collision: Annotated[
-        Literal["auto", "hfield", "boxes"] | None,
-        tyro.conf.arg(metavar="{auto,hfield,boxes}", help_behavior_hint="(default: auto)"),
-    ] = None
-    """For .xml: export the terrain as one heightfield, or as boxes, whose walls are vertical. auto
-    selects boxes if they cover the whole terrain and are few (see terrainkit info --budget)."""
+    collision: (
+        Annotated[Literal["auto", "hfield", "boxes"], option("{auto,hfield,boxes}")] | None
+    ) = None
+    """For .xml: export the terrain as one heightfield, or as boxes, whose walls are vertical. auto,
+    the default, selects boxes if they cover the whole terrain and are few (see terrainkit info
+    --budget)."""
 
-    full: Flag = False
+    full: bool = False
     """For meshes: write two triangles per cell instead of merging coplanar faces."""
 
-    closed: Flag = False
+    closed: bool = False
     """For meshes: add a skirt and a bottom, for a watertight solid."""
 
-    y_up: Flag = False
+    y_up: bool = False
     """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
 
-    max_step: Annotated[
-        float | None, tyro.conf.arg(metavar="M", help_behavior_hint="(default: 0.2)")
-    ] = None
-    """For .yaml: height of the largest step that a robot takes [m]; cells at the top of higher ones
-    are occupied."""
+    max_step: Annotated[float, option("M")] | None = None
+    """For .yaml: height of the largest step that a robot takes, by default 0.2 [m]; cells at the
+    top of higher ones are occupied."""
 
-    checkpoint: Checkpoint = UNSET
-    """For a run: the checkpoint to export."""
+    checkpoint: Checkpoint | None = None
+    """For a run: the checkpoint to export; by default, the last one."""
 
-    example: Flag = False
+    example: bool = False
     """For a run: also write run_policy.py, a program that runs the policy in plain MuJoCo."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace existing files."""
 
     def run(self) -> int:
@@ -98,17 +90,18 @@ class Export(Command):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        for name, given in (("checkpoint", self.checkpoint != UNSET), ("example", self.example)):
+        for name, given in (("checkpoint", self.checkpoint is not None), ("example", self.example)):
             if given:
                 raise ConfigError(f"--{name}: got the map {self.source}; expected a run")
         terrain_map = TerrainMap.load(self.source)
         if not self.output:
             raise ConfigError("--output: missing; expected a file, whose suffix selects the format")
-        output = Path(self.output)
-        files = export_files(terrain_map, output, overwrite=self.overwrite, **self._map_options())
+        files = export_files(
+            terrain_map, self.output, overwrite=self.overwrite, **self._map_options()
+        )
         render.result(written(terrain_map, *files))
         is_auto = self.collision in (None, "auto")
-        if output.suffix == ".xml" and is_auto and "<hfield" in output.read_text():
+        if self.output.suffix == ".xml" and is_auto and "<hfield" in self.output.read_text():
             render.result(
                 "the terrain is a heightfield, whose walls are one cell wide; "
                 "with --collision boxes, walls are vertical where the terrain is level"
@@ -125,12 +118,12 @@ class Export(Command):
         from terrainkit_robots.rl.run import open_run
         from terrainkit_robots.rl.tasks import get_task
 
-        run = open_run(self.source, optional_number(self.checkpoint))
+        run = open_run(self.source, self.checkpoint)
         default = run.folder / "exported"
         if run.folder.resolve() == get_task(run.info.robot).trained_run.resolve():
             # The folder of a bundled policy is part of an installed package.
             default = Path(f"{run.folder.name}_policy")
-        folder = Path(self.output) if self.output else default
+        folder = self.output or default
         result = export_policy(run, folder, example=self.example, overwrite=self.overwrite)
         render.result(
             f"wrote {', '.join(map(str, result.files))}: {result.num_observations} observations "

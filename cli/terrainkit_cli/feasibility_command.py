@@ -2,19 +2,18 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ConfigError
 from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import terrain_columns
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_cli import render
+from terrainkit_cli.argument_types import Limits, MapFile, OutputPath, RobotName, parse_pairs
 from terrainkit_cli.parse import Command, value_of
-from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, parse_pairs, text_option
-from terrainkit_cli.terrain_commands import MapFile
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -44,13 +43,13 @@ class Feasibility(Command):
     robot: RobotName = ""
     """Name of a bundled robot, or a folder written by terrainkit onboard."""
 
-    limit: LimitWords = field(default_factory=list)
+    limit: Limits = ()
     """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
-    output: Annotated[str, text_option("PATH", "-o")] = ""
+    output: OutputPath | None = None
     """Write PATH.json with all paths, and PATH.png with the paths on the preview."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace existing files."""
 
     def run(self) -> int:
@@ -60,7 +59,7 @@ class Feasibility(Command):
 
         derived = robot_limits(self.robot, self.limit)
         terrain_map = TerrainMap.load(self.map)
-        target = Path(self.output).with_suffix("") if self.output else None
+        target = self.output.with_suffix("") if self.output else None
         if target:
             self._check_targets(target)
         results = assess_map(terrain_map, derived.limits, render.progress)

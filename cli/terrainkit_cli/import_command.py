@@ -1,23 +1,18 @@
 """The command import: a file of heights or a mesh becomes a map."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
 from terrainkit.importing.options import ImportOptions
 from terrainkit_cli import render
+from terrainkit_cli.argument_types import OutputPath
 from terrainkit_cli.config_options import ConfigCommand
-from terrainkit_cli.parse import check_options
-from terrainkit_cli.robot_options import Flag
-from terrainkit_cli.terrain_commands import Output, written
+from terrainkit_cli.map_text import written
+from terrainkit_cli.parse import positional
 
 if TYPE_CHECKING:
-    from typing import Self
-
     from terrainkit import ImportReport
 
 
@@ -29,22 +24,20 @@ class Import(ConfigCommand):
     parts hang over the ground.
     """
 
-    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE")]
+    file: Annotated[Path, positional("FILE")]
     """Image (.png with 16 bits, .tif), array (.npy), ASCII grid (.asc) or mesh (.obj, .stl, .ply,
     .glb)."""
 
-    output: Output
+    output: OutputPath
     """File to write, as of terrainkit generate."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace an existing file."""
 
     @classmethod
-    def options(cls, arguments: Sequence[str]) -> "type[Self]":
-        """Return this command with an option for each value of :class:`ImportOptions`."""
-        command = cls.with_options(ImportOptions())
-        check_options(command, arguments)
-        return command
+    def default_config(cls) -> ImportOptions:
+        """Return the default options."""
+        return ImportOptions()
 
     def run(self) -> int:
         """Import the file, write the map, and print the report."""

@@ -6,9 +6,14 @@ import signal
 import sys
 import warnings
 from collections.abc import Sequence
+from itertools import takewhile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from terrainkit_cli import parse, render, signals
+from terrainkit_cli import render, signals
+
+if TYPE_CHECKING:
+    from terrainkit_cli.parse import Command
 
 COMMAND_GROUPS = {
     "Terrain": {
@@ -94,6 +99,7 @@ def _open_closed_streams() -> None:
 
 def _run(arguments: list[str]) -> int:
     from terrainkit import __version__
+    from terrainkit.errors import ConfigError
     from terrainkit.settings.text import expected_names, truncate
 
     name = arguments[0] if arguments else "--help"
@@ -105,9 +111,22 @@ def _run(arguments: list[str]) -> int:
         return 0
     if name not in COMMANDS:
         known = expected_names(name, COMMANDS)
-        raise parse.UsageError(f"no command {truncate(repr(name))}; {known}")
-    options = command(name).options(arguments[1:])
-    return parse.parse(options, f"terrainkit {name}", arguments[1:]).run()
+        raise ConfigError(f"no command {truncate(repr(name))}; {known}")
+    return _run_command(f"terrainkit {name}", command(name), arguments[1:])
+
+
+def _run_command(prog: str, chosen: "type[Command]", words: list[str]) -> int:
+    from terrainkit_cli.parse import HELP, UsageError, format_help
+
+    if {*HELP} & {*takewhile(lambda word: word != "--", words)}:
+        options, doc = chosen.options(words), chosen.__doc__ or ""
+        render.help_page(format_help(prog, doc, options, render.width()))
+        return 0
+    try:
+        parsed = chosen.parse(words)
+    except UsageError as error:
+        raise UsageError(f"{error}; see {prog} --help") from None
+    return parsed.run()
 
 
 def _print_overview() -> None:
@@ -121,10 +140,10 @@ def _print_overview() -> None:
     render.result("terrainkit COMMAND --help lists its options; --version prints the version.")
 
 
-def command(name: str) -> type[parse.Command]:
+def command(name: str) -> "type[Command]":
     """Return the class of the command `name`."""
     module = importlib.import_module(f"terrainkit_cli.{COMMANDS[name]}")
-    found: type[parse.Command] = getattr(module, name.title().replace("-", ""))
+    found: type[Command] = getattr(module, name.title().replace("-", ""))
     return found
 
 

@@ -1,29 +1,23 @@
 """The command that onboards a robot."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import (
-    Flag,
+from terrainkit_cli.argument_types import (
     IgnoredRules,
     InputPath,
-    Output,
+    OutputPath,
     Packages,
-    StringList,
     XacroArguments,
     find_robot,
     parse_settings,
-    repeated_option,
     split_commas,
 )
+from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
     from terrainkit_robots.onboarding.pipeline import OnboardOptions
@@ -43,19 +37,17 @@ class Onboard(Command):
     stand or a framework was skipped. 2: a file cannot be read or written, or an option is invalid.
     """
 
-    file: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="FILE", help_behavior_hint="")
-    ] = ""
+    file: Annotated[str, positional("FILE")] = ""
     """The robot file, or the name of a bundled robot: quadruped, biped."""
 
-    output: Output = ""
+    output: OutputPath | None = None
     """Folder to write; by default, a folder with the name of the robot."""
 
     collision: Literal["keep", "hull", "coacd", "primitives"] = "keep"
     """Simplify collision meshes: keep them; replace them by their convex hulls; decompose
     nonconvex meshes into convex parts with CoACD; or fit a box, cylinder, capsule or sphere."""
 
-    config: Annotated[StringList, *repeated_option("FRAMEWORK")] = field(default_factory=list)
+    config: Annotated[tuple[str, ...], option("FRAMEWORK", is_repeated=True)] = ()
     """Also write the configuration file of a training framework: legged_gym, leggedgym_ex,
     isaaclab, mjlab, genesis."""
 
@@ -63,37 +55,37 @@ class Onboard(Command):
     """Type of the base: floating, or fixed to the world. With auto, it is floating if the file
     says so, or if the robot has legs or wheels."""
 
-    spec: InputPath = ""
+    spec: InputPath | None = None
     """A robot.toml whose values override the derived ones, such as one that you have edited."""
 
     gains: Literal["stand", "train"] = "stand"
     """PD gains to suggest: those that hold the default pose without a policy; or softer ones for
     training, as in published configurations, with action scales of about 0.25 rad."""
 
-    unsafe_fixes: Flag = False
+    unsafe_fixes: bool = False
     """Also apply fixes that change a number, a shape or a mesh. The input file is not changed."""
 
-    force: Flag = False
+    force: bool = False
     """Continue even if errors remain in the XML, the tree, joints, meshes or masses. The result
     may differ from the robot."""
 
-    strict: Flag = False
+    strict: bool = False
     """Exit with code 1 also if the robot does not stand, or does not fit a framework of --config.
     The folder is written anyway."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace the folder if it contains an onboarded robot."""
 
-    pictures: Flag = True
+    pictures: bool = True
     """Render the pictures of report.md."""
 
-    ignore: IgnoredRules = field(default_factory=list)
+    ignore: IgnoredRules = ()
     """Ignore these rules; the reason is written to the report."""
 
-    package: Packages = field(default_factory=list)
+    package: Packages = ()
     """Folder of a ROS package, for package:// and $(find ...)."""
 
-    xacro_arg: XacroArguments = field(default_factory=list)
+    xacro_arg: XacroArguments = ()
     """Value of a xacro argument of the file."""
 
     def run(self) -> int:
@@ -103,9 +95,8 @@ class Onboard(Command):
 
         if not self.file:
             raise ConfigError("FILE: missing; expected a robot file, quadruped, or biped")
-        output = Path(self.output) if self.output else None
         with render.steps() as steps:
-            result = onboard(find_robot(self.file), output, self._options(steps))
+            result = onboard(find_robot(self.file), self.output, self._options(steps))
         if result.folder is None:
             render.report(_blocking_errors(result))
             render.error(f"{self.file}: errors remain{self._advice(result)}; nothing was written")
@@ -134,7 +125,7 @@ class Onboard(Command):
             collision=self.collision,
             frameworks=tuple(word for words in self.config for word in split_commas(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
-            spec=Path(self.spec) if self.spec else None,
+            spec=self.spec,
             gains=self.gains,
             unsafe_fixes=self.unsafe_fixes,
             force=self.force,

@@ -1,90 +1,261 @@
-"""Parse command-line arguments into a command, a dataclass whose docstrings are its help."""
+"""Parse the words of a command line into a command.
 
-import contextlib
-import dataclasses
+A command is a dataclass. The annotation of a field states the type and range of an option, its
+docstring the help text, as in :class:`terrainkit.settings.schema.Config`.
+"""
+
+import argparse
 import inspect
-import io
 import re
-import sys
+import textwrap
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, get_type_hints
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import MISSING, dataclass
+from pathlib import Path
+from typing import Any, Literal, Self, get_args, get_origin
 
-from terrainkit.errors import TerrainkitError
+from msgspec import Meta
+
+from terrainkit.errors import ConfigError
 from terrainkit.settings.field_docs import field_docs
-from terrainkit.settings.text import closest, expected_names, truncate
-from terrainkit_cli import render
+from terrainkit.settings.schema import Config, field_types
+from terrainkit.settings.text import closest, truncate
+from terrainkit.settings.type_hint import NONE, TypeHint, convert, is_table, parse_hint
 
-if TYPE_CHECKING:
-    from typing import Self
+HELP = ("-h", "--help")
+
+_NUMBER = re.compile(r"-(\d|\.\d|inf$|nan$)")
+"""Beginning of a negative number. For argparse, -1e-3 would be an option."""
+
+
+def option(metavar: str, alias: str = "", *, is_repeated: bool = False) -> Meta:
+    """Return the annotation of an option.
+
+    Args:
+        metavar: Placeholders of the values in the help, separated by spaces.
+        alias: A second name, such as `-o`.
+        is_repeated: Whether a tuple consists of one value of each occurrence of the option.
+    """
+    return Meta(extra={"metavar": metavar, "alias": alias, "is_repeated": is_repeated})
+
+
+def positional(metavar: str) -> Meta:
+    """Return the annotation of an argument that has no option name."""
+    return Meta(extra={"metavar": metavar, "is_positional": True})
+
+
+class UsageError(ConfigError):
+    """The words of a command line are not a command."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Command(ABC):
     """A command of `terrainkit`: its fields are the options."""
 
-    arguments: ClassVar[tuple[str, ...]] = ()
-    """The words on the command line."""
+    @classmethod
+    def options(cls, words: Sequence[str]) -> "list[Option]":  # noqa: ARG003 - for subclasses
+        """Return the options; for the help of some commands, `words` select the defaults."""
+        return options_of(cls)
 
     @classmethod
-    def options(cls, arguments: Sequence[str]) -> "type[Self]":
-        """Return the command with all its options, which may depend on the arguments.
+    def parse(cls, words: Sequence[str]) -> Self:
+        """Return the command that the words describe.
 
         Raises:
-            UsageError: if an option is unknown.
+            ConfigError: if an option is unknown, missing, or has an invalid value.
         """
-        check_options(cls, arguments)
-        return type(cls.__name__, (cls,), {"arguments": tuple(arguments), "__doc__": cls.__doc__})
-
-    def flag(self, name: str) -> bool | None:
-        """Return the value of a flag; None if it is not on the command line."""
-        option = name.replace("_", "-")
-        given = {word.replace("_", "-") for word in self.arguments}
-        is_given = given & {f"--{option}", f"--no-{option}"}
-        return bool(getattr(self, name)) if is_given else None
+        return cls(**read_words(options_of(cls), words))
 
     @abstractmethod
     def run(self) -> int:
         """Run the command, and return the exit code."""
 
 
-class UsageError(TerrainkitError):
-    """An invalid command line."""
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """An option or positional argument: a field of a command or config."""
+
+    owner: Any
+    """The dataclass that has the field."""
+
+    key: str
+    """Name of the field; for a nested config, with the names of the outer fields: env.num_envs."""
+
+    default: Any
+    """Value if the option is not given; `dataclasses.MISSING` if it is required."""
+
+    annotation: Any
+    """Type hint of the value."""
+
+    names: Sequence[str]
+    """Names on the command line; none for a positional argument. The last one of a flag is for
+    false, such as --no-overwrite or --asset.no-self-collisions."""
+
+    nargs: int | Literal["*"]
+    """Number of values, as argparse counts them; 0 for a flag."""
+
+    metavar: str
+    """Placeholders of the values in the help."""
+
+    is_repeated: bool
+    """Whether a tuple consists of one value of each occurrence of the option."""
+
+    @property
+    def name(self) -> str:
+        """Name in messages."""
+        return f"--{self.key}".replace("_", "-") if self.names else self.metavar
+
+    @property
+    def help(self) -> str:
+        """Help text."""
+        doc = field_docs(self.owner).get(self.key.rpartition(".")[2], "")
+        if self.is_repeated:
+            return f"{doc} (may be repeated)"
+        if self.default is MISSING:
+            return f"{doc} (required)" if self.names else doc
+        is_none = self.default is None and not parse_hint(self.annotation).is_optional
+        if is_none or self.default in ("", ()):
+            return doc
+        return f"{doc} (default: {_format_value(self.default)})"
+
+    def convert(self, words: Sequence[str]) -> Any:
+        """Return the value that words describe.
+
+        Raises:
+            ConfigError: if they have another type, or the value is out of range.
+        """
+        kind, origin, args, _, is_optional = parse_hint(self.annotation)
+        if is_optional and list(words) == [NONE]:
+            return None
+        if kind is Path and self.default is None and list(words) == [""]:
+            return None
+        is_tuple = origin is tuple
+        item = parse_hint(args[0]).kind if is_tuple else kind
+        from_word = {str: str, Path: Path}.get(item, value_of)
+        values = words if get_origin(item) is Literal else [from_word(word) for word in words]
+        return convert(self.name, values if is_tuple else values[0], self.annotation)
 
 
-_Command = TypeVar("_Command", bound=Command)
+def options_of(
+    owner: Any, aliases: Mapping[str, str] | None = None, prefix: str = ""
+) -> list[Option]:
+    """Return an option for each field of a command or config, nested configs included.
+
+    Args:
+        owner: The class of a command, or a config, whose values are the defaults.
+        aliases: Second names of options by key.
+        prefix: Beginning of the keys.
+    """
+    kind, options = owner if isinstance(owner, type) else type(owner), []
+    for name, annotation in field_types(kind).items():
+        default, key = getattr(owner, name, MISSING), prefix + name
+        hint = parse_hint(annotation)
+        if isinstance(default, Config):
+            options += options_of(default, aliases, f"{key}.")
+        elif hint.origin is not Mapping and not any(map(is_table, (hint.kind, *hint.args))):
+            options.append(_option(kind, key, default, annotation, (aliases or {}).get(key, "")))
+    return options
 
 
-def parse(command: type[_Command], prog: str, arguments: list[str]) -> _Command:
-    """Return the `command` that `arguments` describe; `--help` prints its help and exits.
+def _option(owner: Any, key: str, default: Any, annotation: Any, alias: str) -> Option:
+    extra = parse_hint(annotation).constraints
+    if "metavar" in extra and parse_hint(annotation).is_optional:
+        annotation = get_args(annotation)[0]  # None is only the default
+    hint = parse_hint(annotation)
+    section, dot, name = key.replace("_", "-").rpartition(".")
+    names = [alias or extra.get("alias", ""), f"--{section}{dot}{name}"]
+    is_repeated = bool(extra.get("is_repeated"))
+    nargs: int | Literal["*"] = 1
+    if hint.kind is bool and not hint.is_optional:
+        names, nargs = [*names, f"--{section}{dot}no-{name}"], 0
+    elif hint.origin is tuple and not is_repeated:
+        nargs = "*" if ... in hint.args or hint.is_optional else len(hint.args)
+    return Option(
+        owner=owner,
+        key=key,
+        default=default,
+        annotation=annotation,
+        names=[] if "is_positional" in extra else [each for each in names if each],
+        nargs=nargs,
+        metavar=extra.get("metavar") or _metavar(hint),
+        is_repeated=is_repeated,
+    )
+
+
+def read_words(options: Sequence[Option], words: Sequence[str]) -> dict[str, Any]:
+    """Return the values of the options that are given, by key.
 
     Raises:
-        UsageError: if an option is unknown, missing, or has an invalid value.
+        ConfigError: if an option is unknown.
+        UsageError: if one is missing, or has an invalid value.
     """
-    import tyro
-
-    # tyro would keep some line breaks of docstrings.
-    paragraphs = (inspect.getdoc(command) or "").split("\n\n")
-    description = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
-    if {"-h", "--help"} & set(arguments):
-        docs = field_docs(command)
-        for field in dataclasses.fields(command):
-            field.metadata = MappingProxyType({"help": docs.get(field.name, "")})
-    stdout, stderr = io.TextIOWrapper(io.BytesIO(), sys.stdout.encoding), io.StringIO()
-    stdout.isatty = sys.stdout.isatty  # type: ignore[method-assign]  # for colors
+    given, rest = split_words(options, words)
+    end = rest.index("--") if "--" in rest else len(rest)
+    for word in filter(is_option, rest[:end]):
+        name = word.partition("=")[0]
+        names = [*HELP, *(each for option in options for each in option.names)]
+        near = closest(name.replace("_", "-"), names)
+        hint = f"did you mean {near}?" if near else "--help lists the options"
+        raise ConfigError(f"no option {truncate(word)}; {hint}")
+    rest = rest[:end] + rest[end + 1 :]
+    positionals = [each for each in options if not each.names]
+    num_missing = sum(each.default is MISSING for each in positionals) - len(rest)
+    lists = [given[each.key] for each in options if each.nargs == "*" and each.key in given]
+    if num_missing > 0 and lists:  # they follow an option with any number of values
+        rest += lists[-1][-num_missing:]
+        del lists[-1][-num_missing:]
+    for each in positionals[: len(rest)]:
+        number = len(rest) if each.nargs == "*" else 1
+        given[each.key], rest = rest[:number], rest[number:]
+    if rest:
+        raise UsageError(f"got {truncate(rest[0])}; expected no more arguments")
+    for each in options:
+        if each.default is MISSING and each.key not in given:
+            raise UsageError(f"{each.name}: missing")
     try:
-        with contextlib.redirect_stdout(stdout), contextlib.redirect_stderr(stderr):
-            return tyro.cli(command, prog=prog, description=description, args=arguments)
-    except SystemExit as end:
-        if end.code in (0, None):
-            stdout.seek(0)
-            render.help_page(stdout.read())
-            sys.stdout.flush()
-            raise
-        raise UsageError(f"{_error_message(stderr.getvalue())}; see {prog} --help") from None
+        return {each.key: each.convert(given[each.key]) for each in options if each.key in given}
+    except ConfigError as error:
+        raise UsageError(str(error)) from None
+
+
+def split_words(
+    options: Iterable[Option], words: Sequence[str]
+) -> tuple[dict[str, list[str]], list[str]]:
+    """Return the words of each option that is given, by key, and the other words.
+
+    Raises:
+        UsageError: if an option has too few values, or a flag has one.
+    """
+    parser = argparse.ArgumentParser(
+        add_help=False,
+        allow_abbrev=False,
+        exit_on_error=False,
+        argument_default=argparse.SUPPRESS,
+    )
+    parser._negative_number_matcher = _NUMBER
+    by_name = {name: option for option in options for name in option.names}
+    for name, each in by_name.items():
+        if each.nargs == 0:
+            value = ["false" if name == each.names[-1] else "true"]
+            parser.add_argument(name, dest=each.key, action="store_const", const=value)
+        else:
+            action = "extend" if each.is_repeated else "store"
+            parser.add_argument(name, dest=each.key, action=action, nargs=each.nargs)
+    end = words.index("--") if "--" in words else len(words)
+    try:
+        given, rest = parser.parse_known_args([_with_dashes(word) for word in words[:end]])
+    except argparse.ArgumentError as error:
+        name = str(error.argument_name)
+        nargs = by_name[name].nargs
+        message = f"too few values; expected {nargs}" if nargs else "got a value; expected none"
+        raise UsageError(f"{name}: {message}") from None
+    return vars(given), [*rest, *words[end:]]
+
+
+def is_option(word: str) -> bool:
+    """Return whether a word is the name of an option, known or not."""
+    return word.startswith("-") and word != "-" and not _NUMBER.match(word)
 
 
 def value_of(word: str) -> str | float | bool | None:
@@ -93,81 +264,67 @@ def value_of(word: str) -> str | float | bool | None:
     if word.lower() in constants:
         return constants[word.lower()]
     for kind in (int, float):
-        with contextlib.suppress(ValueError):
+        with suppress(ValueError):
             return kind(word)
     return word
 
 
-def word_after(option: str, arguments: Sequence[str]) -> str:
-    """Return the word after an option, also in `--option=word`; empty if it is not given."""
-    for word, following in pairwise([*arguments, ""]):
-        name, equals, value = word.partition("=")
-        if name == option:
-            return value if equals else following
-    return ""
+def format_help(prog: str, doc: str, options: Sequence[Option], width: int) -> str:
+    """Return the help page of a command.
+
+    Args:
+        prog: The words that run the command.
+        doc: Docstring of the command.
+        options: The options, with the defaults to show.
+        width: Length of the lines [characters].
+    """
+    positionals = [each.metavar for each in options if not each.names]
+    parser = argparse.ArgumentParser(
+        usage=" ".join([prog, "[OPTIONS]", *positionals]),
+        description=_fill(doc, width),
+        formatter_class=lambda prog: argparse.RawDescriptionHelpFormatter(prog, width=width),
+    )
+    sections: dict[str, Any] = {"": parser}
+    for each in options:
+        section, text = each.key.rpartition(".")[0], each.help.replace("%", "%%")
+        if section not in sections:
+            about = _fill(inspect.getdoc(each.owner) or "", width - 2)
+            sections[section] = parser.add_argument_group(f"{section} options", about)
+        if each.nargs == 0:
+            sections[section].add_argument(*each.names, action="store_true", help=text)
+        else:
+            names = each.names or [each.key]
+            sections[section].add_argument(*names, metavar=each.metavar, help=text)
+    return parser.format_help()
 
 
-def option_names(command: type[Any], prefix: str = "", *, flags_only: bool = False) -> list[str]:
-    """Return the options of a dataclass that tyro parses, those of nested dataclasses included."""
-    options = []
-    for name, hint in get_type_hints(command, include_extras=True).items():
-        markers = [each for each in getattr(hint, "__metadata__", ()) if hasattr(each, "aliases")]
-        kind = getattr(hint, "__origin__", hint)
-        named = next((each.name for each in markers if each.name is not None), name)
-        if dataclasses.is_dataclass(kind):
-            inner = f"{prefix}{named}." if named else prefix
-            options += option_names(kind, inner, flags_only=flags_only)  # type: ignore[arg-type]
-        elif kind is bool or not flags_only:
-            options.append(f"--{prefix}{named}")
-            options += [f"--{prefix}no-{named}"] * (kind is bool)
-            options += [alias for each in markers for alias in each.aliases or ()]
-    return [option.replace("_", "-") for option in options]
+def _with_dashes(word: str) -> str:
+    """Return a word with dashes for the underscores in the name of an option."""
+    name, equals, value = word.partition("=")
+    return f"{name.replace('_', '-')}{equals}{value}" if word.startswith("--") else word
 
 
-def check_options(command: type[Command], arguments: Sequence[str]) -> None:
-    """Raise UsageError if an option is unknown; tyro's message fills a page."""
-    known = [*option_names(command), "--help"]
-    for word in arguments:
-        name = word.partition("=")[0]
-        if name.startswith("--") and name.replace("_", "-") not in known:
-            near = closest(name.replace("_", "-"), known)
-            hint = f"did you mean {near}?" if near else "--help lists the options"
-            raise UsageError(f"no option {truncate(name)}; {hint}")
+def _metavar(hint: TypeHint) -> str:
+    kind, origin, args, _, is_optional = hint
+    if origin is Literal:
+        text = "{" + ",".join(map(str, args)) + "}"
+    elif origin is tuple:
+        items = [_metavar(parse_hint(each)) for each in args if each is not ...]
+        text = f"[{items[0]} ...]" if ... in args else " ".join(items)
+    else:
+        text = {int: "INT", float: "FLOAT", str: "TEXT", bool: "{true,false}"}.get(kind, "VALUE")
+    return f"{text}|{NONE}" if is_optional else text
 
 
-def _error_message(box: str) -> str:
-    """Return the message in a box of tyro on one line, worded like the other errors."""
-    # A terminal that is not UTF-8 gets a box of other characters.
-    rows = [row.strip("│| ") for row in box.splitlines()[1:]]
-    parts = " ".join(row if row.strip("─╰╯+- ") else "\n" for row in rows).split("\n")
-    texts = [part.strip() for part in parts]
-    texts = [text for text in texts if text and not text.startswith(("For full", "Argument help"))]
-    text = re.sub(r"^Error parsing (\S+): (?=\1: )", "", ". ".join(texts))
-    for pattern, message in _MESSAGES.items():
-        if match := re.match(pattern, text):
-            return message(*match.groups())
-    return text
+def _format_value(value: object) -> str:
+    """Return a value as it is written on the command line."""
+    if isinstance(value, tuple):
+        return " ".join(map(_format_value, value))
+    if isinstance(value, bool) or value is None:
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else f"{value}"
 
 
-def _choice_message(value: str, option: str, choices: str) -> str:
-    names = [name for name in re.findall(r"'([^']*)'", choices) if name != "None"]
-    return f"{option}: got {value!r}; {expected_names(value, names, 'expected one of')}"
-
-
-_MESSAGES: dict[str, Callable[..., str]] = {
-    r"invalid choice '(.*)' for argument '(.*)'\. Expected one of \((.*)\)": _choice_message,
-    r"Missing value for argument '(.*)'\. Expected (\d+)": "{}: too few values; expected {}".format,
-    r"Missing from [\w -]+: (?:-\w \S+, )?(\S+)": "{}: missing".format,
-    r"Error parsing (\S+): Could not parse arguments \[(.*?)\] .*\[(.*)\]": (
-        "{}: got {}; expected {}".format
-    ),
-    r"Error parsing (\S+): invalid literal for int\(\) .*: (.*)": (
-        "{}: got {}; expected an integer".format
-    ),
-    r"Error parsing (\S+): could not convert string to float: (.*)": (
-        "{}: got {}; expected a number".format
-    ),
-    r"Unrecognized options: (-.*)": "no option {}".format,
-    r"Unrecognized options: (.*)": "got {}; expected no more arguments".format,
-}
-"""Patterns of tyro's errors, and functions that return the message for their groups."""
+def _fill(text: str, width: int) -> str:
+    paragraphs = inspect.cleandoc(text).split("\n\n")
+    return "\n\n".join(textwrap.fill(paragraph, width) for paragraph in paragraphs)

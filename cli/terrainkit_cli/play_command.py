@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
+from terrainkit_cli.argument_types import OutputPath
 from terrainkit_cli.evaluate_command import PolicyCommand, gait_lines, result_rows, summary_line
-from terrainkit_cli.robot_options import Flag, Output
+from terrainkit_cli.parse import option
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
@@ -27,25 +26,22 @@ class Play(PolicyCommand):
     seconds: float = 12.0
     """Duration of the rollout and of the video [s]."""
 
-    output: Output = ""
+    output: OutputPath | None = None
     """The video to write; by default RUN.mp4 in the working directory."""
 
     robots: int = 4
     """On a map, number of robots that the video follows in turn."""
 
-    size: Annotated[
-        tuple[int, int],
-        tyro.conf.arg(metavar="WIDTH HEIGHT", help_behavior_hint="(default: 640 360)"),
-    ] = (640, 360)
+    size: Annotated[tuple[int, int], option("WIDTH HEIGHT")] = (640, 360)
     """Size of the video [pixels]."""
 
-    video: Flag = True
+    video: bool = True
     """Write a video; --no-video only prints the table."""
 
-    viewer: Flag = False
+    viewer: bool = False
     """Show one robot in MuJoCo's viewer until its window is closed, and write nothing."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace an existing video."""
 
     def run(self) -> int:
@@ -57,8 +53,12 @@ class Play(PolicyCommand):
         spec = self.load_spec()
         from terrainkit_robots.rl.run import Run
 
-        named = spec.folder.resolve().name if isinstance(spec, Run) else Path(self.policy).stem
-        target = Path(self.output or f"{named}.mp4")
+        if isinstance(spec, Run):
+            named = spec.folder.resolve().name
+        else:
+            assert self.policy is not None
+            named = self.policy.stem
+        target = self.output or Path(f"{named}.mp4")
         config = self.eval_config(self.seconds)
         from terrainkit_robots.policy.play import play, view
         from terrainkit_robots.rendering.video import check_video_path, check_video_size

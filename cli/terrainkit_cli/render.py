@@ -40,11 +40,9 @@ def table(rows: Sequence[Sequence[str]]) -> None:
 
 
 def help_page(text: str) -> None:
-    """Print a help page; lines wider than the terminal are wrapped, except styled ones."""
-    columns = width()
+    """Print a help page; argparse does not wrap long names of options."""
     for line in text.splitlines():
-        is_long = len(line) > columns and "\x1b" not in line
-        print(textwrap.fill(line, columns) if is_long else line.rstrip())
+        print(textwrap.fill(line, width(), subsequent_indent="    ") if line else "")
 
 
 def report(text: str) -> None:

@@ -2,28 +2,24 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
-
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import (
-    Flag,
+from terrainkit_cli.argument_types import (
     IgnoredRules,
     InputPath,
-    Output,
+    OptionalFlag,
+    OutputPath,
     Packages,
-    StringList,
     XacroArguments,
     find_robot,
     parse_settings,
-    repeated_option,
     split_commas,
 )
+from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.fixes.apply import FixResult
@@ -50,53 +46,50 @@ class CheckRobot(Command):
     contains it, for those on the same line, and for the next one.
     """
 
-    files: Annotated[
-        StringList,
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="FILE [FILE ...]", help_behavior_hint=""),
-    ] = field(default_factory=list)
+    files: Annotated[tuple[str, ...], positional("FILE [FILE ...]")] = ()
     """Files to check, or names of bundled robots: quadruped, biped."""
 
     format: Literal["text", "json", "sarif", "github", "markdown"] = "text"
     """Format of the report. For several files, json prints one document per line."""
 
-    output: Output = ""
+    output: OutputPath | None = None
     """Write the report to this file. An existing file is replaced."""
 
-    select: Annotated[StringList, *repeated_option("CODES")] = field(default_factory=list)
+    select: Annotated[tuple[str, ...], option("CODES", is_repeated=True)] = ()
     """Run only these rules: comma-separated codes, prefixes of codes, or names."""
 
-    ignore: IgnoredRules = field(default_factory=list)
+    ignore: IgnoredRules = ()
     """Do not run these rules; the reason is printed in the report."""
 
-    package: Packages = field(default_factory=list)
+    package: Packages = ()
     """Folder of a ROS package, for package:// and $(find ...)."""
 
-    xacro_arg: XacroArguments = field(default_factory=list)
+    xacro_arg: XacroArguments = ()
     """Value of a xacro argument of the file."""
 
-    against: InputPath = ""
+    against: Annotated[str, option("PATH")] = ""
     """Compare with another file of the same robot: URDF, xacro or MJCF."""
 
-    spec: InputPath = ""
+    spec: InputPath | None = None
     """Compare with the robot.toml of the robot."""
 
-    simulation: Flag = True
-    """Run the rules that simulate the robot (drop test, standing test, joint sweep)."""
+    simulation: OptionalFlag | None = None
+    """Run the rules that simulate the robot: drop test, standing test, joint sweep. This is the
+    default."""
 
-    strict: Flag = False
+    strict: OptionalFlag | None = None
     """Exit with code 1 if there are warnings."""
 
-    notes: Flag = False
+    notes: bool = False
     """Print notes in full; the text report has one line for each."""
 
-    fix: Flag = False
+    fix: bool = False
     """Apply the safe fixes: they do not change the robot for any parser that reads the file."""
 
-    unsafe_fixes: Flag = False
+    unsafe_fixes: bool = False
     """Also apply fixes that change a number, a shape or another file. Review the result."""
 
-    diff: Flag = False
+    diff: bool = False
     """Print the changes of --fix or --unsafe-fixes, and write nothing."""
 
     def run(self) -> int:
@@ -108,11 +101,10 @@ class CheckRobot(Command):
         if len(self.files) > 1 and (self.against or self.spec):
             raise ConfigError(f"--against and --spec: got {len(self.files)} files; expected one")
         options = self._settings()
-        output = Path(self.output) if self.output else None
-        if output is not None:
-            _check_output(output, [Path(name) for name in self.files])
+        if self.output:
+            _check_output(self.output, [Path(name) for name in self.files])
         checks = [check for name in self.files if (check := self._check_file(name, options))]
-        self._print([check.report for check in checks], "".join(c.diff for c in checks), output)
+        self._print([check.report for check in checks], "".join(c.diff for c in checks))
         crashed = [rule for check in checks for rule in check.report.crashed]
         for rule in crashed:
             render.error(f"{rule.code}: {rule.reason}")
@@ -126,8 +118,8 @@ class CheckRobot(Command):
         settings = replace(
             parse_settings(self.ignore, self.package, self.xacro_arg),
             select=tuple(word for words in self.select for word in split_commas(words)),
-            strict=self.flag("strict"),
-            simulate=self.flag("simulation"),
+            strict=self.strict,
+            simulate=self.simulation,
         )
         select_rules(settings)
         return settings
@@ -163,9 +155,7 @@ class CheckRobot(Command):
         against = find_robot(self.against) if self.against else None
 
         def check(contents: Mapping[Path, bytes]) -> "Report":
-            return check_robot(
-                path, settings, against=against, spec=self.spec or None, contents=contents
-            )
+            return check_robot(path, settings, against=against, spec=self.spec, contents=contents)
 
         report, diff = check({}), ""
         if self.fix or self.unsafe_fixes or self.diff:
@@ -183,7 +173,7 @@ class CheckRobot(Command):
         failing = ("fail", "warn") if settings.strict else ("fail",)
         return _Check(report=report, failed=report.verdict in failing, diff=diff)
 
-    def _print(self, reports: "Sequence[Report]", diff: str, output: Path | None) -> None:
+    def _print(self, reports: "Sequence[Report]", diff: str) -> None:
         from terrainkit_robots.lint.report import to_text
         from terrainkit_robots.lint.report.summary import summarize_findings
 
@@ -194,24 +184,22 @@ class CheckRobot(Command):
         elif self.format == "text":
             from terrainkit_robots.lint.report import text as text_report
 
-            if output is None and render.has_colors():
-                lines = text_report.format_lines(
-                    reports, width=render.width(), verbose=bool(self.flag("notes"))
-                )
-                render.styled(lines)
+            if self.output is None and render.has_colors():
+                width = render.width()
+                render.styled(text_report.format_lines(reports, width=width, verbose=self.notes))
                 return
-            text = text_report.to_text(reports, verbose=bool(self.flag("notes")))
+            text = text_report.to_text(reports, verbose=self.notes)
         else:
             text = to_text(reports, self.format)
-        if output is None:
+        if self.output is None:
             render.report(text)
         elif reports:
             from terrainkit.files.atomic_write import atomic_write
 
-            _check_output(output, [path for r in reports for path in r.facts.model.sources])
-            with atomic_write(output, overwrite=True) as path:
+            _check_output(self.output, [path for r in reports for path in r.facts.model.sources])
+            with atomic_write(self.output, overwrite=True) as path:
                 path.write_bytes(text.encode("utf-8", "backslashreplace"))
-            render.result(f"wrote {output}: {summarize_findings(reports)}")
+            render.result(f"wrote {self.output}: {summarize_findings(reports)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,12 +242,10 @@ def _check_output(output: Path, inputs: Sequence[Path]) -> None:
 class Rule(Command):
     """Explain a rule of check-robot, or list all rules."""
 
-    code: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="[CODE]", help_behavior_hint="")
-    ] = ""
+    code: Annotated[str, positional("[CODE]")] = ""
     """Code of the rule, such as INR001, or its name."""
 
-    all: Flag = False
+    all: bool = False
     """List all rules. This is the default without CODE."""
 
     def run(self) -> int:

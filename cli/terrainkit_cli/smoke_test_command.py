@@ -2,25 +2,24 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
+from msgspec import Meta
 
 from terrainkit.errors import ConfigError, TerrainkitError, listing
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import (
+from terrainkit_cli.argument_types import (
     IgnoredRules,
     InputPath,
-    Output,
+    OutputPath,
     Packages,
-    StringList,
     XacroArguments,
     parse_settings,
 )
+from terrainkit_cli.parse import Command, positional
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
@@ -42,33 +41,29 @@ class SmokeTest(Command):
     option is invalid.
     """
 
-    robots: Annotated[
-        StringList,
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="ROBOT [ROBOT ...]", help_behavior_hint=""),
-    ] = field(default_factory=list)
+    robots: Annotated[tuple[str, ...], positional("ROBOT [ROBOT ...]")] = ()
     """Names of robots, folders written by terrainkit onboard, or URDF, xacro or MJCF files."""
 
-    samples: int = 100_000
+    samples: Annotated[int, Meta(ge=0)] = 100_000
     """Samples of the short training; 0 for none. With fewer than 50,000, only its losses are
     checked."""
 
     format: Literal["text", "json"] = "text"
     """Format of the report. For several robots, json writes one document per line."""
 
-    output: Output = ""
+    output: OutputPath | None = None
     """Write the report to this file; an existing file is replaced."""
 
-    ignore: IgnoredRules = field(default_factory=list)
+    ignore: IgnoredRules = ()
     """For robot files: rules to ignore, with the reason."""
 
-    package: Packages = field(default_factory=list)
+    package: Packages = ()
     """For robot files: folder of a ROS package, for package:// and $(find ...)."""
 
-    xacro_arg: XacroArguments = field(default_factory=list)
+    xacro_arg: XacroArguments = ()
     """For robot files: value of a xacro argument."""
 
-    spec: InputPath = ""
+    spec: InputPath | None = None
     """For a robot file: a robot.toml whose values override the derived ones."""
 
     def run(self) -> int:
@@ -90,7 +85,7 @@ class SmokeTest(Command):
         if self.output:
             from terrainkit.files.atomic_write import atomic_write
 
-            with atomic_write(Path(self.output), overwrite=True) as path:
+            with atomic_write(self.output, overwrite=True) as path:
                 path.write_text(text, encoding="utf-8")
             render.result(f"wrote {self.output}: {', '.join(map(summary, results.values()))}")
         else:
@@ -104,8 +99,6 @@ class SmokeTest(Command):
             raise ConfigError("ROBOT: missing; expected a name, a folder, or a robot file")
         if self.spec and len(self.robots) > 1:
             raise ConfigError(f"--spec: got {len(self.robots)} robots; expected one")
-        if self.samples < 0:
-            raise ConfigError(f"--samples: got {self.samples}; expected 0 or more")
         names = "package", "xacro-arg", "ignore", "spec"
         given = [name for name in names if getattr(self, name.replace("-", "_"))]
         if given and not any(Path(name).is_file() for name in self.robots):
@@ -114,15 +107,14 @@ class SmokeTest(Command):
         if self.output:
             from terrainkit.files.atomic_write import check_target
 
-            check_target(Path(self.output), overwrite=True)  # before the tests
+            check_target(self.output, overwrite=True)  # before the tests
 
     def _smoke_test(self, name: str, progress: Callable[[float], None]) -> "SmokeTestResult":
         from terrainkit_robots.onboarding.pipeline import OnboardOptions
         from terrainkit_robots.smoke_test.checks import smoke_test
 
         settings = parse_settings(self.ignore, self.package, self.xacro_arg)
-        spec = Path(self.spec) if self.spec else None
-        options = OnboardOptions(settings=settings, spec=spec)
+        options = OnboardOptions(settings=settings, spec=self.spec)
         return smoke_test(name, options, samples=self.samples, progress=progress)
 
 

@@ -2,10 +2,7 @@
 
 import textwrap
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Literal
-
-import tyro
 
 from terrainkit import suites
 from terrainkit.errors import ConfigError
@@ -13,9 +10,9 @@ from terrainkit.map.config import MapConfig
 from terrainkit.terrain.parameter import format_value
 from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import Flag, text_option
-from terrainkit_cli.terrain_commands import written
+from terrainkit_cli.argument_types import OutputPath
+from terrainkit_cli.map_text import written
+from terrainkit_cli.parse import Command, positional
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,19 +23,17 @@ class Suite(Command):
     and its columns are tests.
     """
 
-    action: Annotated[Literal["list", "show", "generate"], tyro.conf.Positional]
+    action: Annotated[Literal["list", "show", "generate"], positional("ACTION")]
     """list: the names of all suites. show: the tests of a suite, their dimensions and the hash.
     generate: write the map, and verify the hash."""
 
-    name: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="[NAME]", help_behavior_hint="")
-    ] = ""
+    name: Annotated[str, positional("[NAME]")] = ""
     """Name of the suite, for show and generate."""
 
-    output: Annotated[str, text_option("FILE", "-o")] = ""
+    output: OutputPath | None = None
     """For generate: file to write. The suffix selects the format, as in `terrainkit generate`."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """For generate: replace an existing file."""
 
     def run(self) -> int:
@@ -68,10 +63,10 @@ class Suite(Command):
 
         if not self.output:
             raise ConfigError("--output: missing; expected a file, whose suffix selects the format")
-        output, (x, y) = Path(self.output), suite.config.grid.shape
-        export.check_export(output, x * y, overwrite=self.overwrite)  # before generating
+        x, y = suite.config.grid.shape
+        export.check_export(self.output, x * y, overwrite=self.overwrite)  # before generating
         terrain_map = suites.generate_suite(suite.name, progress=render.progress)
-        files = export.export_files(terrain_map, output, overwrite=self.overwrite)
+        files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, *files))
         render.result(f"verified: SHA-256 {suite.sha256}")
 

@@ -1,16 +1,15 @@
 """The commands for maps: generate, list, info, preview, check-map and diff."""
 
 import re
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
-import tyro
+from msgspec import Meta
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError
 from terrainkit.map.config import MapConfig
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain import presets, registry
@@ -18,15 +17,11 @@ from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, format_value, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render
+from terrainkit_cli.argument_types import Limits, MapFile, OutputPath, RobotName
 from terrainkit_cli.config_options import ConfigCommand
-from terrainkit_cli.parse import Command, check_options, value_of, word_after
-from terrainkit_cli.robot_options import Flag, LimitWords, RobotName, StringList, text_option
-
-if TYPE_CHECKING:
-    from typing import Self
-
-MapFile = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="MAP.npz")]
-Output = Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+from terrainkit_cli.map_text import bytes_text, size_text, written
+from terrainkit_cli.parse import Command, option, positional, value_of
+from terrainkit_cli.worker_pool import MAX_JOBS, worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,60 +32,62 @@ class Generate(ConfigCommand):
     select the terrains; --rows and the options after it override the map config.
     """
 
-    output: Output
+    defaults: MapConfig
+
+    output: OutputPath
     """File to write. The suffix selects the format: .npz for a complete map, which the other
     commands read; .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png for other
     programs."""
 
-    config: Annotated[str, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = ""
+    config: Annotated[str, option("FILE")] = ""
     """Map config (.toml), or a map (.npz) whose config is used; options override it."""
 
-    terrain: Annotated[str, tyro.conf.arg(metavar="NAME", help_behavior_hint="")] = ""
+    terrain: Annotated[str, option("NAME")] = ""
     """Use only this terrain, not a preset; `terrainkit list` prints the names."""
 
-    set: Annotated[str, tyro.conf.arg(metavar="NAME=VALUE,...", help_behavior_hint="")] = ""
+    set: Annotated[str, option("NAME=VALUE,...")] = ""
     """Parameters of --terrain: NAME=VALUE, NAME=EASY:HARD for a range over the difficulty, or
     NAME=[X,Y,...] for a tuple."""
 
-    overlay: Annotated[
-        StringList,
-        tyro.conf.arg(metavar="NAME[:PARAMETER=VALUE,...]", help_behavior_hint=""),
-    ] = field(default_factory=list)
+    overlay: Annotated[tuple[str, ...], option("[NAME[:PARAMETER=VALUE,...] ...]")] = ()
     """Overlays on all terrains, in their order, such as `noise:amplitude=0:0.05 side_walls`;
     `terrainkit list` prints the names."""
 
     robot: RobotName = ""
     """With --demand: name of a bundled robot, or a folder written by terrainkit onboard."""
 
-    demand: Annotated[str, text_option("LOW:HIGH")] = ""
+    demand: Annotated[str, option("LOW:HIGH")] = ""
     """Replace the ranges of each terrain, so that they demand LOW to HIGH of --robot: 0 is level
     ground, 1 the limit of the robot; see terrainkit feasibility."""
 
-    limit: LimitWords = field(default_factory=list)
+    limit: Limits = ()
     """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
-    jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    jobs: Annotated[int, Meta(ge=1, le=MAX_JOBS), option("N")] = 1
     """Number of processes that build patches; the map does not depend on it. More than one is
     faster for maps that take several seconds."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace an existing file."""
 
     @classmethod
-    def options(cls, arguments: Sequence[str]) -> "type[Self]":
-        """Return this command with an option for each value of the config."""
-        path = word_after("--config", arguments)
-        config = _load_config(path) if path else MapConfig()
-        command = cls.with_options(config, exclude=("terrains",))
-        check_options(command, arguments)
-        return command
+    def default_config(cls) -> MapConfig:
+        """Return the default config."""
+        return MapConfig()
+
+    @classmethod
+    def load_config(cls, words: Sequence[str]) -> MapConfig:
+        """Return the config in the file of --config, or the default one."""
+        path = cls.split(words)[0].get("config", "")
+        if path.endswith(".npz"):
+            return TerrainMap.load(path).config
+        return MapConfig.load(path) if path else MapConfig()
 
     def run(self) -> int:
         """Generate the map, write it, and print the next commands."""
         from terrainkit import export
         from terrainkit.map.generation import generate
         from terrainkit_cli.feasibility_command import solve_demand
-        from terrainkit_cli.worker_pool import worker_pool
 
         config = self.changed_config()
         samples = config.grid.shape[0] * config.grid.shape[1]
@@ -113,9 +110,9 @@ class Generate(ConfigCommand):
             )
         return 0
 
-    def overrides(self) -> dict[str, Any]:
-        """Return the values on the command line by field name."""
-        values = super().overrides()
+    def changed_config(self) -> Any:
+        """Return the config with the values, terrain and overlays on the command line."""
+        values = dict(self.changes)
         if self.terrain and "preset" in values:
             raise ConfigError("--terrain, --preset: got both; expected one of them")
         if self.set and not self.terrain:
@@ -126,13 +123,14 @@ class Generate(ConfigCommand):
             values["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
         elif "preset" in values:
             values["terrains"] = ()
-        return values
-
-    def changed_config(self) -> Any:
-        """Return the config with the values and the overlays on the command line."""
-        config, added = super().changed_config(), tuple(map(_overlay, self.overlay))
-        terrains = [replace(each, overlays=each.overlays + added) for each in config.sub_terrains]
-        return replace(config, terrains=tuple(terrains)) if added else config
+        config = replace(self.defaults, **values)
+        overlays = tuple(map(_overlay, self.overlay))
+        if not overlays:
+            return config
+        terrains = [
+            replace(each, overlays=each.overlays + overlays) for each in config.sub_terrains
+        ]
+        return replace(config, terrains=tuple(terrains))
 
 
 def _overlay(text: str) -> Overlay:
@@ -140,10 +138,6 @@ def _overlay(text: str) -> Overlay:
     name, _, values = text.partition(":")
     parameters = _parameters("--overlay", values, registry.get_overlay(name))
     return registry.make_overlay(name, parameters)
-
-
-def _load_config(path: str) -> MapConfig:
-    return TerrainMap.load(path).config if path.endswith(".npz") else MapConfig.load(path)
 
 
 def _parameters(option: str, text: str, owner: Any) -> dict[str, Any]:
@@ -175,9 +169,7 @@ def _parameter_value(text: str, parameter: Parameter | None) -> Any:
 class List(Command):
     """List terrains, overlays and presets, or the parameters of one."""
 
-    terrain: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="[NAME]", help_behavior_hint="")
-    ] = ""
+    terrain: Annotated[str, positional("[NAME]")] = ""
     """Name of a terrain or overlay, to print its parameters."""
 
     def run(self) -> int:
@@ -218,10 +210,6 @@ class List(Command):
         return 0
 
 
-_WHOLE_MAP = (-sys.maxsize, -sys.maxsize)
-"""Value of --patch if it is not given; with None, tyro's errors name the types of a union."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Info(Command):
     """Print the size, terrains and difficulty of a map, or one patch."""
@@ -229,26 +217,24 @@ class Info(Command):
     map: MapFile
     """The map, a file written by terrainkit generate."""
 
-    patch: Annotated[tuple[int, int], tyro.conf.arg(metavar="ROW COL", help_behavior_hint="")] = (
-        _WHOLE_MAP
-    )
+    patch: Annotated[tuple[int, int], option("ROW COL")] | None = None
     """Row and column of a patch, to print its requested and realized parameters."""
 
-    budget: Flag = False
+    budget: bool = False
     """Print what the map costs: triangles, geoms, file sizes, contacts, and the estimated time of
     a MuJoCo step."""
 
-    foot_radius: Annotated[float, tyro.conf.arg(metavar="M")] = 0.03
+    foot_radius: Annotated[float, option("M")] = 0.03
     """With --budget: half of the side of the square that contains a foot [m]."""
 
     def run(self) -> int:
         """Print the size of the map and its columns, one patch, or the budget."""
         terrain_map = TerrainMap.load(self.map)
-        if self.patch != _WHOLE_MAP and self.budget:
+        if self.patch and self.budget:
             raise ConfigError("--budget, --patch: got both; expected one of them")
         if self.budget:
             _print_budget(terrain_map, self.foot_radius)
-        elif self.patch != _WHOLE_MAP:
+        elif self.patch:
             _print_patch(terrain_map, *self.patch)
         else:
             _print_map(terrain_map)
@@ -261,9 +247,9 @@ def _print_map(terrain_map: TerrainMap) -> None:
     config, grid = terrain_map.config, terrain_map.grid
     heights = terrain_map.heights
     facts = {
-        "patches": f"{config.rows} x {config.cols} of {_size_text(*config.patch_size)}",
+        "patches": f"{config.rows} x {config.cols} of {size_text(*config.patch_size)}",
         "samples": f"{grid.shape[0]} x {grid.shape[1]}, one every {config.cell:g} m",
-        "extent": f"{_size_text(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
+        "extent": f"{size_text(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
         "border": f"{config.border:g} m",
         "heights": f"{heights.min():g} to {heights.max():g} m",
         "solids": _solids_text(terrain_map),
@@ -330,7 +316,7 @@ def _print_budget(terrain_map: TerrainMap, foot_radius: float) -> None:
     render.table(rows)
     render.result("")
     sizes = budget.file_sizes.items()
-    texts = [(name, _bytes_text(n) if isinstance(n, int) else n) for name, n in sizes]
+    texts = [(name, bytes_text(n) if isinstance(n, int) else n) for name, n in sizes]
     render.table([("file", "size"), *texts])
 
 
@@ -362,13 +348,13 @@ class Preview(Command):
     map: MapFile
     """The map, a file written by terrainkit generate."""
 
-    output: Output
+    output: OutputPath
     """The image to write (.png)."""
 
     width: int = 1600
     """Minimum width of the map in the image [pixels]."""
 
-    overwrite: Flag = False
+    overwrite: bool = False
     """Replace an existing file."""
 
     def run(self) -> int:
@@ -396,7 +382,7 @@ class CheckMap(Command):
     """Also check that this robot can cross every patch: name of a bundled robot, or a folder
     written by terrainkit onboard."""
 
-    limit: LimitWords = field(default_factory=list)
+    limit: Limits = ()
     """With --robot: limits that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
     def run(self) -> int:
@@ -444,7 +430,7 @@ class Diff(Command):
     a: MapFile
     """The first map, a file written by terrainkit generate."""
 
-    b: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="OTHER.npz")]
+    b: Annotated[Path, positional("OTHER.npz")]
     """The second map."""
 
     def run(self) -> int:
@@ -465,22 +451,3 @@ class Diff(Command):
             return 1
         render.result(f"{self.a} and {self.b} are the same")
         return 0
-
-
-def written(terrain_map: TerrainMap, path: Path, *others: Path) -> str:
-    """Return the message about a written map, and other files that were written beside it."""
-    config, grid = terrain_map.config, terrain_map.grid
-    beside = f", with {listing(each.name for each in others)} beside it" if others else ""
-    return (
-        f"wrote {path}{beside}: "
-        f"{config.rows} x {config.cols} patches of {_size_text(*config.patch_size)}, "
-        f"{grid.shape[0]} x {grid.shape[1]} samples, {_bytes_text(path.stat().st_size)}"
-    )
-
-
-def _bytes_text(number: int) -> str:
-    return f"{number / 1e3:.1f} kB" if number < 1e6 else f"{number / 1e6:,.1f} MB"
-
-
-def _size_text(x: float, y: float) -> str:
-    return f"{x:g} m x {y:g} m"

@@ -1,28 +1,28 @@
 """The command that trains a policy."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from importlib.util import find_spec
+from os.path import isdir
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, listing
 from terrainkit_cli import render
-from terrainkit_cli.config_options import TaskCommand
-from terrainkit_cli.robot_options import text_option
+from terrainkit_cli.argument_types import Device, TerrainName
+from terrainkit_cli.config_options import ConfigCommand
+from terrainkit_cli.parse import is_option, option, positional
 from terrainkit_cli.signals import stop_on_signals
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.config import Task
-    from terrainkit_robots.rl.run import Run
     from terrainkit_robots.rl.runner import LeggedRunner
 
 
 @dataclass(frozen=True, kw_only=True)
-class Train(TaskCommand):
+class Train(ConfigCommand):
     """Train a policy for a robot on a terrain, and save it as a run.
 
     A run is a folder with the task, checkpoints (model_100.pt is the one after 100 iterations) and
@@ -40,38 +40,60 @@ class Train(TaskCommand):
         "runner.seed": "--seed",
     }
 
-    terrain: Annotated[str, text_option("TERRAIN")] = ""
+    robot: Annotated[str, positional("ROBOT")] = ""
+    """Name of a bundled task, or a folder written by terrainkit onboard."""
+
+    config: Annotated[str, option("PATH")] = ""
+    """Task file (.toml) whose values override those of ROBOT; options override both."""
+
+    terrain: TerrainName = ""
     """plane (the default), a map (.npz), or a map config (.toml)."""
 
-    log_dir: Annotated[str, text_option("FOLDER")] = ""
+    log_dir: Annotated[Path, option("FOLDER")] | None = None
     """Folder of the run, new or empty; by default logs/ROBOT/DATE-TIME."""
 
-    resume: Annotated[str, text_option("RUN")] = ""
+    resume: Annotated[str, option("RUN")] = ""
     """Continue a run: its folder, or one of its checkpoints. Robot, terrain and task default to
     those of the run. Training continues in the same folder, as if it had not been interrupted.
     With another terrain or task, a new run starts with the networks of this run. It also starts
     with its optimizer state if --algorithm.learning-rate and --algorithm.schedule are the same, and
     with its terrain levels if the map is the same."""
 
-    device: Annotated[str, text_option("DEVICE")] = "cpu"
-    """Device of the networks: cpu (the default), cuda, cuda:1. The physics runs on the CPU."""
+    device: Device = "cpu"
+    """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""
 
-    def default_config(self) -> "Task":
-        """Return the task before options: that of the run, or of the robot; then --config."""
+    @classmethod
+    def default_config(cls) -> "Task":
+        """Return the default task."""
         from terrainkit_robots.rl.config import Task
-        from terrainkit_robots.rl.tasks import get_task
 
-        run = self._resume_run
-        task = get_task(self._robot(None)).task if run is None else run.task
-        return Task.load(self.config, task) if self.config else task
+        return Task()
+
+    @classmethod
+    def load_config(cls, words: Sequence[str]) -> "Task":
+        """Return the task before options: that of the run, or of the robot; then --config."""
+        given, rest = cls.split(words)
+        if resume := given.get("resume"):
+            from terrainkit_robots.rl.run import open_run
+
+            task = open_run(resume).task
+        else:
+            from terrainkit_robots.rl.tasks import get_task
+
+            task = get_task(_find_robot(rest)).task
+        path = given.get("config")
+        return type(task).load(path, task) if path else task
 
     def run(self) -> int:
         """Train, and print the next commands."""
         require_training()
+        from terrainkit_robots.rl.run import open_run
         from terrainkit_robots.rl.train import train
 
-        run = self._resume_run
-        robot, terrain, task = self._robot(run), self._terrain(run), self.changed_config()
+        run = open_run(self.resume) if self.resume else None
+        robot = self.robot or (run.info.robot if run else "")
+        terrain = self.terrain or (run.terrain if run else "plane")
+        task = self.changed_config()
         if task.runner.logger == "wandb" and find_spec("wandb") is None:
             raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
         with stop_on_signals() as stop_signal, render.training() as show_progress:
@@ -79,7 +101,7 @@ class Train(TaskCommand):
                 robot,
                 terrain,
                 task,
-                folder=Path(self.log_dir) if self.log_dir else None,
+                folder=self.log_dir,
                 resume=run,
                 device=self.device,
                 start_callback=lambda runner: _print_start(runner, terrain),
@@ -91,25 +113,28 @@ class Train(TaskCommand):
         _print_result(runner, task)
         return 128 + number if number else 0
 
-    @cached_property  # read once: training may write a checkpoint in between
-    def _resume_run(self) -> "Run | None":
-        from terrainkit_robots.rl.run import open_run
 
-        return open_run(self.resume) if self.resume else None
+def _find_robot(words: Sequence[str]) -> str:
+    """Return ROBOT among words.
 
-    def _robot(self, run: "Run | None") -> str:
-        if self.robot or run is not None:
-            return self.robot or run.info.robot  # type: ignore[union-attr]
-        from terrainkit.errors import listing
-        from terrainkit_robots.rl.tasks import task_names
+    An option that only the task of ROBOT has may precede it. How many of the words in between are
+    values of that option is unknown until then.
 
-        raise ConfigError(
-            "ROBOT: missing; expected a folder written by terrainkit onboard, or one of: "
-            f"{listing(task_names())}"
-        )
+    Raises:
+        ConfigError: if there is none.
+    """
+    from terrainkit_robots.rl.tasks import task_names
 
-    def _terrain(self, run: "Run | None") -> str:
-        return self.terrain or ("plane" if run is None else run.terrain)
+    names = task_names()
+    for word in words:
+        if word in names or isdir(word):  # noqa: PTH112 - Path.is_dir raises OSError for long names
+            return word
+    if words and words[0] and not is_option(words[0]):
+        return words[0]
+    raise ConfigError(
+        "ROBOT: missing; expected a folder written by terrainkit onboard, or one of: "
+        f"{listing(names)}"
+    )
 
 
 def _print_start(runner: "LeggedRunner", terrain: str) -> None:

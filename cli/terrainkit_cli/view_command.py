@@ -4,28 +4,25 @@ import socket
 import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import tyro
+from msgspec import Meta
 
 from terrainkit.errors import ConfigError
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
-from terrainkit_cli.parse import Command
-from terrainkit_cli.robot_options import (
-    UNSET,
+from terrainkit_cli.argument_types import (
     Checkpoint,
-    Flag,
     Packages,
+    TerrainName,
     XacroArguments,
-    optional_number,
     parse_settings,
-    text_option,
 )
+from terrainkit_cli.parse import Command, positional
 
 if TYPE_CHECKING:
     import viser
@@ -52,32 +49,30 @@ class View(Command):
     host, forward the port of a remote machine (ssh -L 8080:localhost:8080) and open the address.
     """
 
-    source: Annotated[
-        str, tyro.conf.Positional, tyro.conf.arg(metavar="MAP.npz|ROBOT|RUN", help_behavior_hint="")
-    ] = ""
+    source: Annotated[str, positional("MAP.npz|ROBOT|RUN")] = ""
     """A map; a URDF, xacro or MJCF file, an onboarded folder, or a bundled robot; or a run of
     terrainkit train, a checkpoint in one, or a bundled policy."""
 
-    policy: Flag = False
+    policy: bool = False
     """Show the bundled policy of a robot instead of the robot."""
 
-    terrain: Annotated[str, text_option("TERRAIN")] = ""
+    terrain: TerrainName = ""
     """For a policy: plane, a map (.npz), or a map config (.toml); by default, the terrain of the
     training."""
 
-    checkpoint: Checkpoint = UNSET
-    """For a policy: the checkpoint to load."""
+    checkpoint: Checkpoint | None = None
+    """For a policy: the checkpoint to load; by default, the last one."""
 
-    package: Packages = field(default_factory=list)
+    package: Packages = ()
     """For a robot: folder of a ROS package, for package:// and $(find ...)."""
 
-    xacro_arg: XacroArguments = field(default_factory=list)
+    xacro_arg: XacroArguments = ()
     """For a robot: value of a xacro argument of the file."""
 
     host: str = "localhost"
     """Address that the server listens on; 0.0.0.0 is reachable from other machines."""
 
-    port: int = 8080
+    port: Annotated[int, Meta(ge=1, le=65535)] = 8080
     """Port that the server listens on; the next free one if it is in use."""
 
     def run(self) -> int:
@@ -93,7 +88,7 @@ class View(Command):
         self._check_address()
         kind = source_kind(self.source, policy=self.policy)
         for name, expected in OPTION_KINDS.items():
-            if getattr(self, name) not in ("", UNSET, []) and kind != expected:
+            if getattr(self, name) != getattr(type(self), name) and kind != expected:
                 option = name.replace("_", "-")
                 raise ConfigError(
                     f"--{option}: got the {kind} {self.source}; expected a {expected}"
@@ -111,8 +106,6 @@ class View(Command):
         return 0
 
     def _check_address(self) -> None:
-        if not 0 < self.port < 1 << 16:
-            raise ConfigError(f"--port: got {self.port}; expected 1 to 65535")
         try:  # viser would wait forever for a server that cannot listen
             with socket.socket() as trial:
                 trial.bind((self.host, 0))
@@ -167,7 +160,7 @@ class View(Command):
         from terrainkit_robots.rl.run import open_run
         from terrainkit_robots.viewer.show_policy import PolicyView
 
-        run = open_run(self.source, optional_number(self.checkpoint))
+        run = open_run(self.source, self.checkpoint)
         return lambda server: PolicyView(server, run, self.terrain or None).run
 
 

@@ -51,10 +51,7 @@ def run_main(capsys) -> Callable[..., Run]:
 
     def run(*words: object) -> Run:
         capsys.readouterr()
-        try:
-            code = main([str(word) for word in words])
-        except SystemExit as error:  # after --help
-            code = error.code
+        code = main([str(word) for word in words])
         captured = capsys.readouterr()
         return Run(words, code, captured.out, captured.err)
 

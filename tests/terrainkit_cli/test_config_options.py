@@ -2,43 +2,15 @@ import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, field, replace
-from typing import Annotated
 
 import pytest
-import tyro
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import field_types, flatten
-from terrainkit_cli.config_options import TaskCommand
-from terrainkit_cli.parse import UsageError, parse
-from terrainkit_cli.robot_options import InputPath, Output
+from terrainkit_cli.train_command import Train
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Commands, Env, Rewards, Task
 from terrainkit_robots.rl.tasks import get_task, register_task
-
-
-@dataclass(frozen=True, kw_only=True)
-class Train(TaskCommand):
-    """Train a policy.
-
-    On a ground.
-    """
-
-    terrain: InputPath = ""
-    """The ground: an option with the name of a section."""
-
-    named: Annotated[str, tyro.conf.arg(name="robot")] = ""
-    """An option with another name than its field."""
-
-    output: Output = ""
-    """An option with a short name."""
-
-    quick: bool = False
-    """A flag."""
-
-    def run(self) -> int:
-        """Do nothing."""
-        return 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,26 +40,25 @@ def rover(monkeypatch, tmp_path):
 
 def parse_words(*words):
     """Return the command that words describe, as `terrainkit train` reads them."""
-    return parse(Train.options(words), "terrainkit train", list(words))
+    return Train.parse(words)
 
 
 def changes(command):
     """Return what the command line changed, by name."""
-    before = dict(flatten(command.default_config()))
+    before = dict(flatten(command.defaults))
     return {name: new for name, new in flatten(command.changed_config()) if new != before[name]}
 
 
-def test_task_command_has_option_for_each_value():
+def test_train_has_option_for_each_value():
     words = (
         "quadruped --rewards.tracking-lin-vel 1.25 --commands.lin-vel-x -1 2 --terrain rough.npz "
         "--terrain.collision plane --rewards.dof-acc -1e-8 --domain-rand.friction none "
-        "--domain-rand.added-mass 0 3 --terrain.measure_heights true --quick "
+        "--domain-rand.added-mass 0 3 --terrain.measure_heights true "
         "--policy.actor-hidden-dims 64 32 --algorithm.symmetry false --env.num-envs=64 "
-        "--normalization.obs-scales.lin-vel 1 --commands.heading-command true --robot x -o y"
+        "--normalization.obs-scales.lin-vel 1 --commands.heading-command true"
     )
     made = parse_words(*words.split())
-    assert (made.robot, made.terrain, made.quick) == ("quadruped", "rough.npz", True)
-    assert (made.named, made.output) == ("x", "y")
+    assert (made.robot, made.terrain) == ("quadruped", "rough.npz")
     assert changes(made) == {
         "rewards.tracking_lin_vel": 1.25,
         "commands.lin_vel_x": (-1.0, 2.0),
@@ -114,7 +85,7 @@ def words_of(name, annotation, value):
     return ["--" + ".".join([*sections, last]), *words]
 
 
-def test_task_command_accepts_every_default():
+def test_train_accepts_every_default():
     words = ["quadruped"]
     for name, value in flatten(Task()):
         section = getattr(Task(), name.partition(".")[0])
@@ -123,7 +94,7 @@ def test_task_command_accepts_every_default():
     assert parse_words(*words).changed_config() == Task()
 
 
-def test_task_command_accepts_robot_last():
+def test_train_accepts_robot_last():
     made = parse_words(
         "--rewards.tracking-lin-vel", "2", "--commands.lin-vel-y", "0", "1", "quadruped"
     )
@@ -131,27 +102,26 @@ def test_task_command_accepts_robot_last():
     assert made.changed_config().commands == Commands(lin_vel_y=(0.0, 1.0))
     own = get_task("quadruped").task
     assert parse_words("quadruped").changed_config() == own
-    assert parse_words().robot == ""
 
 
-def test_task_command_options_override_file(tmp_path, rover):
+def test_train_options_override_file(tmp_path, rover):
     path = tmp_path / "mine.toml"
     path.write_text("laps = 4\n[rewards]\nwheel_slip = -3\ntorques = -1\n")
     made = parse_words("rover", "--config", str(path), "--rewards.torques", "-2")
-    assert made.default_config() == Task.from_toml(path.read_text(), rover.task)
+    assert made.defaults == Task.from_toml(path.read_text(), rover.task)
     task = made.changed_config()
     assert (task.laps, task.rewards.wheel_slip, task.rewards.torques) == (4, -3.0, -2.0)
     assert task.env.num_envs == 17
 
 
 @pytest.mark.parametrize("words", [("rover", "--laps", "5"), ("--laps", "5", "rover")])
-def test_task_command_options_of_custom_task(rover, words):
+def test_train_options_of_custom_task(rover, words):
     made = parse_words(*words, "--rewards.wheel-slip", "-1", "--rewards.tracking-lin-vel", "3")
     rewards = RoverRewards(wheel_slip=-1.0, tracking_lin_vel=3.0)
     assert made.changed_config() == replace(rover.task, laps=5, rewards=rewards)
 
 
-def test_task_command_onboarded_folder_has_default_task(tmp_path):
+def test_train_onboarded_folder_has_default_task(tmp_path):
     folder = tmp_path / "mine"
     folder.mkdir()
     shutil.copy(get_task("quadruped").folder / "robot.toml", folder)
@@ -174,8 +144,8 @@ def test_task_command_onboarded_folder_has_default_task(tmp_path):
         (("quadruped", "rough.npz"), r"^got rough\.npz; expected no more arguments"),
     ],
 )
-def test_task_command_suggests_nearest_option(words, message):
-    with pytest.raises(UsageError, match=message) as error:
+def test_train_suggests_nearest_option(words, message):
+    with pytest.raises(ConfigError, match=message) as error:
         parse_words(*words)
     assert "\n" not in str(error.value)
 
@@ -209,12 +179,12 @@ def test_task_command_suggests_nearest_option(words, message):
         (("--env.episode-length-s", "0.001"), r"^env\.episode_length_s: got 0\.001; expected at"),
     ],
 )
-def test_task_command_rejects_invalid_value(words, message):
+def test_train_rejects_invalid_value(words, message):
     with pytest.raises(ConfigError, match=message):
         parse_words("quadruped", *words).changed_config()
 
 
-def test_task_command_rejects_unknown_robot_or_file(tmp_path):
+def test_train_rejects_unknown_robot_or_file(tmp_path):
     with pytest.raises(ConfigError, match=r"folder 'quadrupd'; did you mean 'quadruped'\?"):
         parse_words("quadrupd", "--rewards.torques", "1")
     with pytest.raises(ConfigError, match=r"cannot read .*missing\.toml"):
@@ -222,43 +192,41 @@ def test_task_command_rejects_unknown_robot_or_file(tmp_path):
 
 
 @pytest.mark.usefixtures("rover")
-def test_task_command_help_shows_task_values(capsys):
-    with pytest.raises(SystemExit) as end:
-        parse_words("rover", "--help")
-    assert end.value.code in (0, None)
-    output = " ".join(capsys.readouterr().out.replace("│", " ").split())
-    assert "Train a policy. On a ground." in output
-    assert "--terrain PATH The ground: an option" in output
-    assert "--env.num-envs INT Number of parallel environments" in output
+def test_train_help_shows_task_values(run_main, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    run = run_main("train", "rover", "--help")
+    assert (run.returncode, run.stderr) == (0, "")
+    output = " ".join(run.stdout.split())
+    assert output.startswith("usage: terrainkit train [OPTIONS] ROBOT Train a policy for a robot ")
+    assert "env options: Environments and episodes. --num-envs" in output
     assert "(default: 17)" in output
     assert "--rewards.wheel-slip FLOAT Wheels that slide. (default: -0.5)" in output
     assert "--laps INT A value that is in no section. (default: 3)" in output
     assert "--domain-rand.friction FLOAT FLOAT|none" in output
+    assert "--asset.self-collisions, --asset.no-self-collisions" in output
     assert "(default: 0.5 1.25)" in output
 
 
-def test_task_command_help_ignores_invalid_task(capsys):
-    for words in (("--help",), ("-h", "no_such_robot")):
-        with pytest.raises(SystemExit):
-            parse_words(*words)
-        assert "--rewards.tracking-lin-vel FLOAT" in capsys.readouterr().out
+@pytest.mark.parametrize(
+    "words", [("--help",), ("-h", "no_such_robot"), ("quadruped", "--rowz", "-h")]
+)
+def test_train_help_ignores_invalid_words(run_main, words):
+    run = run_main("train", *words)
+    assert run.returncode == 0
+    assert "--rewards.tracking-lin-vel FLOAT" in run.stdout
 
 
-def test_task_command_avoids_slow_imports():
+def test_train_options_avoid_slow_imports():
     code = (
-        "import sys; from dataclasses import dataclass\n"
-        "from terrainkit_cli.config_options import TaskCommand\n"
+        "import sys; from terrainkit_cli.train_command import Train\n"
         "assert not {'terrainkit_robots.rl', 'mujoco'} & set(sys.modules)\n"
-        "@dataclass(frozen=True, kw_only=True)\n"
-        "class Train(TaskCommand):\n"
-        "    def run(self): return 0\n"
-        "Train.options(['quadruped', '--env.num-envs', '4'])\n"
-        "assert not {'torch', 'mujoco', 'typeguard', 'rsl_rl'} & set(sys.modules)\n"
+        "Train.parse(['quadruped', '--env.num-envs', '4'])\n"
+        "assert not {'torch', 'mujoco', 'rsl_rl'} & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-def test_task_command_flags_set_and_clear(tmp_path):
+def test_train_flags_set_and_clear(tmp_path):
     path = tmp_path / "task.toml"
     path.write_text("[asset]\nself_collisions = true\n")
     words = ("quadruped", "--config", str(path))

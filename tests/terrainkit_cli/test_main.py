@@ -39,7 +39,7 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
         (("generat",), "no command 'generat'; did you mean 'generate'? There are: gen"),
         (
             ("check-robot", "quadruped", "--format", "jso"),
-            "--format: got 'jso'; did you mean 'json'?",
+            "--format: got 'jso'; expected one of: text, json, sarif, github, markdown;",
         ),
         (("generate",), "error: --output: missing; see terrainkit generate --help"),
         (("generate", "-o", "a.npz", "--row", 3), "no option --row; did you mean --rows?"),
@@ -104,7 +104,17 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
         (("list", "moon"), "no terrain 'moon' is built in, installed, or registered"),
         (("info", "none.npz"), "no file none.npz"),
         (("info", "none.npz", "--patch", 3), "--patch: too few values; expected 2"),
-        (("info", "none.npz", "--patch", "x", "y"), "--patch: got 'x', 'y'; expected int, int"),
+        (
+            ("info", "none.npz", "--patch", "x", "y"),
+            "--patch: got ['x', 'y']; expected 2 values, each an integer",
+        ),
+        (("check-map",), "MAP.npz: missing; see terrainkit check-map --help"),
+        (("rule", "--all=yes"), "--all: got a value; expected none"),
+        (("diff", "a.npz", "--", "--b"), "no file a.npz"),
+        (
+            ("view", "quadruped", "--checkpoint", "last"),
+            "--checkpoint: got 'last'; expected",
+        ),
         (("info", "none.npz", "more"), "got more; expected no more arguments"),
         (
             ("preview", "none.npz", "-o", "a.png", "--width", "x"),
@@ -118,7 +128,7 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
         (("generate", "-o", "a.npz", "--mode", "curiculum"), "did you mean 'curriculum'?"),
         (("check-robot", "quadrupd"), "did you mean 'quadruped'? Bundled robots are: biped"),
         (("check-robot", "quadruped", "-x"), "no option -x"),
-        (("check-robot", "quadruped", "--format", "jsn"), "--format: got 'jsn'; did you mean"),
+        (("check-robot", "quadruped", "--format", "jsn"), "markdown; did you mean 'json'?"),
         (("onboard", "quadrupd"), "did you mean 'quadruped'?"),
         (("onboard", "quadruped", "--config", "isaclab"), "did you mean 'isaaclab'?"),
         (("rule", "INR0011"), "did you mean 'INR011'?"),

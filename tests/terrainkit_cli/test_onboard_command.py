@@ -207,8 +207,7 @@ def test_onboard_ignores_rule_selection_of_settings(here, tmp_path):
 
 
 def test_onboard_help_lists_frameworks(capsys):
-    with pytest.raises(SystemExit):
-        main(["onboard", "--help"])
+    assert main(["onboard", "--help"]) == 0
     output = " ".join(capsys.readouterr().out.split())
     for name in framework_names():
         assert name in output

@@ -140,7 +140,7 @@ def test_smoke_test_passes_samples(here, calls):
     ("words", "message"),
     [
         (("a", "--format", "sarif"), "sarif"),
-        (("a", "--samples", -3), "--samples: got -3; expected 0 or more"),
+        (("a", "--samples", -3), "--samples: got -3; expected an integer >= 0"),
         (("a", "b", "--spec", "c.toml"), "--spec: got 2 robots; expected one"),
         ((), "ROBOT: missing"),
         (("a", "--package", "my=."), "--package: got no robot file among a"),

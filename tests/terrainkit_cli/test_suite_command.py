@@ -49,7 +49,10 @@ def test_generate_with_another_hash_writes_nothing(terrainkit, tmp_path, monkeyp
         (("list", "basics-1"), "suite list: got 'basics-1'; expected no name"),
         (("show", "basics-1", "-o", "a.npz"), "--output: got suite show; expected suite generate"),
         (("list", "--overwrite"), "--overwrite: got suite list; expected suite generate"),
-        (("shwo", "basics-1"), "action: got 'shwo'; did you mean 'show'?"),
+        (
+            ("shwo", "basics-1"),
+            "ACTION: got 'shwo'; expected one of: list, show, generate; did you mean 'show'?",
+        ),
         ((), "missing; see terrainkit suite --help"),
     ],
 )

@@ -37,7 +37,7 @@ def test_view_serves_until_it_is_ended(map_file):
     ("words", "message"),
     [
         (("missing.npz",), "missing.npz"),
-        (("map.npz", "--port", 0), "--port: got 0; expected 1 to 65535"),
+        (("map.npz", "--port", 0), "--port: got 0; expected an integer from 1 to 65535"),
         (("map.npz", "--host", "no.such.host.invalid"), "no.such.host.invalid"),
         ((), "MAP.npz, ROBOT or RUN: missing"),
         (("quadruped_mop",), "did you mean 'quadruped_map'"),

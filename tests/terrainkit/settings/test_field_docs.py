@@ -29,3 +29,9 @@ def test_field_docs_are_on_one_line():
 def test_field_docs_are_inherited():
     assert field_docs(Leg) == field_docs(Body) | {"length": "Length [m]."}
     assert field_docs(type("Leg", (Leg,), {})) == field_docs(Leg)
+
+
+def test_field_docs_of_a_class_without_source_are_empty():
+    names = {"dataclass": dataclass}
+    exec("@dataclass\nclass Typed:\n    mass: float = 1.0\n", names)
+    assert field_docs(names["Typed"]) == {}

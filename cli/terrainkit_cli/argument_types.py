@@ -1,60 +1,35 @@
-"""Options that several commands share."""
+"""Types of arguments that several commands share."""
 
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import expected_names
+from terrainkit_cli.parse import option, positional
 
 if TYPE_CHECKING:
     from terrainkit_robots.lint.settings import Settings
 
-    StringList = list[str]
-else:
-    # For list[str], or a tuple, tyro imports typeguard, which takes a quarter of the time of
-    # check-robot.
-    StringList = list
+MapFile = Annotated[Path, positional("MAP.npz")]
+InputPath = Annotated[Path, option("PATH")]
+OutputPath = Annotated[Path, option("PATH", "-o")]
 
-
-def repeated_option(metavar: str) -> tuple[object, ...]:
-    """Return the annotations of an option that can be repeated."""
-    hint = "(may be repeated)"
-    return tyro.conf.UseAppendAction, tyro.conf.arg(metavar=metavar, help_behavior_hint=hint)
-
-
-def text_option(metavar: str, *aliases: str) -> object:
-    """Return the annotation of a text option whose default is an empty text."""
-    return tyro.conf.arg(metavar=metavar, aliases=list(aliases), help_behavior_hint="")
-
-
-IgnoredRules = Annotated[StringList, *repeated_option("CODES=REASON")]
-Packages = Annotated[StringList, *repeated_option("NAME=DIR")]
-XacroArguments = Annotated[StringList, *repeated_option("NAME:=VALUE")]
-InputPath = Annotated[str, text_option("PATH")]
-Output = Annotated[str, text_option("PATH", "-o")]
-
-Flag = Annotated[bool, tyro.conf.arg(help_behavior_hint=lambda text: f"(default: {text.lower()})")]
-"""An option --x or --no-x."""
-
-RobotName = Annotated[str, text_option("ROBOT")]
-LimitWords = Annotated[StringList, tyro.conf.arg(metavar="NAME=VALUE", help_behavior_hint="")]
+RobotName = Annotated[str, option("ROBOT")]
+Limits = Annotated[tuple[str, ...], option("[NAME=VALUE ...]")]
 """Limits of a robot for feasibility."""
 
-UNSET = -1
-"""Default of optional numbers; with None, tyro would print the types of a union in errors."""
+IgnoredRules = Annotated[tuple[str, ...], option("CODES=REASON", is_repeated=True)]
+Packages = Annotated[tuple[str, ...], option("NAME=DIR", is_repeated=True)]
+XacroArguments = Annotated[tuple[str, ...], option("NAME:=VALUE", is_repeated=True)]
 
-Checkpoint = Annotated[
-    int, tyro.conf.arg(metavar="ITERATION", help_behavior_hint="(default: the last)")
-]
-"""Iteration of a checkpoint; the default is UNSET."""
+TerrainName = Annotated[str, option("TERRAIN")]
+Device = Annotated[str, option("DEVICE")]
+Checkpoint = Annotated[int, option("ITERATION")]
+"""Iteration of a checkpoint."""
 
-
-def optional_number(number: int) -> int | None:
-    """Return the value of a numeric option, or None if it is UNSET."""
-    return None if number == UNSET else number
+OptionalFlag = Annotated[bool, option("")]
+"""A flag whose default is None: a settings file may state the value."""
 
 
 def find_robot(name: str) -> Path:
