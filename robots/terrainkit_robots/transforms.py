@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Matrix = NDArray[np.float64]
 FloatArray = NDArray[np.float32]
+BoolArray = NDArray[np.bool_]
 
 _GIMBAL_LOCK = 1e-13
 """Cosine of the pitch below which roll and yaw are not unique; roll is then 0."""

@@ -11,13 +11,13 @@ import torch
 from terrainkit.integrations import missing
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
-from terrainkit_robots.rl.env import BoolArray, LeggedEnv
+from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task, task_names
 from terrainkit_robots.rl.terrain import load_terrain
 from terrainkit_robots.spec.robot import Robot
-from terrainkit_robots.transforms import FloatArray
+from terrainkit_robots.transforms import BoolArray, FloatArray
 
 try:
     import gymnasium

@@ -2,9 +2,9 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import product
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import torch
@@ -15,7 +15,6 @@ from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import Config
 from terrainkit.settings.type_hint import PositiveInt
 from terrainkit_robots.policy import gait
-from terrainkit_robots.policy.gait import BoolArray
 from terrainkit_robots.policy.load import Policy, load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -24,7 +23,7 @@ from terrainkit_robots.rl.run import PolicySpec, Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.rl.terrain import Terrain, load_terrain
-from terrainkit_robots.transforms import FloatArray
+from terrainkit_robots.transforms import BoolArray, FloatArray
 
 Progress = Callable[[float], object]
 """Called after each step with the completed fraction of the time, 0 to 1."""
@@ -303,21 +302,75 @@ def command_schedule(commands: FloatArray | None, num_steps: int) -> list[FloatA
     return [parts[step * len(parts) // num_steps] for step in range(num_steps)]
 
 
+class ErrorMean:
+    """The mean of an error over the measured steps of each of n robots."""
+
+    def __init__(self, num_envs: int) -> None:
+        self.total, self.count = np.zeros(num_envs), np.zeros(num_envs, np.int64)
+
+    def add(self, errors: FloatArray, measured: BoolArray) -> None:
+        """Add the errors of a step, shape (n,), of the measured robots."""
+        self.total[measured] += errors[measured]
+        self.count[measured] += 1
+
+    def over(self, robots: BoolArray) -> float | None:
+        """Return the mean over some robots, each with the same weight; None without measurement."""
+        measured = robots & (self.count > 0)
+        means = self.total[measured] / self.count[measured]
+        return float(means.mean()) if means.size else None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MotionSums:
+    """Sums over the measured steps of robots that are commanded to move, shapes (n,).
+
+    Power and speed are those under a linear command.
+    """
+
+    lin_vel: NDArray[Any]  # dot product of linear velocity and command [m2/s2]
+    lin_command: NDArray[Any]  # squared norm of the linear command [m2/s2]
+    ang_vel: NDArray[Any]  # product of yaw velocity and command [rad2/s2]
+    ang_command: NDArray[Any]  # squared yaw command [rad2/s2]
+    pitch: NDArray[Any]  # [rad], positive when the nose is down
+    power: NDArray[Any]  # mechanical power of the motors [W]
+    speed: NDArray[Any]  # horizontal [m/s]
+    steps: NDArray[Any]  # number of steps
+
+    def of(self, robots: BoolArray) -> "MotionSums":
+        """Return the sums of the robots in a mask."""
+        return MotionSums(**{name: total[robots] for name, total in vars(self).items()})
+
+    def add(self, step: "MotionSums", robots: BoolArray) -> None:
+        """Add a step of the robots in a mask."""
+        for name, total in vars(self).items():
+            total[robots] += getattr(step, name)[robots]
+
+
+class GaitStep(NamedTuple):
+    """The feet in one step."""
+
+    measured: BoolArray  # robots that are commanded to move, shape (n,)
+    contact: BoolArray  # shape (n, f)
+    height: FloatArray  # above the ground [m], shape (n, f)
+    speed: FloatArray  # horizontal [m/s], shape (n, f)
+
+
 class EvaluationRollout:
     """A rollout that measures each robot up to its first fall.
 
     On a map, a robot is measured until it has crossed half a patch: the terrain beyond belongs to
     another patch. It succeeds if it crosses, or walks half of the commanded distance without a
-    fall. Error sums are in the order of :class:`RolloutMetrics`, shape (4, n).
+    fall.
     """
 
     def __init__(self, env: LeggedEnv) -> None:
         n, dt = env.num_envs, env.cfg.dt
-        self.env, self.start_pos = env, env.start_pos.copy()
+        self.env, self.start_pos = env, env.curriculum.progress.start.copy()
         self.half_patch = np.inf if env.terrain.is_flat else env.terrain.patch_length / 2
         self.falls, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
         self.distance, self.commanded_distance = np.zeros(n), np.zeros(n)
-        self.error_sums, self.error_counts = np.zeros((4, n)), np.zeros((4, n), np.int64)
+        names = "lin_vel_error", "lin_vel_error_1s", "ang_vel_error", "ang_vel_error_1s"
+        self.errors = {name: ErrorMean(n) for name in names}  # as in `RolloutMetrics`
         self._settling_steps = round(SETTLING_TIME / dt)
         self._window = max(1, round(AVERAGING_TIME / dt))
         self._recent_errors = np.zeros((self._window, n, 3), np.float32)  # ring buffer
@@ -325,10 +378,8 @@ class EvaluationRollout:
         self._command_steps = np.zeros(n, np.int64)  # since the command changed
         self._measured_steps = np.zeros(n, np.int64)  # without interruption
         self._num_steps = 0
-        # Sums over steps; see `_update_gait`.
-        self.sums = np.zeros((8, n))
-        # Of each step: measured robots; contact, height and speed of their feet.
-        self.gait: list[tuple[BoolArray, BoolArray, FloatArray, FloatArray]] = []
+        self.motion = MotionSums(**{each.name: np.zeros(n) for each in fields(MotionSums)})
+        self.gait: list[GaitStep] = []
 
     def run(
         self,
@@ -366,19 +417,24 @@ class EvaluationRollout:
         self.crossed |= active & (distance > self.half_patch)
 
     def _update_gait(self, commands: FloatArray, velocity: FloatArray, settled: BoolArray) -> None:
-        squares, along = np.square(commands), velocity * commands
-        lin_sq, yaw_sq, lin, yaw = (
-            part for each in (squares, along) for part in (each[:, :2].sum(axis=1), each[:, 2])
-        )
         state, moving = self.env.state, settled & (commands != 0).any(axis=1)
-        pitch = np.arctan2(state.projected_gravity[:, 0], -state.projected_gravity[:, 2])
-        power = np.abs(state.torques * state.dof_vel).sum(axis=1) * (lin_sq > 0)
-        speed = np.hypot(velocity[:, 0], velocity[:, 1]) * (lin_sq > 0)
-        values = (lin, lin_sq, yaw, yaw_sq, pitch, power, speed, np.ones_like(pitch))
-        self.sums[:, moving] += np.array(values)[:, moving]
+        along, squares = velocity * commands, np.square(commands)
+        lin_command = squares[:, :2].sum(axis=1)
+        step = MotionSums(
+            lin_vel=along[:, :2].sum(axis=1),
+            lin_command=lin_command,
+            ang_vel=along[:, 2],
+            ang_command=squares[:, 2],
+            pitch=np.arctan2(state.projected_gravity[:, 0], -state.projected_gravity[:, 2]),
+            power=np.abs(state.torques * state.dof_vel).sum(axis=1) * (lin_command > 0),
+            speed=np.hypot(velocity[:, 0], velocity[:, 1]) * (lin_command > 0),
+            steps=np.ones(len(commands)),
+        )
+        self.motion.add(step, moving)
         if len(self.gait) < MAX_GAIT_STEPS and settled.any():
             foot_speed = np.hypot(state.foot_vel[..., 0], state.foot_vel[..., 1])
-            self.gait.append((moving, state.foot_contact, state.foot_height.copy(), foot_speed))
+            feet = state.foot_contact, state.foot_height.copy(), foot_speed
+            self.gait.append(GaitStep(moving, *feet))
 
     def _update_errors(
         self, commands: FloatArray, error: FloatArray, active: BoolArray
@@ -395,21 +451,15 @@ class EvaluationRollout:
         self._num_steps += 1
         averaged = self._measured_steps >= self._window
         mean_error = self._recent_errors.mean(axis=0)
-        for row, (value, mask) in enumerate([(error, settled), (mean_error, averaged)]):
-            self.error_sums[row, mask] += np.hypot(value[mask, 0], value[mask, 1])
-            self.error_sums[row + 2, mask] += np.abs(value[mask, 2])
-            self.error_counts[row::2, mask] += 1
+        for suffix, value, mask in (("", error, settled), ("_1s", mean_error, averaged)):
+            self.errors[f"lin_vel_error{suffix}"].add(np.hypot(value[:, 0], value[:, 1]), mask)
+            self.errors[f"ang_vel_error{suffix}"].add(np.abs(value[:, 2]), mask)
         return settled
 
     def metrics(self, mask: BoolArray, **key: Any) -> RolloutMetrics:
         """Return the metrics of the robots in a mask; each robot has the same weight."""
         success = self.crossed | (~self.falls & (self.distance >= self.commanded_distance / 2))
-        errors: dict[str, Any] = {}
-        names = "lin_vel_error", "lin_vel_error_1s", "ang_vel_error", "ang_vel_error_1s"
-        for name, total, count in zip(names, self.error_sums, self.error_counts, strict=True):
-            measured = mask & (count > 0)
-            means = total[measured] / count[measured]
-            errors[name] = float(means.mean()) if means.size else None
+        errors: dict[str, Any] = {name: each.over(mask) for name, each in self.errors.items()}
         return RolloutMetrics(
             **key,
             robots=int(mask.sum()),
@@ -421,25 +471,27 @@ class EvaluationRollout:
 
     def _gait_metrics(self, mask: BoolArray) -> dict[str, Any]:
         """Return the gait of the robots in a mask, as fields of :class:`RolloutMetrics`."""
-        lin, lin_sq, yaw, yaw_sq, pitch, power, speed, count = self.sums[:, mask]
-        scene, commanded = self.env.scene, (self.last_commands[mask] != 0).any(axis=1) | (count > 0)
-        followed = (lin >= MIN_FOLLOWED * lin_sq) & (yaw >= MIN_FOLLOWED * yaw_sq) & (count > 0)
+        scene, motion = self.env.scene, self.motion.of(mask)
+        moved = motion.steps > 0
+        commanded = (self.last_commands[mask] != 0).any(axis=1) | moved
+        followed = moved & (motion.lin_vel >= MIN_FOLLOWED * motion.lin_command)
+        followed &= motion.ang_vel >= MIN_FOLLOWED * motion.ang_command
         result = {"followed": float(followed[commanded].mean())} if commanded.any() else {}
-        if not count.any():
+        if not moved.any():
             return result
         measured, contact, height, foot_speed = (
-            np.array([step[k][mask] for step in self.gait]) for k in range(4)
+            np.array([each[mask] for each in parts]) for parts in zip(*self.gait, strict=True)
         )
         heights = gait.swing_heights(contact, height, measured)
         duty = gait.duty_factors(contact, measured)
         mirror = mirror_feet(scene.foot_pos)
-        work = 9.81 * scene.model.body_subtreemass[scene.base] * speed.sum()
+        work = 9.81 * scene.model.body_subtreemass[scene.base] * motion.speed.sum()
         return result | {
             "step_frequency": _number(gait.step_frequency(contact, measured, self.env.cfg.dt)),
             "foot_slip": _number(gait.foot_slip(contact, foot_speed, measured)),
             "asymmetry": max(gait.asymmetry(each, mirror) for each in (heights, duty)),
-            "base_pitch": float(pitch.sum() / count.sum()),
-            "cost_of_transport": float(power.sum() / work) if work else None,
+            "base_pitch": float(motion.pitch.sum() / motion.steps.sum()),
+            "cost_of_transport": float(motion.power.sum() / work) if work else None,
             "swing_height": tuple(map(_number, heights)),
             "duty_factor": tuple(map(_number, duty)),
         }
@@ -449,7 +501,7 @@ class EvaluationRollout:
         forward, left, yaw = self.last_commands.T
         robot = int((forward - np.abs(left) - np.abs(yaw)).argmax())
         steps = round(DIAGRAM_TIME / self.env.cfg.dt)
-        rows = [contact[robot] for moving, contact, *_ in self.gait if moving[robot]][-steps:]
+        rows = [step.contact[robot] for step in self.gait if step.measured[robot]][-steps:]
         feet = self.env.robot.spec.feet
         return {foot: "".join(str(int(row[k])) for row in rows) for k, foot in enumerate(feet)}
 

@@ -7,9 +7,7 @@ Arrays have the shape (t, n, f): t steps of n robots with f feet. Contacts are B
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit_robots.transforms import FloatArray
-
-BoolArray = NDArray[np.bool_]
+from terrainkit_robots.transforms import BoolArray, FloatArray
 
 MIN_SWING_STEPS = 2
 """Shorter interruptions of a contact are vibrations, not swings [steps]."""

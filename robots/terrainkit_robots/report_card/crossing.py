@@ -118,7 +118,7 @@ class _Progress:
         self._lower = np.array([patch.grid.lower for patch in patches])
         self._upper = np.array([patch.grid.upper for patch in patches])
         turn = np.pi / min(-env.cfg.commands.ang_vel_yaw[0], env.cfg.commands.ang_vel_yaw[1])
-        lengths = np.nanmax(route_lengths(env.start_pos, goals), axis=1)
+        lengths = np.nanmax(route_lengths(env.curriculum.progress.start, goals), axis=1)
         seconds = TIME_FACTOR * lengths / speed + turn + EXTRA_TIME
         self._max_steps = np.rint(seconds / env.cfg.dt)
 

@@ -1,6 +1,5 @@
 """The terrain curriculum: the patches that robots are reset on, and what came of the episodes."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -50,10 +49,6 @@ class TerrainCurriculum:
         return draw_statistics(self.sampler.statistics, self._terrain.terrain_names)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the state of the sampler, for a checkpoint."""
+        """Return the state of the sampler, for a checkpoint; the sampler loads it."""
         state = self.sampler.state_dict().items()
         return {k: torch.from_numpy(v) if isinstance(v, np.ndarray) else v for k, v in state}
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Continue from a checkpoint; see :meth:`PatchSampler.load_state_dict`."""
-        self.sampler.load_state_dict(state)

@@ -25,9 +25,7 @@ from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Terrain
 from terrainkit_robots.spec.robot import Robot
-from terrainkit_robots.transforms import FloatArray, quat_to_yaw
-
-BoolArray = NDArray[np.bool_]
+from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 
 
 class LeggedEnv(VecEnv):
@@ -93,12 +91,8 @@ class LeggedEnv(VecEnv):
     @cached_property
     def mirror_maps(self) -> MirrorMaps:
         """Left-right symmetry of observations and actions."""
-        return mirror_maps(self)
-
-    @property
-    def start_pos(self) -> NDArray[np.float64]:
-        """Position of each base at its last reset, x and y [m], shape (n, 2)."""
-        return self.curriculum.progress.start
+        robot, scene, scale = self.robot, self.scene, self.action_scale
+        return mirror_maps(robot, scene, scale, self.obs_groups, self.state, self.cfg.terrain)
 
     @property
     def num_obs(self) -> dict[str, int]:
@@ -253,15 +247,13 @@ class LeggedEnv(VecEnv):
         # MuJoCo moved the unstable robots to the world's origin.
         pos = np.where(unstable[:, None], progress.position, state.base_pos[:, :2])
         rate = self.velocity_command.yaw_rate(progress.yaw.astype(np.float32))
-        yaw = quat_to_yaw(state.base_quat)
-        progress.update(pos, yaw, self.commands, rate, self.cfg.dt)
+        progress.update(pos, quat_to_yaw(state.base_quat), self.commands, rate, self.cfg.dt)
 
     def _yaw(self) -> FloatArray:
         return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
 
     def _update_heading(self) -> None:
-        position = self.sim.qpos[:, :2].astype(np.float32)
-        self.velocity_command.update_heading(self._yaw(), position)
+        self.velocity_command.update_heading(self._yaw(), self.sim.qpos[:, :2].astype(np.float32))
 
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
         """Update the curricula at the end of episodes, and return the values to log."""
@@ -281,7 +273,7 @@ class LeggedEnv(VecEnv):
         if self.waypoints and self.velocity_command.fixed is None:
             reached = self.waypoints.progress[env_ids]
             commanded = self.curriculum.progress.commanded[env_ids]
-            start = self.start_pos[env_ids]
+            start = self.curriculum.progress.start[env_ids]
             to_goals = self.waypoints.of_episodes(env_ids, fallen, start, commanded)
             progress = np.where(np.isnan(reached), progress, to_goals)
             if not np.isnan(reached).all():
@@ -331,7 +323,7 @@ class LeggedEnv(VecEnv):
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore a state; if the number of environments differs, restore only the curricula."""
-        self.curriculum.load_state_dict(state["curriculum"])
+        self.curriculum.sampler.load_state_dict(state["curriculum"])
         arrays, saved = self._arrays(), state["arrays"]
         if len(saved["episode_length"]) != self.num_envs:
             self.reset()

@@ -4,7 +4,7 @@ The policy group is what a real robot can measure, with noise. The privileged gr
 terms without noise, and terms that only a simulation knows. Exported policies use this order.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -43,6 +43,10 @@ class ObservationTerm:
     symmetry: Symmetry = "scalar"  # how it transforms when left and right are swapped
     scale: tuple[float, ...] | float = 1.0  # scale factor, or one per number
     noise: float = 0.0  # half range of the uniform noise, added before scaling
+
+
+ObsGroups = Mapping[str, Sequence[ObservationTerm]]
+"""The terms of each observation group by its name."""
 
 
 def uses_height_scan(task: Task, *, is_flat: bool) -> bool:

@@ -218,7 +218,7 @@ class LeggedRunner(OnPolicyRunner):
             process = processes[min(self.gpu_global_rank, len(processes) - 1)]
             if load_cfg is not None:
                 if load_cfg.get("curriculum"):
-                    self.env.curriculum.load_state_dict(process["env"]["curriculum"])
+                    self.env.curriculum.sampler.load_state_dict(process["env"]["curriculum"])
                     self.env.reset()
                 return {}
             self.current_learning_iteration = state["iteration"]

@@ -8,7 +8,7 @@ Symmetric Robot Policies, 2024.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -17,10 +17,11 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Terrain
+from terrainkit_robots.rl.observations import ObsGroups
+from terrainkit_robots.rl.scene import Scene
+from terrainkit_robots.rl.state import State
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
-
-if TYPE_CHECKING:
-    from terrainkit_robots.rl.env import LeggedEnv
 
 TOLERANCE = 1e-3
 """Allowed difference between left and right: default pose [rad], scan points [m], and action
@@ -47,16 +48,34 @@ class MirrorMaps(NamedTuple):
     actions: SignedPermutation
 
 
-def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
+class MirroredEnv(Protocol):
+    """An environment with mirror maps."""
+
+    @property
+    def mirror_maps(self) -> MirrorMaps:
+        """Left-right symmetry of observations and actions."""
+
+
+def mirror_maps(
+    robot: Robot, scene: Scene, scale: FloatArray, groups: ObsGroups, state: State, cfg: Terrain
+) -> MirrorMaps:
     """Return the mirror maps of an environment.
+
+    Args:
+        robot: The robot, whose spec pairs its joints.
+        scene: The scene, with the gains of the motors and the positions of the feet.
+        scale: Scale of each joint's action, shape (j,); a joint with 0 has no action.
+        groups: Terms of each observation group.
+        state: Any state of the robots, from which the width of each term is computed.
+        cfg: The points of the height scan.
 
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
     """
-    names, pairs = env.robot.spec.joint_order, env.robot.spec.mirror_joints()
+    names, pairs = robot.spec.joint_order, robot.spec.mirror_joints()
     joints = _map([names.index(each.joint) for each in pairs], [each.sign for each in pairs])
-    _check_control(env, joints)
-    controlled = env.action_joints
+    _check_sides(robot, scene, scale, joints)
+    controlled = np.flatnonzero(scale)
     images = np.searchsorted(controlled, joints.index[controlled])
     maps = {
         "vector": _map(range(3), [1, -1, 1]),
@@ -65,16 +84,16 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
         "phase": _map(range(2), [-1, -1]),  # left and right are half a period apart
         "joints": joints,
         "actions": _map(images, joints.sign[controlled]),
-        **_foot_maps(env),
+        **_foot_maps(robot, scene),
     }
-    groups = {}
-    for name, group in env.obs_groups.items():
+    group_maps = {}
+    for name, group in groups.items():
         index, sign = np.zeros(0, np.int64), np.zeros(0, np.float32)
         for term in group:
-            width, start = term.function(env.state).shape[1], len(index)
+            width, start = term.function(state).shape[1], len(index)
             maps["scalar"] = _map(range(width), np.ones(width))
             if term.symmetry == "scan":
-                maps["scan"] = _scan_map(env.cfg.terrain)
+                maps["scan"] = _scan_map(cfg)
             if term.symmetry == "history":  # repeats the terms before it
                 repeated = index + np.arange(0, width, start)[:, None]
                 maps["history"] = _map(repeated.ravel(), np.tile(sign, len(repeated)))
@@ -83,11 +102,11 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
                 expected = f"the symmetry {term.symmetry!r} expects {len(part.index)}"
                 raise ConfigError(f"observation {term.name}: got {width} numbers; {expected}")
             index, sign = np.append(index, part.index + start), np.append(sign, part.sign)
-        groups[name] = SignedPermutation(index, sign)
-    return MirrorMaps(groups, joints, maps["actions"])
+        group_maps[name] = SignedPermutation(index, sign)
+    return MirrorMaps(group_maps, joints, maps["actions"])
 
 
-def has_symmetry(env: "LeggedEnv") -> bool:
+def has_symmetry(env: MirroredEnv) -> bool:
     """Return whether left and right of the robot and its height scan are mirror images."""
     try:
         return bool(env.mirror_maps)
@@ -96,7 +115,7 @@ def has_symmetry(env: "LeggedEnv") -> bool:
 
 
 def augment(
-    env: "LeggedEnv", obs: TensorDict | None, actions: torch.Tensor | None
+    env: MirroredEnv, obs: TensorDict | None, actions: torch.Tensor | None
 ) -> tuple[TensorDict | None, torch.Tensor | None]:
     """Return observations and actions followed by their mirror images.
 
@@ -118,11 +137,11 @@ def _map(index: Sequence[int] | NDArray[np.int64], sign: ArrayLike) -> SignedPer
     return SignedPermutation(np.array(index, np.int64), np.array(sign, np.float32))
 
 
-def _check_control(env: "LeggedEnv", joints: SignedPermutation) -> None:
+def _check_sides(robot: Robot, scene: Scene, scale: FloatArray, joints: SignedPermutation) -> None:
     """Check that an action has the same effect on the left as on the right."""
-    names, pose, model = env.robot.spec.joint_order, env.robot.default_pose, env.scene.model
+    names, pose, model = robot.spec.joint_order, robot.default_pose, scene.model
     tables = {
-        "action_scale": env.action_scale,
+        "action_scale": scale,
         "stiffness": -model.actuator_biasprm[:, 1],
         "damping": -model.actuator_biasprm[:, 2],
         "effort": model.actuator_forcerange[:, 1],
@@ -142,9 +161,9 @@ def mirror_feet(position: FloatArray) -> NDArray[np.int64]:
     return np.linalg.norm(position[:, None] - position * [1, -1, 1], axis=2).argmin(axis=1)
 
 
-def _foot_maps(env: "LeggedEnv") -> dict[str, SignedPermutation]:
+def _foot_maps(robot: Robot, scene: Scene) -> dict[str, SignedPermutation]:
     """Return the maps of a vector and of a number per foot: feet are paired by default position."""
-    feet, index = env.robot.spec.feet, mirror_feet(env.scene.foot_pos)
+    feet, index = robot.spec.feet, mirror_feet(scene.foot_pos)
     for k in np.flatnonzero(index[index] != np.arange(len(feet))):
         got = f"the foot {feet[k]} is nearest to the mirror image of {feet[index[k]]}"
         raise ConfigError(f"symmetry: {got}, which is nearest to another; expected pairs of feet")

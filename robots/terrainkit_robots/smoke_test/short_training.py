@@ -9,14 +9,13 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.policy.evaluate import Progress
-from terrainkit_robots.policy.gait import BoolArray
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
-from terrainkit_robots.transforms import FloatArray
+from terrainkit_robots.transforms import BoolArray, FloatArray
 
 NUM_ENVS, START_TIME = 128, 1.0
 """Number of robots, and time that belongs to no quarter [s]: at first, all robots stand."""

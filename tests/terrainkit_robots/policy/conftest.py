@@ -94,7 +94,7 @@ class SlidingEnv(LeggedEnv):
         state.base_lin_vel[:, :2] = self.velocities[:, :2]
         state.base_ang_vel[:, 2] = self.velocities[:, 2]
         distance = self.velocities[:, 0] * np.float32(time)
-        state.base_pos[:, :2] = self.start_pos + np.column_stack(
+        state.base_pos[:, :2] = self.curriculum.progress.start + np.column_stack(
             [distance, np.zeros(self.num_envs)]
         )
         dones = torch.from_numpy(np.isclose(self.fall_times, time))

@@ -157,7 +157,7 @@ def test_evaluation_is_reproducible(make_run, map_file, on_map):
     def result(seed):
         config = EvaluationConfig(num_envs=3, seed=seed, random_commands=True)
         rollout, _ = run_still(run, config, seconds=2.1)
-        assert rollout.error_counts[0].all()
+        assert rollout.errors["lin_vel_error"].count.all()
         return summarize(run, config, rollout).as_json()
 
     first = result(3)

@@ -94,7 +94,10 @@ def test_errors_are_measured_after_settling(make_sliding):
     assert first.success is None
     assert measured.metrics(select(1, 1)).lin_vel_error == pytest.approx(0.25)
     steps = round((4.0 - SETTLING_TIME) / env.cfg.dt)
-    assert measured.error_counts.tolist() == [[steps] * 2, [steps - 49] * 2] * 2
+    counts = {name: each.count.tolist() for name, each in measured.errors.items()}
+    expected = {"lin_vel_error": [steps] * 2, "lin_vel_error_1s": [steps - 49] * 2}
+    expected |= {"ang_vel_error": [steps] * 2, "ang_vel_error_1s": [steps - 49] * 2}
+    assert counts == expected
 
 
 def test_averaged_errors_ignore_sway(make_sliding):
@@ -115,9 +118,8 @@ def test_averaged_errors_ignore_sway(make_sliding):
 def test_each_new_command_settles(make_sliding, headings):
     env = make_sliding([[1, 0, 0]], commands=Commands(heading_command=headings))
     measured = run(env, 6.0, np.array([[[1, 0, 0]], [[1, 0, 0.5]]], np.float32))
-    assert measured.error_counts[0, 0] == 2 * round((3 - SETTLING_TIME) / env.cfg.dt)
-    mean_error = measured.error_sums[2, 0] / measured.error_counts[2, 0]
-    assert mean_error == pytest.approx(0.25)
+    assert measured.errors["lin_vel_error"].count[0] == 2 * round((3 - SETTLING_TIME) / env.cfg.dt)
+    assert measured.metrics(select(1)).ang_vel_error == pytest.approx(0.25)
 
 
 def test_heading_command_is_one_command(make_sliding):
@@ -126,14 +128,14 @@ def test_heading_command_is_one_command(make_sliding):
     yaw_rates = []
     measured = run(env, 3.0, None, progress=lambda _: yaw_rates.append(float(env.commands[0, 2])))
     assert len(set(yaw_rates)) > 1
-    assert measured.error_counts[0, 0] == round((3 - SETTLING_TIME) / env.cfg.dt)
+    assert measured.errors["lin_vel_error"].count[0] == round((3 - SETTLING_TIME) / env.cfg.dt)
 
 
 def test_fall_ends_the_measurement(make_sliding):
     env = make_sliding([[0, 0, 0]] * 3, fall_times=[0, 3.0, 1.0])
     measured = run(env, 4.0, np.tile(FORWARD, (3, 1)))
     assert measured.falls.tolist() == [False, True, True]
-    assert measured.error_counts[0].tolist() == [100, 49, 0]
+    assert measured.errors["lin_vel_error"].count.tolist() == [100, 49, 0]
     metrics = measured.metrics(select(0, 0, 1))
     assert (metrics.falls, metrics.robots, metrics.lin_vel_error) == (1, 1, None)
 
@@ -146,7 +148,8 @@ def test_success_is_half_a_patch_or_half_the_distance(make_sliding, map_terrain)
     assert measured.falls.tolist() == [False, False, False, False, True]
     success = [measured.metrics(np.arange(5) == k).success for k in range(5)]
     assert success == [1, 1, 0, 1, 0]
-    assert measured.error_counts[0, 1] == measured.error_counts[0, 0] < 100
+    counts = measured.errors["lin_vel_error"].count
+    assert counts[1] == counts[0] < 100
     metrics = measured.metrics(np.ones(5, bool))
     assert (metrics.success, metrics.falls) == (0.6, 1)
 

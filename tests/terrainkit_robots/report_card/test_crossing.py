@@ -28,7 +28,8 @@ def make_progress():
             base_pos=np.full((number, 3), 2.5), base_quat=np.tile([1.0, 0, 0, 0], (number, 1))
         )
         cfg = SimpleNamespace(commands=Commands(), dt=0.5)
-        env = SimpleNamespace(state=state, start_pos=np.full((number, 2), 2.5), cfg=cfg)
+        progress = SimpleNamespace(start=np.full((number, 2), 2.5))
+        env = SimpleNamespace(state=state, curriculum=SimpleNamespace(progress=progress), cfg=cfg)
         return _Progress(env, [PATCH] * number, 0.75), env
 
     return make

@@ -17,10 +17,13 @@ import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit_robots.rl.config import (
+    Algorithm,
     DomainRand,
     Env,
     InitState,
     Noise,
+    Policy,
+    Runner,
     Task,
 )
 from terrainkit_robots.rl.env import LeggedEnv
@@ -150,24 +153,28 @@ def course_ground() -> Terrain:
 
 
 @pytest.fixture(scope="session")
-def nominal_task() -> Callable[..., Task]:
+def no_randomization() -> DomainRand:
+    return DomainRand(
+        friction=None,
+        added_mass=None,
+        com_shift=0.0,
+        gains=None,
+        motor_strength=None,
+        joint_offset=0.0,
+        push_interval_s=0.0,
+    )
+
+
+@pytest.fixture(scope="session")
+def nominal_task(no_randomization: DomainRand) -> Callable[..., Task]:
     """Return a function that makes tasks without randomization, noise and pushes."""
+    start = InitState(reset_range=(1.0, 1.0), position=0.0, yaw=0.0, lin_vel=0.0, ang_vel=0.0)
 
     def make(num_envs: int = 4, **sections: Any) -> Task:
         still = {
             "env": Env(num_envs=num_envs, num_threads=1),
-            "init_state": InitState(
-                reset_range=(1.0, 1.0), position=0.0, yaw=0.0, lin_vel=0.0, ang_vel=0.0
-            ),
-            "domain_rand": DomainRand(
-                friction=None,
-                added_mass=None,
-                com_shift=0.0,
-                gains=None,
-                motor_strength=None,
-                joint_offset=0.0,
-                push_interval_s=0.0,
-            ),
+            "init_state": start,
+            "domain_rand": no_randomization,
             "noise": Noise(noise_level=0.0),
         }
         return Task(**(still | sections))
@@ -185,10 +192,36 @@ def random_task() -> Callable[..., Task]:
     return make
 
 
-@pytest.fixture
-def standing(quadruped: Robot, nominal_task: Callable[..., Task]) -> LeggedEnv:
-    """Return an environment with four quadrupeds at rest on a plane."""
-    env = LeggedEnv(nominal_task(), quadruped, Plane())
-    for _ in range(50):
-        env.step(torch.zeros(4, 12))
-    return env
+@pytest.fixture(scope="session")
+def nominal_env(quadruped: Robot, nominal_task: Callable[..., Task]) -> Callable[..., LeggedEnv]:
+    """Return a function that makes environments of the nominal task, by default on a plane."""
+
+    def make(
+        num_envs: int = 4, ground: Terrain | None = None, robot: Robot = quadruped, **sections: Any
+    ) -> LeggedEnv:
+        return LeggedEnv(nominal_task(num_envs, **sections), robot, ground or Plane())
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def random_env(quadruped: Robot, random_task: Callable[..., Task]) -> Callable[..., LeggedEnv]:
+    """Return a function that makes environments of the random task, by default on a plane."""
+
+    def make(
+        num_envs: int = 4, ground: Terrain | None = None, robot: Robot = quadruped, **sections: Any
+    ) -> LeggedEnv:
+        return LeggedEnv(random_task(num_envs, **sections), robot, ground or Plane())
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def task() -> Task:
+    """Return a task to train in a moment: short episodes and small networks."""
+    return Task(
+        env=Env(num_envs=4, num_threads=1, episode_length_s=0.3),
+        policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
+        algorithm=Algorithm(num_learning_epochs=2, num_mini_batches=2),
+        runner=Runner(num_steps_per_env=8, max_iterations=4),
+    )

@@ -187,28 +187,6 @@ def test_error_is_one_short_line(text, told):
     assert len(str(error.value)) <= 500
 
 
-def test_load_reads_a_file(tmp_path):
-    path = tmp_path / "task.toml"
-    path.write_text(RoverTask(laps=9).to_toml())
-    assert Task.load(path, RoverTask()) == RoverTask(laps=9)
-    assert Task.load(str(path), RoverTask(laps=1)).laps == 9
-
-
-@pytest.mark.parametrize(
-    ("data", "told"),
-    [
-        (b"[rewards]\nx = 1", r"task\.toml: rewards has no key 'x'"),
-        (b"\xff\xfe", r"task\.toml: .*can't decode"),
-        (b"#" * ((1 << 20) + 1), r"task\.toml: more than 1048576 bytes; expected"),
-    ],
-)
-def test_load_error_names_the_file(tmp_path, data, told):
-    path = tmp_path / "task.toml"
-    path.write_bytes(data)
-    with pytest.raises(ConfigError, match=told):
-        Task.load(path)
-
-
 @pytest.mark.parametrize("name", ["missing.toml", ".", "a\0b"])
 def test_load_of_other_paths_is_rejected(tmp_path, name):
     with pytest.raises(ConfigError, match="cannot read "):

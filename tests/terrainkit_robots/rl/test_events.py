@@ -134,15 +134,6 @@ class TestApplyParams:
         expected = np.tile(heavier * model.body_inertia[base], (5, 1))
         np.testing.assert_allclose(inertia, expected, rtol=1e-6)
 
-    def test_center_of_mass(self) -> None:
-        sim = physics_of()
-        base, model = sim.scene.base, sim.scene.model
-        drawn = draw(sim, replace(_NONE, com_shift=0.1))
-        apply_params(sim, drawn)
-        shift = sim.batch.expand("body_ipos")[:, base] - model.body_ipos[base]
-        np.testing.assert_allclose(shift, drawn.com_shift, atol=1e-7)
-        assert np.abs(shift).max() > 0.05
-
     def test_friction_of_colliding_geoms(self) -> None:
         sim = physics_of()
         apply_params(sim, draw(sim, replace(_NONE, friction=(0.3, 0.3))))
@@ -152,20 +143,6 @@ class TestApplyParams:
         expected = np.delete(model.geom_friction[:, 0], own)
         np.testing.assert_array_equal(np.delete(friction[0, :, 0], own), expected)
         np.testing.assert_array_equal(friction[0, :, 1:], model.geom_friction[:, 1:])
-
-    def test_gains_of_position_control(self) -> None:
-        sim, model = physics_of("P"), physics_of("P").scene.model
-        drawn = draw(sim, DomainRand())
-        apply_params(sim, drawn)
-        gain = sim.batch.expand("actuator_gainprm")
-        bias = sim.batch.expand("actuator_biasprm")
-        kp = model.actuator_gainprm[:, 0] * drawn.stiffness * drawn.strength
-        kd = -model.actuator_biasprm[:, 2] * drawn.damping * drawn.strength
-        assert (kp > 0).all()
-        assert (kd > 0).all()
-        np.testing.assert_allclose(gain[:, :, 0], kp, rtol=1e-6)
-        np.testing.assert_allclose(bias[:, :, 1], -kp, rtol=1e-6)
-        np.testing.assert_allclose(bias[:, :, 2], -kd, rtol=1e-6)
 
     def test_gains_of_velocity_control(self) -> None:
         sim, model = physics_of("V"), physics_of("V").scene.model
@@ -292,22 +269,6 @@ class TestInEnvironment:
         np.testing.assert_allclose(off, -env.state.joint_offset, atol=1e-3)
         assert np.abs(off).max() > 0.02
 
-    def test_pushes(self) -> None:
-        env = make_env(replace(_NONE, push_interval_s=0.06, max_push_vel_xy=0.5))
-        pushes = []
-        for _ in range(9):
-            env.step(torch.zeros(6, 12))
-            np.testing.assert_array_equal(env.state.push_vel, env.pushes.velocity)
-            pushes.append(env.state.push_vel)
-        velocity = np.array(pushes)
-        pushed = (velocity != 0).any(axis=2)
-        # Each robot every third step, with different phases.
-        assert (pushed[:3].sum(axis=0) == 1).all()
-        np.testing.assert_array_equal(pushed[3:], pushed[:-3])
-        assert len(set(pushed.argmax(axis=0))) > 1
-        assert 0.3 < np.abs(velocity).max() <= 0.5
-        assert (velocity[..., 2] == 0).all()
-
     def test_first_push_time_is_uniform(self) -> None:
         pushes = Pushes(DomainRand(push_interval_s=0.1), 2000, 0.02)
         pushes.reset(np.random.default_rng(0), np.arange(2000))
@@ -324,12 +285,6 @@ class TestInEnvironment:
         pushes.reset(rng, np.array([1, 4]))
         assert np.flatnonzero(pushes.steps_until_push != before).tolist() == [1, 4]
         assert pushes.velocity[:, 0].tolist() == [1, 0, 1, 1, 0, 1]
-
-    def test_no_pushes(self) -> None:
-        env = make_env(replace(_NONE, push_interval_s=0.0))
-        for _ in range(5):
-            env.step(torch.zeros(6, 12))
-        assert (env.pushes.velocity == 0).all()
 
 
 @pytest.fixture(scope="module")

@@ -94,97 +94,57 @@ def slices(group: tuple[ObservationTerm, ...], given: State) -> dict[str, slice]
     return found
 
 
-class TestByHand:
-    """One test per term, which `test_every_term_is_tested` checks."""
+_LEFT = [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]
+"""Orientation of a base that faces +y."""
 
-    def test_commands(self, robot: Robot) -> None:
-        given = state(commands=[[0.5, -1, 0.8]])
-        assert observed(group_of(robot), "commands", given) == pytest.approx([1, -2, 0.2])
+_BY_HAND = {
+    "commands": ({"commands": [[0.5, -1, 0.8]]}, [1, -2, 0.2]),
+    "projected_gravity": ({"projected_gravity": [[0.6, 0, -0.8]]}, [0.6, 0, -0.8]),
+    "base_ang_vel": ({"base_ang_vel": [[4, -2, 1]]}, [1, -0.5, 0.25]),
+    "dof_vel": ({"dof_vel": [[20, -10, *[0] * 10]]}, [1, -0.5, *[0] * 10]),
+    "actions": ({"actions": [[3, -2, *[0] * 10]], "last_actions": 9}, [3, -2, *[0] * 10]),
+    "gait_phase": ({"gait_phase": [[0.6, -0.8]]}, [0.6, -0.8]),
+    # A height of 0.5 m is observed as 0; differences are clipped at 1 m.
+    "height_scan": (
+        {"height_scan": [[0.5, 0.7, 0.3, 9, -9, *[0.5] * 182]]},
+        [0, 1, -1, 5, -5, *[0] * 182],
+    ),
+    "base_lin_vel": ({"base_lin_vel": [[1, -0.5, 0.25]]}, [2, -1, 0.5]),
+    "mean_vel": ({"mean_vel": [[1, -0.5, 0.25]]}, [1, -0.5, 0.25]),
+    "friction": ({"friction": 0.75}, [0.75]),
+    "added_mass": ({"added_mass": -0.5}, [-0.5]),
+    "com_shift": ({"com_shift": [[0.02, -0.03, 0.01]]}, [0.2, -0.3, 0.1]),
+    "joint_offset": ({"joint_offset": 0.25}, [0.25] * 12),
+    # A push along +x is a push to the right of the base.
+    "push_vel": ({"base_quat": _LEFT, "push_vel": [1, 0, 0]}, [0, -1, 0]),
+    # In units of the weight, 100 N, in the frame of the base.
+    "foot_force": (
+        {"base_quat": _LEFT, "foot_force": [[[0, 0, 50], [10, 0, 0], [0, 20, 0], [0, 0, 0]]]},
+        [0, 0, 0.5, 0, -0.1, 0, 0.2, 0, 0, 0, 0, 0],
+    ),
+}
 
-    def test_projected_gravity(self, robot: Robot) -> None:
-        given = state(projected_gravity=[[0.6, 0, -0.8]])
-        assert observed(group_of(robot), "projected_gravity", given) == pytest.approx(
-            [0.6, 0, -0.8]
-        )
 
-    def test_base_ang_vel(self, robot: Robot) -> None:
-        given = state(base_ang_vel=[[4, -2, 1]])
-        assert observed(group_of(robot), "base_ang_vel", given) == [1, -0.5, 0.25]
+@pytest.mark.parametrize("name", _BY_HAND)
+def test_term_by_hand(robot, name):
+    arrays, expected = _BY_HAND[name]
+    assert observed(privileged_of(robot), name, state(**arrays)) == pytest.approx(
+        expected, abs=1e-6
+    )
 
-    def test_dof_pos(self, robot: Robot) -> None:
-        # Measured position, including the joint offset, minus the default pose.
-        given = state(dof_pos=robot.default_pose + np.float32(0.5), joint_offset=0.125)
-        assert observed(group_of(robot), "dof_pos", given) == pytest.approx([0.625] * 12)
-        # Wheels are observed as 0; 100 is the clipping limit.
-        wheeled = replace(robot, wheels=np.arange(12) % 3 == 2)
-        given = state(dof_pos=robot.default_pose + np.float32(400))
-        seen = observed(group_of(wheeled), "dof_pos", given)
-        assert seen == pytest.approx([100, 100, 0] * 4)
 
-    def test_dof_vel(self, robot: Robot) -> None:
-        given = state(dof_vel=[[20, -10, *[0] * 10]])
-        assert observed(group_of(robot), "dof_vel", given) == pytest.approx([1, -0.5, *[0] * 10])
+def test_dof_pos_by_hand(robot):
+    # Measured position, including the joint offset, minus the default pose.
+    given = state(dof_pos=robot.default_pose + np.float32(0.5), joint_offset=0.125)
+    assert observed(group_of(robot), "dof_pos", given) == pytest.approx([0.625] * 12)
+    # Wheels are observed as 0; 100 is the clipping limit.
+    wheeled = replace(robot, wheels=np.arange(12) % 3 == 2)
+    given = state(dof_pos=robot.default_pose + np.float32(400))
+    assert observed(group_of(wheeled), "dof_pos", given) == pytest.approx([100, 100, 0] * 4)
 
-    def test_actions(self, robot: Robot) -> None:
-        given = state(actions=[[3, -2, *[0] * 10]], last_actions=9)
-        assert observed(group_of(robot), "actions", given) == [3, -2, *[0] * 10]
 
-    def test_height_scan(self, robot: Robot) -> None:
-        # A height of 0.5 m is observed as 0; differences are clipped at 1 m.
-        heights = [0.5, 0.7, 0.3, 9, -9, *[0.5] * 182]
-        given = state(height_scan=[heights])
-        expected = [0, 1, -1, 5, -5, *[0] * 182]
-        assert observed(group_of(robot), "height_scan", given) == pytest.approx(expected, abs=1e-6)
-
-    def test_base_lin_vel(self, robot: Robot) -> None:
-        given = state(base_lin_vel=[[1, -0.5, 0.25]])
-        assert observed(privileged_of(robot), "base_lin_vel", given) == [2, -1, 0.5]
-
-    def test_mean_vel(self, robot: Robot) -> None:
-        given = state(mean_vel=[[1, -0.5, 0.25]])
-        assert observed(privileged_of(robot), "mean_vel", given) == [1, -0.5, 0.25]
-
-    def test_gait_phase(self, robot: Robot) -> None:
-        given = state(gait_phase=[[0.6, -0.8]])
-        assert observed(group_of(robot), "gait_phase", given) == pytest.approx([0.6, -0.8])
-        without = policy_group(robot, Task(commands=Commands(gait_period=0)), scan=False)
-        assert "gait_phase" not in {each.name for each in without}
-
-    def test_friction(self, robot: Robot) -> None:
-        assert observed(privileged_of(robot), "friction", state(friction=0.75)) == [0.75]
-
-    def test_added_mass(self, robot: Robot) -> None:
-        assert observed(privileged_of(robot), "added_mass", state(added_mass=-0.5)) == [-0.5]
-
-    def test_com_shift(self, robot: Robot) -> None:
-        given = state(com_shift=[[0.02, -0.03, 0.01]])
-        expected = [0.2, -0.3, 0.1]
-        assert observed(privileged_of(robot), "com_shift", given) == pytest.approx(expected)
-
-    def test_joint_offset(self, robot: Robot) -> None:
-        given = state(joint_offset=0.25)
-        assert observed(privileged_of(robot), "joint_offset", given) == [0.25] * 12
-
-    def test_push_vel(self, robot: Robot) -> None:
-        # The base faces +y, so a push along +x is a push to its right.
-        given = state(base_quat=[np.sqrt(0.5), 0, 0, np.sqrt(0.5)], push_vel=[1, 0, 0])
-        expected = [0, -1, 0]
-        assert observed(privileged_of(robot), "push_vel", given) == pytest.approx(
-            expected, abs=1e-6
-        )
-
-    def test_foot_force(self, robot: Robot) -> None:
-        # In units of the weight, 100 N, in the frame of a base that faces +y.
-        force = [[0, 0, 50], [10, 0, 0], [0, 20, 0], [0, 0, 0]]
-        given = state(base_quat=[np.sqrt(0.5), 0, 0, np.sqrt(0.5)], foot_force=[force])
-        expected = [0, 0, 0.5, 0, -0.1, 0, 0.2, 0, 0, 0, 0, 0]
-        seen = observed(privileged_of(robot), "foot_force", given)
-        assert seen == pytest.approx(expected, abs=1e-6)
-
-    def test_every_term_is_tested(self, robot: Robot) -> None:
-        here = {name.removeprefix("test_") for name in vars(TestByHand) if name.startswith("test_")}
-        names = {each.name for each in privileged_of(robot)}
-        assert names == here - {"every_term_is_tested"}
+def test_every_term_is_tested_by_hand(robot):
+    assert {each.name for each in privileged_of(robot)} == {*_BY_HAND, "dof_pos"}
 
 
 class TestGroups:
@@ -348,13 +308,6 @@ class TestInEnvironment:
         robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
         task = replace(Task(env=Env(num_envs=3, num_threads=1)), **changes)
         return LeggedEnv(task, robot, Plane())
-
-    def test_group_widths(self) -> None:
-        obs = self.make().get_observations()
-        assert {name: tuple(value.shape) for name, value in obs.items()} == {
-            "policy": (3, 47),
-            "privileged": (3, 47 + 38),
-        }
 
     def test_height_scan_on_request(self) -> None:
         env = self.make(terrain=Terrain(measure_heights=True))

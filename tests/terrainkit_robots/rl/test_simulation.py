@@ -1,7 +1,7 @@
 import re
 import subprocess
 import sys
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -11,7 +11,6 @@ import torch
 from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit_robots.rl.config import Algorithm, DomainRand, Env, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.events import RandomizedParams
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation, check_env_memory
 from terrainkit_robots.rl.terrain import MapTerrain, Plane
@@ -153,22 +152,6 @@ class TestApplyParamsToEnv:
             Plane(),
         )
 
-    def test_params_are_within_their_ranges(self, varied):
-        found = varied.params
-        assert found.friction.shape == found.added_mass.shape == found.strength.shape == (5, 1)
-        assert found.stiffness.shape == found.damping.shape == found.com_shift.shape == (5, 3)
-        for values, low, high in (
-            (found.friction, 0.2, 1.5),
-            (found.added_mass, -1.0, 2.0),
-            (found.com_shift, -0.05, 0.05),
-            (found.stiffness, 0.5, 1.5),
-            (found.damping, 0.5, 1.5),
-            (found.strength, 0.7, 1.3),
-        ):
-            assert (low <= values).all()
-            assert (values <= high).all()
-            assert np.ptp(values) > 0.1 * (high - low)
-
     def test_params_reach_every_simulation(self, varied):
         scene, found = varied.scene, varied.params
         nominal, base, hinge, wheel = scene.model, scene.base, 1, 0
@@ -198,15 +181,6 @@ class TestApplyParamsToEnv:
         for k, (added,) in enumerate(varied.params.added_mass):
             model = varied.sim.batch.get_model(k)
             assert model.body_subtreemass[base] == pytest.approx(nominal + added)
-
-    def test_other_parameters_are_unchanged(self, varied):
-        nominal, base = varied.scene.model, varied.scene.base
-        others = np.arange(nominal.nbody) != base
-        model = varied.sim.batch.get_model(3)
-        np.testing.assert_array_equal(model.body_mass[others], nominal.body_mass[others])
-        ground = ~np.isin(np.arange(nominal.ngeom), varied.scene.geoms)
-        np.testing.assert_array_equal(model.geom_friction[ground], nominal.geom_friction[ground])
-        np.testing.assert_array_equal(model.geom_friction[:, 1:], nominal.geom_friction[:, 1:])
 
     def test_no_randomization_keeps_the_model(self, cart, nominal_task):
         env = LeggedEnv(nominal_task(2), cart, Plane())
@@ -245,10 +219,6 @@ class TestApplyParamsToEnv:
         weight = (robot + env.params.added_mass[:, 0]) * 9.81
         np.testing.assert_allclose(env.state.foot_force.sum(axis=1)[:, 2], weight, rtol=0.02)
         assert np.ptp(weight) > 1
-
-    def test_every_param_has_num_envs_rows(self, varied):
-        for field in fields(RandomizedParams):
-            assert len(getattr(varied.params, field.name)) == 5
 
 
 MEASURED = """

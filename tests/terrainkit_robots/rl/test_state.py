@@ -160,21 +160,6 @@ class TestByHand:
         np.testing.assert_array_equal(seen[0], ~seen[1])
         np.testing.assert_array_equal(seen[2:], seen[:2])
 
-    def test_joint_offset_is_observed(self, cart, nominal_task):
-        task = nominal_task(
-            2,
-            domain_rand=DomainRand(
-                friction=None, added_mass=None, com_shift=0, gains=None, motor_strength=None,
-                joint_offset=0.1, push_interval_s=0,
-            ),
-        )  # fmt: skip
-        env = LeggedEnv(task, cart, Plane())
-        offset = env.state.joint_offset
-        assert 0.01 < np.abs(offset).max() <= 0.1
-        observed = env.get_observations()["policy"][:, 9:12]
-        np.testing.assert_allclose(observed, np.where(cart.wheels, 0, offset), atol=1e-6)
-        assert cart.wheels.tolist() == [True, False, False]
-
 
 class TestStateCopies:
     def test_state_is_unchanged_by_later_steps(self, quadruped, random_task):

@@ -16,21 +16,10 @@ import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import tasks
-from terrainkit_robots.rl.config import Algorithm, Commands, Env, Policy, Runner, Task, Terrain
+from terrainkit_robots.rl.config import Task, Terrain
 from terrainkit_robots.rl.run import checkpoints, open_run
 from terrainkit_robots.rl.runner import TrainingProgress
 from terrainkit_robots.rl.train import train
-
-
-@pytest.fixture(scope="module")
-def task() -> Task:
-    """Return a task with short episodes and small networks."""
-    return Task(
-        env=Env(num_envs=4, num_threads=1, episode_length_s=0.3),
-        policy=Policy(actor_hidden_dims=(16,), critic_hidden_dims=(16,)),
-        algorithm=Algorithm(num_learning_epochs=2, num_mini_batches=2),
-        runner=Runner(num_steps_per_env=8, max_iterations=4),
-    )
 
 
 @pytest.fixture(scope="module")
@@ -95,16 +84,6 @@ def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
     assert (folder / "model_1.pt").exists()
 
 
-def test_resume_continues_exactly_in_its_folder(task, tmp_path, run_after):
-    run_after(4, name="whole")
-    run_after(2)
-    done = train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
-    assert done.folder == tmp_path / "run"
-    assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
-    assert list(checkpoints(tmp_path / "run")) == [2, 4]
-    assert open_run(tmp_path / "run").task == task
-
-
 def test_stopped_run_resumes_exactly(task, tmp_path, run_after):
     run_after(4, name="whole")
     calls = iter([False, False, True])
@@ -114,6 +93,7 @@ def test_stopped_run_resumes_exactly(task, tmp_path, run_after):
     assert stopped.current_learning_iteration == 2
     assert list(checkpoints(tmp_path / "run")) == [2]
     train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
+    assert list(checkpoints(tmp_path / "run")) == [2, 4]
     assert same_weights(tmp_path / "whole" / "model_4.pt", tmp_path / "run" / "model_4.pt")
 
 
@@ -145,6 +125,8 @@ def test_tensorboard_has_each_iteration_once_after_a_crash(task, tmp_path):
     (tmp_path / "run" / "model_4.pt").unlink()  # as after a crash
     train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
     curves = EventAccumulator(str(tmp_path / "run")).Reload()
+    tags = curves.Tags()["scalars"]
+    assert {"Episode/rew_tracking_lin_vel", "Train/mean_reward", "Loss/value"} <= set(tags)
     assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
 
 
@@ -290,17 +272,9 @@ def test_resume_rejects_a_completed_run(task, tmp_path, run_after):
 
 def test_resume_rejects_another_robot(task, tmp_path, run_after):
     run_after(1)
-    with pytest.raises(ConfigError, match="belongs to another robot, quadruped"):
+    with pytest.raises(ConfigError, match=r"another robot, quadruped: got the joints .*_"):
         train("biped", "plane", task, resume=open_run(tmp_path / "run"), folder=tmp_path / "b")
     assert not (tmp_path / "b").exists()
-
-
-def test_train_rejects_a_nonempty_folder(task, tmp_path):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "mine.txt").touch()
-    with pytest.raises(ExportError, match="exists"):
-        train("quadruped", "plane", task, folder=tmp_path / "run")
-    assert [path.name for path in (tmp_path / "run").iterdir()] == ["mine.txt"]
 
 
 def test_full_disk_keeps_the_last_checkpoint(task, tmp_path, capfd):
@@ -357,7 +331,9 @@ def test_removed_folder_is_one_error(task, tmp_path, capfd):
 def test_divergence_names_the_last_checkpoint(task, tmp_path):
     algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
     diverging = replace(task, algorithm=algorithm)
-    with pytest.raises(ConfigError, match=r"networks have diverged.*; there is no checkpoint"):
+    with pytest.raises(
+        ConfigError, match=r"iteration 1: the networks have diver.*; there is no check"
+    ):
         train("quadruped", "plane", diverging, folder=tmp_path / "run")
 
 
@@ -375,14 +351,6 @@ def test_missing_wandb_is_reported(task, tmp_path, monkeypatch):
         train("quadruped", "plane", task, folder=tmp_path / "run")
 
 
-@pytest.mark.parametrize("device", ["gpu", "cuda:99", "meta"])
-def test_train_rejects_unknown_device(task, tmp_path, device):
-    if torch.cuda.is_available():
-        pytest.skip("there is one")
-    with pytest.raises(ConfigError, match=f"device: got '{device}'; expected one of: cpu"):
-        train("quadruped", "plane", task, folder=tmp_path / "run", device=device)
-
-
 def test_train_rejects_more_processes_than_environments(task, tmp_path, monkeypatch):
     monkeypatch.setenv("WORLD_SIZE", "9")
     with pytest.raises(
@@ -391,27 +359,7 @@ def test_train_rejects_more_processes_than_environments(task, tmp_path, monkeypa
         train("quadruped", "plane", task, folder=tmp_path / "run")
 
 
-def test_train_rejects_a_mismatched_spec(task, tmp_path):
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    for path in tasks.get_task("quadruped").folder.iterdir():
-        if path.is_file():
-            (mine / path.name).write_bytes(path.read_bytes())
-    model = mine / "quadruped.xml"
-    model.write_text(model.read_text().replace("FL_hip_joint", "FL_shoulder_joint"))
-    with pytest.raises(ConfigError, match="joint_order of quadruped: got 'FL_hip_joint'"):
-        train(mine, "plane", task, folder=tmp_path / "run")
-    assert not (tmp_path / "run").exists()
-
-
 def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
     train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
-
-
-def test_train_rejects_waypoints_without_goals(task, tmp_path):
-    task = replace(task, commands=Commands(waypoints=True))
-    with pytest.raises(ConfigError, match="waypoints: got a terrain without goals"):
-        train("quadruped", "plane", task, folder=tmp_path / "run")
-    assert not (tmp_path / "run").exists()
