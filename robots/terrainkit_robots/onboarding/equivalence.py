@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.analysis.bodies.link_poses import link_poses, random_positions
 from terrainkit_robots.analysis.inertia.composite_inertia import composite_inertias
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.transforms import Matrix
+from terrainkit_robots.transforms import Matrix, pose_error
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -111,19 +110,17 @@ def reference_kinematics(source: "Facts", written: "Facts") -> ReferenceKinemati
         for body, inertia in zip(source.bodies, composite_inertias(source.bodies), strict=True)
         if body.joint is not None and math.isfinite(inertia) and inertia > 0
     }
-    positions = _random_positions(written)
-    source_positions = {renamed[name]: q for name, q in positions.items() if name in renamed}
-    poses = body_poses(source.bodies, source_positions)
-    link_poses = {
-        link.name: np.broadcast_to(pose @ local, (NUM_POSES, 4, 4))
-        for body, pose in zip(source.bodies, poses, strict=True)
-        for link, local in zip(body.links, body.poses, strict=True)
+    ranges = {
+        joint.name: tuple(np.clip(joint_range(joint), -_MAX_POSITION, _MAX_POSITION))
+        for joint in written.joints
     }
+    positions = random_positions(ranges, written.joints, count=NUM_POSES, seed=0)
+    source_positions = {renamed[name]: q for name, q in positions.items() if name in renamed}
     return ReferenceKinematics(
         mass=source.total_mass,
         base=written.bodies[0].top.name,
         positions=positions,
-        link_poses=link_poses,
+        link_poses=link_poses(source.bodies, source_positions, count=NUM_POSES),
         inertia={n: inertias[name] for n, name in renamed.items() if name in inertias},
     )
 
@@ -141,29 +138,18 @@ def compare_models(
         return tuple(_compare(file, model, reference) for file, model in models.items())
 
 
-def _random_positions(facts: "Facts") -> dict[str, Matrix]:
-    """Return random positions of all joints within their limits, shape (NUM_POSES,)."""
-    rng = np.random.default_rng(0)
-    positions: dict[str, Matrix] = {}
-    for joint in facts.joints:
-        lower, upper = np.clip(joint_range(joint), -_MAX_POSITION, _MAX_POSITION)
-        positions[joint.name] = rng.uniform(lower, upper, NUM_POSES)
-    return positions | mimic_positions(facts.joints, positions)
-
-
 def _compare(file: str, model: Any, reference: ReferenceKinematics) -> Equivalence:
-    link_poses = _mujoco_link_poses(model, reference)
+    errors = {
+        name: pose_error(reference.link_poses[name], poses)
+        for name, poses in _mujoco_link_poses(model, reference).items()
+    }
+    distances = {name: float(distance.max()) for name, (distance, _) in errors.items()}
+    angles = {name: float(angle.max()) for name, (_, angle) in errors.items()}
     inertias = {
         name: abs(inertia / reference.inertia[name] - 1)
         for name, inertia in _mujoco_joint_inertia(model, list(reference.positions)).items()
         if name in reference.inertia
     }
-    expected = reference.link_poses
-    distances = {
-        name: float(np.linalg.norm(expected[name][:, :3, 3] - pose[:, :3, 3], axis=1).max())
-        for name, pose in link_poses.items()
-    }
-    angles = {name: _max_angle(expected[name], pose) for name, pose in link_poses.items()}
     link, angle_link, joint = (
         max(errors, key=errors.__getitem__, default="") for errors in (distances, angles, inertias)
     )
@@ -222,12 +208,3 @@ def _mujoco_joint_inertia(model: Any, joints: list[str]) -> dict[str, float]:
         mujoco.mj_mulM(model, data, row, np.eye(model.nv)[dof])
         inertias[name] = float(row[dof] - model.dof_armature[dof])
     return inertias
-
-
-def _max_angle(one: Matrix, other: Matrix) -> float:
-    """Return the largest angle between similar rotations, shapes (..., 4, 4) [rad]."""
-    relative = np.swapaxes(one[..., :3, :3], -1, -2) @ other[..., :3, :3]
-    # The sine of a small angle is accurate; its cosine is dominated by rounding.
-    sine = np.linalg.norm(relative - np.swapaxes(relative, -1, -2), axis=(-2, -1)) / math.sqrt(8)
-    cosine = (np.trace(relative, axis1=-2, axis2=-1) - 1) / 2
-    return float(np.arctan2(sine, cosine).max())

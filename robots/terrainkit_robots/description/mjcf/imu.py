@@ -1,35 +1,12 @@
 """Find the site of the IMU of an MJCF."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
-
-from terrainkit_robots.description.mjcf.shapes import Scale
-from terrainkit_robots.description.mjcf.tree import Node
 
 if TYPE_CHECKING:
     import mujoco
 
 
-@dataclass(frozen=True, kw_only=True)
-class BodySite:
-    """A site on a body."""
-
-    site: Any
-    """The `mujoco.MjsSite`."""
-
-    link: str
-    """Name of the link of the body."""
-
-    depth: int
-    """Depth of the body below the world."""
-
-    node: Node
-    scale: Scale
-    """Scale of the frames around the body."""
-
-
-def find_imu(spec: "mujoco.MjSpec", sites: Sequence[BodySite]) -> BodySite | None:
+def find_imu(spec: "mujoco.MjSpec") -> Any:
     """Return the site of a gyro or an accelerometer, else a site named imu, else None.
 
     Of several sites, the one closest to the base is returned.
@@ -38,6 +15,15 @@ def find_imu(spec: "mujoco.MjSpec", sites: Sequence[BodySite]) -> BodySite | Non
 
     kinds = (mujoco.mjtSensor.mjSENS_GYRO, mujoco.mjtSensor.mjSENS_ACCELEROMETER)
     sensed = {sensor.objname for sensor in spec.sensors if sensor.type in kinds} - {""}
-    mimics = [each for each in sites if each.site.name in sensed]
-    mimics = mimics or [each for each in sites if each.site.name.lower() == "imu"]
-    return min(mimics, key=lambda each: each.depth, default=None)
+    sites = [site for site in spec.sites if site.parent != spec.worldbody]
+    found = [site for site in sites if site.name in sensed]
+    found = found or [site for site in sites if site.name.lower() == "imu"]
+    return min(found, key=lambda site: _depth(site, spec.worldbody), default=None)
+
+
+def _depth(site: Any, world: Any) -> int:
+    """Return the number of bodies above a site, without the world."""
+    depth, body = 0, site.parent
+    while body != world:
+        depth, body = depth + 1, body.parent
+    return depth

@@ -72,6 +72,13 @@ class Node:
             yield node
             stack.extend(reversed(node.children))
 
+    def elements(self) -> Iterator["Node"]:
+        """Yield the elements of a body, including those in frames."""
+        for child in self.children:
+            yield child
+            if child.tag in ("frame", "replicate"):
+                yield from child.elements()
+
     def remove(self) -> None:
         """Remove the node from the tree."""
         if self.parent is not None:

@@ -1,7 +1,8 @@
 """Compare the link poses of two descriptions of a robot.
 
-Both robots are set to the same random joint positions. The link poses of a URDF are computed by
-yourdfpy and those of an MJCF by MuJoCo, which are independent of each other and of terrainkit.
+Both robots are set to the same random joint positions. yourdfpy computes the link poses of a URDF
+from the file. The frames of an MJCF are compiled by MuJoCo when it is read, and moved by our
+kinematics.
 """
 
 import math
@@ -10,11 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
+from terrainkit_robots.analysis.bodies.link_poses import link_poses, random_positions
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.lint.compare.mjcf_poses import mjcf_poses
 from terrainkit_robots.lint.compare.robot_pairs import RobotPairs, pair_robots
 from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
 from terrainkit_robots.transforms import Matrix, invert_poses, pose_error
@@ -98,10 +98,10 @@ def compare_link_poses(
     if pairs is None or len(pairs.links) < 2:
         raise CannotCheckError("the two robots have no links in common")
     positions, other_positions = sample_positions(pairs, poses=poses, seed=seed, locked=locked)
-    link_poses = _relative_to_base(_link_poses(robot, positions), pairs.base[0], poses)
-    other_poses = _relative_to_base(_link_poses(other, other_positions), pairs.base[1], poses)
-    a = np.array([link_poses[name] for name, _ in pairs.links])
-    b = np.array([other_poses[name] for _, name in pairs.links])
+    ours = _relative_to_base(_link_poses(robot, positions, poses), pairs.base[0], poses)
+    theirs = _relative_to_base(_link_poses(other, other_positions, poses), pairs.base[1], poses)
+    a = np.array([ours[name] for name, _ in pairs.links])
+    b = np.array([theirs[name] for _, name in pairs.links])
     with np.errstate(all="ignore"):
         return _difference(a, b, pairs, seed)
 
@@ -114,13 +114,12 @@ def sample_positions(
     Returns:
         The positions by the joint names of the first and of the second robot.
     """
-    generator = np.random.default_rng(seed)
-    positions: dict[str, Matrix] = {}
-    for joint, other in pairs.joints:
-        sampled = generator.uniform(*_bounds(joint, other), poses)
-        positions[joint.name] = np.zeros(poses) if joint.name in locked else sampled
+    ranges = {
+        joint.name: (0.0, 0.0) if joint.name in locked else _bounds(joint, other)
+        for joint, other in pairs.joints
+    }
     joints = [replace(j, mimic=None) if j.name in locked else j for j, _ in pairs.joints]
-    positions |= mimic_positions(joints, positions)
+    positions = random_positions(ranges, joints, count=poses, seed=seed)
     return positions, {other.name: positions[joint.name] for joint, other in pairs.joints}
 
 
@@ -136,9 +135,15 @@ def _bounds(joint: Joint, other: Joint) -> tuple[float, float]:
     return lower, upper
 
 
-def _link_poses(robot: Facts, positions: Mapping[str, Matrix]) -> dict[str, Matrix]:
-    compute = mjcf_poses if robot.model.kind == "mjcf" else urdf_poses
-    return compute(robot, positions)
+def _link_poses(robot: Facts, positions: Mapping[str, Matrix], count: int) -> dict[str, Matrix]:
+    if robot.model.kind != "mjcf":
+        return urdf_poses(robot, positions)
+    # The positions of mimic joints are given: both robots get those of the first.
+    free = [
+        replace(body, joint=None if body.joint is None else replace(body.joint, mimic=None))
+        for body in robot.bodies
+    ]
+    return link_poses(free, positions, count=count)
 
 
 def _relative_to_base(poses: Mapping[str, Matrix], base: str, count: int) -> dict[str, Matrix]:
@@ -153,9 +158,8 @@ def _difference(a: Matrix, b: Matrix, pairs: RobotPairs, seed: int) -> LinkPoseD
     distance, angle = pose_error(a, b)
     if not (np.isfinite(distance).all() and np.isfinite(angle).all()):
         raise CannotCheckError("link poses are not finite")
-    worst = np.unravel_index(
-        (distance if distance.max() > MAX_DISTANCE else angle).argmax(), distance.shape
-    )
+    largest = distance if distance.max() > MAX_DISTANCE else angle
+    worst = np.unravel_index(largest.round(9).argmax(), distance.shape)  # the first of equal ones
     differs = ((distance > MAX_DISTANCE) | (angle > MAX_ANGLE)).any(axis=1)
     has_difference = bool(differs.any())
     names = [name for name, _ in pairs.links]

@@ -2,6 +2,7 @@
 
 import random
 import re
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -408,6 +409,13 @@ def test_geom_inertia_matches_mujoco() -> None:
             f'<geom {shape} pos="0.3 -0.2 0.5" mass="2"/></body>'
         )
         assert_compiled(read(text), compiled(text))
+
+
+def test_shell_inertia_matches_mujoco() -> None:
+    text = in_world(
+        '<body name="a"><joint/><geom type="box" size="0.1 0.2 0.3" shellinertia="true"/></body>'
+    )
+    assert_compiled(read(text), compiled(text))
 
 
 def test_mass_from_mesh_is_nan() -> None:
@@ -961,6 +969,33 @@ def test_defects_have_codes(text: str, code: str, says: str) -> None:
     assert problem.source.line == 1
 
 
+@pytest.mark.parametrize("scale", ["2 3 4", "-1 1 1", "0 1 1"])
+def test_frame_scale_that_is_not_uniform_is_reported(scale: str) -> None:
+    if not hasattr(mujoco.MjSpec().worldbody.add_frame(), "scale"):
+        pytest.skip(f"frames of MuJoCo {mujoco.__version__} have no scale")
+    robot = read(in_world(f'<frame scale="{scale}"><body name="a"><geom size="1"/></body></frame>'))
+    assert "expected equal positive factors" in only(robot).message
+    assert link(robot, "a").collisions[0].shape == "sphere"
+
+
+def test_invalid_geoms_keep_their_values() -> None:
+    robot = read(
+        in_world(
+            '<body name="a"><geom size="-1"/><geom size="1" mass="-2"/>'
+            '<geom type="capsule" size="0.1 0" pos="1 2 3"/></body>'
+            '<body name="b"><geom size="1" mass="3"/></body>'
+        )
+    )
+    assert robot.problems == ()
+    inertial, valid = (link(robot, name).inertial for name in "ab")
+    assert [shape.size for shape in link(robot, "a").collisions] == [(-1,), (1,), (0.1, 0)]
+    assert link(robot, "a").collisions[2].origin[:3, 3].tolist() == [1, 2, 3]
+    assert inertial is not None
+    assert inertial.mass == -2
+    assert valid is not None
+    assert valid.mass == 3
+
+
 def test_everything_mujoco_rejects_is_reported() -> None:
     """Every text of the test above that MuJoCo takes is one that its compiler refuses."""
     for text in (
@@ -1053,6 +1088,16 @@ def test_renamed_top_level_default() -> None:
 def test_memory_is_bounded(text: str) -> None:
     robot = read(text)
     assert "a" in [each.name.rstrip("0") for each in robot.links]
+
+
+def test_long_chain_of_joints_is_compiled_without_them() -> None:
+    """MuJoCo's compiler needs minutes for these 4,600 degrees of freedom."""
+    joints = "<joint/>" * 20
+    began = time.process_time()
+    robot = read(in_world(f"<body>{joints}" * 230 + "</body>" * 230))
+    assert time.process_time() - began < 20
+    assert robot.problems == ()
+    assert len(robot.joints) == 4600
 
 
 def test_too_many_elements_are_reported() -> None:

@@ -23,8 +23,8 @@ def compare_kinematics(robot: Facts) -> Violations:
         Compare the origin of the joint of the first link that differs.
 
     Source:
-        Both robots are compared in 20 random poses. The link poses of a URDF are computed by
-        yourdfpy and those of an MJCF by MuJoCo, two independent implementations.
+        Both robots are compared in 20 random poses. yourdfpy computes the link poses of a URDF, and
+        MuJoCo compiles the frames of an MJCF.
     """
     from terrainkit_robots.lint.compare.link_poses import compare_link_poses
 

@@ -1,0 +1,311 @@
+"""Compile the poses, scales and masses of the bodies of a parsed MJCF with MuJoCo.
+
+The compiler resolves orientations, frames and their scales, and computes the inertia of geoms. It
+also opens all files, and rejects a model with an invalid value, which the reader keeps for the lint
+rules. Therefore it gets a copy of the bodies, in which placeholders replace what it cannot use:
+
+- A shape that needs a file or has an invalid size is a unit sphere without mass.
+- An explicit inertial has a mass of 1 kg and moments of 1 kg m2.
+- A joint is a fixed body at its anchor, because the time to compile joints grows with the third
+  power of their number in a chain. In a scaled frame there is also a joint with limits and an
+  armature of 1, which moves another body.
+
+The compiled value of a placeholder is the scale of what it replaces.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from terrainkit_robots.description.mjcf.shapes import SIZES, shape_kind
+from terrainkit_robots.description.mjcf.tree import Node
+from terrainkit_robots.description.model import ShapeKind
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.transforms import Matrix, quat_to_matrix
+
+if TYPE_CHECKING:
+    import mujoco
+
+_SPANNING: frozenset[ShapeKind] = frozenset({"capsule", "cylinder", "ellipsoid", "box"})
+"""Shapes that `fromto` applies to."""
+
+_MIN_LENGTH = 1e-14
+"""Minimum distance of the points of `fromto`; MuJoCo rejects shorter ones."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointScale:
+    """Factors of the frames around a joint on its positions, forces and armature."""
+
+    position: float = 1.0
+    force: float = 1.0
+    armature: float = 1.0
+
+
+class CompiledBodies:
+    """The compiled bodies of a parsed spec, with their geoms and joints.
+
+    Args:
+        spec: The parsed spec.
+        imu: The site of the IMU, or None. Other sites are not compiled.
+        node_of: Function that returns the node of a MuJoCo element.
+        report: Function that reports what MuJoCo rejects at a node.
+
+    Raises:
+        ValueError: If MuJoCo rejects the bodies.
+    """
+
+    def __init__(
+        self,
+        spec: "mujoco.MjSpec",
+        imu: Any,
+        node_of: Callable[[Any], Node],
+        report: Callable[[Node, str], None],
+    ) -> None:
+        import mujoco
+
+        self._parsed, self._node_of, self._report = spec, node_of, report
+        self._spec = mujoco.MjSpec()
+        self._copies: dict[Any, Any] = {spec.worldbody: self._spec.worldbody}
+        self._placeholders: set[Any] = set()
+        self._scaled: set[Any] = set()
+        """Copies of frames with a scale, and of everything in them."""
+
+        self._unit_joints: dict[tuple[Any, bool], Any] = {}
+        """Slide or hinge joint of each scaled frame or body."""
+
+        self._scaled_joints: dict[Any, Any] = {}
+        """Unit joint with the scale of each parsed joint."""
+
+        self._missing: dict[Any, list[float]] = {}
+        stack = list(spec.worldbody.bodies)
+        while stack:
+            body = stack.pop()
+            self._copy_body(body)
+            stack += body.bodies
+        if imu is not None:
+            self._copy_shape(imu)
+        self._spec.compiler.degree = False
+        self._spec.compiler.balanceinertia = True  # the inertia of huge geoms has rounding errors
+        with quiet_mujoco():
+            self._model = self._spec.compile()
+
+    # Compiled values
+
+    def body_pose(self, body: Any) -> Matrix:
+        """Return the pose of a body in its parent, shape (4, 4) [m]."""
+        index = self._copies[body].id
+        return _pose(self._model.body_pos[index], self._model.body_quat[index])
+
+    def shape_pose(self, shape: Any) -> Matrix:
+        """Return the pose of a geom or site in its body, shape (4, 4) [m]."""
+        index = self._copies[shape].id
+        return _pose(self._model.geom_pos[index], self._model.geom_quat[index])
+
+    def shape_size(self, geom: Any) -> Matrix:
+        """Return the size of a geom, shape (3,) [m]."""
+        size: Matrix = self._model.geom_size[self._copies[geom].id]
+        return geom.size * size[0] if geom in self._placeholders else size
+
+    def mesh_scale(self, geom: Any) -> float:
+        """Return the scale of the frames around a geom with a mesh."""
+        return float(self._model.geom_size[self._copies[geom].id, 0])
+
+    def inertial(self, body: Any) -> tuple[float, Matrix, Matrix]:
+        """Return the mass [kg], the pose of the inertial, and the moments of inertia [kg m2]."""
+        model, index = self._model, self._copies[body].id
+        pose = _pose(model.body_ipos[index], model.body_iquat[index])
+        return float(model.body_mass[index]), pose, model.body_inertia[index]
+
+    def missing_masses(self, body: Any) -> list[float]:
+        """Return what the geoms whose inertia is not compiled add to the mass of a body [kg].
+
+        A mass is negative, or NaN if it depends on a mesh file, or 0 if it is compiled.
+        """
+        return self._missing.get(body, [])
+
+    def joint_pose(self, joint: Any) -> Matrix:
+        """Return the pose of the anchor of a joint in its body, shape (4, 4) [m].
+
+        It has the orientation of the frame in which the axis is written.
+        """
+        return self.body_pose(joint)
+
+    def joint_scale(self, joint: Any) -> JointScale:
+        """Return the factors of the frames around a joint on its values."""
+        if joint not in self._scaled_joints:
+            return JointScale()
+        model, index = self._model, self._scaled_joints[joint].id
+        return JointScale(
+            position=float(model.jnt_range[index, 1]),
+            force=float(model.jnt_actfrcrange[index, 1]),
+            armature=float(model.dof_armature[index]),
+        )
+
+    # Copies
+
+    def _copy_body(self, body: Any) -> None:
+        place = self._place(body)
+        copy = place.add_body(
+            pos=body.pos, quat=self._quat(body, body.quat, body.alt), info=body.info
+        )
+        self._copies[body] = copy
+        if place in self._scaled:
+            self._scaled.add(copy)
+        if is_explicit(body):
+            copy.explicitinertial, copy.mass, copy.inertia = True, 1.0, np.ones(3)
+            copy.ipos = body.ipos
+            if math.isnan(body.fullinertia[0]):  # otherwise it is in the frame of the body
+                copy.iquat = self._quat(body, body.iquat, body.ialt, "inertial")
+        low, high = body.compiler.inertiagrouprange
+        for geom in body.geoms:
+            self._copy_shape(geom)
+            if low <= geom.group <= high:
+                self._set_mass(geom, body)
+        for joint in body.joints:
+            self._copy_joint(joint)
+
+    def _copy_shape(self, shape: Any) -> None:
+        """Add a geom or site to the copy, without mass."""
+        import mujoco
+
+        kind, ends = shape_kind(shape), shape.fromto
+        spans = kind in _SPANNING and not math.isnan(ends[0])
+        if spans and np.linalg.norm(ends[:3] - ends[3:]) < _MIN_LENGTH:
+            self._reject(shape, "the two points of fromto are equal")
+            spans = False
+        count = 1 if spans else SIZES.get(kind, 0)
+        has_mesh = bool(getattr(shape, "meshname", ""))
+        is_valid = count > 0 and not has_mesh and bool((shape.size[:count] > 0).all())
+        if not is_valid:
+            self._placeholders.add(shape)
+        copy = self._place(shape).add_geom(
+            type=shape.type if is_valid or spans else mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=shape.size if is_valid else np.ones(3),
+            mass=0,
+            info=shape.info,
+        )
+        if spans:
+            copy.fromto = ends
+        else:
+            copy.pos, copy.quat = shape.pos, self._quat(shape, shape.quat, shape.alt)
+        self._copies[shape] = copy
+
+    def _set_mass(self, geom: Any, body: Any) -> None:
+        """Give the copy of a geom the mass of the geom, as far as MuJoCo can compile it."""
+        import mujoco
+
+        copy, mass, density = self._copies[geom], float(geom.mass), float(geom.density)
+        is_placeholder, kinds = geom in self._placeholders, mujoco.mjtGeom
+        needs_mesh = bool(geom.meshname) or geom.type in (kinds.mjGEOM_MESH, kinds.mjGEOM_SDF)
+        is_massless = mass == 0 or (math.isnan(mass) and density == 0)
+        if is_massless or (is_placeholder and not needs_mesh):
+            return
+        if not is_placeholder and not mass < 0 and density >= 0:
+            copy.mass, copy.density, copy.typeinertia = mass, density, geom.typeinertia
+            return
+        if mass > 0:
+            copy.mass = mass
+        self._missing.setdefault(body, []).append(0.0 if mass > 0 else mass)
+
+    def _copy_joint(self, joint: Any) -> None:
+        """Add the anchor of a joint to the copy, and a unit joint if its values are scaled."""
+        import mujoco
+
+        place = self._place(joint)
+        self._copies[joint] = place.add_body(pos=joint.pos)
+        if place in self._scaled:
+            slides = joint.type == mujoco.mjtJoint.mjJNT_SLIDE
+            if (place, slides) not in self._unit_joints:
+                self._unit_joints[place, slides] = _add_unit_joint(place, slides)
+            self._scaled_joints[joint] = self._unit_joints[place, slides]
+
+    def _place(self, element: Any) -> Any:
+        """Return the copy of the frame around an element, or of its body if there is none."""
+        frames = []
+        place = element.frame
+        while place is not None and place not in self._copies:
+            frames.append(place)
+            place = place.frame
+        copy = self._copies[element.parent if place is None else place]
+        for frame in reversed(frames):
+            outer = copy
+            copy = outer.add_frame(pos=frame.pos, quat=self._quat(frame, frame.quat, frame.alt))
+            self._copies[frame] = copy
+            is_scaled = outer in self._scaled
+            if hasattr(frame, "scale"):  # MuJoCo 3.16 and newer
+                scale = self._uniform_scale(frame)
+                copy.scale = np.full(3, scale)
+                copy.scaling, copy.massscale = frame.scaling, frame.massscale
+                is_scaled = is_scaled or scale != 1 or frame.massscale > 0
+            if is_scaled:
+                self._scaled.add(copy)
+        return copy
+
+    def _uniform_scale(self, frame: Any) -> float:
+        scale = np.asarray(frame.scale, dtype=np.float64)
+        if scale[0] == scale[1] == scale[2] > 0:
+            return float(scale[0])
+        mean = float(np.cbrt(np.abs(scale).prod())) or 1.0
+        self._report(
+            self._node_of(frame),
+            f"scale of <frame>: got {' '.join(f'{each:g}' for each in scale)}; expected equal "
+            f"positive factors; {mean:g} is used for all axes",
+        )
+        return mean
+
+    def _quat(self, element: Any, quat: Matrix, alt: Any, child: str = "") -> Matrix:
+        """Return the quaternion of an orientation; the identity if it is invalid."""
+        import mujoco
+
+        if alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+            return quat
+        compiler = element.compiler
+        try:
+            return np.array(
+                self._parsed.resolve_orientation(
+                    degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=alt
+                )
+            )
+        except ValueError as error:
+            self._reject(element, f"there is no orientation: {error}", child)
+            return np.array([1.0, 0, 0, 0])
+
+    def _reject(self, element: Any, message: str, child: str = "") -> None:
+        node = self._node_of(element)
+        node = next((each for each in node.elements() if each.tag == child), node)
+        self._report(node, f"<{node.tag}>: {message}; MuJoCo rejects the file")
+
+
+def _add_unit_joint(place: Any, slides: bool) -> Any:
+    """Add a body with a joint to a frame or body; return the joint."""
+    import mujoco
+
+    kinds, limited = mujoco.mjtJoint, mujoco.mjtLimited.mjLIMITED_TRUE
+    body = place.add_body(explicitinertial=True, mass=1.0, inertia=np.ones(3))
+    return body.add_joint(
+        type=kinds.mjJNT_SLIDE if slides else kinds.mjJNT_HINGE,
+        range=[-1, 1],
+        limited=limited,
+        actfrcrange=[-1, 1],
+        actfrclimited=limited,
+        armature=1.0,
+    )
+
+
+def is_explicit(body: Any) -> bool:
+    """Return whether MuJoCo uses the <inertial> of a body."""
+    import mujoco
+
+    derived = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    return bool(body.explicitinertial and body.compiler.inertiafromgeom != derived)
+
+
+def _pose(position: Matrix, quat: Matrix) -> Matrix:
+    pose = np.eye(4)
+    pose[:3, :3] = quat_to_matrix(quat)
+    pose[:3, 3] = position
+    return pose
