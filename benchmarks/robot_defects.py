@@ -9,9 +9,8 @@ The robots are the bundled ones and those in TERRAINKIT_ROBOTS (../shared/robots
 """
 
 import argparse
-import importlib
+import copy
 import os
-import pkgutil
 import random
 import re
 import shutil
@@ -27,9 +26,10 @@ from functools import cache
 from pathlib import Path
 from statistics import median
 
-import defects
-from defects.mutant import MUTATIONS, Mutant, Mutation, NotApplicableError, SourceRobot
 from lxml import etree
+from mutants.defect import Defect, load_defects
+from mutants.mutant import Mutant, NotApplicableError
+from mutants.robot import SourceRobot
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
@@ -37,6 +37,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.runner import Finding, lint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
+DEFECTS = Path(__file__).parent / "defects"
 ROBOTS = Path(
     os.environ.get("TERRAINKIT_ROBOTS", Path(__file__).resolve().parents[2] / "shared" / "robots")
 )
@@ -103,11 +104,10 @@ def robots() -> list[Path]:
     )
 
 
-def mutations() -> list[Mutation]:
+@cache
+def defects() -> list[Defect]:
     """Return all kinds of defects."""
-    for module in pkgutil.iter_modules(defects.__path__):
-        importlib.import_module(f"defects.{module.name}")
-    return MUTATIONS
+    return [defect for path in sorted(DEFECTS.glob("*.toml")) for defect in load_defects(path)]
 
 
 def _robot_folder(path: Path) -> Path:
@@ -167,18 +167,28 @@ def _format(finding: Finding) -> str:
 
 
 def _test_mutant(path: Path, index: int, site: int, seed: int) -> MutantResult | None:
-    """Add a defect to a robot and check it; None if the mutation is not applicable."""
+    """Add a defect to a robot and check it; None if the defect is not applicable."""
     source, findings, result, meshes = _load_source(path)
-    mutation = mutations()[index]
-    rng = random.Random(f"{seed} {path.name} {mutation.title} {site}")
-    mutant = Mutant(source, rng, f"mutant_{index}_{site}")
+    defect = defects()[index]
+    mutant = Mutant(
+        copy.deepcopy(source.root),
+        random.Random(f"{seed} {path.name} {defect.title} {site}"),
+        source.file,
+        prefix=f"mutant_{index}_{site}",
+        functions=source.functions(),
+    )
+    files = []
     try:
-        names = tuple(dict.fromkeys(mutation.apply(mutant)))
-        return _check(mutant, mutation, result.robot, names, findings, meshes)
+        names = defect.apply(mutant)
+        for name, content in mutant.files.items():
+            files.append(mutant.folder / name)
+            files[-1].parent.mkdir(parents=True, exist_ok=True)
+            files[-1].write_bytes(content)
+        return _check(mutant, defect, result.robot, names, findings, meshes)
     except NotApplicableError:
         return None
     finally:
-        for file in mutant.files:
+        for file in files:
             file.unlink(missing_ok=True)
 
 
@@ -188,13 +198,14 @@ def _raise_timeout(*_: object) -> None:
 
 def _check(
     mutant: Mutant,
-    mutation: Mutation,
+    defect: Defect,
     robot: str,
     names: tuple[str, ...],
     source_findings: Sequence[Finding],
     meshes: Meshes,
 ) -> MutantResult:
-    file, text = mutant.folder / mutant.file_name, mutant.text()
+    file = mutant.folder / mutant.file_name
+    text = mutant.rewrite(etree.tostring(mutant.root.getroottree(), encoding="utf-8"))
     known = {(f.code, f.subject, f.severity) for f in source_findings}
     known_messages = {(f.code, f.severity, f.message) for f in source_findings}
     signal.signal(signal.SIGALRM, _raise_timeout)
@@ -205,26 +216,26 @@ def _check(
     except Exception as exception:  # a crash or a timeout counts as a miss
         error = f"{type(exception).__name__}: {exception}"
         return MutantResult(
-            title=mutation.title, robot=robot, is_found=False, names=names, error=error
+            title=defect.title, robot=robot, is_found=False, names=names, error=error
         )
     finally:
         signal.alarm(0)
     new = [f for f in findings if (f.code, f.subject, f.severity) not in known]
     changed = [f for f in findings if (f.code, f.severity, f.message) not in known_messages]
     return MutantResult(
-        title=mutation.title,
+        title=defect.title,
         robot=robot,
-        is_found=any(_is_expected(f, mutation) and _has_subject(f, names) for f in new)
-        or any(_is_expected(f, mutation) and _has_name(f, names) for f in changed),
+        is_found=any(_is_expected(f, defect) and _has_subject(f, names) for f in new)
+        or any(_is_expected(f, defect) and _has_name(f, names) for f in changed),
         findings=tuple(_format(f) for f in new),
         names=names,
-        extra=sum(f.severity != "info" and f.code not in mutation.codes for f in new),
+        extra=sum(f.severity != "info" and f.code not in defect.codes for f in new),
     )
 
 
-def _is_expected(finding: Finding, mutation: Mutation) -> bool:
-    severe = _LEVELS[finding.severity] >= _LEVELS[mutation.severity]
-    return finding.code in mutation.codes and severe
+def _is_expected(finding: Finding, defect: Defect) -> bool:
+    severe = _LEVELS[finding.severity] >= _LEVELS[defect.severity]
+    return finding.code in defect.codes and severe
 
 
 def _has_subject(finding: Finding, names: Sequence[str]) -> bool:
@@ -256,12 +267,12 @@ def _num_bytes(path: Path) -> int:
 
 
 def measure(sites: int = 2, seed: int = 0, only: str = "", robot: str = "") -> Result:
-    """Test every mutation on every robot.
+    """Test every defect on every robot.
 
     Args:
-        sites: Number of mutants for each mutation and robot.
+        sites: Number of mutants for each defect and robot.
         seed: Seed of the random elements.
-        only: Test only mutations with a code that starts like this.
+        only: Test only defects with a code that starts like this.
         robot: Test only robots whose file name contains this.
     """
     start = time.perf_counter()
@@ -270,8 +281,8 @@ def measure(sites: int = 2, seed: int = 0, only: str = "", robot: str = "") -> R
         format_ = "mjcf" if path.suffix == ".xml" else "urdf"
         indices = [
             index
-            for index, mutation in enumerate(mutations())
-            if mutation.format == format_ and any(code.startswith(only) for code in mutation.codes)
+            for index, defect in enumerate(defects())
+            if defect.format == format_ and any(code.startswith(only) for code in defect.codes)
         ]
         size = _num_bytes(path)
         tasks.append((size, path, indices, (sites + 1) // 2 if size > _MAX_MESH_BYTES else sites))
@@ -334,7 +345,7 @@ def run() -> Iterator[tuple[str, float]]:
 
 def _table(result: Result) -> Iterator[str]:
     by_title = _by_title(result)
-    expected = {m.title: f"{'/'.join(m.codes)} {m.severity}" for m in mutations()}
+    expected = {m.title: f"{'/'.join(m.codes)} {m.severity}" for m in defects()}
     rows = [
         (_recall(group), title, len(group), sum(mutant.extra for mutant in group) / len(group))
         for title, group in by_title.items()

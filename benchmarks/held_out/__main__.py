@@ -7,7 +7,7 @@ import re
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from operator import itemgetter
@@ -17,7 +17,9 @@ from typing import Any
 
 from lxml import etree
 
-from benchmarks.held_out.defect import Defect, Mutant
+from benchmarks.mutants.defect import Defect, load_defects
+from benchmarks.mutants.edits import apply_edits
+from benchmarks.mutants.mutant import Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
 SHARED = Path(os.environ.get("TERRAINKIT_ROBOTS", ROOT.parent / "shared" / "robots"))
@@ -48,8 +50,8 @@ def read(robot: str) -> Any:
     return tree
 
 
-def check(robot: str, tree: Any, mutant: Mutant) -> list[dict[str, Any]] | None:
-    """Return what check-robot finds in a tree, written next to links to the robot's meshes.
+def check(robot: str, mutant: Mutant) -> list[dict[str, Any]] | None:
+    """Return what check-robot finds in a mutant, written next to links to the robot's meshes.
 
     The command is called, not the Python API: it has been the same for longer.
 
@@ -67,53 +69,47 @@ def check(robot: str, tree: Any, mutant: Mutant) -> list[dict[str, Any]] | None:
         for item in top.iterdir():
             if item.is_dir() and item != source.parent:
                 (folder / item.name).symlink_to(item)
-        text = etree.tostring(tree, encoding="unicode")
+        text = etree.tostring(mutant.root, encoding="unicode")
         header = '<?xml version="1.0" encoding="utf-8"?>\n'
-        path.write_bytes((mutant.encode or str.encode)(header + text))
+        path.write_bytes(mutant.rewrite((header + text).encode()))
         for file, content in mutant.files.items():
-            (path.parent / file).write_text(content)
+            (path.parent / file).write_bytes(content)
         report = Path(name) / "report.json"
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             code = terrainkit(["check-robot", str(path), "--format", "json", "-o", str(report)])
         return None if code == 2 else json.loads(report.read_text())["findings"]
 
 
-def is_about(finding: Any, mutant: Mutant) -> bool:
-    """Return whether a finding names a broken element."""
+def is_about(finding: Any, names: Sequence[str], about: str) -> bool:
+    """Return whether a finding names a broken element, or matches `about`."""
     text = f"{finding['subject']}\n{finding['message']}"
-    names = "|".join(rf"(?<![\w-]){re.escape(name)}(?![\w-])" for name in mutant.names)
-    return any(p and re.search(p, text, re.IGNORECASE) for p in (names, mutant.about))
-
-
-def new_findings(original: list[Any], found: list[Any], mutant: Mutant) -> list[Any]:
-    """Return the findings about the broken elements that the original does not have."""
-    key = itemgetter("code", "subject", "severity")
-    known = {key(f) for f in original if is_about(f, mutant)}
-    return [f for f in found if is_about(f, mutant) and key(f) not in known]
+    words = "|".join(rf"(?<![\w-]){re.escape(name)}(?![\w-])" for name in names)
+    return any(p and re.search(p, text, re.IGNORECASE) for p in (words, about))
 
 
 def measure(defect: Defect, seed: int) -> Iterator[dict[str, Any]]:
     """Yield the result for each robot that a defect is applied to."""
     for robot in defect.robots:
-        original, tree = read(robot), read(robot)
-        if defect.prepare:
-            defect.prepare(original)
-            defect.prepare(tree)
-        mutant = defect.apply(tree, Random(f"{defect.name} {robot} {seed}"))
-        result = {"kind": defect.name, "family": defect.family, "robot": robot}
-        found = check(robot, tree, mutant)
+        mutant = Mutant(read(robot), Random(f"{defect.title} {robot} {seed}"), ROBOTS[robot])
+        names = defect.apply(mutant)
+        about = mutant.fill(defect.about)
+        result = {"kind": defect.title, "family": defect.family, "robot": robot, "names": names}
+        found = check(robot, mutant)
         if found is None:
-            yield result | {"found": "refused", "rules": [], "names": mutant.names}
+            yield result | {"found": "refused", "rules": []}
             continue
-        key = robot + defect.name * bool(defect.prepare)
+        key = robot + defect.title * bool(defect.prepare)
         if key not in ORIGINALS:
-            ORIGINALS[key] = check(robot, original, Mutant()) or []
-        before = ORIGINALS[key]
-        new = new_findings(before, found, mutant)
+            original = Mutant(read(robot), Random(0), ROBOTS[robot])
+            apply_edits(original, defect.prepare)
+            ORIGINALS[key] = check(robot, original) or []
+        identity = itemgetter("code", "subject", "severity")
+        known = {identity(f) for f in ORIGINALS[key] if is_about(f, names, about)}
+        new = [f for f in found if is_about(f, names, about) and identity(f) not in known]
         severities = {f["severity"] for f in new}
         level = next((s for s in (*SEVERITIES, "info") if s in severities), "")
         rules = sorted({f"{f['code']} {f['severity']}" for f in new})
-        yield result | {"found": level, "rules": rules, "names": mutant.names}
+        yield result | {"found": level, "rules": rules}
 
 
 def table(results: list[dict[str, Any]]) -> str:
@@ -144,8 +140,8 @@ def main() -> None:
     sys.path[:0] = [str(options.tree / part) for part in ("", "robots", "cli")]
     everything = {}
     for name in options.sets:
-        module = __import__(f"benchmarks.held_out.set_{name}", fromlist=["DEFECTS"])
-        chosen = [d for d in module.DEFECTS if re.search(options.only, d.name)]
+        defects = load_defects(Path(__file__).parent / f"set_{name}.toml")
+        chosen = [d for d in defects if re.search(options.only, d.title)]
         results = [r for d in chosen for r in measure(d, options.seed)]
         everything[name] = results
         print(f"set {name.upper()}\n{table(results)}\nmissed:")

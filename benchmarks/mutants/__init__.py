@@ -1,0 +1,1 @@
+"""Mutants: copies of robots to which a defect is added; the defects are TOML data."""
