@@ -185,7 +185,7 @@ class Evaluate(PolicyCommand):
     def _report_card(self) -> int:
         """Measure the policy on a suite or up to its limits, and print and write the result."""
         from terrainkit.files.atomic_write import check_target
-        from terrainkit.suites.suite import get_suite
+        from terrainkit.suites import get_suite
         from terrainkit_cli import report_card
 
         if self.suite and self.limits:

@@ -36,7 +36,7 @@ def report_suite(
         MemoryLimitError: if the simulations would not fit in memory.
     """
     from terrainkit import TerrainMap
-    from terrainkit.suites.suite import generate_suite
+    from terrainkit.suites import generate_suite
     from terrainkit_robots.report_card.card import CRITERION, measure, summary
     from terrainkit_robots.report_card.picture import draw_card
 

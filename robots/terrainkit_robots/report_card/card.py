@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from terrainkit import TerrainMap
-from terrainkit.suites.suite import suite_hash
+from terrainkit.suites import suite_hash
 from terrainkit.terrain.parameter import format_value
 from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
 from terrainkit_robots.report_card.crossing import (
