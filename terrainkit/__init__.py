@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from terrainkit.map.patch import Patch, make_patch
     from terrainkit.map.terrain_map import TerrainMap
     from terrainkit.map.terrain_mesh import import_terrain_mesh
-    from terrainkit.suites.suite import Suite, generate_suite, get_suite, suite_hash, suite_names
+    from terrainkit.suites import Suite, generate_suite, get_suite, suite_hash, suite_names
     from terrainkit.terrain import parameter
     from terrainkit.terrain.overlay import Overlay
     from terrainkit.terrain.registry import register_overlay, register_terrain
