@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit import ImportedMap, ImportOptions, import_terrain_mesh
 from terrainkit.export.mjcf import Collision
+from terrainkit.importing.options import ImportOptions
 from terrainkit.integrations import missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
+from terrainkit.map.import_map import ImportedMap
 from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.map.terrain_mesh import import_terrain_mesh
 
 try:
     import mujoco
