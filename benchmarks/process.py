@@ -14,7 +14,7 @@ def run() -> Iterator[tuple[str, float]]:
         target = Path(folder) / "map.npz"
         command = [str(Path(sys.executable).with_name("terrainkit")), "generate"]
         command += ["--rows", "10", "--cols", "10", "-o", str(target), "--overwrite"]
-        yield "generate_over_import_numpy (at most 5)", ratio(process(command), numpy, 21)
+        yield "generate_over_import_numpy (at most 4)", ratio(process(command), numpy, 21)
         yield "map_megabytes (at most 16)", target.stat().st_size / 1e6
     imported = process([sys.executable, "-c", "import terrainkit"])
     yield "import_over_import_numpy (at most 1.3)", ratio(imported, numpy, 31)
