@@ -244,10 +244,10 @@ class SafetyController:
     k_velocity: float | None = None
     """Gain from the velocity error to the effort limit [N m s/rad] or [N s/m]."""
 
-    lower: float | None = None
+    soft_lower_limit: float | None = None
     """Lower soft limit [rad] or [m]."""
 
-    upper: float | None = None
+    soft_upper_limit: float | None = None
     """Upper soft limit [rad] or [m]."""
 
 

@@ -105,16 +105,10 @@ class PackageResolver:
             return None
         ends = [parts[k:] for k in range(len(parts))] if absolute else [parts]
         for end in ends:
-            if len(end) == 1:
-                continue
-            for folder in self._search_folders:
+            for folder in self._search_folders if len(end) > 1 else ():
                 if exists(folder.joinpath(*end)):
                     return folder.joinpath(*end)
-        return self._search_by_name(parts[-1])
-
-    def _search_by_name(self, name: str) -> Path | None:
-        """Return a file with this name in a nearby folder of meshes."""
-        paths = (folder / name for folder in self._mesh_folders)
+        paths = (folder / parts[-1] for folder in self._mesh_folders)
         return next((path for path in paths if exists(path)), None)
 
     @cached_property
@@ -346,14 +340,8 @@ def _list_names(folder: Path) -> list[str]:
 
 def _list_folders(folder: Path) -> list[Path]:
     """Return the folders in a folder that are not hidden, sorted by name."""
-    try:
-        with os.scandir(folder) as entries:
-            first = list(islice(entries, _MAX_ENTRIES))
-            return sorted(
-                Path(entry.path) for entry in first if entry.name[0] != "." and entry.is_dir()
-            )
-    except (OSError, ValueError):
-        return []
+    paths = (folder / name for name in _list_names(folder) if name[0] != ".")
+    return sorted(path for path in paths if is_folder(path))
 
 
 def _iter_ros_paths(name: str) -> Iterator[Path]:

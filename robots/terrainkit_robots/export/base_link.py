@@ -84,10 +84,8 @@ def _constrains(joint: Joint) -> bool:
 def _is_actuated(facts: "Facts", root: str) -> bool:
     """Return whether an actuator acts on a joint below a root link, or on the joint above it."""
     motors = {motor.joint for motor in facts.model.actuators}
-    stack = [root]
-    while stack:
-        link = stack.pop()
-        stack += [joint.child for joint in facts.tree.child_joints[link]]
-        if any(joint.name in motors for joint in facts.tree.child_joints[link]):
-            return True
-    return any(j.child == root and j.name in motors for j in facts.model.joints)
+    subtree = {root}
+    for joint in facts.model.joints:  # parents come first
+        if joint.parent in subtree:
+            subtree.add(joint.child)
+    return any(joint.child in subtree and joint.name in motors for joint in facts.model.joints)

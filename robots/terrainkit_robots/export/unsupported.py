@@ -17,29 +17,25 @@ def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
     """Return one line for each kind of MJCF element that is not exported."""
     if model.kind != "mjcf":
         return ()
-    sections, stiffness_count, contact_count = Counter[str](), 0, 0
+    ignored = Counter[str]()
     for file in model.sources:
         root = parse_xml(file, read_bytes(file)).root
         if root is None:
             continue
         for section in _SECTIONS:
-            sections[section] += sum(len(each) for each in root.iter(section))
-        stiffness_count += sum(_is_set(joint.get("stiffness")) for joint in root.iter("joint"))
-        contact_count += sum(
+            ignored[f"<{section}>"] += sum(len(each) for each in root.iter(section))
+        ignored["stiffness of joints"] += sum(
+            _is_set(joint.get("stiffness")) for joint in root.iter("joint")
+        )
+        ignored["friction and contact parameters of geoms"] += sum(
             any(name in geom.attrib for name in _CONTACT) for geom in root.iter("geom")
         )
-    sections["equality"] -= sum(joint.mimic is not None for joint in model.joints)
+    ignored["<equality>"] -= sum(joint.mimic is not None for joint in model.joints)
     changes = [
-        f"ignored <{name}> ({count(sections[name], 'element')})"
-        for name in _SECTIONS
-        if sections[name] > 0
+        f"ignored {what} ({count(number, 'element')})"
+        for what, number in ignored.items()
+        if number > 0
     ]
-    if stiffness_count:
-        changes.append(f"ignored stiffness of joints ({count(stiffness_count, 'element')})")
-    if contact_count:
-        changes.append(
-            f"ignored friction and contact parameters of geoms ({count(contact_count, 'element')})"
-        )
     unused = [actuator.name for actuator in model.actuators if not actuator.joint]
     if unused:
         changes.append(f"ignored {count(len(unused), 'actuator')} without a joint: {names(unused)}")

@@ -196,25 +196,19 @@ class _Writer:
             )
 
     def _limit(self, element: Any, joint: Joint) -> None:
-        limit, limits = joint.limit, joint.range
-        attributes = {}
+        attributes, limits = {}, joint.range
         if limits is not None:
             attributes = {"lower": number_text(limits[0]), "upper": number_text(limits[1])}
         elif joint.kind == "prismatic":
             upper = self._default_value("position limit", DEFAULT_RANGE, joint)
             attributes = {"lower": f"-{upper}", "upper": upper}
-        effort = limit.effort if limit else None
-        velocity = limit.velocity if limit else None
-        attributes["effort"] = (
-            self._default_value("effort limit", DEFAULT_EFFORT, joint)
-            if effort is None
-            else number_text(effort)
-        )
-        attributes["velocity"] = (
-            self._default_value("velocity limit", DEFAULT_VELOCITY, joint)
-            if velocity is None
-            else number_text(velocity)
-        )
+        for name, default in (("effort", DEFAULT_EFFORT), ("velocity", DEFAULT_VELOCITY)):
+            value = getattr(joint.limit, name, None)
+            attributes[name] = (
+                self._default_value(f"{name} limit", default, joint)
+                if value is None
+                else number_text(value)
+            )
         etree.SubElement(element, "limit", attributes)
 
 

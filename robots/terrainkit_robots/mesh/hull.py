@@ -2,12 +2,7 @@
 
 import numpy as np
 
-from terrainkit_robots.mesh.surface import (
-    MeshError,
-    Points,
-    Surface,
-    is_flat,
-)
+from terrainkit_robots.mesh.surface import MeshError, Points, Surface, is_flat
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 _MAX_POINTS = 30_000

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from functools import partial
 from io import BytesIO
 
 import numpy as np
@@ -115,18 +116,15 @@ def _hull_of_points(points: Points) -> Surface:
     return convex_hull(unique_points(points)[0])
 
 
-def _trimesh_reader(mesh_format: str) -> Callable[[bytes], Surface]:
-    def read(data: bytes) -> Surface:
-        import trimesh
+def _read_with_trimesh(mesh_format: str, data: bytes) -> Surface:
+    import trimesh
 
-        try:
-            # without a resolver, no other files are opened
-            mesh = trimesh.load(BytesIO(data), file_type=mesh_format, force="mesh", process=False)
-            return Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
-        except Exception as error:  # trimesh raises many types
-            raise MeshError(f"cannot be read: {type(error).__name__}: {error}") from None
-
-    return read
+    try:
+        # without a resolver, no other files are opened
+        mesh = trimesh.load(BytesIO(data), file_type=mesh_format, force="mesh", process=False)
+        return Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
+    except Exception as error:  # trimesh raises many types
+        raise MeshError(f"cannot be read: {type(error).__name__}: {error}") from None
 
 
 _READERS: dict[Format, Callable[[bytes], Surface]] = {
@@ -135,6 +133,6 @@ _READERS: dict[Format, Callable[[bytes], Surface]] = {
     "obj": _obj,
     "dae": read_dae,
     "msh": _msh,
-    "ply": _trimesh_reader("ply"),
-    "glb": _trimesh_reader("glb"),
+    "ply": partial(_read_with_trimesh, "ply"),
+    "glb": partial(_read_with_trimesh, "glb"),
 }

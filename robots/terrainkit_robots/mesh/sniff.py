@@ -89,6 +89,11 @@ def header_of(suffix: str, data: bytes) -> Header:
     return _classify(mesh_format, len(data), data[:_SAMPLE_BYTES], data[-_SAMPLE_BYTES:])
 
 
+def _header(mesh_format: Format, size: int, problem: str = "", faces: int | None = None) -> Header:
+    state: State = "broken" if problem else "fine"
+    return Header(format=mesh_format, size=size, faces=faces, state=state, problem=problem)
+
+
 def _classify(mesh_format: Format, size: int, head: bytes, tail: bytes) -> Header:
     if size == 0:
         return Header(format=mesh_format, state="empty", problem="is empty: it has 0 bytes")
@@ -98,9 +103,7 @@ def _classify(mesh_format: Format, size: int, head: bytes, tail: bytes) -> Heade
         problem = f"is a Git LFS pointer of {size} bytes instead of the mesh{length}"
         return Header(format=mesh_format, size=size, state="lfs", problem=problem)
     if re.match(rb"\s*<(?:!doctype html|html)\b", head, re.IGNORECASE):
-        return Header(
-            format=mesh_format, size=size, state="broken", problem="is an HTML page, not a mesh"
-        )
+        return _header(mesh_format, size, "is an HTML page, not a mesh")
     classify = _CLASSIFIERS.get(mesh_format)
     return classify(size, head, tail) if classify else Header(format=mesh_format, size=size)
 
@@ -108,7 +111,7 @@ def _classify(mesh_format: Format, size: int, head: bytes, tail: bytes) -> Heade
 def _stl(size: int, head: bytes, tail: bytes) -> Header:
     declared = int(np.frombuffer(head, "<u4", 1, 80)[0]) if len(head) >= STL_HEADER else None
     if declared and size == STL_HEADER + STL_FACE * declared:
-        return Header(format="stl", size=size, faces=declared)
+        return _header("stl", size, faces=declared)
     if head.lstrip()[:5].lower() == b"solid" and _is_text(head):
         return _ascii_stl(size, head, tail)
     if declared is None:
@@ -123,7 +126,7 @@ def _stl(size: int, head: bytes, tail: bytes) -> Header:
             f"{STL_HEADER + STL_FACE * declared:,} bytes"
         )
     complete_faces = declared if declared and size > STL_HEADER + STL_FACE * declared else None
-    return Header(format="stl", size=size, faces=complete_faces, state="broken", problem=problem)
+    return _header("stl", size, problem, complete_faces)
 
 
 def _ascii_stl(size: int, head: bytes, tail: bytes) -> Header:
@@ -134,16 +137,12 @@ def _ascii_stl(size: int, head: bytes, tail: bytes) -> Header:
         problem = "is an ASCII STL without facets"
     elif b"endsolid" not in tail.lower():
         problem = "is a truncated ASCII STL: it does not end with endsolid"
-    state: State = "broken" if problem else "fine"
-    return Header(format="ascii-stl", size=size, state=state, problem=problem)
+    return _header("ascii-stl", size, problem)
 
 
 def _obj(size: int, head: bytes, tail: bytes) -> Header:
-    if _is_text(head) and _is_text(tail):
-        return Header(format="obj", size=size)
-    return Header(
-        format="obj", size=size, state="broken", problem="is not an OBJ: it is not a text file"
-    )
+    is_text = _is_text(head) and _is_text(tail)
+    return _header("obj", size, "" if is_text else "is not an OBJ: it is not a text file")
 
 
 def _dae(size: int, head: bytes, tail: bytes) -> Header:
@@ -154,7 +153,7 @@ def _dae(size: int, head: bytes, tail: bytes) -> Header:
         problem = "is not a COLLADA file: it does not start with a COLLADA element"
     elif re.search(rb"</COLLADA\s*>", tail) is None:
         problem = "is truncated: it does not end with </COLLADA>"
-    return Header(format="dae", size=size, state="broken" if problem else "fine", problem=problem)
+    return _header("dae", size, problem)
 
 
 def _msh(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signature of _CLASSIFIERS
@@ -162,25 +161,23 @@ def _msh(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signa
     vertices, normals, textures, faces = counts
     expected = 16 + 12 * vertices + 12 * normals + 8 * textures + 12 * faces
     if min(counts) >= 0 and vertices > 0 and size == expected:
-        return Header(format="msh", size=size, faces=faces or None)
+        return _header("msh", size, faces=faces or None)
     problem = f"is not a MuJoCo mesh: the counts in its header do not match its {size:,} bytes"
-    return Header(format="msh", size=size, state="broken", problem=problem)
+    return _header("msh", size, problem)
 
 
 def _ply(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signature of _CLASSIFIERS
     if not head.startswith(b"ply"):
-        problem = "is not a PLY: it does not start with ply"
-        return Header(format="ply", size=size, state="broken", problem=problem)
+        return _header("ply", size, "is not a PLY: it does not start with ply")
     count = re.search(rb"element\s+face\s+(\d{1,15})\s", head)
-    return Header(format="ply", size=size, faces=int(count[1]) if count else None)
+    return _header("ply", size, faces=int(count[1]) if count else None)
 
 
 def _glb(size: int, head: bytes, tail: bytes) -> Header:  # noqa: ARG001 - signature of _CLASSIFIERS
     fits = len(head) >= 12 and int(np.frombuffer(head, "<u4", 1, 8)[0]) == size
-    if head.startswith(b"glTF") and fits:
-        return Header(format="glb", size=size)
-    problem = f"is not a GLB: its header does not match its {size:,} bytes"
-    return Header(format="glb", size=size, state="broken", problem=problem)
+    is_glb = head.startswith(b"glTF") and fits
+    problem = "" if is_glb else f"is not a GLB: its header does not match its {size:,} bytes"
+    return _header("glb", size, problem)
 
 
 _CLASSIFIERS: dict[Format, Callable[[int, bytes, bytes], Header]] = {
@@ -194,4 +191,4 @@ _CLASSIFIERS: dict[Format, Callable[[int, bytes, bytes], Header]] = {
 
 
 def _is_text(sample: bytes) -> bool:
-    return b"\0" not in sample and sum(byte < 9 for byte in sample) == 0
+    return all(byte >= 9 for byte in sample)

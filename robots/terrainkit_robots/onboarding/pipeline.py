@@ -4,19 +4,14 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.export.canonical import plain_name
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.runner import Finding, Report
 from terrainkit_robots.lint.settings import Settings, read_settings
-from terrainkit_robots.onboarding.folder import (
-    check_folder,
-    find_edits,
-    new_folder,
-    write_files,
-)
+from terrainkit_robots.onboarding.folder import check_folder, find_edits, new_folder, write_files
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
 from terrainkit_robots.onboarding.placeholder_effort import placeholder_effort
 from terrainkit_robots.onboarding.repairs import with_onboarding_repairs
@@ -43,10 +38,6 @@ MuJoCo rejects. For example, a joint of an unknown type would become fixed."""
 _FIXED_BY_EXPORT = frozenset({"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
 """Rules whose errors cannot occur in the written files: each link has an <inertial>, meshes are
 converted and renamed, and rotations are written as roll, pitch and yaw."""
-
-
-def _no_progress(items: Any, _total: int) -> Any:
-    return items
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +79,7 @@ class OnboardOptions:
     cache_dir: Path | None = None
     """Folder that caches convex decompositions between runs."""
 
-    progress: "Progress" = _no_progress
+    progress: "Progress" = lambda items, _: items
     """Wraps an iterable of collision meshes to display a progress bar."""
 
     on_step: Callable[[str], None] = lambda _: None

@@ -32,18 +32,17 @@ def without_effort(
     """Return a model in which the efforts of some joints are unknown, and the change."""
     if not joints:
         return model, ()
-    efforts = sorted(
-        {
-            joint.limit.effort
-            for joint in model.joints
-            if joint.name in joints and joint.limit is not None and joint.limit.effort is not None
-        }
-    )
+    limits = {
+        joint.name: joint.limit
+        for joint in model.joints
+        if joint.name in joints and joint.limit is not None
+    }
+    efforts = sorted({limit.effort for limit in limits.values() if limit.effort is not None})
     changed = replace(
         model,
         joints=tuple(
-            replace(joint, limit=replace(joint.limit, effort=None))
-            if joint.name in joints and joint.limit is not None
+            replace(joint, limit=replace(limits[joint.name], effort=None))
+            if joint.name in limits
             else joint
             for joint in model.joints
         ),

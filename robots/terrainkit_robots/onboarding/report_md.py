@@ -11,11 +11,7 @@ from terrainkit_robots.analysis.simulator_conventions.order_table import order_t
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_list
-from terrainkit_robots.lint.report.summary import (
-    SEVERITY_LABELS,
-    group_skipped,
-    summarize_findings,
-)
+from terrainkit_robots.lint.report.summary import SEVERITY_LABELS, group_skipped, summarize_findings
 from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.simulation.assessment import assess

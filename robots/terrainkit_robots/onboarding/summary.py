@@ -55,14 +55,11 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
 
 def _repairs(fixed: "Sequence[Finding]") -> Iterator[tuple[str, str]]:
     """Yield the repairs of inertias and of mesh paths, which may change the robot."""
-    links = [finding.subject for finding in fixed if finding.code in ("INR003", "INR004")]
-    if links:
-        noun = "inertia" if len(links) == 1 else "inertias"
-        yield "repaired", f"the {noun} of {names(links, max_count=3)}; see report.md"
-    meshes = [finding.subject for finding in fixed if finding.code == "MSH001"]
-    if meshes:
-        noun = "path" if len(meshes) == 1 else "paths"
-        yield "repaired", f"the {noun} of {names(meshes, max_count=3)}; see report.md"
+    for noun, codes in (("inertia", ("INR003", "INR004")), ("path", ("MSH001",))):
+        subjects = [finding.subject for finding in fixed if finding.code in codes]
+        if subjects:
+            plural = "s" * (len(subjects) > 1)
+            yield "repaired", f"the {noun}{plural} of {names(subjects, max_count=3)}; see report.md"
 
 
 def _list_files(robot: "RobotFiles") -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from functools import partial
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import RenderError, stream_frames
-from terrainkit_robots.simulation.geoms import lowest_point
+from terrainkit_robots.simulation.geoms import box_corners, lowest_point
 from terrainkit_robots.text import one_line
 
 DEFAULT_SIZE = (480, 420)  # [pixels]
@@ -106,14 +105,6 @@ def show_robot_geoms(model: Any) -> NDArray[np.int64]:
     model.geom_group[:] = np.where(shown, 0, 5)
     model.geom(FLOOR).group = 0
     return np.flatnonzero(shown)
-
-
-def box_corners(model: Any, data: Any, geoms: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the corners of the bounding boxes of geoms in the world frame, shape (n, 3) [m]."""
-    corners, boxes = np.array(list(product((-1.0, 1.0), repeat=3))), model.geom_aabb[geoms, None]
-    local = boxes[..., :3] + corners * boxes[..., 3:]
-    axes = data.geom_xmat[geoms].reshape(-1, 3, 3).transpose(0, 2, 1)
-    return np.concatenate(local @ axes + data.geom_xpos[geoms, None])
 
 
 def fit_camera(

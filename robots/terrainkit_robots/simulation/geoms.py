@@ -1,5 +1,6 @@
-"""Geoms of a MuJoCo model: which collide, and how high they are."""
+"""Geoms of a MuJoCo model: which collide, and where they are."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,14 @@ from numpy.typing import NDArray
 def collides(model: Any) -> NDArray[np.bool_]:
     """Return which geoms of a MuJoCo model collide, shape (ngeom,)."""
     return np.asarray((model.geom_contype != 0) | (model.geom_conaffinity != 0))
+
+
+def box_corners(model: Any, data: Any, geoms: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return the corners of the bounding boxes of geoms in the world frame, shape (n, 3) [m]."""
+    corners, boxes = np.array(list(product((-1.0, 1.0), repeat=3))), model.geom_aabb[geoms, None]
+    local = boxes[..., :3] + corners * boxes[..., 3:]
+    axes = data.geom_xmat[geoms].reshape(-1, 3, 3).transpose(0, 2, 1)
+    return np.concatenate(local @ axes + data.geom_xpos[geoms, None])
 
 
 def lowest_point(model: Any, data: Any, geom: int) -> float:

@@ -17,11 +17,7 @@ from dataclasses import replace
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.simulation.gain import Gain, GainSet
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
-from terrainkit_robots.simulation.stiffness import (
-    GainTarget,
-    leg_gain_target,
-    other_gain_target,
-)
+from terrainkit_robots.simulation.stiffness import GainTarget, leg_gain_target, other_gain_target
 from terrainkit_robots.simulation.time_step import JointInertia, joint_inertia
 from terrainkit_robots.simulation.units import REVOLUTE, JointUnits
 
@@ -126,9 +122,9 @@ def _group_joints(facts: Facts, joints: Sequence[str]) -> tuple[_Groups, _Groups
     for name in joints:
         if name in sections:
             legs[sections[name]].append(name)
-            continue
-        others[min(name, _mirror_joint(facts, name, joints) or name), ""].append(name)
-    return dict(legs), dict(others)
+        else:
+            others[min(name, _mirror_joint(facts, name, joints) or name), ""].append(name)
+    return legs, others
 
 
 def _mirror_joint(facts: Facts, name: str, joints: Sequence[str]) -> str | None:
@@ -138,8 +134,9 @@ def _mirror_joint(facts: Facts, name: str, joints: Sequence[str]) -> str | None:
     if body is None or body.joint is None or counterpart is None:
         return None
     other = facts.bodies[counterpart[0]].joint
-    is_valid = other is not None and other.kind == body.joint.kind and other.name in joints
-    return other.name if other is not None and is_valid else None
+    if other is None or other.kind != body.joint.kind or other.name not in joints:
+        return None
+    return other.name
 
 
 def _sections(facts: Facts) -> dict[str, tuple[str, str]]:
@@ -151,9 +148,7 @@ def _sections(facts: Facts) -> dict[str, tuple[str, str]]:
             if role == "knee":
                 found[joint.name] = "knee", role
                 section = "ankle"
-            elif role == "waist":
-                continue
-            else:
+            elif role != "waist":
                 is_ankle = section == "ankle" and role != "slide"
                 found[joint.name] = section, "ankle" if is_ankle else role
     return found

@@ -3,16 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility.limits import RobotLimits
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.geoms import collides
+from terrainkit_robots.simulation.geoms import box_corners, collides
 from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.text import one_line
 
 STEP_UP = 0.4
 """Highest step up, in leg lengths. A leg folds to about half of its length, and the foot has to
@@ -109,7 +109,7 @@ def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float]:
         with quiet_mujoco():
             model = mujoco.MjModel.from_xml_path(str(mjcf))
     except ValueError as error:
-        reason = " ".join(str(error).split())
+        reason = one_line(str(error))
         raise ConfigError(f"mjcf of {spec.name}: {mjcf} cannot be loaded: {reason}") from error
     data = mujoco.MjData(model)
     for name, position in spec.per_joint("default_pose").items():
@@ -118,17 +118,8 @@ def _extents(spec: RobotSpec, mjcf: Path) -> tuple[float, float]:
             raise ConfigError(f"mjcf of {spec.name}: {mjcf} has no joint {name}")
         data.qpos[model.jnt_qposadr[joint]] = position
     mujoco.mj_kinematics(model, data)
-    lower, upper = _bounds(model, data)
-    size = upper - lower
-    return float(size[1]), float(size[2])
-
-
-def _bounds(model: Any, data: Any) -> tuple[Any, Any]:
-    """Return the corners of the bounding box of all colliding geoms of the robot [m]."""
     geoms = np.flatnonzero(collides(model) & (model.geom_bodyid > 0))
     if not len(geoms):
         raise ConfigError("mjcf: got a robot without collision geoms; expected at least one")
-    axes = data.geom_xmat[geoms].reshape(-1, 3, 3)
-    center = data.geom_xpos[geoms] + np.einsum("nij,nj->ni", axes, model.geom_aabb[geoms, :3])
-    half = np.einsum("nij,nj->ni", np.abs(axes), model.geom_aabb[geoms, 3:])
-    return (center - half).min(axis=0), (center + half).max(axis=0)
+    _, width, height = np.ptp(box_corners(model, data, geoms), axis=0).tolist()
+    return width, height

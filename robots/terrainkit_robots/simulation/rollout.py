@@ -8,6 +8,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.simulation.gain import Gain
+from terrainkit_robots.simulation.geoms import collides
 from terrainkit_robots.simulation.sim_model import SimModel
 
 _MAX_CONTACTS = 300
@@ -28,11 +29,7 @@ class Rollout:
     """A simulation of a robot. Use it within `quiet_mujoco`."""
 
     def __init__(
-        self,
-        sim: SimModel,
-        gains: Mapping[str, Gain] | None = None,
-        *,
-        self_collision: bool = True,
+        self, sim: SimModel, gains: Mapping[str, Gain] | None = None, *, self_collision: bool = True
     ) -> None:
         """Copy a model, and set the gains of its actuators.
 
@@ -54,10 +51,9 @@ class Rollout:
                 f"degrees of freedom: got {model.nv}; expected at most {_MAX_DOFS} to simulate it"
             )
         if not self_collision:
-            collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-            floor = model.geom_bodyid == 0
-            model.geom_contype[:] = np.where(floor, 1, 0)
-            model.geom_conaffinity[:] = np.where(floor, 0, collides)
+            can_collide, floor = collides(model), model.geom_bodyid == 0
+            model.geom_contype[:] = floor
+            model.geom_conaffinity[:] = can_collide & ~floor
         for index, name in enumerate(sim.actuated if gains else ()):
             assert gains is not None
             gain = gains[name]
@@ -112,10 +108,9 @@ class Rollout:
 
         model, data = self.model, self.data
         (floors,) = np.nonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
-        colliding = np.flatnonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
         distances = [
             mujoco.mj_geomDistance(model, data, int(floors[0]), int(geom), _MAX_DISTANCE, None)
-            for geom in colliding
+            for geom in np.flatnonzero(collides(model))
             if geom not in floors
         ]
         return min(distances, default=float(data.qpos[2]))
@@ -139,9 +134,5 @@ class Rollout:
         import mujoco
 
         kinds = mujoco.mjtWarning
-        counts = self.data.warning.number
-        return bool(
-            counts[int(kinds.mjWARN_BADQPOS)]
-            + counts[int(kinds.mjWARN_BADQVEL)]
-            + counts[int(kinds.mjWARN_BADQACC)]
-        )
+        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+        return any(self.data.warning[int(kind)].number for kind in bad)

@@ -133,13 +133,13 @@ def make_sim_model(facts: Facts) -> SimModel:
         model, assets = _keep_collision_shapes(to_canonical(facts).model, facts)
     except RobotFileError as error:
         raise CannotCheckError(str(error)) from None
-    actuators = {motor.joint: ActuatorConfig(stiffness=0, damping=0) for motor in model.actuators}
-    for joint in model.joints:
-        if joint.name in actuators:
-            effort = joint.limit.effort if joint.limit else None
-            actuators[joint.name] = ActuatorConfig(
-                stiffness=0, damping=0, effort=effort, armature=joint.armature
-            )
+    armature = {joint.name: joint.armature for joint in model.joints}
+    actuators = {
+        motor.joint: ActuatorConfig(
+            stiffness=0, damping=0, effort=motor.effort, armature=armature[motor.joint]
+        )
+        for motor in model.actuators
+    }
     extras = Extras(
         actuators=actuators,
         excluded=model.excluded,

@@ -230,8 +230,8 @@ class _Recorder:
         rollout, data = self.rollout, self.rollout.data
         error = np.abs(data.qpos[7:] - self.targets)
         motion = data.qpos[:3] - self.start
-        joint = int(np.argmax(self.saturation)) if len(self.saturation) else 0
-        saturation = float(self.saturation[joint]) if len(self.saturation) else 0.0
+        saturation = float(self.saturation.max(initial=0.0))
+        saturated = rollout.sim.actuated[int(self.saturation.argmax())] if saturation > 0 else ""
         feet = dict.fromkeys(area.foot for area in self.area_of.values())
         return StandResult(
             tilt=self._tilt(),
@@ -245,7 +245,7 @@ class _Recorder:
             ),
             lifted_feet=tuple(foot for foot in feet if foot not in self.contact_feet),
             saturation=saturation,
-            saturated_joint=rollout.sim.actuated[joint] if saturation > 0 else "",
+            saturated_joint=saturated,
             joint_error=float(error.max(initial=0.0)),
             diverged=rollout.diverged,
             seconds=self.steps * float(rollout.model.opt.timestep),

@@ -82,7 +82,7 @@ class _RequiredStiffness:
     """A stiffness that a task requires."""
 
     stiffness: float
-    reason: str
+    task: str
 
     min_error: float
     """Error at which the joint may reach its effort limit, at least [rad]; for a prismatic joint
@@ -102,23 +102,17 @@ def leg_gain_target(
     length = float(np.mean([leg.length for leg in facts.legs]))
     units = sim.units(joints[0])
     if units == PRISMATIC:
-        stiffness = weight / count / (_MAX_LEG_SAG * length)
-        reason = f"to sink by {_MAX_LEG_SAG:.0%} of the leg under the weight = {stiffness:.3g}"
-        required = [_RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_ERROR)]
+        stiffness, min_error = weight / count / (_MAX_LEG_SAG * length), _MIN_ERROR
+        task = f"to sink by {_MAX_LEG_SAG:.0%} of the leg under the weight"
     elif gain_set == "train":
-        stiffness = _TRAIN_FACTOR * weight * length
-        reason = f"{_TRAIN_FACTOR:g} x weight x leg length = {stiffness:.3g}"
-        required = [
-            _RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_LEG_ERROR)
-        ]
-        return _make_target(sim, inertia, joints, required)
+        stiffness, min_error = _TRAIN_FACTOR * weight * length, _MIN_LEG_ERROR
+        task = f"{_TRAIN_FACTOR:g} x weight x leg length"
     else:
-        stiffness = _UPRIGHT_FACTOR * weight * length / count
-        reason = f"{_UPRIGHT_FACTOR:g} x weight x leg length / {count} legs = {stiffness:.3g}"
-        required = [
-            _RequiredStiffness(stiffness=stiffness, reason=reason, min_error=_MIN_LEG_ERROR)
-        ]
-    if facts.stance is not None and is_statically_stable(facts.legs):
+        stiffness, min_error = _UPRIGHT_FACTOR * weight * length / count, _MIN_LEG_ERROR
+        task = f"{_UPRIGHT_FACTOR:g} x weight x leg length / {count} legs"
+    required = [_RequiredStiffness(stiffness=stiffness, task=task, min_error=min_error)]
+    holds_pose = gain_set == "stand" or units == PRISMATIC
+    if holds_pose and facts.stance is not None and is_statically_stable(facts.legs):
         required.append(_stance_stiffness(facts.stance.torques, sim, units))
     return _make_target(sim, inertia, joints, required)
 
@@ -130,12 +124,9 @@ def _stance_stiffness(
     same_units = (name for name in torques if sim.units(name) == units)
     torque = max((abs(torques[name]) for name in same_units), default=0.0)
     sag = _MAX_LEG_SAG * _length_scale(units)
-    stiffness = torque / sag
-    reason = f"to hold {torque:.2g} {units.effort} in the standing pose within {sag:g} "
+    task = f"to hold {torque:.2g} {units.effort} in the standing pose within {sag:g} "
     return _RequiredStiffness(
-        stiffness=stiffness,
-        reason=f"{reason}{units.position} = {stiffness:.3g}",
-        min_error=_MIN_HOLDING_ERROR,
+        stiffness=torque / sag, task=task + units.position, min_error=_MIN_HOLDING_ERROR
     )
 
 
@@ -150,13 +141,12 @@ def other_gain_target(
     required = [
         _RequiredStiffness(
             stiffness=load / sag,
-            reason=f"to hold its own {load:.2g} {units.effort} within {sag:g} {units.position} "
-            f"= {load / sag:.3g}",
+            task=f"to hold its own {load:.2g} {units.effort} within {sag:g} {units.position}",
             min_error=_MIN_ERROR,
         ),
         _RequiredStiffness(
             stiffness=dynamic,
-            reason=f"for a natural frequency of {_MIN_FREQUENCY:g} rad/s = {dynamic:.3g}",
+            task=f"for a natural frequency of {_MIN_FREQUENCY:g} rad/s",
             min_error=_MIN_ERROR,
         ),
     ]
@@ -212,7 +202,7 @@ def _limit_by_effort(
     error = required.min_error * _length_scale(units)
     limit = effort / error
     if required.stiffness <= limit:
-        return required.stiffness, required.reason
+        return required.stiffness, f"{required.task} = {required.stiffness:.3g}"
     limit_text = f"its effort limit of {effort:.3g} {units.effort}"
     return limit, f"{limit_text} at an error of {error:g} {units.position}"
 

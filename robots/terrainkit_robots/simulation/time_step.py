@@ -92,21 +92,13 @@ def max_stable_time_step(sim: SimModel, gains: Mapping[str, Gain]) -> StableTime
     stable, unstable = 0.0, 1.0
     for _ in range(30):
         middle = (stable + unstable) / 2
-        if _is_positive_definite(matrix(middle)):
+        if np.linalg.eigvalsh(matrix(middle))[0] > 0:
             stable = middle
         else:
             unstable = middle
     motion = np.linalg.eigh(matrix(unstable))[1][:, 0]
     dof = int(np.argmax((2 * damping + unstable * stiffness) * motion**2))
     return StableTimeStep(seconds=stable, joint=sim.joints[dof - sim.base_dofs])
-
-
-def _is_positive_definite(matrix: Any) -> bool:
-    try:
-        np.linalg.cholesky(matrix)
-    except np.linalg.LinAlgError:
-        return False
-    return True
 
 
 def _mass_matrix(sim: SimModel) -> tuple[Any, Any]:

@@ -2,10 +2,11 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 
-from terrainkit_robots.spec.name_patterns import by_pattern
 from terrainkit_robots.spec.robot_spec import Provenance
+
+Column = dict[str, tuple[float, Provenance]]
+"""Value of each joint with its provenance, by name or pattern."""
 
 
 def rounded(value: float, digits: int = 6) -> float:
@@ -18,49 +19,19 @@ def rounded_length(value: float) -> float:
     return round(value, 3) if abs(value) > 0.1 else rounded(value, 3)
 
 
-@dataclass(kw_only=True)
-class Column:
-    """A table by joint that is filled one joint at a time."""
-
-    values: dict[str, float] = field(default_factory=dict)
-    """Value of each joint, by name or pattern."""
-
-    origins: dict[str, Provenance] = field(default_factory=dict)
-    """Provenance of each value."""
-
-    def add(self, joint: str, value: float, origin: Provenance) -> None:
-        """Add the value of a joint."""
-        self.values[joint] = value
-        self.origins[joint] = origin
-
-    def by_pattern(self) -> "Column":
-        """Return a column whose keys are patterns of joints with the same value and provenance."""
-        table = {joint: (value, self.origins[joint]) for joint, value in self.values.items()}
-        patterns = by_pattern(table, list(table))
-        return Column(
-            values={key: value for key, (value, _) in patterns.items()},
-            origins={key: origin for key, (_, origin) in patterns.items()},
-        )
-
-    def provenance(self, name: str) -> Iterator[tuple[str, Provenance]]:
-        """Yield the most common provenance by the name of the table, and the others by joint.
-
-        Args:
-            name: Name of the table.
-        """
-        if not self.origins:
-            return
-        (common, count), *_ = Counter(self.origins.values()).most_common(1)
-        if 2 * count < len(self.origins):  # no reason holds for most joints
-            common = Provenance(origin=common.origin, reason="by joint")
-        yield name, common
-        for joint, origin in self.origins.items():
-            if origin != common:
-                yield f"{name}.{joint}", origin
-
-
 def collect_provenance(columns: Mapping[str, Column]) -> dict[str, Provenance]:
     """Return the provenance of the values of all columns, as a spec has it."""
-    return {
-        key: origin for name, column in columns.items() for key, origin in column.provenance(name)
-    }
+    return {key: origin for name in columns for key, origin in _provenance(name, columns[name])}
+
+
+def _provenance(name: str, column: Column) -> Iterator[tuple[str, Provenance]]:
+    """Yield the most common provenance by the name of the table, and the others by joint."""
+    if not column:
+        return
+    (common, count), *_ = Counter(origin for _, origin in column.values()).most_common(1)
+    if 2 * count < len(column):  # no reason holds for most joints
+        common = Provenance(origin=common.origin, reason="by joint")
+    yield name, common
+    for joint, (_, origin) in column.items():
+        if origin != common:
+            yield f"{name}.{joint}", origin

@@ -28,12 +28,7 @@ Origin = Literal["declared", "measured", "solved", "suggested", "given"]
 solved, as the standing pose; suggested by a rule that `reason` states; given in an edited spec."""
 
 Name = Annotated[
-    str,
-    Meta(
-        min_length=1,
-        pattern=r"^[^\0\ud800-\udfff]+$",
-        description="a non-empty string",
-    ),
+    str, Meta(min_length=1, pattern=r"^[^\0\ud800-\udfff]+$", description="a non-empty string")
 ]
 Names = Annotated[tuple[Name, ...], UNIQUE]
 

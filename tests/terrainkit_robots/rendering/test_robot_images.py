@@ -12,7 +12,6 @@ from terrainkit_robots.rendering.child_process import RenderError
 from terrainkit_robots.rendering.robot_images import (
     FILL_RATIO,
     VIEWS,
-    box_corners,
     fit_camera,
     render_robot,
     render_views,
@@ -152,27 +151,6 @@ def test_show_robot_geoms_colors_transparent_robot():
     assert show_robot_geoms(model).tolist() == [1, 2]
     assert (model.geom_rgba[1:, 3] == 1).all()
     assert model.geom_group.tolist() == [0, 0, 0]
-
-
-@pytest.mark.parametrize(
-    ("shape", "half_size"),
-    [
-        ('type="sphere" size="0.3"', (0.3, 0.3, 0.3)),
-        ('type="box" size="0.1 0.2 0.3"', (0.1, 0.2, 0.3)),
-        ('type="box" size="0.1 0.2 0.3" euler="90 0 0"', (0.1, 0.3, 0.2)),
-        ('type="cylinder" size="0.1 0.4"', (0.1, 0.1, 0.4)),
-        ('type="capsule" size="0.1 0.4"', (0.1, 0.1, 0.5)),
-        ('type="capsule" size="0.1 0.4" euler="0 90 0"', (0.5, 0.1, 0.1)),
-        ('type="ellipsoid" size="0.1 0.2 0.3"', (0.1, 0.2, 0.3)),
-    ],
-)
-def test_box_corners_bound_shape(shape, half_size):
-    model = compiled(f'<body pos="1 2 3"><freejoint/><geom {shape}/></body>')
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    points = box_corners(model, data, np.array([1]))
-    np.testing.assert_allclose(points.max(axis=0), np.add([1, 2, 3], half_size), atol=1e-6)
-    np.testing.assert_allclose(points.min(axis=0), np.subtract([1, 2, 3], half_size), atol=1e-6)
 
 
 def project(points, view, aspect):

@@ -6,8 +6,9 @@ rest is read.
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from lxml import etree
@@ -45,6 +46,8 @@ from terrainkit_robots.description.xml.document import XmlDocument
 from terrainkit_robots.description.xml.number_text import place_text
 from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbers, replace_commas
 from terrainkit_robots.transforms import Matrix, matrix_to_rpy, quat_to_matrix, rpy_to_matrix
+
+_Numbers = TypeVar("_Numbers", Limit, Dynamics, SafetyController)
 
 
 def read_urdf(doc: XmlDocument, *, packages: Mapping[str, Path]) -> RobotModel:
@@ -111,11 +114,9 @@ class _Reader:
             self._report("XML007", element, message, attribute=attribute, known=known)
         for element in repeated_children(root):
             parent = element.getparent()
-            owner = "" if parent is None else parent.tag
-            message = f"second <{element.tag}> in a <{owner}>; expected one, and the first is read"
-            first = None if parent is None else parent.find(element.tag)
-            is_copy = first is not None and _same_content(first, element)
-            self._report("XML015", element, message, copy="1" if is_copy else "")
+            message = f"second <{element.tag}> in a <{parent.tag}>; expected one, and the first is "
+            is_copy = _same_content(parent.find(element.tag), element)
+            self._report("XML015", element, f"{message}read", copy="1" if is_copy else "")
         for element in undefined_materials(root):
             name = truncate(element.get("name", ""))
             message = f"material {name}: has no color or texture anywhere; expected a definition"
@@ -321,51 +322,26 @@ class _Reader:
             origin=self._origin(element),
             axis=direction,
             axis_source=None if axis is None else self._doc.source(axis),
-            limit=self._limit(element.find("limit")),
+            limit=self._numbers(Limit, element.find("limit")),
             mimic=self._mimic(element.find("mimic")),
-            dynamics=self._dynamics(element.find("dynamics")),
+            dynamics=self._numbers(Dynamics, element.find("dynamics")),
             dont_collapse=element.get("dont_collapse", "").lower() == "true",
-            safety_controller=self._safety_controller(element.find("safety_controller")),
+            safety_controller=self._numbers(SafetyController, element.find("safety_controller")),
         )
 
-    def _dynamics(self, element: "etree._Element | None") -> Dynamics | None:
+    def _numbers(self, kind: type[_Numbers], element: "etree._Element | None") -> _Numbers | None:
+        """Return an element whose attributes are numbers, named like the fields of `kind`."""
         if element is None:
             return None
-        return Dynamics(
-            source=self._doc.source(element),
-            damping=self._parse_number(element, "damping"),
-            friction=self._parse_number(element, "friction"),
-        )
-
-    def _safety_controller(self, element: "etree._Element | None") -> SafetyController | None:
-        if element is None:
-            return None
-        return SafetyController(
-            source=self._doc.source(element),
-            k_position=self._parse_number(element, "k_position"),
-            k_velocity=self._parse_number(element, "k_velocity"),
-            lower=self._parse_number(element, "soft_lower_limit"),
-            upper=self._parse_number(element, "soft_upper_limit"),
-        )
-
-    def _limit(self, element: "etree._Element | None") -> Limit | None:
-        if element is None:
-            return None
-        return Limit(
-            source=self._doc.source(element),
-            lower=self._parse_number(element, "lower"),
-            upper=self._parse_number(element, "upper"),
-            effort=self._parse_number(element, "effort"),
-            velocity=self._parse_number(element, "velocity"),
-        )
+        names = (each.name for each in fields(kind) if each.name != "source")
+        numbers = {name: self._parse_number(element, name) for name in names}
+        return kind(source=self._doc.source(element), **numbers)
 
     def _mimic(self, element: "etree._Element | None") -> Mimic | None:
         if element is None:
             return None
-        multiplier, offset = (
-            self._parse_number(element, "multiplier"),
-            self._parse_number(element, "offset"),
-        )
+        multiplier = self._parse_number(element, "multiplier")
+        offset = self._parse_number(element, "offset")
         return Mimic(
             source=self._doc.source(element),
             joint=element.get("joint", ""),
@@ -374,6 +350,7 @@ class _Reader:
         )
 
 
+_NAMED_TAGS = ("link", "joint", "robot")
 _DIAGONAL = ("ixx", "iyy", "izz")
 _PRODUCTS = ("ixy", "ixz", "iyz")
 
@@ -401,12 +378,8 @@ def _complete(*values: float | None) -> tuple[float, ...] | None:
 
 def _owner(element: "etree._Element") -> str:
     """Return the name of the link or joint that contains an element."""
-    at: etree._Element | None = element
-    while at is not None:
-        if at.tag in ("link", "joint", "robot") and at.get("name"):
-            return str(at.get("name"))
-        at = at.getparent()
-    return ""
+    owners = (each for each in (element, *element.iterancestors()) if each.tag in _NAMED_TAGS)
+    return next((str(each.get("name")) for each in owners if each.get("name")), "")
 
 
 def _same_content(first: "etree._Element", second: "etree._Element") -> bool:

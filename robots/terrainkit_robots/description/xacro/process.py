@@ -10,7 +10,7 @@ import json
 import os
 import stat
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -128,18 +128,16 @@ def _check_open(path: Any, _: Any, flags: Any) -> None:
 
 def _install_expression_checks(xacro: Any, substitution_args: Any) -> None:
     """Check each expression before xacro evaluates it."""
-    evaluate, substitute = xacro.safe_eval, substitution_args._eval
 
-    def safe_eval(text: str, *scope: Any) -> Any:
-        _check_expression(text)
-        return evaluate(text, *scope)
+    def checked(evaluate: Callable[..., Any]) -> Callable[..., Any]:
+        def check_and_evaluate(text: str, *scope: Any) -> Any:
+            _check_expression(text)
+            return evaluate(text, *scope)
 
-    def checked_eval(text: str, context: Any) -> Any:
-        _check_expression(text)
-        return substitute(text, context)
+        return check_and_evaluate
 
-    xacro.safe_eval = safe_eval
-    substitution_args._eval = checked_eval
+    xacro.safe_eval = checked(xacro.safe_eval)
+    substitution_args._eval = checked(substitution_args._eval)
     dict.pop(xacro._global_symbols["python"], "vars", None)  # gives access to every attribute
 
     def argument(name: str) -> Any:
@@ -173,9 +171,8 @@ def _install_find(
 
     def find_package(name: str) -> str:
         at = str((xacro.filestack or [None])[-1] or file)
-        for start in dict.fromkeys(
-            (str(file), at)
-        ):  # an included file may belong to another package
+        # an included file may belong to another package
+        for start in dict.fromkeys((str(file), at)):
             search = searches.setdefault(start, PackageResolver(Path(start), packages))
             folder = search.find_package(name)
             if folder is not None:

@@ -79,9 +79,8 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
     """
     problems: list[Problem] = []
     if len(data) > MAX_BYTES:
-        return _rejected(
-            file, data, f"the file has more than {MAX_BYTES // 2**20} MiB; it is not parsed"
-        )
+        message = f"the file has more than {MAX_BYTES // 2**20} MiB; it is not parsed"
+        return _rejected(file, data, message)
     encoding = _wide_encoding(file, data)
     if encoding is not None:
         problems.append(encoding)
@@ -91,14 +90,7 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
     if b"<!ENTITY" in text or (b"<!DOCTYPE" in text and b"SYSTEM" in text):
         line = text[: text.find(b"<!")].count(b"\n") + 1
         message = "the file declares entities, which are not resolved; expected plain XML"
-        problems.append(
-            Problem(
-                code="XML010",
-                message=message,
-                source=Source(file=file, line=line),
-                subject=file.name,
-            )
-        )
+        problems.append(_problem("XML010", file, message, line))
     text = _with_version(file, data, text, problems)
     parser = etree.XMLParser(
         recover=True, resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False
@@ -115,18 +107,19 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
         return _unparsed(file, data, problems)
     elements = list(itertools.islice(root.iter(etree.Element), MAX_ELEMENTS + 1))
     if len(elements) > MAX_ELEMENTS:
-        return _rejected(
-            file, data, f"the file has more than {MAX_ELEMENTS} elements; it is not parsed"
-        )
+        message = f"the file has more than {MAX_ELEMENTS} elements; it is not parsed"
+        return _rejected(file, data, message)
     if any(len(element.attrib) > _MAX_ATTRIBUTES for element in elements):
-        return _rejected(
-            file,
-            data,
-            f"an element has more than {_MAX_ATTRIBUTES} attributes; the file is not parsed",
-        )
+        message = f"an element has more than {_MAX_ATTRIBUTES} attributes; the file is not parsed"
+        return _rejected(file, data, message)
     line_offset = data[: len(data) - len(text)].count(b"\n")
     sources = _sources(file, text, elements, line_offset)
     return XmlDocument(file=file, data=data, root=root, sources=sources, problems=tuple(problems))
+
+
+def _problem(code: str, file: Path, message: str, line: int = 1, **details: str) -> Problem:
+    source = Source(file=file, line=line)
+    return Problem(code=code, message=message, source=source, subject=file.name, details=details)
 
 
 def _rejected(
@@ -151,16 +144,10 @@ def _with_version(file: Path, data: bytes, text: bytes, problems: list[Problem])
         return text
     start = len(data) - len(text) + match.start(1)
     version = match[1].decode("ascii", "replace")
-    problems.append(
-        Problem(
-            code="XML001",
-            message=f"version in <?xml?>: got {version!r}; expected 1.0, or strict readers reject "
-            "the file",
-            source=Source(file=file, line=1),
-            subject=file.name,
-            details={"start": str(start), "end": str(start + 3)},
-        )
+    message = (
+        f"version in <?xml?>: got {version!r}; expected 1.0, or strict readers reject the file"
     )
+    problems.append(_problem("XML001", file, message, start=str(start), end=str(start + 3)))
     return text[: match.start(1)] + b"1.0" + text[match.end(1) :]
 
 
@@ -182,15 +169,8 @@ def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> byt
     if not has_bom and not (skipped and data[leading.end() :].startswith(b"<?xml")):
         return data
     what = "a byte order mark" if has_bom else "white space before the XML declaration"
-    problems.append(
-        Problem(
-            code="XML009",
-            message=f"the file starts with {what}, which some parsers reject",
-            source=Source(file=file, line=1),
-            subject=file.name,
-            details={"bytes": str(len(skipped))},
-        )
-    )
+    message = f"the file starts with {what}, which some parsers reject"
+    problems.append(_problem("XML009", file, message, bytes=str(len(skipped))))
     return data[leading.end() :]
 
 
@@ -211,19 +191,11 @@ def _wide_encoding(file: Path, data: bytes) -> Problem | None:
         is_big = start in starts[1::2]
         codec = encoding if has_bom else f"{encoding}-{'BE' if is_big else 'LE'}"
         text = data.decode(codec, "replace")
-        return Problem(
-            code="XML009",
-            message=f"the file is encoded as {encoding}, which MuJoCo and urdfdom reject; expected "
-            "UTF-8",
-            source=Source(file=file, line=1),
-            subject=file.name,
-            details={
-                "bytes": str(len(data)),
-                "text": re.sub(
-                    r'(<\?xml[^>]*?encoding=)["\'][^"\']*["\']', r'\1"UTF-8"', text, count=1
-                ),
-            },
+        message = (
+            f"the file is encoded as {encoding}, which MuJoCo and urdfdom reject; expected UTF-8"
         )
+        utf8 = re.sub(r'(<\?xml[^>]*?encoding=)["\'][^"\']*["\']', r'\1"UTF-8"', text, count=1)
+        return _problem("XML009", file, message, bytes=str(len(data)), text=utf8)
     return None
 
 
@@ -231,10 +203,7 @@ def leading_bytes_fix(problem: Problem) -> Fix:
     """Return the fix that removes the reported bytes, or that writes the file as UTF-8."""
     text = problem.details.get("text", "")
     edit = ReplaceBytes(
-        source=problem.source,
-        start=0,
-        end=int(problem.details["bytes"]),
-        replacement=text.encode(),
+        source=problem.source, start=0, end=int(problem.details["bytes"]), replacement=text.encode()
     )
     description = "Write the file as UTF-8." if text else "Remove the leading bytes."
     return Fix(safety="safe", description=description, edits=(edit,))
@@ -247,12 +216,7 @@ def _syntax_errors(file: Path, parser: etree.XMLParser) -> list[Problem]:
         if entry.level >= etree.ErrorLevels.ERROR and "namespace" not in entry.message.lower():
             seen.setdefault(entry.line, " ".join(entry.message.split()))
     return [
-        Problem(
-            code="XML001",
-            message=f"malformed XML: {message}",
-            source=Source(file=file, line=line),
-            subject=file.name,
-        )
+        _problem("XML001", file, f"malformed XML: {message}", line)
         for line, message in list(seen.items())[:_MAX_ERRORS]
     ]
 

@@ -12,8 +12,9 @@ from terrainkit.errors import TerrainkitError
 from terrainkit.files.isolated import IsolatedError
 from terrainkit.geometry.convex_decomposition import convex_decomposition
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
-    DecompositionCache,
     is_valid,
+    read_parts,
+    write_parts,
 )
 from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.surface import MeshError, Surface
@@ -49,12 +50,13 @@ def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
         MeshError: If CoACD fails.
         TerrainkitError: If CoACD is not installed.
     """
-    decompositions = DecompositionCache(cache)
     key = _key(surface)
-    parts = decompositions.get(key)
+    file = None if cache is None else cache / f"{key}.npz"
+    parts = None if file is None else read_parts(file)
     if parts is None:
         parts = _decompose(decimate(surface, _MAX_FACES))
-        decompositions.put(key, parts)
+        if file is not None:
+            write_parts(file, parts)
     return parts
 
 

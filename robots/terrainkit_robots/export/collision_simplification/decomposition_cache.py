@@ -35,50 +35,13 @@ def cache_folder() -> Path:
     return platformdirs.user_cache_path("terrainkit", appauthor=False) / "coacd"
 
 
-class DecompositionCache:
-    """Convex parts by key; damaged files are ignored."""
-
-    def __init__(self, folder: Path | None) -> None:
-        """Create a cache in `folder`, which is created when needed; None disables the cache."""
-        self._folder = folder
-
-    def get(self, key: str) -> tuple[Surface, ...] | None:
-        """Return the parts of a key, or None."""
-        if self._folder is None:
-            return None
-        file = self._folder / f"{key}.npz"
-        try:
-            if not file.is_file() or file.stat().st_size > _MAX_BYTES:
-                return None
-            return from_npz(file.read_bytes())
-        except OSError:
-            return None
-
-    def put(self, key: str, parts: Sequence[Surface]) -> None:
-        """Store parts; errors are ignored, because parts can be computed again."""
-        if self._folder is None:
-            return
-        with suppress(OSError, ExportError):
-            self._folder.mkdir(parents=True, exist_ok=True)
-            with atomic_write(self._folder / f"{key}.npz", overwrite=True) as file:
-                file.write_bytes(to_npz(parts))
-
-
-def to_npz(parts: Sequence[Surface]) -> bytes:
-    """Return surfaces as the content of an npz file."""
-    arrays = {}
-    for k, part in enumerate(parts):
-        arrays[f"points_{k}"] = np.asarray(part.points, dtype=np.float64)
-        arrays[f"faces_{k}"] = np.asarray(part.faces, dtype=np.int64)
-    stream = io.BytesIO()
-    np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-    return stream.getvalue()
-
-
-def from_npz(data: bytes) -> tuple[Surface, ...] | None:
-    """Return the surfaces of an npz file; None if it is damaged."""
+def read_parts(file: Path) -> tuple[Surface, ...] | None:
+    """Return the parts in an npz file; None if it does not exist, is too large or is damaged."""
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        if not file.is_file() or file.stat().st_size > _MAX_BYTES:
+            return None
+        # from memory, because numpy does not close the file if it is damaged
+        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as arrays:
             count = len(arrays.files) // 2
             parts = tuple(
                 Surface(points=arrays[f"points_{k}"], faces=arrays[f"faces_{k}"])
@@ -87,6 +50,18 @@ def from_npz(data: bytes) -> tuple[Surface, ...] | None:
     except _NPZ_ERRORS:
         return None
     return parts if parts and all(map(is_valid, parts)) else None
+
+
+def write_parts(file: Path, parts: Sequence[Surface]) -> None:
+    """Write parts to an npz file; errors are ignored, because parts can be computed again."""
+    arrays = {}
+    for k, part in enumerate(parts):
+        arrays[f"points_{k}"] = np.asarray(part.points, dtype=np.float64)
+        arrays[f"faces_{k}"] = np.asarray(part.faces, dtype=np.int64)
+    with suppress(OSError, ExportError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_write(file, overwrite=True) as target, target.open("wb") as stream:
+            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
 
 
 def is_valid(part: Surface) -> bool:

@@ -20,12 +20,7 @@ from terrainkit_robots.export.mesh_export.file_names import FileNames
 from terrainkit_robots.export.mesh_export.mesh_bytes import has_no_volume, scaled
 from terrainkit_robots.mesh.hull import convex_hull
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
-from terrainkit_robots.mesh.surface import (
-    Surface,
-    binary_stl,
-    signed_volume,
-    welded,
-)
+from terrainkit_robots.mesh.surface import Surface, binary_stl, signed_volume, welded
 from terrainkit_robots.text import count
 
 CollisionMethod = Literal["keep", "hull", "coacd", "primitives"]
@@ -43,28 +38,6 @@ _MAX_WELDED_FACES = 500_000
 """Larger meshes are decimated before their vertices are merged."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class VolumeError:
-    """Change of the volume of a collision mesh."""
-
-    mesh: str
-    """File name, as written."""
-
-    replacement: str
-    """What replaces the mesh, in words."""
-
-    original: float | None
-    """Volume of the mesh [m3]; None if it is not closed."""
-
-    volume: float
-    """Volume of the replacement, the sum of its parts [m3]."""
-
-    @property
-    def percent(self) -> float | None:
-        """Return the change of volume [%]; None if the volume of the mesh is unknown."""
-        return 100 * (self.volume / self.original - 1) if self.original else None
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SimplifiedRobot:
     """A robot with simplified collision geometry."""
@@ -77,9 +50,6 @@ class SimplifiedRobot:
 
     meshes: Meshes
     """Mesh files of the robot, including the new ones."""
-
-    errors: tuple[VolumeError, ...] = ()
-    """Volume error of each mesh that was replaced."""
 
     changes: tuple[str, ...] = ()
     """What replaced each collision mesh, one sentence each."""
@@ -123,7 +93,6 @@ def simplify_collisions(
         model=replace(model, links=links),
         contents=contents,
         meshes=meshes.with_contents(contents),
-        errors=tuple(simplifier.errors),
         changes=tuple(simplifier.changes),
     )
 
@@ -138,7 +107,6 @@ class _Simplifier:
         self._shapes: dict[tuple[Path, tuple[float, float, float]], tuple[Geometry, ...]] = {}
         # a folder that does not exist, because the contents are in memory
         self.names = FileNames(f".terrainkit-{method}")
-        self.errors: list[VolumeError] = []
         self.changes: list[str] = []
 
     def simplify(self, mesh: MeshFile) -> None:
@@ -151,11 +119,7 @@ class _Simplifier:
         except MeshError:
             return  # unchanged; export_meshes reports the error
         self._shapes[mesh.path, mesh.scale] = shapes
-        error = VolumeError(
-            mesh=mesh.filename, replacement=replacement, original=original, volume=volume
-        )
-        self.errors.append(error)
-        change = "unknown" if error.percent is None else f"{error.percent:+.1f} %"
+        change = f"{100 * (volume / original - 1):+.1f} %" if original else "unknown"
         self.changes.append(
             f"replaced collision mesh {mesh.filename} by {replacement} (volume {change})"
         )

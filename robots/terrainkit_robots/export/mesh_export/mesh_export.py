@@ -66,7 +66,7 @@ class _MeshExporter:
     def __init__(self, model: RobotModel, meshes: Meshes, folder: str) -> None:
         self._model = model
         self._meshes = meshes
-        self._converted: dict[tuple[Path, tuple[float, float, float]], MeshBytes | MeshError] = {}
+        self._converted: dict[tuple[Path, tuple[float, float, float]], MeshBytes] = {}
         self.names = FileNames(folder)
         self.changes: dict[str, None] = {}
 
@@ -141,14 +141,8 @@ class _MeshExporter:
     def _content(self, mesh: MeshFile) -> MeshBytes:
         key = mesh.path, mesh.scale
         if key not in self._converted:
-            try:
-                self._converted[key] = mesh_bytes(self._meshes, mesh)
-            except MeshError as error:
-                self._converted[key] = error
-        result = self._converted[key]
-        if isinstance(result, MeshError):
-            raise MeshError(*result.args)
-        return result
+            self._converted[key] = mesh_bytes(self._meshes, mesh)
+        return self._converted[key]
 
     def _box_of_flat_mesh(
         self, link: Link, shape: Geometry, mesh: MeshFile, file: str

@@ -51,24 +51,28 @@ def effort_column(
         gains: PD gains of each joint.
         mirror: The joint on the other side of each joint.
     """
-    in_file = {joint.name: _valid_limit(robot.effort_limit(joint)) for joint in robot.actuated}
-    torques = robot.stance.torques if robot.stance is not None else {}
+    limits = {joint.name: robot.effort_limit(joint) for joint in robot.actuated}
+    in_file = _limits_in_file(robot, limits, mirror)
+    return {
+        joint.name: in_file.get(joint.name)
+        or _suggest_effort(robot, joint, gains[joint.name].stiffness)
+        for joint in robot.actuated
+    }
+
+
+def _suggest_effort(robot: Facts, joint: Joint, stiffness: float) -> tuple[float, Provenance]:
+    """Return an effort limit for a joint whose limit is unknown [N m] or [N]."""
     leg_effort = _leg_effort(robot)
-    column = Column()
-    for joint in robot.actuated:
-        if not _add_from_file(column, robot, joint, in_file, mirror):
-            if joint in robot.leg_joints and joint.kind != "prismatic" and leg_effort > 0:
-                value, reason = leg_effort, f"{_LEG_FACTOR:g} x weight x leg length"
-            else:
-                error = _by_kind(_DEFAULT_ERROR, joint)
-                value = gains[joint.name].stiffness * error
-                reason = f"the stiffness at an error of {error:g} {joint.unit}"
-            holding = _HOLDING_FACTOR * abs(torques.get(joint.name, 0.0))
-            if math.isfinite(holding) and holding > value:
-                value, reason = holding, f"{_HOLDING_FACTOR:g} times the holding torque"
-            origin = _suggested(f"not in the file; {reason}")
-            column.add(joint.name, rounded(value, 2) or 1.0, origin)
-    return column
+    if joint in robot.leg_joints and joint.kind != "prismatic" and leg_effort > 0:
+        value, reason = leg_effort, f"{_LEG_FACTOR:g} x weight x leg length"
+    else:
+        error = _by_kind(_DEFAULT_ERROR, joint)
+        value, reason = stiffness * error, f"the stiffness at an error of {error:g} {joint.unit}"
+    torques = robot.stance.torques if robot.stance is not None else {}
+    holding = _HOLDING_FACTOR * abs(torques.get(joint.name, 0.0))
+    if math.isfinite(holding) and holding > value:
+        value, reason = holding, f"{_HOLDING_FACTOR:g} times the holding torque"
+    return rounded(value, 2) or 1.0, _suggested(f"not in the file; {reason}")
 
 
 def _leg_effort(robot: Facts) -> float:
@@ -85,37 +89,31 @@ def velocity_column(robot: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
         robot: The robot.
         mirror: The joint on the other side of each joint.
     """
-    in_file = {
-        joint.name: _valid_limit(joint.limit.velocity if joint.limit else None)
+    limits = {joint.name: joint.limit.velocity if joint.limit else None for joint in robot.actuated}
+    in_file = _limits_in_file(robot, limits, mirror)
+    typical = _suggested("not in the file; typical of motors of legged robots")
+    return {
+        joint.name: in_file.get(joint.name, (_by_kind(_DEFAULT_VELOCITY, joint), typical))
         for joint in robot.actuated
     }
-    column = Column()
-    for joint in robot.actuated:
-        if not _add_from_file(column, robot, joint, in_file, mirror):
-            origin = _suggested("not in the file; typical of motors of legged robots")
-            column.add(joint.name, _by_kind(_DEFAULT_VELOCITY, joint), origin)
-    return column
 
 
 def armature_column(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
     """Return the armature of each joint [kg m2] or [kg]."""
-    column = Column()
+    column: Column = {}
     for joint in robot.actuated:
         in_file, required = joint.armature, gains[joint.name].armature
         if 0 < in_file < math.inf and required <= in_file:
-            column.add(joint.name, rounded(in_file), _from_file(robot))
+            column[joint.name] = rounded(in_file), _from_file(robot)
             continue
         reason = f"{in_file:.3g} in the file" if in_file > 0 else "not in the file"
         reason += "; required by the gains" if required > 0 else ""
-        column.add(joint.name, rounded(required, 3), _suggested(reason))
+        column[joint.name] = rounded(required, 3), _suggested(reason)
     return column
 
 
 def action_scale_column(
-    robot: Facts,
-    gains: "Mapping[str, Gain]",
-    effort: Column,
-    velocity: Column,
+    robot: Facts, gains: "Mapping[str, Gain]", effort: Column, velocity: Column
 ) -> Column:
     """Return the change of each joint target for an action of 1 [rad] or [m].
 
@@ -130,7 +128,7 @@ def action_scale_column(
         effort: Effort limits.
         velocity: Velocity limits.
     """
-    column = Column()
+    column: Column = {}
     in_legs = {joint.name for leg in robot.legs for joint in leg.joints}
     for joint in robot.actuated:
         stiffness = gains[joint.name].stiffness
@@ -140,7 +138,7 @@ def action_scale_column(
             largest = _by_kind(_MAX_ACTION_SCALE, joint)
             scales = {
                 largest: f"{largest:g} {joint.unit}, the largest suggested scale",
-                _ACTION_FACTOR * effort.values[joint.name] / stiffness: (
+                _ACTION_FACTOR * effort[joint.name][0] / stiffness: (
                     f"{_ACTION_FACTOR:g} * effort / stiffness"
                 ),
             }
@@ -150,9 +148,9 @@ def action_scale_column(
                 scales[scale] = f"{_MAX_RANGE_FACTOR:g} of the joint range"
             value, reason = min(scales), scales[min(scales)]
         else:
-            value = _WHEEL_ACTION_FACTOR * velocity.values[joint.name]
+            value = _WHEEL_ACTION_FACTOR * velocity[joint.name][0]
             reason = f"{_WHEEL_ACTION_FACTOR:g} * velocity; the target is a speed without stiffness"
-        column.add(joint.name, rounded(value, 3), _suggested(reason))
+        column[joint.name] = rounded(value, 3), _suggested(reason)
     return column
 
 
@@ -160,9 +158,21 @@ def _by_kind(values: Mapping[str, float], joint: Joint) -> float:
     return values["prismatic" if joint.kind == "prismatic" else "revolute"]
 
 
-def _valid_limit(value: float | None) -> float | None:
-    """Return a limit from a file, or None if it is not positive and finite."""
-    return (rounded(value) or None) if value is not None and 0 < value < math.inf else None
+def _limits_in_file(
+    robot: Facts, limits: Mapping[str, float | None], mirror: Mapping[str, MirrorJoint]
+) -> Column:
+    """Return the valid limits of the file; a joint without one has that of its mirror joint."""
+    valid = {
+        name: rounded(limit)
+        for name, limit in limits.items()
+        if limit is not None and 0 < limit < math.inf and rounded(limit)
+    }
+    copied = {
+        name: (valid[other.joint], _suggested(f"not in the file; copied from {other.joint}"))
+        for name, other in mirror.items()
+        if other.joint in valid
+    }
+    return copied | {name: (limit, _from_file(robot)) for name, limit in valid.items()}
 
 
 def _suggested(reason: str) -> Provenance:
@@ -171,23 +181,3 @@ def _suggested(reason: str) -> Provenance:
 
 def _from_file(robot: Facts) -> Provenance:
     return Provenance(origin="declared", reason=f"in {robot.model.file.name}")
-
-
-def _add_from_file(
-    column: Column,
-    robot: Facts,
-    joint: Joint,
-    in_file: Mapping[str, float | None],
-    mirror: Mapping[str, MirrorJoint],
-) -> bool:
-    """Add the value of a joint, or of its mirror joint; return False if neither is in the file."""
-    value, mirrored = in_file[joint.name], mirror.get(joint.name)
-    if value is not None:
-        column.add(joint.name, value, _from_file(robot))
-        return True
-    value = in_file.get(mirrored.joint) if mirrored is not None else None
-    if mirrored is None or value is None:
-        return False
-    origin = _suggested(f"not in the file; copied from {mirrored.joint}")
-    column.add(joint.name, value, origin)
-    return True

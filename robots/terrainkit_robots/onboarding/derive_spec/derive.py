@@ -71,11 +71,13 @@ def derive_spec(
     columns["action_scale"] = action_scale_column(
         facts, gains, columns["effort"], columns["velocity"]
     )
-    pose = columns["default_pose"].values
+    pose = {joint: value for joint, (value, _) in columns["default_pose"].items()}
     reset, reset_reason = _reset_range(facts, pose)
     lengths = _lengths(facts)
-    columns = {name: column.by_pattern() for name, column in columns.items()}
-    values: dict[str, Any] = {name: column.values for name, column in columns.items()}
+    columns = {name: by_pattern(column, list(column)) for name, column in columns.items()}
+    values: dict[str, Any] = {
+        name: {key: value for key, (value, _) in column.items()} for name, column in columns.items()
+    }
     heights: dict[str, Any] = {name: value for name, (value, _) in lengths.items()}
     return RobotSpec(
         name=facts.model.title,
@@ -111,21 +113,15 @@ def _provenance(origin: Origin, reason: str) -> Provenance:
 
 
 def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
-    pose, stiffness, damping = Column(), Column(), Column()
+    pose: Column = {}
+    stiffness: Column = {}
+    damping: Column = {}
     origin = _pose_provenance(facts)
     for joint in facts.actuated:
-        gain = gains[joint.name]
-        pose.add(joint.name, rounded(facts.positions[joint.name]), origin)
-        stiffness.add(
-            joint.name,
-            rounded(gain.stiffness, 2),
-            _provenance("suggested", gain.reason),
-        )
-        damping.add(
-            joint.name,
-            rounded(gain.damping, 2),
-            _provenance("suggested", "see stiffness"),
-        )
+        name, gain = joint.name, gains[joint.name]
+        pose[name] = rounded(facts.positions[name]), origin
+        stiffness[name] = rounded(gain.stiffness, 2), _provenance("suggested", gain.reason)
+        damping[name] = rounded(gain.damping, 2), _provenance("suggested", "see stiffness")
     return {"default_pose": pose, "stiffness": stiffness, "damping": damping}
 
 
@@ -200,32 +196,17 @@ def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:
     with np.errstate(all="ignore"):  # a lint rule reports lengths such as 1e308
         width = float(np.ptp(stance.contacts @ facts.mirror.normal))
         length = float(np.mean([leg.length for leg in facts.legs]))
-    found = {
-        "base_height_target": (
-            stance.height,
-            _provenance("solved", "standing at the default pose"),
-        ),
-        "spawn_height": (
-            stance.spawn_height,
-            _provenance("solved", "1 cm above the standing height"),
-        ),
-        "leg_length": (
-            length,
-            _provenance("measured", f"hip to knee to contact, {count}"),
-        ),
-        "stance_width": (
-            width,
-            _provenance("solved", "distance between the contacts at the default pose"),
-        ),
-        "foot_radius": (
-            foot_radius(facts),
-            _provenance("measured", f"collision shapes of the feet, {count}"),
-        ),
+    found: dict[str, tuple[float | None, Origin, str]] = {
+        "base_height_target": (stance.height, "solved", "standing at the default pose"),
+        "spawn_height": (stance.spawn_height, "solved", "1 cm above the standing height"),
+        "leg_length": (length, "measured", f"hip to knee to contact, {count}"),
+        "stance_width": (width, "solved", "distance between the contacts at the default pose"),
+        "foot_radius": (foot_radius(facts), "measured", f"collision shapes of the feet, {count}"),
     }
     if facts.bodies[0].virtual:  # the base is the world, which has no height
         del found["base_height_target"], found["spawn_height"]
     return {
-        name: (rounded_length(value), origin)
-        for name, (value, origin) in found.items()
+        name: (rounded_length(value), _provenance(origin, reason))
+        for name, (value, origin, reason) in found.items()
         if value is not None and math.isfinite(value)
     }

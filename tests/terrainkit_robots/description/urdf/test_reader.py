@@ -132,12 +132,8 @@ def test_joint_with_all_elements():
     assert (read_joint.damping, read_joint.friction) == (0.1, 1)
     dynamics, safety = read_joint.dynamics, read_joint.safety_controller
     assert (dynamics.damping, dynamics.friction) == (0.1, 1)
-    assert (safety.k_position, safety.k_velocity, safety.lower, safety.upper) == (
-        100,
-        1,
-        None,
-        None,
-    )
+    assert (safety.k_position, safety.k_velocity) == (100, 1)
+    assert (safety.soft_lower_limit, safety.soft_upper_limit) == (None, None)
     line = mimic.source.line
     assert (dynamics.source.line, safety.source.line) == (line + 1, line + 2)
     assert read_joint.dont_collapse

@@ -7,10 +7,9 @@ import trimesh
 
 from terrainkit_robots.export.collision_simplification import decomposition_cache as module
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
-    DecompositionCache,
     cache_folder,
-    from_npz,
-    to_npz,
+    read_parts,
+    write_parts,
 )
 from terrainkit_robots.mesh.surface import Surface
 
@@ -26,13 +25,13 @@ def assert_same(found, wanted):
         np.testing.assert_array_equal(a.faces, b.faces)
 
 
-def test_put_and_get(tmp_path):
-    cache = DecompositionCache(tmp_path / "deep" / "cache")
-    assert cache.get("a") is None
-    cache.put("a", [PART, PART])
-    assert_same(DecompositionCache(tmp_path / "deep" / "cache").get("a"), [PART, PART])
-    assert cache.get("b") is None
-    assert [file.name for file in (tmp_path / "deep" / "cache").iterdir()] == ["a.npz"]
+def test_write_and_read(tmp_path):
+    file = tmp_path / "deep" / "cache" / "a.npz"
+    assert read_parts(file) is None
+    write_parts(file, [PART, PART])
+    assert_same(read_parts(file), [PART, PART])
+    assert read_parts(file.with_name("b.npz")) is None
+    assert list(file.parent.iterdir()) == [file]
 
 
 DAMAGES = {
@@ -46,13 +45,12 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_damaged_file_is_replaced(tmp_path, damage):
-    cache = DecompositionCache(tmp_path)
-    cache.put("a", [PART])
     file = tmp_path / "a.npz"
+    write_parts(file, [PART])
     file.write_bytes(DAMAGES[damage](file.read_bytes()))
-    assert cache.get("a") is None
-    cache.put("a", [PART])
-    assert_same(cache.get("a"), [PART])
+    assert read_parts(file) is None
+    write_parts(file, [PART])
+    assert_same(read_parts(file), [PART])
 
 
 @pytest.mark.parametrize(
@@ -65,10 +63,11 @@ def test_damaged_file_is_replaced(tmp_path, damage):
         Surface(points=PART.points[:3], faces=PART.faces[:1] * 0),
     ],
 )
-def test_invalid_parts_are_ignored(part):
-    assert from_npz(to_npz([PART])) is not None
-    assert from_npz(to_npz([PART, part])) is None
-    assert from_npz(to_npz([])) is None
+def test_invalid_parts_are_ignored(tmp_path, part):
+    file = tmp_path / "a.npz"
+    for parts, is_read in (([PART], True), ([PART, part], False), ([], False)):
+        write_parts(file, parts)
+        assert (read_parts(file) is not None) == is_read
 
 
 def test_pickles_are_not_loaded(tmp_path):
@@ -77,28 +76,21 @@ def test_pickles_are_not_loaded(tmp_path):
             return Path.touch, (tmp_path / "executed",)
 
     np.savez(tmp_path / "a.npz", points_0=np.array([Evil()], dtype=object))
-    assert DecompositionCache(tmp_path).get("a") is None
+    assert read_parts(tmp_path / "a.npz") is None
     assert not (tmp_path / "executed").exists()
 
 
 def test_large_file_is_not_read(tmp_path, monkeypatch):
-    cache = DecompositionCache(tmp_path)
-    cache.put("a", [PART])
+    write_parts(tmp_path / "a.npz", [PART])
     monkeypatch.setattr(module, "_MAX_BYTES", 10)
-    assert cache.get("a") is None
-
-
-def test_no_folder_disables_cache():
-    cache = DecompositionCache(None)
-    cache.put("a", [PART])
-    assert cache.get("a") is None
+    assert read_parts(tmp_path / "a.npz") is None
 
 
 def test_unwritable_folder_is_ignored(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    cache = DecompositionCache(tmp_path / "file" / "cache")
-    cache.put("a", [PART])
-    assert cache.get("a") is None
+    file = tmp_path / "file" / "cache" / "a.npz"
+    write_parts(file, [PART])
+    assert read_parts(file) is None
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="XDG folders")

@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,7 @@ from terrainkit_robots.analysis.bodies.shapes import volume
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
 from terrainkit_robots.export.collision_simplification import simplify as module
-from terrainkit_robots.export.collision_simplification.simplify import (
-    VolumeError,
-    simplify_collisions,
-)
+from terrainkit_robots.export.collision_simplification.simplify import simplify_collisions
 from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.mesh.surface import MeshError, Surface, binary_stl
@@ -61,13 +59,17 @@ def volumes(done):
     return [volume(shape, done.meshes) for shape in shapes(done)]
 
 
+def percent(change):
+    return float(re.search(r"\(volume (\S+) %\)", change)[1])
+
+
 def test_keep():
     model, meshes = robot(mesh("thin.stl")), Meshes(FILES)
     done = simplify_collisions(model, meshes)
     assert done.model is model
     assert done.meshes is meshes
     assert not done.contents
-    assert not done.errors
+    assert not done.changes
 
 
 class TestHull:
@@ -84,19 +86,17 @@ class TestHull:
 
     def test_volume_error(self):
         done = treated("hull", mesh("angle.stl", (1, 2, 1)))
-        (error,) = done.errors
-        assert error.original == pytest.approx(8)
-        assert error.volume == pytest.approx(2 * ANGLE.convex_hull.volume)
-        assert error.percent == pytest.approx(100 * (ANGLE.convex_hull.volume / 4 - 1))
+        assert volumes(done) == pytest.approx([2 * ANGLE.convex_hull.volume])
+        percent = 100 * (2 * ANGLE.convex_hull.volume / 8 - 1)
         assert done.changes == (
-            f"replaced collision mesh angle.stl by its convex hull (volume {error.percent:+.1f} %)",
+            f"replaced collision mesh angle.stl by its convex hull (volume {percent:+.1f} %)",
         )
 
     def test_open_mesh(self):
         done = treated("hull", mesh("open.stl"))
-        assert done.errors[0].original is None
-        assert done.errors[0].percent is None
-        assert "(volume unknown)" in done.changes[0]
+        assert done.changes == (
+            "replaced collision mesh open.stl by its convex hull (volume unknown)",
+        )
         assert volumes(done) == pytest.approx([0.006])
 
     def test_scale_is_applied_to_vertices(self):
@@ -126,10 +126,10 @@ class TestHull:
 class TestCoacd:
     def test_nonconvex_mesh_is_decomposed(self, tmp_path):
         done = treated("coacd", mesh("thin.stl", name="shin"), mesh("angle.stl"), cache=tmp_path)
-        thin, angle = done.errors
-        assert thin.replacement == "2 convex parts"
-        assert thin.percent == pytest.approx(0, abs=2)
-        assert angle.replacement == "its convex hull"
+        thin, angle = done.changes
+        assert "thin.stl by 2 convex parts (" in thin
+        assert percent(thin) == pytest.approx(0, abs=2)
+        assert "angle.stl by its convex hull (" in angle
         assert [shape.name for shape in shapes(done)] == ["shin", "shin_2", ""]
         assert sum(volumes(done)[:2]) == pytest.approx(THIN.volume, rel=0.02)
         assert len(list(tmp_path.iterdir())) == 1
@@ -150,9 +150,10 @@ class TestCoacd:
 
         monkeypatch.setattr(module, "convex_parts", fail)
         done = treated("coacd", mesh("thin.stl"))
-        assert done.errors[0].replacement == "its convex hull"
+        failed, replaced = done.changes
         expected = "collision mesh thin.stl makes CoACD fail: no reason; its convex hull is used"
-        assert done.changes[0] == expected
+        assert failed == expected
+        assert "thin.stl by its convex hull (" in replaced
 
 
 class TestPrimitives:
@@ -166,15 +167,10 @@ class TestPrimitives:
         assert shape.origin[:3, 3] == pytest.approx([1, 2, 3])
         assert shape.mesh is None
         assert not done.contents
-        assert done.errors == (
-            VolumeError(
-                mesh="box.stl",
-                replacement="a box",
-                original=pytest.approx(0.012),
-                volume=pytest.approx(0.012),
-            ),
-        )
-        assert done.errors[0].percent == pytest.approx(0, abs=0.01)
+        assert volumes(done) == pytest.approx([0.012])
+        (change,) = done.changes
+        assert change.startswith("replaced collision mesh box.stl by a box (volume ")
+        assert percent(change) == 0
 
     def test_fit_to_mesh_is_cleared(self):
         assert (
@@ -192,7 +188,7 @@ class TestUnchanged:
         )
         done = treated(how, *given)
         assert shapes(done) == given
-        assert not done.errors
+        assert not done.changes
 
     def test_visual_meshes(self):
         visual = mesh("thin.stl")
@@ -221,16 +217,16 @@ def test_progress():
 def test_result_is_deterministic(how):
     first, second = (treated(how, mesh("thin.stl"), mesh("angle.stl")) for _ in range(2))
     assert dict(first.contents) == dict(second.contents)
-    assert first.errors == second.errors
+    assert first.changes == second.changes
     assert [shape.size for shape in shapes(first)] == [shape.size for shape in shapes(second)]
 
 
 def test_robot_with_meshes(robot_file):
     model = load_robot(robot_file("h1/urdf/h1.urdf"))
     done = simplify_collisions(model, Meshes(), "hull")
-    assert len(done.errors) == 18
+    assert len(done.changes) == 18
     # never smaller than the mesh, but for corners that a hull may not have
-    assert all(-1 < error.percent < 200 for error in done.errors)
+    assert all(-1 < percent(change) < 200 for change in done.changes)
     packed = export_meshes(done.model, done.meshes)
     names = {s.mesh.filename for link in packed.model.links for s in link.collisions if s.mesh}
     assert names <= set(packed.files)

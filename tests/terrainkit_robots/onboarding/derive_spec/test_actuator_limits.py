@@ -8,6 +8,7 @@ from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
     effort_column,
     velocity_column,
 )
+from terrainkit_robots.spec.column import collect_provenance
 from tests.robots import ARM
 
 HIP = 'effort="23.7" velocity="30.1"'
@@ -23,11 +24,15 @@ def with_first_limit(bundled, tmp_path, *, limit):
     return Facts(load_robot(path))
 
 
+def values(column):
+    return {joint: value for joint, (value, _) in column.items()}
+
+
 def test_derive_effort_from_file(bundled, gains):
     facts = bundled("quadruped.urdf")
     column = effort_column(facts, gains(facts), facts.mirror_map)
-    assert column.values["FR_calf_joint"] == 45.43
-    assert dict(column.provenance("effort"))["effort"].reason == "in quadruped.urdf"
+    assert column["FR_calf_joint"][0] == 45.43
+    assert collect_provenance({"effort": column})["effort"].reason == "in quadruped.urdf"
 
 
 def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
@@ -35,9 +40,9 @@ def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
     twins = facts.mirror_map
     effort = effort_column(facts, gains(facts), twins)
     speed = velocity_column(facts, twins)
-    assert effort.values["FL_hip_joint"] == 23.7
-    assert speed.values["FL_hip_joint"] == 30.1
-    origins = dict(effort.provenance("effort"))
+    assert effort["FL_hip_joint"][0] == 23.7
+    assert speed["FL_hip_joint"][0] == 30.1
+    origins = collect_provenance({"effort": effort})
     assert set(origins) == {"effort", "effort.FL_hip_joint"}
     assert origins["effort"].origin == "declared"
     assert origins["effort.FL_hip_joint"].origin == "suggested"
@@ -49,24 +54,24 @@ def test_derive_effort_of_leg_from_mass_and_length(bundled, gains, tmp_path):
     twins = facts.mirror_map
     column = effort_column(facts, gains(facts), twins)
     # 0.5 * 15.0 kg * 9.81 m/s2 * 0.448 m
-    assert column.values["FL_hip_joint"] == 33.0
-    assert column.origins["FL_hip_joint"].reason.endswith("0.5 x weight x leg length")
+    assert column["FL_hip_joint"][0] == 33.0
+    assert column["FL_hip_joint"][1].reason.endswith("0.5 x weight x leg length")
     speeds = velocity_column(facts, twins)
-    assert speeds.values["FL_hip_joint"] == 20.0
-    assert speeds.origins["FL_hip_joint"].origin == "suggested"
+    assert speeds["FL_hip_joint"][0] == 20.0
+    assert speeds["FL_hip_joint"][1].origin == "suggested"
 
 
 def test_derive_armature_from_file_or_gains(bundled, gains):
     urdf, mjcf = bundled("quadruped.urdf"), bundled("quadruped.xml")
-    assert set(armature_column(urdf, gains(urdf)).values.values()) == {0.0}
+    assert set(values(armature_column(urdf, gains(urdf))).values()) == {0.0}
     needed = armature_column(urdf, gains(urdf, armature=0.01))
-    assert set(needed.values.values()) == {0.01}
-    assert "required by the gains" in needed.origins["FL_hip_joint"].reason
+    assert set(values(needed).values()) == {0.01}
+    assert "required by the gains" in needed["FL_hip_joint"][1].reason
     declared = {joint.name: joint.armature for joint in mjcf.actuated}
     kept = armature_column(mjcf, gains(mjcf))
-    assert kept.values == pytest.approx(declared)
+    assert values(kept) == pytest.approx(declared)
     more = armature_column(mjcf, gains(mjcf, armature=1.0))
-    assert set(more.values.values()) == {1.0}
+    assert set(values(more).values()) == {1.0}
 
 
 def test_derive_effort_from_stiffness(gains, tmp_path):
@@ -74,8 +79,8 @@ def test_derive_effort_from_stiffness(gains, tmp_path):
     path.write_text(ARM.replace('effort="30" ', ""))
     facts = Facts(load_robot(path))
     column = effort_column(facts, gains(facts, stiffness=40.0), {})
-    assert column.values["shoulder"] == 40.0
-    assert "the stiffness at an error of 1 rad" in column.origins["shoulder"].reason
+    assert column["shoulder"][0] == 40.0
+    assert "the stiffness at an error of 1 rad" in column["shoulder"][1].reason
 
 
 @pytest.mark.parametrize(
@@ -91,8 +96,8 @@ def test_derive_action_scale_from_effort(bundled, gains, stiffness, scale, reaso
     gain, twins = gains(facts, stiffness=stiffness), facts.mirror_map
     effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
     column = action_scale_column(facts, gain, effort, velocity)
-    assert column.values["FL_hip_joint"] == pytest.approx(scale, rel=0.01)
-    assert column.origins["FL_hip_joint"].reason == reason
+    assert column["FL_hip_joint"][0] == pytest.approx(scale, rel=0.01)
+    assert column["FL_hip_joint"][1].reason == reason
 
 
 def test_derive_action_scale_of_short_range(bundled, gains, tmp_path):
@@ -102,8 +107,8 @@ def test_derive_action_scale_of_short_range(bundled, gains, tmp_path):
     gain, twins = gains(facts, stiffness=10.0), facts.mirror_map
     effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
     column = action_scale_column(facts, gain, effort, velocity)
-    assert column.values["FL_hip_joint"] == pytest.approx(0.05)
-    assert column.origins["FL_hip_joint"].reason == "0.25 of the joint range"
+    assert column["FL_hip_joint"][0] == pytest.approx(0.05)
+    assert column["FL_hip_joint"][1].reason == "0.25 of the joint range"
 
 
 def test_joints_off_the_legs_hold_the_default_pose(bundled, gains, tmp_path):
@@ -116,9 +121,10 @@ def test_joints_off_the_legs_hold_the_default_pose(bundled, gains, tmp_path):
     gain, twins = gains(facts, stiffness=40.0), facts.mirror_map
     effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
     column = action_scale_column(facts, gain, effort, velocity)
-    assert column.values.pop("arm_joint") == 0.0
-    assert set(column.values.values()) == {0.25}
-    assert "holds the default pose" in column.origins["arm_joint"].reason
+    scale, origin = column.pop("arm_joint")
+    assert scale == 0.0
+    assert "holds the default pose" in origin.reason
+    assert set(values(column).values()) == {0.25}
 
 
 def test_only_joint_of_an_arm_moves(gains, tmp_path):
@@ -127,4 +133,4 @@ def test_only_joint_of_an_arm_moves(gains, tmp_path):
     facts = Facts(load_robot(path))
     gain = gains(facts, stiffness=40.0)
     effort, velocity = effort_column(facts, gain, {}), velocity_column(facts, {})
-    assert action_scale_column(facts, gain, effort, velocity).values == {"shoulder": 0.25}
+    assert values(action_scale_column(facts, gain, effort, velocity)) == {"shoulder": 0.25}
