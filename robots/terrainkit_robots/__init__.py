@@ -10,7 +10,8 @@ if TYPE_CHECKING:
     from terrainkit_robots.description.load import load_robot
     from terrainkit_robots.description.model import RobotModel
     from terrainkit_robots.lint.check import check_robot
-    from terrainkit_robots.lint.runner import Finding, Report
+    from terrainkit_robots.lint.rule import Finding
+    from terrainkit_robots.lint.runner import Report
     from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
     from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -28,7 +29,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "Finding": "lint.runner",
+    "Finding": "lint.rule",
     "OnboardOptions": "onboarding.pipeline",
     "OnboardResult": "onboarding.result",
     "Report": "lint.runner",

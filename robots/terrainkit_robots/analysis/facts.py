@@ -275,10 +275,10 @@ class Facts:
         return find_misalignments(self.mirror, self.uncopied_pairs, self.leg_bodies)
 
     def outlier_first(
-        self, left: MirrorSide, right: MirrorSide, value: Callable[[Body], Matrix | None]
+        self, pair: MirrorPair, value: Callable[[Body], Matrix | None]
     ) -> tuple[MirrorSide, MirrorSide]:
-        """Return the two joints, the one whose value deviates more from the other legs first."""
-        return outlier_first(left, right, value, self.bodies, self.legs, self.mirror)
+        """Return the joints of a pair; the one that deviates more from the other legs is first."""
+        return outlier_first(pair, value, self.bodies, self.legs, self.mirror)
 
     # Simulators
 

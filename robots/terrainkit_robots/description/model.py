@@ -309,6 +309,11 @@ class Joint:
         return (self.dynamics and self.dynamics.friction) or 0.0
 
     @property
+    def velocity(self) -> float | None:
+        """Return the velocity limit [rad/s] or [m/s]; None if it is missing."""
+        return self.limit.velocity if self.limit else None
+
+    @property
     def moves(self) -> bool:
         """Whether the joint has one degree of freedom."""
         return self.kind in MOVING

@@ -23,9 +23,10 @@ import inspect
 import pkgutil
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import closest, expected_names
@@ -68,33 +69,75 @@ IMPORTANCE = (
 """Families in the order of reports: the most important first."""
 
 
+class Element(Protocol):
+    """A part of a robot with a name, such as a link or a joint."""
+
+    @property
+    def name(self) -> str:
+        """Return the name."""
+
+    @property
+    def source(self) -> Source:
+        """Return where it is written."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Violation:
     """One place where a robot violates a rule."""
 
-    subject: str
-    """Name of the link, joint, mesh or file."""
-
-    source: Source
-    """File and line of the element."""
-
     message: str
     """One sentence with the measured value, its unit and the threshold."""
 
+    element: Element | None = None
+    """What violates the rule, such as a link or a joint. By default, the robot."""
+
+    subject: str | None = None
+    """Name of the link, joint, mesh or file. By default, the name of the element."""
+
+    source: Source | None = None
+    """File and line. By default, those of the element."""
+
     hint: str = ""
-    """How to correct it. If empty, the `Fix:` section of the rule is used."""
+    """How to correct it. By default, the `Fix:` section of the rule."""
 
     severity: Severity | None = None
-    """Severity, if it differs from that of the rule."""
+    """By default, the severity of the rule."""
 
-    certainty: Certainty = "proven"
-    """`likely` if the violation depends on a heuristic, such as leg detection."""
+    certainty: Certainty | None = None
+    """`likely` if the violation depends on a heuristic, such as leg detection. By default, the
+    certainty of the rule."""
 
     measured: Measured = field(default_factory=dict)
     """The numbers in the message, by name."""
 
     fix: Fix | None = None
     """The edits that correct it, if it can be corrected automatically."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding(Violation):
+    """A violation with the defaults of the rule that found it, as shown in reports."""
+
+    code: str
+    """Code of the rule, such as `INR002`."""
+
+    name: str
+    """Name of the rule, such as `negative-mass`."""
+
+    subject: str
+    source: Source
+    severity: Severity
+    certainty: Certainty
+
+    @property
+    def file(self) -> Path:
+        """File of the element."""
+        return self.source.file
+
+    @property
+    def line(self) -> int:
+        """Line of the element, or 0 for the whole file."""
+        return self.source.line
 
 
 Violations = Iterator[Violation]
@@ -122,6 +165,28 @@ class Rule:
 
     needs: tuple[Need, ...] = ()
     """Inputs that the rule requires."""
+
+    certainty: Certainty = "proven"
+    """Default certainty of a violation."""
+
+    def findings(self, robot: "Facts") -> Iterator[Finding]:
+        """Yield the violations on a robot with their defaults filled in."""
+        for violation in self.check(robot):
+            element, subject = violation.element, violation.subject
+            if subject is None:
+                subject = robot.model.title if element is None else element.name
+            yield Finding(
+                code=self.code,
+                name=self.name,
+                message=violation.message,
+                subject=subject,
+                source=violation.source or (element or robot.model).source,
+                hint=violation.hint or self.how_to_fix,
+                severity=violation.severity or self.severity,
+                certainty=violation.certainty or self.certainty,
+                measured=violation.measured,
+                fix=violation.fix,
+            )
 
     @property
     def family(self) -> str:
@@ -177,6 +242,7 @@ def rule(
     *,
     fixes: Literal["safe", "unsafe", "no"] = "no",
     needs: tuple[Need, ...] = (),
+    certainty: Certainty = "proven",
 ) -> Callable[[Check], Check]:
     """Return a decorator that registers a function as the rule `code`."""
 
@@ -184,7 +250,13 @@ def rule(
         if code in _RULES and _RULES[code].check.__module__ != check.__module__:
             raise ConfigError(f"rule code {code}: registered twice; expected a unique code")
         _RULES[code] = Rule(
-            code=code, name=name, severity=severity, check=check, fixes=fixes, needs=needs
+            code=code,
+            name=name,
+            severity=severity,
+            check=check,
+            fixes=fixes,
+            needs=needs,
+            certainty=certainty,
         )
         return check
 
@@ -220,11 +292,10 @@ def get_rule(code_or_name: str) -> Rule:
     raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")
 
 
-def violations(robot: "Facts", *codes: str) -> Violations:
+def violations(robot: "Facts", *codes: str) -> Iterator[Finding]:
     """Yield the violations of the rules with these codes, with their severities.
 
     For rules that depend on what other rules report.
     """
     for rule in map(get_rule, codes):
-        for violation in rule.check(robot):
-            yield replace(violation, severity=violation.severity or rule.severity)
+        yield from rule.findings(robot)

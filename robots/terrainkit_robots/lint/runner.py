@@ -1,24 +1,13 @@
 """Run rules on a robot and collect their findings in a report."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 from typing import Literal
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.fix import Fix
-from terrainkit_robots.lint.rule import (
-    IMPORTANCE,
-    Certainty,
-    Measured,
-    Need,
-    Rule,
-    Severity,
-    Violation,
-    rules,
-)
+from terrainkit_robots.lint.rule import IMPORTANCE, Finding, Need, Rule, rules
 
 Verdict = Literal["pass", "warn", "fail"]
 
@@ -40,40 +29,6 @@ SkipKind = Literal[
 
 INTERNAL_ERROR = "internal error, please report it"
 """Description of an unexpected exception."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Finding:
-    """A violation together with the rule that found it, as shown in reports."""
-
-    code: str
-    """Code of the rule, such as `INR002`."""
-
-    name: str
-    """Name of the rule, such as `negative-mass`."""
-
-    severity: Severity
-    certainty: Certainty
-    """`likely` if the finding depends on a heuristic, such as leg detection."""
-
-    subject: str
-    """Name of the link, joint, mesh or file."""
-
-    message: str
-    """One sentence with the measured value, its unit and the threshold."""
-
-    hint: str
-    """How to correct it."""
-
-    file: Path
-    line: int
-    """Line of the element, or 0 for the whole file."""
-
-    measured: Measured = field(default_factory=dict)
-    """The numbers in the message, by name."""
-
-    fix: Fix | None = None
-    """The edits that correct it, if it can be corrected automatically."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,9 +113,9 @@ def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool
                 kind: SkipKind = "no-legs" if missing == "legs" else "no-input"
                 skipped.append(Skipped(code=rule.code, kind=kind, reason=_MISSING[missing]))
                 continue
-            violations = list(islice(rule.check(facts), MAX_FINDINGS + 1))
-            findings += [_finding(rule, violation) for violation in violations[:MAX_FINDINGS]]
-            if len(violations) > MAX_FINDINGS:
+            found = list(islice(rule.findings(facts), MAX_FINDINGS + 1))
+            findings += found[:MAX_FINDINGS]
+            if len(found) > MAX_FINDINGS:
                 reason = f"more than {MAX_FINDINGS} findings; only the first are reported"
                 skipped.append(Skipped(code=rule.code, kind="truncated", reason=reason))
         except CannotCheckError as error:
@@ -214,19 +169,3 @@ def _missing_need(rule: Rule, facts: Facts, *, simulate: bool) -> Need | None:
         "legs": lambda: not facts.legs,
     }
     return next((need for need in rule.needs if lacks[need]()), None)
-
-
-def _finding(rule: Rule, violation: Violation) -> Finding:
-    return Finding(
-        code=rule.code,
-        name=rule.name,
-        severity=violation.severity or rule.severity,
-        certainty=violation.certainty,
-        subject=violation.subject,
-        message=violation.message,
-        hint=violation.hint or rule.how_to_fix,
-        file=violation.source.file,
-        line=violation.source.line,
-        measured=violation.measured,
-        fix=violation.fix,
-    )

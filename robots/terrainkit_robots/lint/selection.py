@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.lint.rule import Rule, rules
-from terrainkit_robots.lint.runner import Finding, Report, Skipped, is_applicable, lint
+from terrainkit_robots.lint.rule import Finding, Rule, rules
+from terrainkit_robots.lint.runner import Report, Skipped, is_applicable, lint
 from terrainkit_robots.lint.settings import Settings, matching
 from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
 from terrainkit_robots.text import display_path

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.export.canonical import plain_name
 from terrainkit_robots.lint.check import check_robot
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.lint.settings import Settings, read_settings
 from terrainkit_robots.onboarding.folder import check_folder, find_edits, new_folder, write_files
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text

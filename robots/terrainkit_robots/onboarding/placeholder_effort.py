@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.description.model import RobotModel
-    from terrainkit_robots.lint.runner import Finding
+    from terrainkit_robots.lint.rule import Finding
 
 _RULE = "JNT011"
 """The rule that finds placeholder limits."""

@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report
 
 _RULES = ("INR003", "INR004")
 """Rules on the inertia of a single link."""

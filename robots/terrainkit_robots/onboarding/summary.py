@@ -10,7 +10,7 @@ from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.text import count, names
 
 if TYPE_CHECKING:
-    from terrainkit_robots.lint.runner import Finding
+    from terrainkit_robots.lint.rule import Finding
     from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.onboarding.robot_files import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification

@@ -232,10 +232,7 @@ def _changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, An
 
 
 def _level_result(
-    level: int,
-    parameters: dict[str, Any],
-    outcomes: NDArray[np.int8],
-    seconds: NDArray[np.float64],
+    level: int, parameters: dict[str, Any], outcomes: NDArray[np.int8], seconds: NDArray[np.float64]
 ) -> LevelResult:
     success, interval = _success(outcomes)
     return LevelResult(

@@ -11,13 +11,12 @@ import numpy as np
 from terrainkit.views.viewer import add_checkbox
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Source
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.viewer.robot_scene import RobotScene, body_node
 
 if TYPE_CHECKING:
     import viser
-
-    from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 _SEVERITY_COLORS = {"error": (200, 40, 40), "warning": (215, 130, 0), "info": (60, 110, 190)}
 
@@ -96,7 +95,8 @@ class JointSliders:
                 return
             values = {name: self.sliders[name].value}
             if self.mirrored.value and name in self._mirror:
-                values = mirrored_position(self._mirror[name], values[name]) | values
+                image = self._mirror[name]
+                values = {image.joint: image.sign * values[name]} | values
             self._assign(values)
 
     def _assign(self, values: Mapping[str, float]) -> None:
@@ -108,11 +108,6 @@ class JointSliders:
                 slider.value = min(max(values[name], slider.min), slider.max)
             self._is_updating = False
             self._set_positions({name: slider.value for name, slider in self.sliders.items()})
-
-
-def mirrored_position(image: "MirrorJoint", position: float) -> dict[str, float]:
-    """Return the position of the mirror image of a joint [rad] or [m], by its name."""
-    return {image.joint: image.sign * position}
 
 
 def slider_range(joint: Joint, position: float) -> tuple[float, float]:

@@ -8,7 +8,9 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.runner import Finding, Report, Skipped
+from terrainkit_robots.description.model import Source
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report, Skipped
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.onboarding.equivalence import Equivalence
 from terrainkit_robots.onboarding.report_md import report_markdown
@@ -70,7 +72,7 @@ def make_result(facts, **changes):
     return OnboardResult(**fields | changes)
 
 
-def finding(**changes):
+def finding(file="robot.urdf", **changes):
     fields = {
         "code": "INR002",
         "name": "negative-mass",
@@ -79,8 +81,7 @@ def finding(**changes):
         "subject": "calf",
         "message": "the mass is -1 kg",
         "hint": "Weigh it.",
-        "file": Path("robot.urdf"),
-        "line": 12,
+        "source": Source(file=Path(file), line=12),
     }
     return Finding(**fields | changes)
 

@@ -163,9 +163,7 @@ def merge_bodies(tree: Tree) -> tuple[Body, ...]:
     return tuple(
         Body(
             index=index,
-            parent=frame.parent,
-            joint=frame.joint,
-            origin=frame.origin,
+            **vars(frame),
             zero_pose=zero_pose,
             links=tuple(tree.links[name] for name in poses),
             poses=tuple(poses.values()),
@@ -182,3 +180,14 @@ def physical_parent(bodies: Sequence[Body], body: Body) -> Body | None:
     while parent is not None and bodies[parent].virtual:
         parent = bodies[parent].parent
     return None if parent is None else bodies[parent]
+
+
+def center_of_mass(bodies: Sequence[Body], poses: Sequence[Matrix]) -> Matrix:
+    """Return the center of mass in the frame of the poses, shape (3,) [m]."""
+    total = sum(body.mass for body in bodies)
+    if total <= 0:
+        return poses[0][:3, 3]
+    centers = [pose[:3, :3] @ b.center + pose[:3, 3] for b, pose in zip(bodies, poses, strict=True)]
+    return np.asarray(
+        sum((b.mass * c for b, c in zip(bodies, centers, strict=True)), np.zeros(3)) / total
+    )

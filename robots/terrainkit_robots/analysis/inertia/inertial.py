@@ -1,4 +1,4 @@
-"""Check the inertials of links."""
+"""Check the inertials of links, and find where they are written."""
 
 from collections.abc import Iterable, Iterator
 
@@ -6,7 +6,17 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA, MIN_INERTIA
-from terrainkit_robots.description.model import Link
+from terrainkit_robots.description.model import Link, Source
+
+
+def mass_source(link: Link) -> Source:
+    """Return where the mass of a link is written, or the link itself without one."""
+    return (link.inertial or link).source
+
+
+def inertia_source(link: Link) -> Source:
+    """Return where the inertia of a link is written, or the link itself without one."""
+    return (link.inertial and link.inertial.inertia_source) or mass_source(link)
 
 
 def max_inertia(link: Link) -> float:

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from terrainkit_robots.analysis.bodies.bodies import center_of_mass
 from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
@@ -40,8 +40,7 @@ def keyframe_defect(robot: LegModel) -> str:
     if not has_leg_positions(robot) or not robot.legs:
         return ""
     positions = {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
-    followers = {name: float(q) for name, q in mimic_positions(robot.joints, positions).items()}
-    poses = body_poses(robot.bodies, positions | followers)
+    poses = body_poses(robot.bodies, positions)
     lowest = {
         body.index: min(min_height(shape, pose, robot.meshes) for shape in body.collisions)
         for body, pose in zip(robot.bodies, poses, strict=True)
@@ -70,12 +69,9 @@ def keyframe_defect(robot: LegModel) -> str:
 
 def _com_offset(robot: LegModel, poses: Sequence[Matrix]) -> float:
     """Return how far the center of mass is outside of the rectangle around the feet [m]."""
-    masses = np.array([body.mass for body in robot.bodies])
-    pairs = zip(robot.bodies, poses, strict=True)
-    centers = np.array([pose[:3, :3] @ body.center + pose[:3, 3] for body, pose in pairs])
     feet = [leg.limb.chain[-1] for leg in robot.legs]
     points = np.concatenate([contact_points(robot.bodies[i], poses[i], robot.meshes) for i in feet])
-    com = masses @ centers / masses.sum()
+    com = center_of_mass(robot.bodies, poses)
     outside = np.maximum(points.min(axis=0) - com, com - points.max(axis=0))[:2]
     return float(outside.max(initial=0.0)) if np.isfinite(com).all() else 0.0
 

@@ -90,10 +90,7 @@ class Limb(Chain):
 
 
 def detect_limbs(
-    tree: Tree,
-    bodies: Sequence[Body],
-    actuated: Sequence[Joint],
-    meshes: Meshes,
+    tree: Tree, bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes
 ) -> tuple[Limb, ...]:
     """Return the limbs of a robot in the order of its bodies.
 
@@ -163,11 +160,7 @@ def _length(limb: Chain, start: int) -> float:
     return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
 
 
-def _leaves(
-    bodies: Sequence[Body],
-    actuated: Sequence[Joint],
-    meshes: Meshes,
-) -> list[Chain]:
+def _leaves(bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes) -> list[Chain]:
     parents = {body.parent for body in bodies}
     actuated_ids = {id(joint) for joint in actuated}
     leaves = []
@@ -178,10 +171,8 @@ def _leaves(
         moving = [i for i in chain if (j := bodies[i].joint) is not None and j.moves]
         joints = [j for i in moving if (j := bodies[i].joint) is not None]
         # A wheel at the end does not bend the limb.
-        bending = (
-            joints[:-1] if joints and _is_continuous_wheel(bodies[moving[-1]], meshes) else joints
-        )
-        driven = sum(id(joint) in actuated_ids for joint in bending)
+        has_wheel = bool(joints) and _is_continuous_wheel(bodies[moving[-1]], meshes)
+        driven = sum(id(joint) in actuated_ids for joint in joints[: len(joints) - has_wheel])
         if len(joints) <= _MAX_JOINTS and driven >= 2:
             tip = contact_points(body, body.zero_pose, meshes).mean(axis=0)
             points = [joint_axis(bodies[i], bodies[i].zero_pose)[0] for i in moving]
@@ -244,14 +235,7 @@ def _make_limb(
     is_finger = any(_HAND_NAME.search(link.name.lower()) for link in bodies[0].links)
     is_other = other_names > leg_names or (is_finger and not leg_names)
     score += 0.5 if leg_names > other_names else -1.0 if is_other else 0.0
-    return Limb(
-        chain=leaf.chain,
-        joints=leaf.joints,
-        points=leaf.points,
-        tip=leaf.tip,
-        score=score,
-        has_leg_names=leg_names > other_names,
-    )
+    return Limb(**vars(leaf), score=score, has_leg_names=leg_names > other_names)
 
 
 def _is_mirror_image(one: Chain, other: Chain, size: float) -> bool:

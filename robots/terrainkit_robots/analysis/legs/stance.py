@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass
 from terrainkit_robots.analysis.bodies.contact import contact_points, convex_hull, margin
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import min_height
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
-from terrainkit_robots.analysis.legs.standing_pose import center_of_mass
 from terrainkit_robots.transforms import Matrix
 
 GRAVITY = 9.81

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass
 from terrainkit_robots.analysis.bodies.contact import contact_points, flat_foot_angle
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis, joint_motion
-from terrainkit_robots.analysis.bodies.mimic_joints import mimic_positions
 from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
@@ -77,7 +76,8 @@ _MIN_KNEE_HEIGHT = 0.15
 def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
     """Return the position of each moving joint in the standing pose [rad] or [m], by name.
 
-    A keyframe in which the robot stands on its feet is used unchanged.
+    A keyframe in which the robot stands on its feet is used unchanged. Mimic joints are treated as
+    if they were free.
     """
     if is_standing_keyframe(robot):
         return {joint.name: robot.keyframe.get(joint.name, 0.0) for joint in robot.joints}
@@ -96,9 +96,7 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
             positions |= solution
             if mirror_leg is not None:
                 positions |= _mirror_solution(solution, leg, mirror_leg, signs)
-    positions = {joint.name: round_position(joint, positions[joint.name]) for joint in robot.joints}
-    mimicked = mimic_positions(robot.joints, positions)
-    return positions | {name: float(position) for name, position in mimicked.items()}
+    return {joint.name: round_position(joint, positions[joint.name]) for joint in robot.joints}
 
 
 def round_position(joint: Joint, position: float) -> float:
@@ -169,17 +167,6 @@ def _foot_shift(robot: LegModel, positions: Mapping[str, float]) -> Matrix:
     offset = (center - np.mean(hips, axis=0)) * [1, 1, 0]
     limit = _MAX_FOOT_OFFSET * float(np.mean([leg.length for leg in robot.legs]))
     return np.asarray(offset * min(1.0, limit / max(float(np.linalg.norm(offset)), 1e-9)))
-
-
-def center_of_mass(bodies: Sequence[Body], poses: Sequence[Matrix]) -> Matrix:
-    """Return the center of mass in the frame of the poses, shape (3,) [m]."""
-    total = sum(body.mass for body in bodies)
-    if total <= 0:
-        return poses[0][:3, 3]
-    centers = [pose[:3, :3] @ b.center + pose[:3, 3] for b, pose in zip(bodies, poses, strict=True)]
-    return np.asarray(
-        sum((b.mass * c for b, c in zip(bodies, centers, strict=True)), np.zeros(3)) / total
-    )
 
 
 def _hip_point(leg: Leg, robot: LegModel, poses: Sequence[Matrix]) -> Matrix:

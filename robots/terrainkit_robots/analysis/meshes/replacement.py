@@ -1,9 +1,6 @@
-"""Make the contents of the files that replace a mesh: a binary copy, a hull, a simplified mesh.
+"""Make the contents of the files that replace a mesh: a binary copy, a hull, a simplified mesh."""
 
-Each function returns a function, because the content is only computed when a fix is applied.
-"""
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from terrainkit_robots.analysis.meshes.uses import MeshUse, UsedMesh
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
@@ -35,25 +32,20 @@ def has_hull(meshes: Meshes, uses: Sequence[MeshUse]) -> bool:
         return False
 
 
-def stl_or_hull(used: UsedMesh) -> Callable[[], bytes]:
+def stl_or_hull(used: UsedMesh) -> bytes:
     """Return the mesh as binary STL, or its convex hull if the mesh is too dense to collide."""
-
-    def convert() -> bytes:
-        if used.meshes.faces(used.mesh.path) > MAX_COLLISION_FACES:
-            return hull_stl(used)()
-        return binary_stl(used.meshes.surface(used.mesh.path))
-
-    return convert
+    is_dense = used.meshes.faces(used.mesh.path) > MAX_COLLISION_FACES
+    return hull_stl(used) if is_dense else binary_copy(used)
 
 
-def hull_stl(used: UsedMesh) -> Callable[[], bytes]:
+def hull_stl(used: UsedMesh) -> bytes:
     """Return the convex hull as binary STL."""
-    return lambda: binary_stl(used.meshes.hull(used.mesh.path, _HULL_VERTICES))
+    return binary_stl(used.meshes.hull(used.mesh.path, _HULL_VERTICES))
 
 
-def binary_copy(used: UsedMesh) -> Callable[[], bytes]:
+def binary_copy(used: UsedMesh) -> bytes:
     """Return the mesh as binary STL."""
-    return lambda: binary_stl(used.meshes.surface(used.mesh.path))
+    return binary_stl(used.meshes.surface(used.mesh.path))
 
 
 def count_faces(used: UsedMesh) -> int | None:
@@ -68,20 +60,16 @@ def count_faces(used: UsedMesh) -> int | None:
         return None
 
 
-def simplified_stl(used: UsedMesh) -> Callable[[], bytes]:
+def simplified_stl(used: UsedMesh) -> bytes:
     """Return the mesh with fewer faces, as binary STL."""
-
-    def simplify() -> bytes:
-        surface = used.meshes.surface(used.mesh.path)
-        cells = _INITIAL_CELLS
-        while True:
-            coarse = cluster_vertices(surface, cells)
-            if not len(coarse.faces):
-                raise MeshError("has no faces left after its vertices are merged")
-            share = _SIMPLIFIED_FACES / len(coarse.faces)
-            if share >= 1:
-                return binary_stl(coarse)
-            # The number of faces grows with the square of the number of cells.
-            cells = max(1, int(cells * min(0.9, share**0.5)))
-
-    return simplify
+    surface = used.meshes.surface(used.mesh.path)
+    cells = _INITIAL_CELLS
+    while True:
+        coarse = cluster_vertices(surface, cells)
+        if not len(coarse.faces):
+            raise MeshError("has no faces left after its vertices are merged")
+        share = _SIMPLIFIED_FACES / len(coarse.faces)
+        if share >= 1:
+            return binary_stl(coarse)
+        # The number of faces grows with the square of the number of cells.
+        cells = max(1, int(cells * min(0.9, share**0.5)))

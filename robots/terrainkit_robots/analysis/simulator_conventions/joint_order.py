@@ -22,7 +22,7 @@ If these possibilities lead to different orders for a robot, its order has to be
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import cached_property
@@ -82,20 +82,7 @@ def simulator_orders(
         fixed: The fixed joints of the main tree.
     """
     robot = _Robot(model=model, tree=tree, bodies=bodies, fixed=fixed)
-    found = []
-    for simulator in SIMULATORS:
-        joints, bodies_in_order = robot.default_order(simulator)
-        certain, reason = robot.certainty(simulator)
-        found.append(
-            SimulatorOrder(
-                simulator=simulator,
-                joints=joints,
-                bodies=bodies_in_order,
-                certain=certain,
-                reason=reason,
-            )
-        )
-    return tuple(found)
+    return tuple(map(robot.order, SIMULATORS))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -111,8 +98,15 @@ class _Robot:
     def is_urdf(self) -> bool:
         return self.model.kind != "mjcf"
 
-    def default_order(self, simulator: Simulator) -> tuple[_Names, _Names]:
-        """Return the likely order of joints and bodies."""
+    def order(self, simulator: Simulator) -> SimulatorOrder:
+        """Return the likely order of joints and bodies, and whether it is certain."""
+        joints, bodies = self._default_order(simulator)
+        certain, reason = self._certainty(simulator)
+        return SimulatorOrder(
+            simulator=simulator, joints=joints, bodies=bodies, certain=certain, reason=reason
+        )
+
+    def _default_order(self, simulator: Simulator) -> tuple[_Names, _Names]:
         if not self.bodies:
             return (), ()
         key: _Key | None = None
@@ -130,7 +124,7 @@ class _Robot:
             tuple(name for name in body_names if name not in virtual),
         )
 
-    def certainty(self, simulator: Simulator) -> tuple[bool, str]:
+    def _certainty(self, simulator: Simulator) -> tuple[bool, str]:
         """Return whether the order of the joints is known, and the reason."""
         if self.tree.rejected:
             return False, "links or joints are missing from the tree"
@@ -146,32 +140,19 @@ class _Robot:
                     "older versions are breadth first"
                 )
             case "Isaac Lab":
-                if self._is_unique(_breadth_first, (None, self._file_index, _joint_name)):
-                    return True, f"breadth first; {_SAME_ORDER}"
-                likely = (
-                    "siblings by the name of the joint, as in importers up to Isaac Sim 5.1"
-                    if self.is_urdf
-                    else "siblings as in the file"
-                )
-                return False, f"breadth first, {likely}; compare with robot.joint_names"
+                traverse, first, keys = _breadth_first, "breadth first", [_joint_name]
+                known, names = "in importers up to Isaac Sim 5.1", "robot.joint_names"
             case "Isaac Gym":
-                keys = (None, self._file_index, _joint_name, _link_name)
-                if self._is_unique(_depth_first, keys):
-                    return True, f"depth first; {_SAME_ORDER}"
-                likely = (
-                    "siblings by the name of the joint, as in the lists published for A1 and Go1"
-                    if self.is_urdf
-                    else "siblings as in the file"
-                )
-                return (
-                    False,
-                    f"depth first, {likely}; compare with gym.get_asset_dof_names(asset)",
-                )
+                traverse, first, keys = _depth_first, "depth first", [_joint_name, _link_name]
+                known = "in the lists published for A1 and Go1"
+                names = "gym.get_asset_dof_names(asset)"
+        if self._is_unique(traverse, (None, self._file_index, *keys)):
+            return True, f"{first}; {_SAME_ORDER}"
+        likely = f"by the name of the joint, as {known}" if self.is_urdf else "as in the file"
+        return False, f"{first}, siblings {likely}; compare with {names}"
 
     def _is_unique(
-        self,
-        traverse: Callable[[_ChildJoints, str], Iterator[Joint]],
-        keys: Sequence[_Key | None],
+        self, traverse: Callable[[_ChildJoints, str], Iterator[Joint]], keys: Sequence[_Key | None]
     ) -> bool:
         """Return whether all sibling orders and merges lead to the same order of the joints."""
         if any(body.virtual for body in self.bodies):
@@ -199,26 +180,15 @@ class _Robot:
             if (i := self.tree.links[joint.child].inertial) is None or not i.mass
         }
         collapsed = {joint for joint in self.fixed if not joint.dont_collapse}
-        for merged in _unique([set(self.fixed), collapsed, massless, set[Joint]()]):
-            yield self._merge(merged)
+        yield from map(self._merge, {frozenset(x) for x in (self.fixed, collapsed, massless, ())})
 
     def _merge(self, merged: AbstractSet[Joint]) -> MergedTree:
         return merge_joints(self.tree, self.bodies, merged)
 
-    def _file_index(self, joint: Joint) -> int:
-        return self._file_indices[joint]
-
     @cached_property
-    def _file_indices(self) -> dict[Joint, int]:
-        return {joint: index for index, joint in enumerate(self.model.joints)}
-
-
-def _unique(sets: Iterable[set[Joint]]) -> list[set[Joint]]:
-    found: list[set[Joint]] = []
-    for each in sets:
-        if each not in found:
-            found.append(each)
-    return found
+    def _file_index(self) -> _Key:
+        """Return the index of a joint in the file."""
+        return {joint: index for index, joint in enumerate(self.model.joints)}.__getitem__
 
 
 def _sort_siblings(tree: MergedTree, key: _Key | None) -> _ChildJoints:
@@ -246,14 +216,11 @@ def _breadth_first(child_joints: _ChildJoints, base: str) -> Iterator[Joint]:
         level = [joint for parent in level for joint in child_joints[parent.child]]
 
 
-def _joint_name(joint: Joint) -> object:
-    return _usd_name(joint.name)
+def _joint_name(joint: Joint) -> str:
+    """Return the name of a joint in USD: only letters, digits and underscores."""
+    return re.sub(r"[^A-Za-z0-9_]", "_", joint.name)
 
 
-def _link_name(joint: Joint) -> object:
-    return _usd_name(joint.child)
-
-
-def _usd_name(name: str) -> str:
-    """Return a valid name of USD: only letters, digits and underscores."""
-    return re.sub(r"[^A-Za-z0-9_]", "_", name)
+def _link_name(joint: Joint) -> str:
+    """Return the name of the link below a joint in USD."""
+    return re.sub(r"[^A-Za-z0-9_]", "_", joint.child)

@@ -42,8 +42,7 @@ _MIN_PARALLEL_COSINE = 0.9
 class Misalignment:
     """A pair of joints that are not mirror images."""
 
-    left: MirrorSide
-    right: MirrorSide
+    pair: MirrorPair
 
     is_axis: bool
     """Whether the declared axes differ; otherwise the origins do."""
@@ -80,7 +79,7 @@ def find_misalignments(
             misalignment = _misalignment(mirror, pair, pair_of.get(left.body.parent or 0))
             if misalignment is None:
                 continue
-            displaced |= {misalignment.left.body.index, misalignment.right.body.index}
+            displaced |= misalignment.pair.indices
             if misalignment.distance and _is_half_rotation(left, right):
                 continue
             # The zero of many arm joints is that of the motor, which differs from left to right.
@@ -118,15 +117,13 @@ def _misalignment(
         is_same_length = abs(lengths[0] - lengths[1]) <= tolerance
         if parents is not None and is_same_length and _is_rotated(mirror, parents, angle):
             # The same distance in another direction: the frame of the parent joint is rotated.
-            return Misalignment(
-                left=parents.left, right=parents.right, is_axis=False, distance=0.0, angle=angle
-            )
-        return Misalignment(left=left, right=right, is_axis=False, distance=distance, angle=0.0)
+            return Misalignment(pair=parents, is_axis=False, distance=0.0, angle=angle)
+        return Misalignment(pair=pair, is_axis=False, distance=distance, angle=0.0)
     angle = math.acos(min(1.0, abs(float(mirror.image(left.axis) @ right.axis))))
     if angle > MAX_AXIS_ERROR:
         declared = [np.abs(joint.joint.direction) for joint in (left, right)]
         is_axis = bool(np.abs(declared[0] - declared[1]).max() > math.sin(MAX_AXIS_ERROR))
-        return Misalignment(left=left, right=right, is_axis=is_axis, distance=0.0, angle=angle)
+        return Misalignment(pair=pair, is_axis=is_axis, distance=0.0, angle=angle)
     return None
 
 
@@ -198,10 +195,7 @@ def find_flipped_joints(legs: Sequence[Leg], bodies: Sequence[Body]) -> Iterator
 
 
 def find_flipped_pairs(
-    legs: Sequence[Leg],
-    mirror: Mirror,
-    pairs: Sequence[MirrorPair],
-    leg_bodies: Collection[int],
+    legs: Sequence[Leg], mirror: Mirror, pairs: Sequence[MirrorPair], leg_bodies: Collection[int]
 ) -> Iterator[tuple[MirrorPair, int]]:
     """Yield the pairs of a biped with opposite axes if all comparable pairs have equal axes.
 

@@ -12,9 +12,7 @@ from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 
 def mirror_map(
-    bodies: Sequence[Body],
-    actuated: Sequence[Joint],
-    mirror: Mirror,
+    bodies: Sequence[Body], actuated: Sequence[Joint], mirror: Mirror
 ) -> dict[str, MirrorJoint]:
     """Return the mirrored joint of each actuated joint that has one, by name.
 

@@ -53,9 +53,7 @@ class MirrorPair:
 
 
 def mirror_pairs(
-    bodies: Sequence[Body],
-    mirror: Mirror,
-    leg_bodies: Collection[int],
+    bodies: Sequence[Body], mirror: Mirror, leg_bodies: Collection[int]
 ) -> tuple[MirrorPair, ...]:
     """Return the pairs of mirrored joints, parents first.
 
@@ -101,8 +99,7 @@ def _mirror_joint(bodies: Sequence[Body], mirror: Mirror, index: int) -> MirrorS
 
 
 def outlier_first(
-    left: MirrorSide,
-    right: MirrorSide,
+    pair: MirrorPair,
     value: Callable[[Body], Matrix | None],
     bodies: Sequence[Body],
     legs: Sequence[Leg],
@@ -113,15 +110,15 @@ def outlier_first(
     The right joint is first if there are no other legs to compare with.
 
     Args:
-        left: The left joint.
-        right: The right joint.
+        pair: The joints.
         value: The property in which the two differ. Signs count less than magnitudes, because they
             differ between front and rear for good reason.
         bodies: The bodies, the trunk first.
         legs: The legs of the robot.
         mirror: The mirror plane.
     """
-    siblings = _sibling_bodies(legs, {left.body.index, right.body.index})
+    left, right = pair.left, pair.right
+    siblings = _sibling_bodies(legs, pair.indices)
     left_bodies = {pair.left for pair in mirror.pairs}
     right_bodies = {pair.right for pair in mirror.pairs}
 

@@ -20,7 +20,8 @@ from terrainkit_robots.description.fix import Edit, Fix, InsertChild, ReplaceByt
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import read_bytes
 from terrainkit_robots.lint.fixes.edits import EditedBytes, EditError
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.text import display_path
 

@@ -50,10 +50,6 @@ class EditedBytes:
         self._replacements: list[_Replacement] = []
         self._locks: list[tuple[int, int]] = []
 
-    def add(self, edits: Sequence[Edit]) -> None:
-        """Apply all of `edits`, or none; see `prepare`."""
-        self.apply(self.prepare(edits))
-
     def prepare(self, edits: Sequence[Edit]) -> tuple[_Replacement, ...]:
         """Return the replacements that `apply` needs for `edits`, without applying them.
 

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 
 from terrainkit_robots.lint.report.escape import escape_surrogates
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.text import display_path
 
 _LEVELS = {"error": "error", "warning": "warning", "info": "notice"}

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence, Set
 from dataclasses import dataclass
 
 from terrainkit_robots.description.model import RobotModel
-from terrainkit_robots.lint.runner import Finding
+from terrainkit_robots.lint.rule import Finding
 
 _MAX_LISTED = 12
 """Maximum number of elements that the list of a group shows."""

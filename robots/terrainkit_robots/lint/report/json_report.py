@@ -7,7 +7,8 @@ from typing import Any
 
 from terrainkit_robots.lint.report.escape import escape_surrogates
 from terrainkit_robots.lint.report.facts_json import facts_json
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.text import display_path
 
 SCHEMA_VERSION = 1

@@ -9,8 +9,8 @@ from urllib.parse import quote_from_bytes
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import to_json
 from terrainkit_robots.lint.report.summary import SEVERITY_LABELS
-from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
-from terrainkit_robots.lint.runner import Finding, Report, Skipped
+from terrainkit_robots.lint.rule import FAMILIES, Finding, Rule, rules
+from terrainkit_robots.lint.runner import Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import display_path
 
@@ -38,7 +38,8 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
         results += [_result(finding, index) for finding in report.findings]
         for skipped in report.skipped:
             if isinstance(skipped, Suppressed):
-                results.append(_suppressed_result(skipped, index))
+                source = {"kind": "inSource", "justification": skipped.comment.reason}
+                results.append({**_result(skipped.finding, index), "suppressions": [source]})
             else:
                 notifications.append(_notification(skipped, report.facts.model.file))
     driver = {"name": "terrainkit", "version": __version__, "rules": [_rule(r) for r in rules()]}
@@ -86,11 +87,6 @@ def _properties(finding: Finding) -> Iterator[tuple[str, Any]]:
     if finding.fix is not None:
         # SARIF's own `fix` contains bytes of the file, which a report does not read.
         yield "fix", {"safety": finding.fix.safety, "description": finding.fix.description}
-
-
-def _suppressed_result(suppressed: Suppressed, index: dict[str, int]) -> dict[str, Any]:
-    suppression = {"kind": "inSource", "justification": suppressed.comment.reason}
-    return {**_result(suppressed.finding, index), "suppressions": [suppression]}
 
 
 def _notification(skipped: Skipped, file: Path) -> dict[str, Any]:

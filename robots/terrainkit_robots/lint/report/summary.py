@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from terrainkit_robots.lint.report.grouping import group_findings
-from terrainkit_robots.lint.rule import Severity
-from terrainkit_robots.lint.runner import Finding, Report, SkipKind, Skipped
+from terrainkit_robots.lint.rule import Finding, Severity
+from terrainkit_robots.lint.runner import Report, SkipKind, Skipped
 from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import count, display_path, names
 

@@ -18,8 +18,8 @@ from terrainkit_robots.lint.report.summary import (
     summarize_findings,
     summarize_fixes,
 )
-from terrainkit_robots.lint.rule import Severity
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding, Severity
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.text import count, display_path
 
 DEFAULT_WIDTH = 100

@@ -38,7 +38,7 @@ def repaired(tmp_path):
         fix = facts.inertia_repair.fix(facts.tree.links[link])
         assert fix is not None
         edited = EditedBytes(path.read_bytes())
-        edited.add(fix.edits)
+        edited.apply(edited.prepare(fix.edits))
         data = edited.result()
         model = mujoco.MjModel.from_xml_string(data.decode())
         body = model.body(link)

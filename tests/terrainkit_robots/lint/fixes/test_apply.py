@@ -17,7 +17,8 @@ from terrainkit_robots.description.fix import (
 )
 from terrainkit_robots.description.model import RobotModel, Source
 from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff, write_fixes
-from terrainkit_robots.lint.runner import Finding, Report
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.mesh.mesh_cache import MeshError
 
 ROBOT = """<robot name="r">
@@ -43,8 +44,7 @@ def finding(subject, message, file, *edits, safety="safe"):
         subject=subject,
         message=message,
         hint="",
-        file=file,
-        line=0,
+        source=Source(file=file, line=0),
         fix=fix,
     )
 

@@ -42,7 +42,7 @@ def child(element, xml, *, first=False):
 
 def edit_bytes(data, edits):
     edited = EditedBytes(data)
-    edited.add(edits)
+    edited.apply(edited.prepare(edits))
     return edited.result()
 
 
@@ -336,25 +336,25 @@ class TestSuccessiveFixes:
     )
     def test_later_overlapping_fix_is_rejected(self, one, other):
         text = EditedBytes(self.TEXT)
-        text.add([one])
+        text.apply(text.prepare([one]))
         alone = text.result()
         with pytest.raises(EditError, match="another fix"):
-            text.add([set_to(0, "unrelated", "1"), other])
+            text.apply(text.prepare([set_to(0, "unrelated", "1"), other]))
         assert text.result() == alone != self.TEXT
 
     def test_separate_fixes_are_applied(self):
         text = EditedBytes(self.TEXT)
-        text.add([set_to(1, "x", "1")])
-        text.add([set_to(2, "z", "1")])
-        text.add([removed(3)])
-        text.add([child(0, "<n/>", first=True)])
+        text.apply(text.prepare([set_to(1, "x", "1")]))
+        text.apply(text.prepare([set_to(2, "z", "1")]))
+        text.apply(text.prepare([removed(3)]))
+        text.apply(text.prepare([child(0, "<n/>", first=True)]))
         assert text.result() == b'<r>\n  <n/>\n  <a x="1" y="0"><b z="1"/></a>\n</r>'
 
     def test_many_fixes_are_fast(self):
         count = 20_000
         text = EditedBytes(b"<r>" + b"<a/>\n" * count + b"</r>")
         for index in range(count, 0, -1):
-            text.add([set_to(index, "x", "1")])
+            text.apply(text.prepare([set_to(index, "x", "1")]))
         assert text.result() == b"<r>" + b'<a x="1"/>\n' * count + b"</r>"
 
 

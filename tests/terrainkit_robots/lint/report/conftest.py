@@ -7,7 +7,8 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import RobotModel, Source
-from terrainkit_robots.lint.runner import Finding, Report, Skipped
+from terrainkit_robots.lint.rule import Finding
+from terrainkit_robots.lint.runner import Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.lint.suppressions import read_comments
 
@@ -26,14 +27,15 @@ def model():
 
 @pytest.fixture
 def finding():
-    def make(code="INR002", name="negative-mass", severity="error", **changes):
+    def make(
+        code="INR002", name="negative-mass", severity="error", file="robot.urdf", line=12, **changes
+    ):
         fields = {
             "certainty": "proven",
             "subject": "calf",
             "message": "the mass is -1 kg; expected > 0",
             "hint": "Weigh it.",
-            "file": Path("robot.urdf"),
-            "line": 12,
+            "source": Source(file=Path(file), line=line),
             "measured": {"mass": -1.0},
         }
         return Finding(code=code, name=name, severity=severity, **fields | changes)

@@ -45,7 +45,7 @@ LIFT = """
 
 
 def check(code, path):
-    return list(get_rule(code).check(Facts(load_robot(path))))
+    return list(get_rule(code).findings(Facts(load_robot(path))))
 
 
 @pytest.fixture

@@ -21,11 +21,11 @@ def check(path):
     """Return code, severity and subject of the errors and warnings of the JNT rules."""
     facts = Facts(load_robot(path))
     return [
-        (rule.code, violation.severity or rule.severity, violation.subject)
+        (rule.code, violation.severity, violation.subject)
         for rule in rules()
         if rule.family == "JNT" and (facts.legs or "legs" not in rule.needs)
-        for violation in rule.check(facts)
-        if (violation.severity or rule.severity) != "info"
+        for violation in rule.findings(facts)
+        if violation.severity != "info"
     ]
 
 
@@ -85,7 +85,7 @@ def messages(tmp_path, code, text):
     """Return the messages of one rule."""
     path = tmp_path / "r.urdf"
     path.write_text(text)
-    return [violation.message for violation in get_rule(code).check(Facts(load_robot(path)))]
+    return [violation.message for violation in get_rule(code).findings(Facts(load_robot(path)))]
 
 
 @pytest.mark.parametrize(("count", "listed"), [(1, "a"), (2, "a, b")])

@@ -16,7 +16,7 @@ def check(path, text=None):
         (rule.code, violation.subject)
         for rule in rules()
         if rule.family == "SYM"
-        for violation in rule.check(facts)
+        for violation in rule.findings(facts)
     ]
 
 

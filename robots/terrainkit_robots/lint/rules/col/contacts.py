@@ -24,7 +24,7 @@ def _disabled_shapes(body: Body) -> list[BodyShape]:
     ]
 
 
-@rule("COL001", "no-foot-collision", "error", needs=("legs",))
+@rule("COL001", "no-foot-collision", "error", needs=("legs",), certainty="likely")
 def no_foot_collision(robot: Facts) -> Violations:
     """A foot has no collision shape.
 
@@ -49,10 +49,8 @@ def no_foot_collision(robot: Facts) -> Violations:
             shapes = f"0, and those of {body.top.name} end above it"
         if shapes:
             yield Violation(
-                subject=leg.foot,
-                source=robot.tree.links[leg.foot].source,
+                element=robot.tree.links[leg.foot],
                 message=f"collision shapes of foot {leg.foot}: got {shapes}; expected 1 or more",
-                certainty="likely",
             )
 
 
@@ -67,7 +65,7 @@ def _is_visual_only(leg: Leg, body: Body, robot: Facts) -> bool:
     return floor > float(position[2])
 
 
-@rule("COL002", "no-trunk-collision", "warning", needs=("legs",))
+@rule("COL002", "no-trunk-collision", "warning", needs=("legs",), certainty="likely")
 def no_trunk_collision(robot: Facts) -> Violations:
     """The trunk has no collision shape.
 
@@ -91,12 +89,10 @@ def no_trunk_collision(robot: Facts) -> Violations:
     if colliding:
         trunk = robot.bodies[0]
         yield Violation(
-            subject=trunk.name,
-            source=robot.tree.links[trunk.name].source,
+            element=robot.tree.links[trunk.name],
             severity="info" if colliding <= {leg.limb.chain[-1] for leg in robot.legs} else None,
             message=f"collision shapes of trunk {trunk.name} and all other bodies outside of the "
             "legs: got 0; expected 1 or more",
-            certainty="likely",
         )
 
 
@@ -119,15 +115,13 @@ def no_collision(robot: Facts) -> Violations:
         if robot.model.kind == "mjcf":
             severity = "info"
         yield Violation(
-            subject=robot.model.title,
-            source=robot.model.source,
             severity=None if robot.legs else severity,
             message=f"collision shapes of {count(len(robot.links), 'link')}: got 0; expected 1 or "
             "more",
         )
 
 
-@rule("COL007", "foot-contacts-disabled", "error", needs=("legs",))
+@rule("COL007", "foot-contacts-disabled", "error", needs=("legs",), certainty="likely")
 def foot_contacts_disabled(robot: Facts) -> Violations:
     """The contacts of a foot are disabled.
 
@@ -163,5 +157,4 @@ def foot_contacts_disabled(robot: Facts) -> Violations:
             source=placed.geometry.source,
             message=f"contacts of the {placed.geometry.shape} of {placed.link}, the lowest shape "
             "of a leg: got contype 0 and conaffinity 0; expected one of them above 0",
-            certainty="likely",
         )

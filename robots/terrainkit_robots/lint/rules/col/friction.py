@@ -14,7 +14,7 @@ _MIN_FRICTION, _MAX_FRICTION = 0.1, 10.0
 feet."""
 
 
-@rule("COL008", "foot-friction", "warning", needs=("legs",))
+@rule("COL008", "foot-friction", "warning", needs=("legs",), certainty="likely")
 def foot_friction(robot: Facts) -> Violations:
     """The friction of a foot is implausible, or differs from that of the other feet.
 
@@ -55,7 +55,6 @@ def foot_friction(robot: Facts) -> Violations:
         yield Violation(
             subject=foot,
             source=geometry.source,
-            certainty="likely",
             message=f"sliding friction of foot {foot}: got {value:g}; {expected}",
             measured={"friction": value},
         )

@@ -108,7 +108,7 @@ def _group_by_pair(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, 
     return by_pair
 
 
-@rule("COL006", "overlap-in-range", "info")
+@rule("COL006", "overlap-in-range", "info", certainty="likely")
 def overlap_in_range(robot: Facts) -> Violations:
     """Two bodies overlap in a large part of the joint range.
 
@@ -145,6 +145,5 @@ def overlap_in_range(robot: Facts) -> Violations:
                 source=robot.tree.links[pair[0]].source,
                 message=f"part of the joint range in which {pair[0]} and {pair[1]} overlap: got "
                 f"{got}; expected at most {expected}",
-                certainty="likely",
                 measured={"share": share},
             )

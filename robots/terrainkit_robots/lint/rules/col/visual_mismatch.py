@@ -124,7 +124,7 @@ def _difference(a: Geometry, b: Geometry) -> str:
     return f"an angle of {math.degrees(angle):.3g} deg to" if angle > _MAX_ANGLE else ""
 
 
-@rule("COL010", "collision-outside-visual", "warning", needs=("legs",))
+@rule("COL010", "collision-outside-visual", "warning", needs=("legs",), certainty="likely")
 def collision_outside_visual(robot: Facts) -> Violations:
     """Most of a collision shape is outside of the visible robot.
 
@@ -156,7 +156,6 @@ def collision_outside_visual(robot: Facts) -> Violations:
                 yield Violation(
                     subject=shape.link,
                     source=shape.geometry.source,
-                    certainty="likely",
                     message=f"part of the collision {shape.geometry.shape} of link {shape.link} "
                     f"inside of the visible robot: got {share:.0%}; expected at least "
                     f"{_MIN_SHARE_INSIDE:.0%}",

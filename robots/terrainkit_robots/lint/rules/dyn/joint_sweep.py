@@ -15,7 +15,7 @@ _FULL_RANGE_SHARE = 0.99
 """Usable share of the joint range from which a joint reaches its limits."""
 
 
-@rule("DYN003", "unreachable-limits", "info", needs=("simulation",))
+@rule("DYN003", "unreachable-limits", "info", needs=("simulation",), certainty="likely")
 def unreachable_limits(robot: Facts) -> Violations:
     """A joint does not reach its limits while the others stay at the standing pose.
 
@@ -42,7 +42,6 @@ def unreachable_limits(robot: Facts) -> Violations:
                 subject=result.joint,
                 source=sources.get(result.joint, robot.model.source),
                 severity="warning",
-                certainty="likely",
                 message=message,
                 measured={"share": round(result.share, 3), "load": round(result.load, 4)},
             )
@@ -65,11 +64,7 @@ def unreachable_limits(robot: Facts) -> Violations:
         )
     if parts:
         yield Violation(
-            subject=robot.model.title,
-            source=robot.model.source,
-            certainty="likely",
-            message="; ".join(parts),
-            measured={"short": len(blocked), "weak": len(weak)},
+            message="; ".join(parts), measured={"short": len(blocked), "weak": len(weak)}
         )
 
 

@@ -69,8 +69,6 @@ def unstable_drop(robot: Facts) -> Violations:
     if stable:
         measured["speed_without_self_collision"] = round(without.max_speed, 1)
     yield Violation(
-        subject=robot.model.title,
-        source=robot.model.source,
         severity=_LEVELS[level - with_hulls],
         certainty="likely" if with_hulls else "proven",
         message=f"largest velocity when {start} without torques: got {got}; expected at most "
@@ -90,7 +88,7 @@ def _has_mesh_collision(robot: Facts) -> bool:
     return any(shape.mesh is not None and shape.contacts for shape in shapes)
 
 
-@rule("DYN002", "does-not-stand", "error", needs=("simulation", "legs"))
+@rule("DYN002", "does-not-stand", "error", needs=("simulation", "legs"), certainty="likely")
 def does_not_stand(robot: Facts) -> Violations:
     """The robot does not stand at its standing pose under PD control.
 
@@ -124,10 +122,7 @@ def does_not_stand(robot: Facts) -> Violations:
         level = max(level - 1, 0)
     control = "with locked joints" if locked else "under PD control"
     yield Violation(
-        subject=robot.model.title,
-        source=robot.model.source,
         severity=_LEVELS[level],
-        certainty="likely",
         message=f"standing pose {control}: {'; '.join(assessment.failures)}"
         + ("; without self-collision the robot stands" if stands_without else ""),
         hint=_OVERLAP_HINT if stands_without else "",

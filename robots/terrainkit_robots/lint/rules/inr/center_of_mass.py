@@ -3,9 +3,8 @@
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bounds import half_diagonal
-from terrainkit_robots.analysis.bodies.element_source import mass_source
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass
+from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, mass_source
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import contrast
 from terrainkit_robots.transforms import Matrix

@@ -1,13 +1,12 @@
 """Rule on densities."""
 
-from terrainkit_robots.analysis.bodies.element_source import mass_source
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.density import (
     check_max_density,
     check_min_density,
     has_derived_mass,
 )
-from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass
+from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, mass_source
 from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 

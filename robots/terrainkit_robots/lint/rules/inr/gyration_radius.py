@@ -5,9 +5,12 @@ from dataclasses import replace
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.bounds import half_diagonal
-from terrainkit_robots.analysis.bodies.element_source import inertia_source
 from terrainkit_robots.analysis.facts import Facts, cached_fact
-from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, max_inertia
+from terrainkit_robots.analysis.inertia.inertial import (
+    bodies_with_mass,
+    inertia_source,
+    max_inertia,
+)
 from terrainkit_robots.analysis.inertia.physical import (
     MAX_INERTIA,
     MIN_INERTIA,
@@ -130,7 +133,7 @@ def _report_radius(
 @cached_fact
 def _invalid_bodies(robot: Facts) -> set[str]:
     """Return the bodies whose mass or inertia is reported by another rule."""
-    reported = {link.name for links in placeholder_inertias(robot.bodies) for link in links}
+    reported = {link.name for _, links in placeholder_inertias(robot.bodies) for link in links}
     reported |= {v.subject for v in violations(robot, "INR003", "INR004") if v.severity == "error"}
     return reported | {violation.subject for violation in violations(robot, "INR010", "INR008")}
 

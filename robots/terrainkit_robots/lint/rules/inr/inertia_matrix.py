@@ -4,8 +4,8 @@ from collections.abc import Container, Mapping
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.element_source import inertia_source
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.inertia.inertial import inertia_source
 from terrainkit_robots.analysis.inertia.physical import (
     MAX_INERTIA,
     MIN_INERTIA,
@@ -31,16 +31,7 @@ most 1/2000."""
 _MIN_EXACT_RATIO = 1 - 1e-12
 """The same ratio below which floating-point errors cannot explain the violation."""
 
-_INERTIA_ATTRIBUTES = (
-    "ixx",
-    "ixy",
-    "ixz",
-    "iyy",
-    "iyz",
-    "izz",
-    "diaginertia",
-    "fullinertia",
-)
+_INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz", "diaginertia", "fullinertia")
 """Attributes of URDF and MJCF that hold an inertia."""
 
 
@@ -170,13 +161,11 @@ def placeholder_inertia(robot: Facts) -> Violations:
         Exporters and tutorials use the identity matrix or 0.001 as defaults.
     """
     massive = sum(body.mass > MIN_INERTIA for body in robot.bodies)
-    for links in placeholder_inertias(robot.bodies):
+    for inertia, links in placeholder_inertias(robot.bodies):
         first = links[0]
-        assert first.inertial is not None
-        assert first.inertial.inertia is not None
         got, expected = "the identity matrix", "the inertia of the part"
-        if not is_identity(first):
-            got = f"the same diagonal {numbers(np.diag(first.inertial.inertia), '.4g', ', ')} kg m2"
+        if not is_identity(inertia):
+            got = f"the same diagonal {numbers(np.diag(inertia), '.4g', ', ')} kg m2"
             expected = "an inertia for each of these different parts"
         listed = names(link.name for link in links)
         bodies = f"{len(links)} of {massive} bodies ({listed})"

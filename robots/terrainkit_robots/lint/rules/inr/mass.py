@@ -2,10 +2,9 @@
 
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.analysis.bodies.element_source import mass_source
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.density import shape_volume
-from terrainkit_robots.analysis.inertia.inertial import has_valid_mass, max_inertia
+from terrainkit_robots.analysis.inertia.inertial import has_valid_mass, mass_source, max_inertia
 from terrainkit_robots.analysis.inertia.physical import MIN_INERTIA
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule, violations
 from terrainkit_robots.text import contrast, names
@@ -200,8 +199,7 @@ def inferred_mass(robot: Facts) -> Violations:
         return
     links = sorted((link for link in inferred if inferred[link] > 0), key=lambda x: -inferred[x])
     yield Violation(
-        subject=links[0].name,
-        source=links[0].source,
+        element=links[0],
         severity="error" if share > _MAX_INFERRED_ERROR else "warning",
         message=f"mass that MuJoCo infers for links without <inertial> "
         f"({names(link.name for link in links)}): got {total:.3g} kg, {share:.1%} of the declared "

@@ -3,8 +3,8 @@
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.element_source import inertia_source
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.inertia.inertial import inertia_source
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import numbers
@@ -36,7 +36,7 @@ def _exchanged_link(body: Body, long: int) -> Link | None:
     return found
 
 
-@rule("INR012", "exchanged-axes", "warning")
+@rule("INR012", "exchanged-axes", "warning", certainty="likely")
 def exchanged_axes(robot: Facts) -> Violations:
     """A long body has its largest moment of inertia about its long axis.
 
@@ -74,7 +74,6 @@ def exchanged_axes(robot: Facts) -> Violations:
         yield Violation(
             subject=link.name,
             source=inertia_source(link),
-            certainty="likely",
             message=f"moments of inertia of body {body.name}: got "
             f"{numbers(moments, '.3g', ', ')} kg m2 for a shape of "
             f"{numbers(size, '.3g', ' x ')} m; expected the smallest about {axis}, its "

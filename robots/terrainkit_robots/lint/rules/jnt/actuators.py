@@ -30,8 +30,6 @@ def missing_actuator(robot: Facts) -> Violations:
     if not robot.model.actuators:
         if robot.joints:
             yield Violation(
-                subject=robot.model.title,
-                source=robot.model.source,
                 severity="info",
                 message=f"actuators of the file: got 0 for {count(len(robot.joints), 'joint')}; "
                 "expected one for each joint, unless the framework adds them",
@@ -44,8 +42,7 @@ def missing_actuator(robot: Facts) -> Violations:
     for joint in robot_joints(robot.bodies):
         if joint.name not in actuated and joint.mimic is None:
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
+                element=joint,
                 severity="warning" if robot.legs else "info",
                 message=f"actuators of joint {joint.name}: got 0; expected 1",
             )

@@ -50,8 +50,7 @@ def zero_axis(robot: Facts) -> Violations:
     if len(axisless) == 1 and len(moving) > _MIN_OTHER_AXES and not has_x:
         joint = axisless[0]
         yield Violation(
-            subject=joint.name,
-            source=joint.source,
+            element=joint,
             severity="warning",
             certainty="likely",
             message=f"axis of joint {joint.name}: got none, which means 1 0 0; expected an <axis>, "

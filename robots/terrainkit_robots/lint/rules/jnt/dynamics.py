@@ -1,6 +1,5 @@
 """Rules on damping, friction and armature."""
 
-from terrainkit_robots.analysis.bodies.element_source import dynamics_source
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
@@ -40,7 +39,7 @@ def negative_loss(robot: Facts) -> Violations:
             if value < 0:
                 yield Violation(
                     subject=joint.name,
-                    source=dynamics_source(joint),
+                    source=(joint.dynamics or joint).source,
                     message=f"{name} of joint {joint.name}: got {value:g}; expected 0 or more",
                     measured={name: value},
                 )
@@ -69,7 +68,7 @@ def excessive_friction(robot: Facts) -> Violations:
         share, unit = joint.friction / effort, joint.effort_unit
         yield Violation(
             subject=joint.name,
-            source=dynamics_source(joint),
+            source=(joint.dynamics or joint).source,
             severity="error" if share > 1 else None,
             message=f"friction of joint {joint.name}: got {joint.friction:g} {unit}, {share:.0%} "
             f"of its effort limit of {effort:g} {unit}; expected at most {limit:.0%}",
@@ -98,13 +97,13 @@ def excessive_damping(robot: Facts) -> Violations:
             continue
         speed = effort / joint.damping
         limit = _MIN_LEG_SPEED if joint.name in legs else _MIN_TOP_SPEED
-        velocity = joint.limit.velocity if joint.limit and joint.name in legs else None
+        velocity = joint.velocity if joint.name in legs else None
         if velocity is not None and 0 < velocity <= _MAX_LEG_VELOCITY:
             limit = max(min(limit, velocity), _MIN_SPEED_SHARE * velocity)
         if speed < limit:
             yield Violation(
                 subject=joint.name,
-                source=dynamics_source(joint),
+                source=(joint.dynamics or joint).source,
                 message=f"damping of joint {joint.name}: got {joint.damping:g} N m s/rad, which "
                 f"limits it to {speed:.3g} rad/s at its effort limit of {effort:g} N m; expected "
                 f"at least {limit:g} rad/s",
@@ -132,8 +131,7 @@ def excessive_armature(robot: Facts) -> Violations:
         acceleration = effort / joint.armature
         if acceleration < _MIN_ACCELERATION:
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
+                element=joint,
                 message=f"armature of joint {joint.name}: got {joint.armature:g} kg m2, which "
                 f"limits it to {acceleration:.3g} rad/s2 at its effort limit of {effort:g} N m; "
                 f"expected at least {_MIN_ACCELERATION:g} rad/s2",

@@ -42,15 +42,14 @@ def unknown_joint_type(robot: Facts) -> Violations:
             word = joint.kind.strip().lower()
             near = _TYPE_SYNONYMS.get(word) or closest(word, known, _MIN_SIMILARITY)
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
+                element=joint,
                 message=f"type of joint {joint.name}: got {truncate(joint.kind, 40)!r}"
                 f"{f' (did you mean {near}?)' if near else ''}; expected one of "
                 f"{', '.join(sorted(known))}",
             )
 
 
-@rule("JNT002", "prismatic-leg-joint", "warning", needs=("legs",))
+@rule("JNT002", "prismatic-leg-joint", "warning", needs=("legs",), certainty="likely")
 def prismatic_leg_joint(robot: Facts) -> Violations:
     """A joint of a leg is prismatic.
 
@@ -67,8 +66,6 @@ def prismatic_leg_joint(robot: Facts) -> Violations:
     for joint in robot.leg_joints:
         if joint.kind == "prismatic":
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
-                certainty="likely",
+                element=joint,
                 message=f"type of leg joint {joint.name}: got prismatic; expected revolute",
             )

@@ -2,7 +2,6 @@
 
 import math
 
-from terrainkit_robots.analysis.bodies.element_source import limit_source
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.joint_roles import robot_joints
 from terrainkit_robots.description.model import Joint, Limit
@@ -23,7 +22,7 @@ _MAX_SHIFT = math.pi * 1.05
 """Distance of a whole range from zero above which the range is probably off by a turn [rad]."""
 
 
-@rule("JNT003", "continuous-leg-joint", "warning", needs=("legs",))
+@rule("JNT003", "continuous-leg-joint", "warning", needs=("legs",), certainty="likely")
 def continuous_leg_joint(robot: Facts) -> Violations:
     """A joint of a leg has no limits.
 
@@ -43,9 +42,7 @@ def continuous_leg_joint(robot: Facts) -> Violations:
     for joint in robot.leg_joints:
         if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
-                certainty="likely",
+                element=joint,
                 message=f"type of leg joint {joint.name}: got continuous; expected revolute with "
                 "limits",
             )
@@ -73,7 +70,7 @@ def missing_limit(robot: Facts) -> Violations:
         if error and not robot.unparsed.has(joint.name, "lower", "upper", "range"):
             yield Violation(
                 subject=joint.name,
-                source=joint.limit.source if joint.limit else joint.source,
+                source=(joint.limit or joint).source,
                 message=f"limits of {joint.kind} joint {joint.name}: got {error}; expected lower "
                 "< upper",
             )
@@ -218,15 +215,14 @@ def unlimited_joint(robot: Facts) -> Violations:
     for joint in robot_joints(robot.bodies):
         if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
+                element=joint,
                 severity="warning" if robot.legs else "info",
                 message=f"range of hinge {joint.name}: got none; expected one, unless the hinge "
                 "turns without end",
             )
 
 
-@rule("JNT018", "narrow-range", "warning")
+@rule("JNT018", "narrow-range", "warning", certainty="likely")
 def narrow_range(robot: Facts) -> Violations:
     """The range of a driven hinge is only a few degrees.
 
@@ -241,14 +237,14 @@ def narrow_range(robot: Facts) -> Violations:
         unless half of all joints are concerned: a rodent's shoulder blade moves by 4 degrees.
     """
     options = robot.model.options
-    hinges = [joint for joint in robot.actuated_hinges if joint.range is not None]
-    narrow = [joint for joint in hinges if _range(joint) < _MIN_RANGE]
+    hinges = {joint: joint.range for joint in robot.actuated_hinges if joint.range is not None}
+    narrow = {
+        joint: limits for joint, limits in hinges.items() if limits[1] - limits[0] < _MIN_RANGE
+    }
     certain = {joint.name for joint in robot.leg_joints}
     if robot.legs and 2 * len(narrow) >= len(hinges):
         certain |= {joint.name for joint in narrow}
-    for joint in narrow:
-        limits = joint.range
-        assert limits is not None
+    for joint, limits in narrow.items():
         size = limits[1] - limits[0]
         factor = 180 / math.pi
         unit = (
@@ -258,9 +254,8 @@ def narrow_range(robot: Facts) -> Violations:
         )
         yield Violation(
             subject=joint.name,
-            source=limit_source(joint),
+            source=(joint.limit or joint).source,
             severity=None if joint.name in certain else "info",
-            certainty="likely",
             message=f"range of joint {joint.name}: got {size:.3g} rad ({limits[0]:.3g} to "
             f"{limits[1]:.3g}), which is {factor * size:.3g} after a second conversion; expected "
             f"at least {_MIN_RANGE:g} rad{unit}",
@@ -268,12 +263,7 @@ def narrow_range(robot: Facts) -> Violations:
         )
 
 
-def _range(joint: Joint) -> float:
-    """Return the range of a joint [rad] or [m]; infinite without limits."""
-    return math.inf if joint.range is None else joint.range[1] - joint.range[0]
-
-
-@rule("JNT019", "shifted-range", "warning")
+@rule("JNT019", "shifted-range", "warning", certainty="likely")
 def shifted_range(robot: Facts) -> Violations:
     """The whole range of a hinge is more than half a turn from zero.
 
@@ -296,8 +286,7 @@ def shifted_range(robot: Facts) -> Violations:
             continue
         yield Violation(
             subject=joint.name,
-            source=limit_source(joint),
-            certainty="likely",
+            source=(joint.limit or joint).source,
             message=f"limits of joint {joint.name}: got {limits[0]:.4g} to {limits[1]:.4g} rad, "
             f"with their middle {abs(middle):.3g} rad from zero; expected at most half a turn",
             measured={"lower": limits[0], "upper": limits[1]},

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-from terrainkit_robots.analysis.bodies.element_source import limit_source
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Actuator, Joint
@@ -48,22 +47,30 @@ def missing_effort(robot: Facts) -> Violations:
     Source:
         http://wiki.ros.org/urdf/XML/joint: effort is required.
     """
+    for joint, effort in _missing_limits(robot, "effort"):
+        unit = joint.effort_unit
+        yield Violation(
+            subject=joint.name,
+            source=(joint.limit or joint).source,
+            severity="warning" if effort is None else None,
+            message=f"effort limit of joint {joint.name}: got "
+            f"{'no number' if effort is None else f'{effort:g} {unit}'}; expected the peak "
+            f"{'force' if unit == 'N' else 'torque'} of the motor [{unit}]",
+            measured={} if effort is None else {"effort": effort},
+        )
+
+
+def _missing_limits(robot: Facts, name: str) -> Iterator[tuple[Joint, float | None]]:
+    """Yield the joints whose effort or velocity limit is missing or not positive, with its value.
+
+    XML006 reports a limit that is not a number.
+    """
     for joint in _joints_with_limit(robot):
-        assert joint.limit is not None
-        effort = joint.limit.effort
-        if effort is None and robot.unparsed.has(joint.name, "effort"):
+        value = getattr(joint.limit, name)
+        if value is None and robot.unparsed.has(joint.name, name):
             continue
-        if effort is None or effort <= 0:
-            unit = joint.effort_unit
-            yield Violation(
-                subject=joint.name,
-                source=joint.limit.source,
-                severity="warning" if effort is None else None,
-                message=f"effort limit of joint {joint.name}: got "
-                f"{'no number' if effort is None else f'{effort:g} {unit}'}; expected the peak "
-                f"{'force' if unit == 'N' else 'torque'} of the motor [{unit}]",
-                measured={} if effort is None else {"effort": effort},
-            )
+        if value is None or value <= 0:
+            yield joint, value
 
 
 def _joints_with_limit(robot: Facts) -> Iterator[Joint]:
@@ -93,19 +100,15 @@ def missing_velocity(robot: Facts) -> Violations:
     Source:
         http://wiki.ros.org/urdf/XML/joint: velocity is required.
     """
-    for joint in _joints_with_limit(robot):
-        assert joint.limit is not None
-        velocity, unit = joint.limit.velocity, joint.speed_unit
-        if velocity is None and robot.unparsed.has(joint.name, "velocity"):
-            continue
-        if velocity is None or velocity <= 0:
-            yield Violation(
-                subject=joint.name,
-                source=joint.limit.source,
-                message=f"velocity limit of joint {joint.name}: got "
-                f"{'no number' if velocity is None else f'{velocity:g} {unit}'}; expected the "
-                f"no-load speed of the motor [{unit}]",
-            )
+    for joint, velocity in _missing_limits(robot, "velocity"):
+        unit = joint.speed_unit
+        yield Violation(
+            subject=joint.name,
+            source=(joint.limit or joint).source,
+            message=f"velocity limit of joint {joint.name}: got "
+            f"{'no number' if velocity is None else f'{velocity:g} {unit}'}; expected the "
+            f"no-load speed of the motor [{unit}]",
+        )
 
 
 @rule("JNT011", "placeholder-limit", "warning")
@@ -151,7 +154,7 @@ def placeholder_limit(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT026", "oversized-effort", "warning", needs=("legs",))
+@rule("JNT026", "oversized-effort", "warning", needs=("legs",), certainty="likely")
 def oversized_effort(robot: Facts) -> Violations:
     """The effort limit of a leg joint is far too large for the robot.
 
@@ -179,9 +182,8 @@ def oversized_effort(robot: Facts) -> Violations:
             continue  # reported by JNT011
         yield Violation(
             subject=joint.name,
-            source=geared.source if geared else limit_source(joint),
+            source=geared.source if geared else (joint.limit or joint).source,
             severity="info" if robot.model.kind == "mjcf" and not geared else None,
-            certainty="likely",
             message=f"effort limit of joint {joint.name}: got {effort:g} N m, "
             f"{effort / (weight * length):.3g} times the weight times the leg length; expected at "
             f"most {share:g} times ({limit:.4g} N m)"
@@ -212,13 +214,13 @@ def low_velocity_limit(robot: Facts) -> Violations:
         Published legged robots have 4 rad/s and more.
     """
     for joint in robot.leg_joints:
-        velocity = joint.limit.velocity if joint.limit else None
+        velocity = joint.velocity
         if velocity is None or joint.kind == "prismatic":
             continue
         if 0 < velocity < _MIN_LEG_VELOCITY:
             yield Violation(
                 subject=joint.name,
-                source=limit_source(joint),
+                source=(joint.limit or joint).source,
                 message=f"velocity limit of leg joint {joint.name}: got {velocity:g} rad/s; "
                 f"expected at least {_MIN_LEG_VELOCITY:g} rad/s",
                 measured={"velocity": velocity},

@@ -16,7 +16,7 @@ _MAX_SAG = 1.0
 published legged robots need 0.4 at most."""
 
 
-@rule("JNT015", "insufficient-torque", "warning", needs=("legs",))
+@rule("JNT015", "insufficient-torque", "warning", needs=("legs",), certainty="likely")
 def insufficient_torque(robot: Facts) -> Violations:
     """A joint needs more than half of its effort limit to stand.
 
@@ -52,9 +52,8 @@ def insufficient_torque(robot: Facts) -> Violations:
         got, expected = contrast(share, _MAX_LOAD, ".0%")
         yield Violation(
             subject=joint.name,
-            source=joint.limit.source if joint.limit else joint.source,
+            source=(joint.limit or joint).source,
             severity="error" if share > _MAX_LOAD_ERROR and named else "warning",
-            certainty="likely",
             message=f"static load of joint {joint.name} at the standing pose: got {torque:.3g} "
             f"{unit}, {got} of its effort limit of {effort:.4g} {unit}; expected at most "
             f"{expected}",
@@ -62,7 +61,7 @@ def insufficient_torque(robot: Facts) -> Violations:
         )
 
 
-@rule("JNT028", "weak-position-gain", "warning", needs=("legs",))
+@rule("JNT028", "weak-position-gain", "warning", needs=("legs",), certainty="likely")
 def weak_position_gain(robot: Facts) -> Violations:
     """The gain of a position actuator is too low for the robot to stand.
 
@@ -85,7 +84,6 @@ def weak_position_gain(robot: Facts) -> Violations:
         yield Violation(
             subject=actuator.joint,
             source=actuator.source,
-            certainty="likely",
             message=f"gain of the position actuator of joint {actuator.joint}: got {stiffness:g} "
             f"N m/rad, which needs an error of {torque / stiffness:.3g} rad for the "
             f"{torque:.3g} N m of standing; expected at most {_MAX_SAG:g} rad",

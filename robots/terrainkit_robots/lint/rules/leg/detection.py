@@ -39,7 +39,7 @@ def _joint_types(limb: Limb) -> tuple[str, ...]:
     return tuple(joint.kind for joint in limb.joints)
 
 
-@rule("LEG001", "detected-legs", "info", needs=("legs",))
+@rule("LEG001", "detected-legs", "info", needs=("legs",), certainty="likely")
 def detected_legs(robot: Facts) -> Violations:
     """Lists the legs that were detected and the roles of their joints.
 
@@ -58,16 +58,13 @@ def detected_legs(robot: Facts) -> Violations:
     else:
         listed = "; ".join(f"{foot}: {each}" for foot, each in roles.items())
     yield Violation(
-        subject=robot.model.title,
-        source=robot.model.source,
         message=f"{len(robot.legs)} legs with a length of {mean_length(robot.legs):.3f} m; "
         f"{listed}",
-        certainty="likely",
         measured={"legs": len(robot.legs)},
     )
 
 
-@rule("LEG002", "leg-count", "warning", needs=("legs",))
+@rule("LEG002", "leg-count", "warning", needs=("legs",), certainty="likely")
 def leg_count(robot: Facts) -> Violations:
     """The number of legs is not 2, 4, 6 or 8.
 
@@ -86,21 +83,15 @@ def leg_count(robot: Facts) -> Violations:
     uncounted = _uncounted_legs(robot)
     if uncounted:
         yield Violation(
-            subject=robot.model.title,
-            source=robot.model.source,
             message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
             f"expected {count + len(uncounted)}, since {names(uncounted)} have the joints and "
             "masses of a leg, but do not end near the ground; check that z points up",
-            certainty="likely",
             measured={"legs": count, "uncounted": len(uncounted)},
         )
     elif len(robot.limbs) > 1 and count + len(_inverted_legs(robot)) not in _LEG_COUNTS:
         yield Violation(
-            subject=robot.model.title,
-            source=robot.model.source,
             message=f"number of legs: got {count} ({', '.join(leg.foot for leg in robot.legs)}); "
             "expected 2, 4, 6 or 8",
-            certainty="likely",
             measured={"legs": count},
         )
 
@@ -125,7 +116,7 @@ def _is_equal_limb(robot: Facts, limb: Limb, leg: Limb) -> bool:
     return min(own) > 0 and bool(np.allclose(own, other, rtol=_MAX_MASS_DIFFERENCE))
 
 
-@rule("LEG003", "missing-leg-joint", "warning", needs=("legs",))
+@rule("LEG003", "missing-leg-joint", "warning", needs=("legs",), certainty="likely")
 def missing_leg_joint(robot: Facts) -> Violations:
     """A leg has fewer joints than the others.
 
@@ -143,16 +134,14 @@ def missing_leg_joint(robot: Facts) -> Violations:
     for leg in robot.legs:
         if len(leg.joints) < usual:
             yield Violation(
-                subject=leg.foot,
-                source=robot.tree.links[leg.foot].source,
+                element=robot.tree.links[leg.foot],
                 message=f"moving joints of the leg with foot {leg.foot}: got {len(leg.joints)}; "
                 f"expected {usual}, as in the other legs",
-                certainty="likely",
                 measured={"joints": len(leg.joints), "usual": usual},
             )
 
 
-@rule("LEG007", "leg-points-up", "error", needs=("legs",))
+@rule("LEG007", "leg-points-up", "error", needs=("legs",), certainty="likely")
 def leg_points_up(robot: Facts) -> Violations:
     """A leg points up, unlike the others.
 
@@ -176,6 +165,5 @@ def leg_points_up(robot: Facts) -> Violations:
             message=f"height of the end of leg {leaf.name} above joint {first.name}, all joints at "
             f"zero: got {rise:.3f} m, {rise / reach:.0%} of their distance of {reach:.3f} m; "
             f"expected less than {_MAX_RISE:.0%}, and below 0 as for the other legs",
-            certainty="likely",
             measured={"rise": round(rise, 4), "reach": round(reach, 4)},
         )

@@ -7,7 +7,7 @@ from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import names
 
 
-@rule("LEG004", "foot-collapsed", "info", fixes="safe", needs=("legs",))
+@rule("LEG004", "foot-collapsed", "info", fixes="safe", needs=("legs",), certainty="likely")
 def foot_collapsed(robot: Facts) -> Violations:
     """Isaac Gym merges the feet into their shanks.
 
@@ -41,7 +41,6 @@ def foot_collapsed(robot: Facts) -> Violations:
         source=first.source,
         message=f"fixed joints above the feet ({joints}): got no dont_collapse; expected "
         'dont_collapse="true", or Isaac Gym merges the feet into their parents',
-        certainty="likely",
         measured={"feet": len(merged)},
         fix=make_fix("safe", f'Add dont_collapse="true" to {joints}.', edits),
     )

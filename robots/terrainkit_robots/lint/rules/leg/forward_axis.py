@@ -14,7 +14,7 @@ _RIGHT = {"right", "fr", "hr", "br", "rf", "rh", "rb", "rm", "mr"}
 """Words of names that give the position of a leg. RR is omitted: it also occurs in other names."""
 
 
-@rule("LEG005", "forward-axis", "warning", needs=("legs",))
+@rule("LEG005", "forward-axis", "warning", needs=("legs",), certainty="likely")
 def forward_axis(robot: Facts) -> Violations:
     """The robot does not face +x.
 
@@ -49,12 +49,7 @@ def forward_axis(robot: Facts) -> Violations:
             "least half of the legs, so that they step along x"
         )
     if message:
-        yield Violation(
-            subject=trunk.name,
-            source=robot.tree.links[trunk.name].source,
-            message=message,
-            certainty="likely",
-        )
+        yield Violation(element=robot.tree.links[trunk.name], message=message)
 
 
 def _leg_positions(robot: Facts, labels: set[str], axis: int) -> list[float]:

@@ -49,16 +49,14 @@ def _report_height(
 ) -> Violation:
     trunk = robot.bodies[0].top
     return Violation(
-        subject=trunk.name,
-        source=trunk.source,
+        element=trunk,
         message=message,
         severity=severity,
-        certainty="likely",
         measured={name: round(value, 5) for name, value in measured.items()},
     )
 
 
-@rule("LEG008", "spec-spawn-height", "error", needs=("spec", "legs"))
+@rule("LEG008", "spec-spawn-height", "error", needs=("spec", "legs"), certainty="likely")
 def spec_spawn_height(robot: Facts) -> Violations:
     """The spawn height of the spec is inside the ground or far above it.
 
@@ -88,7 +86,7 @@ def spec_spawn_height(robot: Facts) -> Violations:
     yield _report_height(robot, message, measured, None if gap < 0 else "warning")
 
 
-@rule("LEG009", "spec-target-height", "warning", needs=("spec", "legs"))
+@rule("LEG009", "spec-target-height", "warning", needs=("spec", "legs"), certainty="likely")
 def spec_target_height(robot: Facts) -> Violations:
     """The target height of the spec differs from the standing height.
 
@@ -151,8 +149,7 @@ def spec_reset_range(robot: Facts) -> Violations:
     )
     lower, upper = spec.reset_range
     yield Violation(
-        subject=largest,
-        source=joints[largest].source,
+        element=joints[largest],
         message=f"reset_range: got {lower:g} to {upper:g} times the default pose, which exceeds "
         f"the limits of {len(distances)} joints ({listed}); expected positions within the limits",
         measured={"joints": len(distances), "farthest": round(distances[largest], 5)},

@@ -16,7 +16,7 @@ _MIN_MARGIN_SHARE = 0.25
 """The same as a share of the largest possible distance, for small feet."""
 
 
-@rule("LEG006", "com-outside-support", "error", needs=("legs",))
+@rule("LEG006", "com-outside-support", "error", needs=("legs",), certainty="likely")
 def com_outside_support(robot: Facts) -> Violations:
     """The center of mass is outside of the support polygon of the standing pose.
 
@@ -47,12 +47,10 @@ def com_outside_support(robot: Facts) -> Violations:
     outside = stance.margin < 0
     got, expected = contrast(1000 * abs(stance.margin), 1000 * limit, ".0f")
     yield Violation(
-        subject=trunk.name,
-        source=robot.tree.links[trunk.name].source,
+        element=robot.tree.links[trunk.name],
         message="distance of the center of mass from the edge of the support polygon at the "
         f"standing pose: got {got} mm {'outside' if outside else 'inside'}; expected at least "
         f"{expected} mm inside",
         severity="error" if outside else "warning" if is_statically_stable(robot.legs) else "info",
-        certainty="likely",
         measured={"margin": round(stance.margin, 5)},
     )

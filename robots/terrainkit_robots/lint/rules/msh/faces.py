@@ -1,6 +1,7 @@
 """Rules on the number of faces of meshes."""
 
 from collections.abc import Sequence
+from functools import partial
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.meshes.replacement import (
@@ -37,8 +38,7 @@ def too_many_faces(robot: Facts) -> Violations:
             continue
         is_rejected = used.strict and used.header.format in ("stl", "ascii-stl")
         yield Violation(
-            subject=used.name,
-            source=used.source,
+            element=used,
             message=f"number of faces of {used.label}: got {faces:,}; expected at most "
             f"{MAX_STL_FACES:,}, MuJoCo's limit for STL",
             severity="error" if is_rejected else "warning",
@@ -52,12 +52,12 @@ def _simplify_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
     if used.header.format == "ascii-stl":
         return None  # MSH007 converts it first
     visuals = [use for use in used.uses if not use.is_collision]
-    simplify = simplified_stl(used)
+    simplify = partial(simplified_stl, used)
     if robot.model.kind == "mjcf":  # all uses share one element
         return replace_edits(robot.model, robot.meshes, used.uses, "_simplified.stl", simplify)
     edits: list[Edit] = []
     for uses, ending, content in (
-        (used.collisions, "_hull.stl", hull_stl(used)),
+        (used.collisions, "_hull.stl", partial(hull_stl, used)),
         (visuals, "_simplified.stl", simplify),
     ):
         made = replace_edits(robot.model, robot.meshes, uses, ending, content) if uses else ()
@@ -107,4 +107,5 @@ def _hull_edits(robot: Facts, used: UsedMesh) -> Sequence[Edit] | None:
         or not has_hull(robot.meshes, used.collisions)
     ):
         return None
-    return replace_edits(robot.model, robot.meshes, used.collisions, "_hull.stl", hull_stl(used))
+    content = partial(hull_stl, used)
+    return replace_edits(robot.model, robot.meshes, used.collisions, "_hull.stl", content)

@@ -1,5 +1,7 @@
 """Rules on the formats of mesh files."""
 
+from functools import partial
+
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.meshes.replacement import binary_copy, has_hull, stl_or_hull
 from terrainkit_robots.analysis.meshes.uses import UsedMesh, replace_edits
@@ -32,10 +34,10 @@ def unsupported_format(robot: Facts) -> Violations:
         uses = used.uses if robot.model.kind == "mjcf" else used.collisions
         edits = None
         if has_hull(robot.meshes, uses):
-            edits = replace_edits(robot.model, robot.meshes, uses, ".stl", stl_or_hull(used))
+            content = partial(stl_or_hull, used)
+            edits = replace_edits(robot.model, robot.meshes, uses, ".stl", content)
         yield Violation(
-            subject=used.name,
-            source=used.source,
+            element=used,
             message=f"format of {used.label}: got {suffix or 'no suffix'}; expected "
             f"{', '.join(MUJOCO_SUFFIXES)} for MuJoCo",
             fix=make_fix("unsafe", "Convert it to STL.", edits),
@@ -60,8 +62,7 @@ def malformed_mesh(robot: Facts) -> Violations:
         problem, severity = _file_problem(robot.meshes, used)
         if problem:
             yield Violation(
-                subject=used.name,
-                source=used.source,
+                element=used,
                 message=f"{used.label} {problem}",
                 severity=severity,
                 measured={"bytes": used.header.size},
@@ -102,11 +103,10 @@ def ascii_stl(robot: Facts) -> Violations:
     """
     for used in robot.mesh_files:
         if used.header.format == "ascii-stl" and used.header.state == "fine":
-            content = binary_copy(used)
+            content = partial(binary_copy, used)
             edits = replace_edits(robot.model, robot.meshes, used.uses, "_binary.stl", content)
             yield Violation(
-                subject=used.name,
-                source=used.source,
+                element=used,
                 message=f"format of {used.label}: got ASCII STL of {used.header.size:,} "
                 "bytes; expected binary STL for MuJoCo",
                 severity="error" if used.strict else "info",
@@ -130,8 +130,7 @@ def lfs_pointer(robot: Facts) -> Violations:
     for used in robot.mesh_files:
         if used.header.state == "lfs":
             yield Violation(
-                subject=used.name,
-                source=used.source,
+                element=used,
                 message=f"{used.label} {used.header.problem}",
                 measured={"bytes": used.header.size},
             )

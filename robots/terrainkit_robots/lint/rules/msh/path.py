@@ -47,8 +47,7 @@ def missing_mesh(robot: Facts) -> Violations:
         if is_missing(used) and not _is_written_absolute(robot, used):
             is_mjcf = robot.model.kind == "mjcf"
             yield Violation(
-                subject=used.name,
-                source=used.source,
+                element=used,
                 message=f"{used.label}: does not exist; {_search_result(robot, used)}"
                 + ("; MuJoCo cannot load the robot without it" if is_mjcf else ""),
                 severity="error" if used.collisions or is_mjcf else "warning",
@@ -98,8 +97,7 @@ def absolute_path(robot: Facts) -> Violations:
         else:
             status = "which exists on this machine only"
         yield Violation(
-            subject=used.name,
-            source=used.source,
+            element=used,
             message=f"path of the {used.role}: got the absolute path {used.name}, {status}; "
             "expected a relative path",
             fix=None if is_missing else _relative_fix(robot, used, "unsafe"),
@@ -155,8 +153,7 @@ def package_uri(robot: Facts) -> Violations:
         edits = [edit for _, each in members if each is not None for edit in each.edits]
         description = fix.description if fix and len(members) == 1 else "Use relative paths."
         yield Violation(
-            subject=first.name,
-            source=first.source,
+            element=first,
             message=f"path of {len(members)} mesh{'es' * (len(members) > 1)} "
             f"({names((each.name for each, _ in members), 2)}): refers to {scheme}; expected a "
             "relative path, which MuJoCo can load",
@@ -200,8 +197,7 @@ def filename_case(robot: Facts) -> Violations:
             None if is_package_uri(used.name) else rename_edits(robot.model, used.uses, expected)
         )
         yield Violation(
-            subject=used.name,
-            source=used.source,
+            element=used,
             message=f"path of the {used.role}: got {used.name}; expected {expected}",
             fix=make_fix("safe", f"Change the path to {expected}.", edits),
         )

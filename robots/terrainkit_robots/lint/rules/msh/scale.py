@@ -13,7 +13,7 @@ from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import numbers
 
 
-@rule("MSH011", "wrong-scale", "error")
+@rule("MSH011", "wrong-scale", "error", certainty="likely")
 def wrong_scale(robot: Facts) -> Violations:
     """A mesh is far too large or too small compared with the joint distances.
 
@@ -52,7 +52,6 @@ def wrong_scale(robot: Facts) -> Violations:
                 severity="warning"
                 if is_large and mismatch.ratio <= MAX_PLAUSIBLE_RATIO
                 else "error",
-                certainty="likely",
                 measured={
                     "diagonal": mismatch.diagonal,
                     "reference": mismatch.reference,

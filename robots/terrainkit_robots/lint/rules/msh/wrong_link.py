@@ -33,7 +33,7 @@ def _shapes(link: Link) -> list[tuple[str, Geometry]]:
     return [("visual", g) for g in link.visuals] + [("collision", g) for g in link.collisions]
 
 
-@rule("MSH015", "mesh-of-another-link", "warning")
+@rule("MSH015", "mesh-of-another-link", "warning", certainty="likely")
 def mesh_of_another_link(robot: Facts) -> Violations:
     """A link has the mesh of another link.
 
@@ -64,13 +64,14 @@ def mesh_of_another_link(robot: Facts) -> Violations:
             others = [g for _, g in _shapes(link) if _part(_stem(g)) == own]
             path = geometry.mesh.path
             beside = path.with_name(path.name.replace(_stem(geometry), _own_stem(geometry, link)))
+            # A link with a mesh of its own as well consists of several parts.
+            has_both = any(_part(_stem(g)) == own for k, g in _shapes(link) if k == kind)
             has_own = bool(others) or (beside != path and robot.meshes.exists(beside))
-            if not owners or not has_own or _has_both(link, kind, own):
+            if not owners or not has_own or has_both:
                 continue
             yield Violation(
                 subject=link.name,
                 source=geometry.source,
-                certainty="likely",
                 message=f"{kind} mesh of link {link.name}: got {_stem(geometry)}, the mesh of link "
                 f"{owners[0]}; expected {_own_stem(geometry, link)}, which exists",
             )
@@ -83,15 +84,7 @@ def _own_stem(geometry: Geometry, link: Link) -> str:
     return _SUFFIX.sub("", link.name) + (suffix.group() if suffix else "")
 
 
-def _has_both(link: Link, kind: str, own: str) -> bool:
-    """Return whether a link has a mesh of its own among the shapes of a kind.
-
-    It then consists of several parts.
-    """
-    return any(_part(_stem(g)) == own for k, g in _shapes(link) if k == kind)
-
-
-@rule("MSH016", "odd-leg-mesh", "warning", needs=("legs",))
+@rule("MSH016", "odd-leg-mesh", "warning", needs=("legs",), certainty="likely")
 def odd_leg_mesh(robot: Facts) -> Violations:
     """One leg has another mesh than the three legs that share one.
 
@@ -133,7 +126,6 @@ def odd_leg_mesh(robot: Facts) -> Violations:
             yield Violation(
                 subject=odd_one.link,
                 source=odd_one.geometry.source,
-                certainty="likely",
                 message=f"{kind[:-1]} mesh of {odd_one.link}: got {', '.join(got)}; expected "
                 f"{', '.join(expected)}, or one mesh for all legs, as "
                 f"{', '.join(others)} share {', '.join(shared)} and only "
@@ -163,7 +155,6 @@ def _meshes_of_other_joints(robot: Facts, chains: Sequence[Sequence[int]]) -> Vi
             yield Violation(
                 subject=wrong.link,
                 source=wrong.geometry.source,
-                certainty="likely",
                 message=f"{kind[:-1]} mesh of {wrong.link}: got {stem}, which {len(places) - 1} "
                 f"legs have at {owner.name} instead; expected another mesh",
             )

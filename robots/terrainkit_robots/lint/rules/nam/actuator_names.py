@@ -14,7 +14,7 @@ _FILLERS = frozenset(
 """Words in the names of joints and actuators that do not identify the joint."""
 
 
-@rule("NAM005", "actuator-of-another-joint", "warning")
+@rule("NAM005", "actuator-of-another-joint", "warning", certainty="likely")
 def actuator_of_another_joint(robot: Facts) -> Violations:
     """An actuator has the name of another joint than the one that it drives.
 
@@ -43,7 +43,6 @@ def actuator_of_another_joint(robot: Facts) -> Violations:
             yield Violation(
                 subject=actuator.joint,
                 source=actuator.source,
-                certainty="likely",
                 message=f"joint of actuator {truncate(actuator.name)}: got {actuator.joint}; "
                 f"expected {named}, as its name says",
                 measured={"expected": named},

@@ -16,7 +16,7 @@ _MAX_COSINE = 0.3
 """Cosine below which a joint does not turn about the axis in its name: more than 72 degrees."""
 
 
-@rule("NAM004", "wrong-axis-name", "warning", needs=("legs",))
+@rule("NAM004", "wrong-axis-name", "warning", needs=("legs",), certainty="likely")
 def wrong_axis_name(robot: Facts) -> Violations:
     """A joint of a leg does not turn about the axis in its name.
 
@@ -54,7 +54,6 @@ def wrong_axis_name(robot: Facts) -> Violations:
                 yield Violation(
                     subject=joint.name,
                     source=joint.axis_source or joint.source,
-                    certainty="likely",
                     message=f"axis of joint {joint.name}: got {best} "
                     f"({math.degrees(math.acos(cosines[word])):.0f} deg from {word}); "
                     f"expected {word}, as its name says",

@@ -48,8 +48,7 @@ def invalid_name(robot: Facts) -> Violations:
             continue
         first = next(iter(found.values()))
         yield Violation(
-            subject=first.name,
-            source=first.source,
+            element=first,
             severity=severity,
             message=f"{count(len(found), 'name')} with other characters than letters, digits and "
             f"underscores: {names(found)}; USD renames {truncate(first.name)} to "
@@ -73,8 +72,7 @@ def _conflicts(items: Sequence[Link | Joint]) -> dict[str, list[Link | Joint]]:
 
 def _conflict_violation(kind: str, valid: str, same: Sequence[Link | Joint]) -> Violation:
     return Violation(
-        subject=same[1].name,
-        source=same[1].source,
+        element=same[1],
         message=f"names of {kind} {names(item.name for item in same)}: USD renames all of them to "
         f"{truncate(valid)}; expected names that stay different",
         severity="error",

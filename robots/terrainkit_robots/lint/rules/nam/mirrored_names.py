@@ -191,8 +191,7 @@ class _ModelNames:
             item, mirror, expected = pair.left, pair.right, left
         is_clear = expected and left_counts != right_counts
         yield Violation(
-            subject=item.name,
-            source=item.source,
+            element=item,
             message=f"name of the mirror image of {pair.kind} {mirror.name}: got {item.name}; "
             f"expected {expected if is_clear else 'a name that differs only by the side'}",
             certainty="likely",

@@ -12,7 +12,7 @@ _LEG_WORDS = ("thigh", "calf", "shank", "knee", "hip")
 """Words by which configurations select the links whose contacts they penalize."""
 
 
-@rule("NAM003", "ambiguous-substring", "info", needs=("legs",))
+@rule("NAM003", "ambiguous-substring", "info", needs=("legs",), certainty="likely")
 def ambiguous_substring(robot: Facts) -> Violations:
     """A substring that configurations use matches unexpected links.
 
@@ -30,12 +30,7 @@ def ambiguous_substring(robot: Facts) -> Violations:
     """
     parts = [*_foot_matches(robot), *_other_matches(robot)]
     if parts:
-        yield Violation(
-            subject=robot.model.title,
-            source=robot.model.source,
-            message="; ".join(parts),
-            certainty="likely",
-        )
+        yield Violation(message="; ".join(parts))
 
 
 def _foot_matches(robot: Facts) -> Iterator[str]:

@@ -50,7 +50,6 @@ def wrong_gravity(robot: Facts) -> Violations:
     if points_down and abs(z + 100 * GRAVITY) < 1:
         return  # the unit of length is the centimeter, as for insects
     yield Violation(
-        subject=robot.model.title,
         source=options.source,
         severity="warning" if points_down or is_part else None,
         message=f"gravity{', which is disabled' if off else ''}: got {x:g} {y:g} {z:g} m/s2; "
@@ -76,7 +75,6 @@ def implausible_time_step(robot: Facts) -> Violations:
     if options is None or _MIN_TIME_STEP <= options.timestep <= _MAX_TIME_STEP:
         return
     yield Violation(
-        subject=robot.model.title,
         source=options.source,
         message=f"time step: got {options.timestep:g} s; expected {_MIN_TIME_STEP:g} s to "
         f"{_MAX_TIME_STEP:.2g} s",
@@ -104,7 +102,6 @@ def disabled_physics(robot: Facts) -> Violations:
     if disabled:
         effects = "; ".join(_CONSEQUENCES[name] for name in disabled)
         yield Violation(
-            subject=robot.model.title,
             source=options.source,
             severity=None if _FATAL & set(disabled) else "warning",
             message=f"flags of <option>: got {names(disabled)} disabled ({effects}); expected "

@@ -48,8 +48,6 @@ def joint_order(robot: Facts) -> Violations:
     orders = "; ".join(_format_order(order, file) for order in others)
     rest = f"; {conjunction(same)}: same as the file" if same else ""
     yield Violation(
-        subject=robot.model.title,
-        source=robot.model.source,
         message=f"joint order, as indices into the file's order: {orders}{rest}",
         certainty="proven" if all(order.certain for order in others) else "likely",
         measured={"joints": len(file)},
@@ -118,18 +116,15 @@ def genesis_armature(robot: Facts) -> Violations:
         is compared with the inertia about the joint axis of all links below, at joint positions 0.
     """
     moved = inertia_without_armature(robot.bodies, robot.actuated)
-    slowed = [each for each in moved if each.inertia < GENESIS_ARMATURE]
+    slowed = [inertia for inertia in moved.values() if inertia < GENESIS_ARMATURE]
     if not slowed:
         return
-    worst = min(slowed, key=lambda each: each.inertia)
-    unit = "kg" if worst.joint.kind == "prismatic" else "kg m2"
+    joint = min(moved, key=moved.__getitem__)
+    unit = "kg" if joint.kind == "prismatic" else "kg m2"
     yield Violation(
-        subject=worst.joint.name,
-        source=worst.joint.source,
-        message=(
-            f"default armature of Genesis: {GENESIS_ARMATURE} {unit} exceeds the moved inertia of "
-            f"{len(slowed)} of {len(robot.actuated)} joints; smallest: {worst.joint.name} with "
-            f"{worst.inertia:.2g} {unit}"
-        ),
-        measured={"inertia": worst.inertia, "joints": len(slowed)},
+        element=joint,
+        message=f"default armature of Genesis: {GENESIS_ARMATURE} {unit} exceeds the moved inertia "
+        f"of {len(slowed)} of {len(robot.actuated)} joints; smallest: {joint.name} with "
+        f"{moved[joint]:.2g} {unit}",
+        measured={"inertia": moved[joint], "joints": len(slowed)},
     )

@@ -156,7 +156,7 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
     codes = next((each for pattern, each in _EXPLAINED_BY if re.search(pattern, message)), "")
     for each in codes.split():
         try:
-            found = [violation.severity or "info" for violation in violations(robot, each)]
+            found = [violation.severity for violation in violations(robot, each)]
         except CannotCheckError:
             continue
         if found:

@@ -19,7 +19,7 @@ _MAX_SHAPE_ERROR, _SHAPE_MARGIN = 0.3, 0.01
 [m]."""
 
 
-@rule("SYM013", "collision-asymmetry", "warning")
+@rule("SYM013", "collision-asymmetry", "warning", certainty="likely")
 def collision_asymmetry(robot: Facts) -> Violations:
     """The collision shapes of a body are not where those of its mirror image are, or as large.
 
@@ -60,11 +60,10 @@ def collision_asymmetry(robot: Facts) -> Violations:
             box = bounds(body.collisions, robot.meshes)
             return None if box is None else box.ravel()
 
-        odd, other = robot.outlier_first(left, right, extent)
+        odd, other = robot.outlier_first(pair, extent)
         yield Violation(
             subject=odd.body.name,
             source=odd.body.collisions[0].geometry.source,
-            certainty="likely",
             message=f"bounding box of the collision shapes of {odd.body.name}: got a face "
             f"{1000 * error:.3g} mm from that of its mirror image {other.body.name}; expected at "
             f"most {1000 * limit:.3g} mm",
@@ -87,12 +86,11 @@ def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
             siblings = _primitives(body)
             return np.array(siblings[index].size) if len(siblings) == len(shapes[0]) else None
 
-        odd, other = robot.outlier_first(pair.left, pair.right, size)
+        odd, other = robot.outlier_first(pair, size)
         own, mirrored = (left, right) if odd is pair.left else (right, left)
         return Violation(
             subject=odd.body.name,
             source=own.size_source or own.source,
-            certainty="likely",
             message=f"size of the collision {own.shape} of {odd.body.name}: got "
             f"{numbers(own.size)} m, and {numbers(mirrored.size)} m for its mirror image "
             f"{other.body.name} (radii and half lengths); expected at most a factor of "

@@ -10,7 +10,7 @@ from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("SYM008", "copied-assembly", "info")
+@rule("SYM008", "copied-assembly", "info", certainty="likely")
 def copied_assembly(robot: Facts) -> Violations:
     """The left and the right side are the same assembly, mounted twice.
 
@@ -43,7 +43,6 @@ def copied_assembly(robot: Facts) -> Violations:
         yield Violation(
             subject=first.left.body.name,
             source=first.left.body.top.source,
-            certainty="likely",
             message=f"assemblies on both sides: got {len(copied)} equal pairs of bodies, from "
             f"{first.left.body.name} and {first.right.body.name} on; {len(differing)} of them are "
             "not mirror images",

@@ -4,7 +4,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.transforms import Matrix
 
@@ -19,7 +19,7 @@ _MIN_EFFORT_SHARE = 0.1
 """Difference of that effort, as a share of the effort limit, below which a loss does not matter."""
 
 
-@rule("SYM009", "loss-asymmetry", "warning")
+@rule("SYM009", "loss-asymmetry", "warning", certainty="likely")
 def loss_asymmetry(robot: Facts) -> Violations:
     """The damping, friction or armature of a joint is far from that of its mirror image.
 
@@ -47,20 +47,18 @@ def loss_asymmetry(robot: Facts) -> Violations:
             def value(body: Body, name: str = name) -> Matrix | None:
                 return None if body.joint is None else np.array([getattr(body.joint, name)])
 
-            odd, other = robot.outlier_first(pair.left, pair.right, value)
+            odd, other = robot.outlier_first(pair, value)
             own, mirrored = getattr(odd.joint, name), getattr(other.joint, name)
-            dynamics = odd.joint.dynamics
             yield Violation(
                 subject=odd.joint.name,
-                source=dynamics.source if dynamics else odd.joint.source,
-                certainty="likely",
+                source=(odd.joint.dynamics or odd.joint).source,
                 message=f"{name} of joint {odd.joint.name}: got {own:g}, and {mirrored:g} for its "
                 f"mirror image {other.joint.name}; expected at most a factor of {_MAX_RATIO:g}",
                 measured={name: own, "other": mirrored, "mirror_image": other.joint.name},
             )
 
 
-@rule("SYM010", "gear-asymmetry", "warning")
+@rule("SYM010", "gear-asymmetry", "warning", certainty="likely")
 def gear_asymmetry(robot: Facts) -> Violations:
     """The gear of an actuator has another sign than that of its mirror image.
 
@@ -74,32 +72,30 @@ def gear_asymmetry(robot: Facts) -> Violations:
         MuJoCo's XML reference, actuator: gear scales the force on the joint.
     """
     gears = {actuator.joint: actuator for actuator in robot.model.actuators if actuator.joint}
-    opposite: list[MirrorPair] = []
-    same: list[MirrorPair] = []
-    for pair in robot.mirror_pairs:
-        names = pair.left.joint.name, pair.right.joint.name
-        if pair.sign != 0 and all(name in gears for name in names):
-            product = gears[names[0]].gear * gears[names[1]].gear
-            if product < 0:
-                opposite.append(pair)
-            elif product > 0:
-                same.append(pair)
-    for pair in opposite:
+    products = {
+        pair: gears[a].gear * gears[b].gear
+        for pair in robot.mirror_pairs
+        if pair.sign != 0
+        and (a := pair.left.joint.name) in gears
+        and (b := pair.right.joint.name) in gears
+    }
+    same = [pair for pair, product in products.items() if product > 0]
+    for pair, product in products.items():
         alike = [p for p in same if p.sign == pair.sign]
-        if pair.sign < 0 and not any(_is_parallel(p.left, pair.left) for p in alike):
+        is_convention = pair.sign < 0 and not any(_is_parallel(p.left, pair.left) for p in alike)
+        if not product < 0 or is_convention:
             continue
 
         def is_negative(body: Body) -> Matrix | None:
             actuator = gears.get(body.joint.name) if body.joint else None
             return None if actuator is None else np.array([float(actuator.gear < 0)])
 
-        odd, other = robot.outlier_first(pair.left, pair.right, is_negative)
+        odd, other = robot.outlier_first(pair, is_negative)
         if gears[odd.joint.name].gear > 0:
             odd, other = other, odd
         yield Violation(
             subject=odd.joint.name,
             source=gears[odd.joint.name].source,
-            certainty="likely",
             message=f"gear of the actuator of joint {odd.joint.name}: got "
             f"{gears[odd.joint.name].gear:g}, and {gears[other.joint.name].gear:g} for its mirror "
             f"image {other.joint.name}; expected the same sign",

@@ -5,8 +5,8 @@ from decimal import Decimal
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.element_source import inertia_source
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.inertia.inertial import inertia_source
 from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     MAX_MASS_DIFFERENCE,
     com_error,
@@ -34,7 +34,7 @@ _MAX_MOMENT_ERROR = 0.05
 """Difference of principal moments above which SYM003 reports the pair, as the same share."""
 
 
-@rule("SYM003", "inertia-asymmetry", "warning")
+@rule("SYM003", "inertia-asymmetry", "warning", certainty="likely")
 def inertia_asymmetry(robot: Facts) -> Violations:
     """The principal moments of a body differ from those of its mirror image.
 
@@ -62,12 +62,11 @@ def inertia_asymmetry(robot: Facts) -> Violations:
         digit = max(_precision(left.body), _precision(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):
             continue  # rounding explains the difference
-        odd, other = robot.outlier_first(left, right, lambda body: body.principal)
+        odd, other = robot.outlier_first(pair, lambda body: body.principal)
         moments = [numbers(side.body.principal, ".4g", ", ") for side in (odd, other)]
         yield Violation(
             subject=odd.body.name,
             source=inertia_source(odd.body.main_link),
-            certainty="likely",
             message=f"principal moments of body {odd.body.name}: got {moments[0]} kg m2, and "
             f"{moments[1]} kg m2 for its mirror image {other.body.name}: "
             f"{contrast(difference, _MAX_MOMENT_DIFFERENCE, '.1%')[0]} of the largest apart; "
@@ -100,7 +99,7 @@ def _precision(body: Body) -> float:
     return float(10.0 ** min(exponents, default=0))
 
 
-@rule("SYM011", "product-asymmetry", "warning")
+@rule("SYM011", "product-asymmetry", "warning", certainty="likely")
 def product_asymmetry(robot: Facts) -> Violations:
     """The inertia of a body is not turned like that of its mirror image.
 
@@ -136,11 +135,10 @@ def product_asymmetry(robot: Facts) -> Violations:
         error = float(np.abs(reflection @ a @ reflection - b).max()) / largest
         if error <= _MAX_PRODUCT_ERROR or moments > _MAX_MOMENT_ERROR:
             continue
-        odd, other = robot.outlier_first(left, right, lambda body: body.inertia.ravel())
+        odd, other = robot.outlier_first(pair, lambda body: body.inertia.ravel())
         yield Violation(
             subject=odd.body.name,
             source=inertia_source(odd.body.main_link),
-            certainty="likely",
             message=f"inertia of body {odd.body.name} in the axes of the trunk: got {error:.0%} "
             f"of its largest moment between it and the mirrored one of {other.body.name}; "
             f"expected at most {_MAX_PRODUCT_ERROR:.0%}",
@@ -164,7 +162,6 @@ def _turned_trunk(robot: Facts) -> Violations:
         yield Violation(
             subject=trunk.name,
             source=inertia_source(trunk.main_link),
-            certainty="likely",
             message=f"products of inertia of trunk {trunk.name} with the mirrored axis: got "
             f"{share:.0%} of its largest moment; expected at most {_MAX_PRODUCT_ERROR:.0%}",
             measured={"share": share},

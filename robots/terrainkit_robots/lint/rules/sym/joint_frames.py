@@ -23,7 +23,7 @@ from terrainkit_robots.text import numbers
 from terrainkit_robots.transforms import Matrix
 
 
-@rule("SYM006", "joint-origin-asymmetry", "warning")
+@rule("SYM006", "joint-origin-asymmetry", "warning", certainty="likely")
 def joint_origin_asymmetry(robot: Facts) -> Violations:
     """The origin of a joint does not mirror that of its mirror image.
 
@@ -43,7 +43,7 @@ def joint_origin_asymmetry(robot: Facts) -> Violations:
             yield _report_pair(robot, error)
 
 
-@rule("SYM007", "joint-axis-asymmetry", "warning")
+@rule("SYM007", "joint-axis-asymmetry", "warning", certainty="likely")
 def joint_axis_asymmetry(robot: Facts) -> Violations:
     """The axis of a joint does not mirror that of its mirror image.
 
@@ -71,7 +71,6 @@ def joint_axis_asymmetry(robot: Facts) -> Violations:
         yield Violation(
             subject=joint.name,
             source=joint.axis_source or joint.source,
-            certainty="likely",
             message=f"axis of joint {joint.name} in the trunk frame: got "
             f"{_format_axis(found.axis)}; expected the direction of the same joint of all "
             f"{found.others} other legs, such as {_format_axis(found.expected_axis)}, or mirrored "
@@ -123,7 +122,6 @@ def _report_axis(
     return Violation(
         subject=joint.name,
         source=joint.axis_source or joint.source,
-        certainty="likely",
         message=f"axis of joint {joint.name} in the trunk frame: {message}",
         measured={**measured, "mirror_image": left.joint.name},
     )
@@ -145,7 +143,7 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         return body.origin[:3, :3].ravel()
 
     value = axis if error.is_axis else position if error.distance else rotation
-    odd, other = robot.outlier_first(error.left, error.right, value)
+    odd, other = robot.outlier_first(error.pair, value)
     name, mirror = odd.joint.name, other.joint.name
     if error.distance:
         offsets = [numbers(1000 * side.offset, ".1f", ", ") for side in (odd, other)]
@@ -167,7 +165,6 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
     return Violation(
         subject=name,
         source=source,
-        certainty="likely",
         message=message,
         measured={"gap": error.distance, "angle": error.angle, "mirror_image": mirror},
     )

@@ -1,11 +1,8 @@
 """Rules on the symmetry of position, effort and velocity limits."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.element_source import limit_source
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.asymmetry import (
     MAX_LIMIT_ERROR,
@@ -23,10 +20,8 @@ from terrainkit_robots.transforms import Matrix
 _MAX_LIMIT_DIFFERENCE = 0.01
 """Allowed relative difference of effort and velocity limits."""
 
-_LimitOf = Callable[[Facts, Joint], float | None]
 
-
-@rule("SYM004", "limit-asymmetry", "warning")
+@rule("SYM004", "limit-asymmetry", "warning", certainty="likely")
 def limit_asymmetry(robot: Facts) -> Violations:
     """The limits of a joint do not match those of its mirror image.
 
@@ -50,14 +45,13 @@ def limit_asymmetry(robot: Facts) -> Violations:
             continue
         if has_flipped_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
-        odd, other = robot.outlier_first(left, right, _limit_sizes)
+        odd, other = robot.outlier_first(pair, _limit_sizes)
         own, mirror = (a, b) if odd is left else (b, a)
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
         yield Violation(
             subject=odd.joint.name,
-            source=limit_source(odd.joint),
-            certainty="likely",
+            source=(odd.joint.limit or odd.joint).source,
             message=f"limits of joint {odd.joint.name}: got {numbers(own, '.5g', ' to ')} {unit}; "
             f"expected {numbers(expected, '.5g', ' to ')} {unit}, mirrored from those of {name}, "
             f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range",
@@ -76,7 +70,7 @@ def _limit_sizes(body: Body) -> Matrix | None:
     return None if limits is None else np.sort(np.abs(limits))
 
 
-@rule("SYM005", "effort-asymmetry", "warning")
+@rule("SYM005", "effort-asymmetry", "warning", certainty="likely")
 def effort_asymmetry(robot: Facts) -> Violations:
     """The effort or velocity limit of a joint differs from that of its mirror image.
 
@@ -92,35 +86,32 @@ def effort_asymmetry(robot: Facts) -> Violations:
     other_rules = OtherRules(robot, "JNT011")
     for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
-        differences: dict[str, tuple[float, float, float, _LimitOf]] = {}
-        for name, limit_of in (("effort", Facts.effort_limit), ("velocity", _velocity_of)):
-            a, b = limit_of(robot, left.joint), limit_of(robot, right.joint)
+        differences: dict[str, tuple[float, float, float]] = {}
+        for name in ("effort", "velocity"):
+            a, b = (_motor_limit(robot, side.joint, name) for side in (left, right))
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = relative_difference(a, b)
             if difference > _MAX_LIMIT_DIFFERENCE:
-                differences[name] = (a, b, difference, limit_of)
+                differences[name] = (a, b, difference)
         if not differences or other_rules.report(pair):
             continue
 
-        _, _, _, first = next(iter(differences.values()))
-
-        def value(body: Body, limit_of: _LimitOf = first) -> Matrix | None:
-            limit = limit_of(robot, body.joint) if body.joint else None
+        def value(body: Body, name: str = next(iter(differences))) -> Matrix | None:
+            limit = _motor_limit(robot, body.joint, name) if body.joint else None
             return None if limit is None else np.array([limit])
 
-        odd, other = robot.outlier_first(left, right, value)
+        odd, other = robot.outlier_first(pair, value)
         joint, parts = odd.joint, list[str]()
         measured: dict[str, float | int | str] = {}
-        for name, (a, b, difference, _) in differences.items():
+        for name, (a, b, difference) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
             parts.append(f"{own:g} {unit}, {_percent(difference)} from the {mirror:g} {unit}")
             measured[name], measured[f"other_{name}"] = own, mirror
         yield Violation(
             subject=joint.name,
-            source=limit_source(joint),
-            certainty="likely",
+            source=(joint.limit or joint).source,
             message=f"{' and '.join(differences)} limit of joint {joint.name}: got "
             f"{' and '.join(parts)} of its mirror image {other.joint.name}; expected at "
             f"most {_MAX_LIMIT_DIFFERENCE:.0%}",
@@ -128,9 +119,9 @@ def effort_asymmetry(robot: Facts) -> Violations:
         )
 
 
+def _motor_limit(robot: Facts, joint: Joint, name: str) -> float | None:
+    return robot.effort_limit(joint) if name == "effort" else joint.velocity
+
+
 def _percent(difference: float) -> str:
     return contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")[0]
-
-
-def _velocity_of(_: Facts, joint: Joint) -> float | None:
-    return joint.limit.velocity if joint.limit else None

@@ -5,8 +5,8 @@ from collections import Counter
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
-from terrainkit_robots.analysis.bodies.element_source import mass_source
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.inertia.inertial import mass_source
 from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     MAX_COM_ERROR,
     MAX_MASS_DIFFERENCE,
@@ -26,7 +26,7 @@ _MAX_TRUNK_OFFSET, _TRUNK_OFFSET_SHARE = 0.02, 0.25
 and this share of that of the legs. Of 143 published legged robots, none exceeds 0.11."""
 
 
-@rule("SYM001", "mass-asymmetry", "warning")
+@rule("SYM001", "mass-asymmetry", "warning", certainty="likely")
 def mass_asymmetry(robot: Facts) -> Violations:
     """The mass of a body differs from that of its mirror image.
 
@@ -48,11 +48,10 @@ def mass_asymmetry(robot: Facts) -> Violations:
             continue
         if other_rules.report(pair):
             continue
-        odd, other = robot.outlier_first(left, right, lambda body: np.array([body.mass]))
+        odd, other = robot.outlier_first(pair, lambda body: np.array([body.mass]))
         yield Violation(
             subject=odd.body.name,
             source=mass_source(odd.body.main_link),
-            certainty="likely",
             message=f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
             f"{contrast(difference, MAX_MASS_DIFFERENCE, '.1%')[0]} from the "
             f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
@@ -65,7 +64,7 @@ def mass_asymmetry(robot: Facts) -> Violations:
         )
 
 
-@rule("SYM002", "com-asymmetry", "warning")
+@rule("SYM002", "com-asymmetry", "warning", certainty="likely")
 def com_asymmetry(robot: Facts) -> Violations:
     """A center of mass is not at the mirrored position of its mirror image.
 
@@ -95,13 +94,12 @@ def com_asymmetry(robot: Facts) -> Violations:
             continue
         if _is_same_part(robot, left.body, right.body):
             continue
-        odd, other = robot.outlier_first(left, right, lambda body: body.center)
+        odd, other = robot.outlier_first(pair, lambda body: body.center)
         centers = [numbers(1000 * side.body.center, ".1f", ", ") for side in (odd, other)]
         got, expected = contrast(1000 * error, 1000 * limit, ".3g")
         yield Violation(
             subject=odd.body.name,
             source=mass_source(odd.body.main_link),
-            certainty="likely",
             message=f"center of mass of body {odd.body.name}: got ({centers[0]}) mm, and "
             f"({centers[1]}) mm for its mirror image {other.body.name}, each in its own "
             f"frame: {got} mm from mirrored; expected at most {expected} mm",
@@ -123,7 +121,6 @@ def _trunk_offset(robot: Facts) -> Violations:
         yield Violation(
             subject=trunk.name,
             source=mass_source(trunk.main_link),
-            certainty="likely",
             message=f"distance of the center of mass of trunk {trunk.name} from the mirror plane: "
             f"got {got} mm; expected at most {expected} mm",
             measured={"gap": distance, "allowed": limit},

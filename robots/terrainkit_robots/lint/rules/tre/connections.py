@@ -55,8 +55,7 @@ def unknown_link(robot: Facts) -> Violations:
     for index, (name, uses) in enumerate(missing.items()):
         joints = names(f"{role} of joint {joint.name}" for role, joint in uses)
         yield Violation(
-            subject=uses[0][1].name,
-            source=uses[0][1].source,
+            element=uses[0][1],
             message=f"link {truncate(name)}: does not exist, but is the {joints}; expected a "
             "link in the file",
             hint=_suggestion(robot, name) if index < _MAX_SUGGESTIONS else "",
@@ -219,7 +218,7 @@ def no_links(robot: Facts) -> Violations:
     )
 
 
-@rule("TRE011", "parent-of-another-leg", "warning")
+@rule("TRE011", "parent-of-another-leg", "warning", certainty="likely")
 def parent_of_another_leg(robot: Facts) -> Violations:
     """A link is attached to the link of another leg or side.
 
@@ -245,9 +244,7 @@ def parent_of_another_leg(robot: Facts) -> Violations:
         )
         if lacks_child and expected != joint.parent:
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
-                certainty="likely",
+                element=joint,
                 message=f"parent of link {truncate(joint.child)} in joint {truncate(joint.name)}: "
                 f"got {truncate(joint.parent)}; expected {truncate(expected)}, which lacks a child",
             )

@@ -7,7 +7,7 @@ from terrainkit_robots.description.model import Link
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("TRE007", "no-free-joint", "error", fixes="safe", needs=("legs",))
+@rule("TRE007", "no-free-joint", "error", fixes="safe", needs=("legs",), certainty="likely")
 def no_free_joint(robot: Facts) -> Violations:
     """A legged MJCF robot has no free joint.
 
@@ -33,11 +33,9 @@ def no_free_joint(robot: Facts) -> Violations:
     edit = InsertChild(source=root.source, xml="<freejoint/>", first=True)
     edits = [] if model.keyframe else [edit]
     yield Violation(
-        subject=root.name,
-        source=root.source,
+        element=root,
         message=f"body {root.name}: is welded to the world, but the robot has {len(robot.legs)} "
         "legs; expected a free joint",
-        certainty="likely",
         measured={"legs": len(robot.legs)},
         fix=make_fix("safe", f"Add <freejoint/> to {root.name}.", edits),
     )
@@ -61,8 +59,7 @@ def inner_floating_joint(robot: Facts) -> Violations:
     for joint in tree.parent_joint.values():
         if joint.kind in ("floating", "planar") and not _is_world(robot, joint.parent):
             yield Violation(
-                subject=joint.name,
-                source=joint.source,
+                element=joint,
                 message=f"type of joint {truncate(joint.name)} between links "
                 f"{truncate(joint.parent)} and {truncate(joint.child)}: got {joint.kind}; expected "
                 "fixed, revolute, continuous or prismatic",
@@ -108,8 +105,7 @@ def dummy_root(robot: Facts) -> Violations:
         joint = tree.parent_joint[joint.parent]
     is_welded = root.name == "world" and robot.model.kind != "mjcf" and bool(robot.legs)
     yield Violation(
-        subject=root.name,
-        source=root.source,
+        element=root,
         message=f"root link {truncate(root.name)}: has no mass and no collision shape; the trunk "
         f"is {truncate(trunk)}, attached by the fixed joint {truncate(joint.name)}"
         + (", which welds it to the world; expected a floating joint" if is_welded else ""),

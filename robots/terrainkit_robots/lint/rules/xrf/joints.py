@@ -106,8 +106,7 @@ def compare_joints(robot: Facts) -> Violations:
         label, difference, severity = joint_difference(robot, one, other)
         if label:
             yield Violation(
-                subject=one.name,
-                source=one.source,
+                element=one,
                 severity=severity,
                 message=f"{label} of joint {joint_name(one, other)}: got {difference} "
                 f"({there}, line {other.source.line})",

@@ -38,8 +38,7 @@ def compare_kinematics(robot: Facts) -> Violations:
     links = {link.name: link for link in robot.links}
     subject = gap.base[0] if gap.is_base_offset else gap.first
     yield Violation(
-        subject=subject,
-        source=links[subject].source,
+        element=links[subject],
         severity=severity,
         message=_kinematics_message(gap, other_name(robot)),
         measured={

@@ -1,6 +1,7 @@
 """Rules that compare position, velocity and effort limits."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from terrainkit_robots.lint.rules.xrf.other_robot import (
 )
 from terrainkit_robots.text import names
 
+_Difference = TypeVar("_Difference")
+
 
 @rule("XRF003", "joint-limits-differ", "warning", needs=("against",))
 def compare_limits(robot: Facts) -> Violations:
@@ -37,24 +40,21 @@ def compare_limits(robot: Facts) -> Violations:
     """
     there = other_name(robot)
     pairs = matching_joints(robot)
-    for group in _grouped(pairs, _range_difference):
+    for _, group in _grouped(pairs, _range_difference):
         one, other = group[0]
-        unit = one.unit
         yield _report_group(
             group,
             "limits",
             f"{_format_range(one)} here and {_format_range(other)} in {there}; expected a "
-            f"difference of at most {limit_tolerance(one)} {unit}",
+            f"difference of at most {limit_tolerance(one)} {one.unit}",
         )
-    for group in _grouped(pairs, _velocity_difference):
-        one, other = group[0]
-        assert one.limit is not None
-        assert other.limit is not None
+    velocities = {one.name: (one.velocity, other.velocity) for one, other in pairs}
+    for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *velocities[one.name])):
+        unit = group[0][0].speed_unit
         yield _report_group(
             group,
             "velocity limit",
-            f"{one.limit.velocity:.6g} {one.speed_unit} here and {other.limit.velocity:.6g} "
-            f"{one.speed_unit} in {there}; expected a difference of at most "
+            f"{a:.6g} {unit} here and {b:.6g} {unit} in {there}; expected a difference of at most "
             f"{MAX_RELATIVE_DIFFERENCE:.0%}",
         )
 
@@ -67,13 +67,11 @@ def _range_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
     return one.kind == "prismatic", a, b
 
 
-def _velocity_difference(one: Joint, other: Joint) -> tuple[object, ...] | None:
-    """Return the velocities of two joints if both are given and they differ."""
-    a = one.limit.velocity if one.limit else None
-    b = other.limit.velocity if other.limit else None
+def _difference(joint: Joint, a: float | None, b: float | None) -> tuple[bool, float, float] | None:
+    """Return whether a joint slides, and its two limits if both are given and they differ."""
     if not a or not b or relative_difference(a, b) <= MAX_RELATIVE_DIFFERENCE:
         return None
-    return one.kind == "prismatic", a, b
+    return joint.kind == "prismatic", a, b
 
 
 def _format_range(joint: Joint) -> str:
@@ -83,15 +81,15 @@ def _format_range(joint: Joint) -> str:
 
 
 def _grouped(
-    pairs: Sequence[JointPair], key: Callable[[Joint, Joint], tuple[object, ...] | None]
-) -> Iterator[list[JointPair]]:
-    """Yield groups of pairs with the same difference, without the pairs that agree."""
-    groups: dict[tuple[object, ...], list[JointPair]] = {}
+    pairs: Sequence[JointPair], key: Callable[[Joint, Joint], _Difference | None]
+) -> Iterable[tuple[_Difference, list[JointPair]]]:
+    """Return each difference with the pairs that have it, without the pairs that agree."""
+    groups: dict[_Difference, list[JointPair]] = {}
     for one, other in pairs:
         difference = key(one, other)
         if difference is not None:
             groups.setdefault(difference, []).append((one, other))
-    yield from groups.values()
+    return groups.items()
 
 
 def _report_group(
@@ -127,19 +125,12 @@ def compare_effort(robot: Facts) -> Violations:
     pairs = matching_joints(robot)
     efforts = {a.name: (robot.effort_limit(a), other.effort_limit(b)) for a, b in pairs}
 
-    def difference(one: Joint, _: Joint) -> tuple[object, ...] | None:
-        a, b = efforts[one.name]
-        if not a or not b or relative_difference(a, b) <= MAX_RELATIVE_DIFFERENCE:
-            return None
-        return one.kind == "prismatic", a, b
+    def missing(one: Joint, _: Joint) -> bool | None:
+        a, b = map(bool, efforts[one.name])
+        return None if a == b else a
 
-    def missing(one: Joint, _: Joint) -> tuple[object, ...] | None:
-        a, b = efforts[one.name]
-        return None if bool(a) == bool(b) else (bool(a),)
-
-    for group in _grouped(pairs, difference):
-        one, unit = group[0][0], group[0][0].effort_unit
-        a, b = (effort or 0.0 for effort in efforts[one.name])
+    for (_, a, b), group in _grouped(pairs, lambda one, _: _difference(one, *efforts[one.name])):
+        unit = group[0][0].effort_unit
         yield _report_group(
             group,
             "effort limit",
@@ -147,8 +138,7 @@ def compare_effort(robot: Facts) -> Violations:
             f"{relative_difference(a, b):.1%} apart; expected at most "
             f"{MAX_RELATIVE_DIFFERENCE:.0%}",
         )
-    for group in _grouped(pairs, missing):
-        limited = bool(efforts[group[0][0].name][0])
+    for limited, group in _grouped(pairs, missing):
         bare = other if limited else robot
         has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
         without, note = there if limited else "this file", ", which has no actuators"

@@ -5,6 +5,7 @@ import math
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.analysis.inertia.inertial import mass_source
 from terrainkit_robots.lint.compare.body_mass import (
     body_difference,
     dropped_mass,
@@ -62,8 +63,6 @@ def compare_total_mass(robot: Facts) -> Violations:
             if relative_difference(one.mass, two.mass) > _MAX_MASS_DIFFERENCE
         ]
         yield Violation(
-            subject=robot.model.title,
-            source=robot.model.source,
             severity="error" if difference > _MAX_MASS_ERROR else None,
             message=f"total mass: got {a:.5g} kg here and {b:.5g} kg in {there}, {difference:.1%} "
             f"apart; expected at most {_MAX_MASS_DIFFERENCE:.0%}"
@@ -135,10 +134,9 @@ def compare_inertia(robot: Facts) -> Violations:
                 f"{gap.inertia:.0%} apart; expected at most {_MAX_INERTIA_DIFFERENCE:.0%}"
             )
         if message:
-            link = next(link for link in one.links if link.name == one.name)
             yield Violation(
                 subject=one.name,
-                source=(link.inertial or link).source,
+                source=mass_source(one.main_link),
                 message=message,
                 measured={"mass": gap.mass, "center": gap.center, "inertia": gap.inertia},
             )

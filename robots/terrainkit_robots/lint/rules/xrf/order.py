@@ -38,8 +38,6 @@ def compare_joint_order(robot: Facts) -> Violations:
         return
     subset = len(pairs) < max(len(robot.joints), len(other.joints))
     yield Violation(
-        subject=robot.model.title,
-        source=robot.model.source,
         message=f"order of the {f'{len(pairs)} common ' if subset else ''}joints: got "
         f"{names(ours, max_count=4)} here and {names(theirs, max_count=4)} in {there}; "
         f"{_format_order('theirs', 'ours', indices)}",
@@ -112,4 +110,4 @@ def _actuator_difference(robot: Facts) -> str:
 
 def _report_actuators(robot: Facts, message: str, severity: Severity | None = None) -> Violation:
     first = next((actuator.source for actuator in robot.model.actuators), robot.model.source)
-    return Violation(subject=robot.model.title, source=first, message=message, severity=severity)
+    return Violation(source=first, message=message, severity=severity)

@@ -16,19 +16,15 @@ JointPair = tuple[Joint, Joint]
 
 
 @cached_fact
-def _pair_robots(robot: Facts) -> "RobotPairs | None":
-    from terrainkit_robots.lint.compare.robot_pairs import pair_robots
-
-    return pair_robots(robot, other_robot(robot))
-
-
 def robot_pairs(robot: Facts) -> "RobotPairs":
     """Return the matching elements of both descriptions.
 
     Raises:
         CannotCheckError: If one of them has no links.
     """
-    pairs = _pair_robots(robot)
+    from terrainkit_robots.lint.compare.robot_pairs import pair_robots
+
+    pairs = pair_robots(robot, other_robot(robot))
     if pairs is None:
         empty = robot if not robot.links else other_robot(robot)
         raise CannotCheckError(f"{truncate(empty.model.file.name)} has no links")

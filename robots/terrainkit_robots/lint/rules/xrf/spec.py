@@ -1,9 +1,11 @@
 """Rules that compare the robot with its robot.toml."""
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
+from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
@@ -21,23 +23,12 @@ _MAX_LIMIT_RATIO = 1.01
 
 
 def _report(
-    robot: Facts,
-    name: str,
-    message: str,
-    measured: Mapping[str, float] | None = None,
-    *,
-    likely: bool = False,
+    robot: Facts, name: str, message: str, measured: Mapping[str, float] = MappingProxyType({})
 ) -> Violation:
     """Return a violation at the joint or link of that name, or at the robot."""
-    joints = {joint.name: joint for joint in robot.model.joints}
-    element = joints.get(name) or robot.tree.links.get(name)
-    return Violation(
-        subject=truncate(name) or robot.model.title,
-        source=element.source if element is not None else robot.model.source,
-        message=message,
-        certainty="likely" if likely else "proven",
-        measured=measured or {},
-    )
+    element = _joints_by_name(robot).get(name) or robot.tree.links.get(name)
+    subject = truncate(name) or robot.model.title
+    return Violation(element=element, subject=subject, message=message, measured=measured)
 
 
 def _suggest(name: str, candidates: Sequence[str]) -> str:
@@ -46,7 +37,7 @@ def _suggest(name: str, candidates: Sequence[str]) -> str:
     return f"; did you mean {near}?" if near else ""
 
 
-@rule("XRF013", "spec-feet", "error", needs=("spec", "legs"))
+@rule("XRF013", "spec-feet", "error", needs=("spec", "legs"), certainty="likely")
 def spec_feet(robot: Facts) -> Violations:
     """The feet of the spec are not the feet of the robot.
 
@@ -75,14 +66,14 @@ def spec_feet(robot: Facts) -> Violations:
         else:
             used[index] = name
             continue
-        yield _report(robot, name, message, likely=True)
+        yield _report(robot, name, message)
     missing = [leg.foot for leg in robot.legs if leg.limb.chain[-1] not in used]
     if missing:
         count = len(robot.legs)
         message = (
             f"feet: got {count - len(missing)} of {count} feet; expected also {names(missing)}"
         )
-        yield _report(robot, missing[0], message, likely=True)
+        yield _report(robot, missing[0], message)
 
 
 @rule("XRF014", "spec-bodies", "error", needs=("spec",))
@@ -121,21 +112,18 @@ def spec_bodies(robot: Facts) -> Violations:
         if any(name not in robot.body_of for name in (*bodies, *spec.feet)):
             continue
         for name, foot in zip(bodies, spec.feet, strict=True):
-            carried = [other for other in spec.feet if _is_ancestor(robot, name, other)]
+            index = robot.body_of[name].index
+            carried = [
+                other
+                for other in spec.feet
+                if index in (0, *ancestors(robot.bodies, robot.body_of[other].index))
+            ]
             if carried and foot not in carried:
                 message = (
                     f"{field}: got {truncate(name)}, the parent of {names(carried)}, at the index "
                     f"of {truncate(foot)}; expected the order of feet"
                 )
                 yield _report(robot, name, message)
-
-
-def _is_ancestor(robot: Facts, name: str, foot: str) -> bool:
-    ancestor = robot.body_of[name].index
-    index: int | None = robot.body_of[foot].index
-    while index is not None and index > ancestor:
-        index = robot.bodies[index].parent
-    return index == ancestor
 
 
 def _table_joints(robot: Facts) -> list[str]:
@@ -206,8 +194,6 @@ def spec_joint_order(robot: Facts) -> Violations:
         return
     first = next(k for k, index in enumerate(indices) if index != k)
     yield Violation(
-        subject=robot.model.title,
-        source=robot.model.source,
         message=f"joint_order[{first}]: got {truncate(ours[first])}; expected "
         f"{truncate(order[first])}, as in the {elements} of {robot.model.file.name}, or "
         f"of_file = of_spec[{indices}]",
@@ -279,9 +265,7 @@ def spec_motor_limits(robot: Facts) -> Violations:
         Limits of the description, and the force ranges of an MJCF's actuators.
     """
     yield from _check_limits(robot, "effort", robot.effort_limit, lambda j: j.effort_unit)
-    yield from _check_limits(
-        robot, "velocity", lambda j: j.limit.velocity if j.limit else None, lambda j: j.speed_unit
-    )
+    yield from _check_limits(robot, "velocity", lambda j: j.velocity, lambda j: j.speed_unit)
 
 
 def _check_limits(
