@@ -182,12 +182,11 @@ def nominal_task(no_randomization: DomainRand) -> Callable[..., Task]:
     return make
 
 
-@pytest.fixture(scope="session")
-def random_task() -> Callable[..., Task]:
-    """Return a function that makes tasks of few robots with all randomization."""
-
-    def make(num_envs: int = 4, num_threads: int = 1, **sections: Any) -> Task:
-        return Task(**({"env": Env(num_envs=num_envs, num_threads=num_threads)} | sections))
+def env_maker(make_task: Callable[..., Task], quadruped: Robot) -> Callable[..., LeggedEnv]:
+    def make(
+        num_envs: int = 4, ground: Terrain | None = None, robot: Robot = quadruped, **sections: Any
+    ) -> LeggedEnv:
+        return LeggedEnv(make_task(num_envs, **sections), robot, ground or Plane())
 
     return make
 
@@ -195,25 +194,17 @@ def random_task() -> Callable[..., Task]:
 @pytest.fixture(scope="session")
 def nominal_env(quadruped: Robot, nominal_task: Callable[..., Task]) -> Callable[..., LeggedEnv]:
     """Return a function that makes environments of the nominal task, by default on a plane."""
-
-    def make(
-        num_envs: int = 4, ground: Terrain | None = None, robot: Robot = quadruped, **sections: Any
-    ) -> LeggedEnv:
-        return LeggedEnv(nominal_task(num_envs, **sections), robot, ground or Plane())
-
-    return make
+    return env_maker(nominal_task, quadruped)
 
 
 @pytest.fixture(scope="session")
-def random_env(quadruped: Robot, random_task: Callable[..., Task]) -> Callable[..., LeggedEnv]:
-    """Return a function that makes environments of the random task, by default on a plane."""
+def random_env(quadruped: Robot) -> Callable[..., LeggedEnv]:
+    """Return a function that makes environments with all randomization, by default on a plane."""
 
-    def make(
-        num_envs: int = 4, ground: Terrain | None = None, robot: Robot = quadruped, **sections: Any
-    ) -> LeggedEnv:
-        return LeggedEnv(random_task(num_envs, **sections), robot, ground or Plane())
+    def make_task(num_envs: int, num_threads: int = 1, **sections: Any) -> Task:
+        return Task(**({"env": Env(num_envs=num_envs, num_threads=num_threads)} | sections))
 
-    return make
+    return env_maker(make_task, quadruped)
 
 
 @pytest.fixture(scope="session")

@@ -89,6 +89,13 @@ class TestHeading:
         command.update_heading(np.float32([yaw]), np.zeros((1, 2), np.float32))
         assert command.commands[0, 2] == pytest.approx(rate, abs=1e-4)
 
+    def test_yaw_rate_of_fixed_commands(self):
+        command = VelocityCommand(Commands(), 2, 0.02, heading_command=True)
+        command.heading[:] = 1.0
+        command.fixed = np.float32([[1, 0, 0.25], [0, 0, -0.5]])
+        command.update_heading(np.zeros(2, np.float32), np.zeros((2, 2), np.float32))
+        assert command.yaw_rate(np.zeros(2, np.float32)).tolist() == [0.25, -0.5]
+
     def test_heading_control_converges(self):
         yaw, heading = np.float32([-3.0, 0.1, 2.5]), np.float32([3.0, -1.0, 0.0])
         command = VelocityCommand(Commands(), 3, 0.02, heading_command=True)

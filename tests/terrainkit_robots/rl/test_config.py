@@ -1,30 +1,24 @@
+"""The sections of a task; tests/terrainkit/settings has the rules of every config."""
+
 import dataclasses
 import math
+import tomllib
 from dataclasses import dataclass, field, replace
-from typing import Annotated
 
 import pytest
-from msgspec import Meta
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.field_docs import field_docs
-from terrainkit.settings.schema import Config
-from terrainkit.settings.type_hint import SORTED, PositiveFloat
+from terrainkit.settings.schema import Config, flatten
 from terrainkit_robots.rl.config import (
-    Algorithm,
     Commands,
     Control,
     DomainRand,
     Env,
-    InitState,
-    Observations,
-    Policy,
     Rewards,
     Runner,
     Sim,
     Task,
-    Termination,
-    Terrain,
 )
 
 NESTING = {
@@ -33,106 +27,73 @@ NESTING = {
 }
 
 
-def sections(section=None):
-    """Return a task and all its sections."""
-    section = section or Task()
+def sections(section):
+    """Return a config and all its sections."""
     inner = [getattr(section, each.name) for each in dataclasses.fields(section)]
     return [section] + [s for one in inner if isinstance(one, Config) for s in sections(one)]
-
-
-every_section = pytest.mark.parametrize("section", sections(), ids=lambda s: type(s).__name__)
 
 
 def test_task_has_sections_of_legged_gym():
     assert {each.name for each in dataclasses.fields(Task)} >= NESTING
 
 
-@every_section
-def test_every_option_has_a_docstring(section):
+@pytest.mark.parametrize("section", sections(Task()), ids=lambda s: type(s).__name__)
+def test_every_option_has_a_docstring_and_a_type(section):
     told = field_docs(type(section))
     for each in dataclasses.fields(section):
         if not isinstance(getattr(section, each.name), Config):  # it has a docstring of its own
             assert told[each.name].endswith("."), each.name
-
-
-@every_section
-def test_wrong_type_is_rejected_by_name(section):
-    for each in dataclasses.fields(section):
         with pytest.raises(ConfigError, match=rf"^{each.name}: "):
             replace(section, **{each.name: object()})
 
 
-@every_section
-def test_non_finite_numbers_are_rejected(section):
-    for each in dataclasses.fields(section):
-        value = getattr(section, each.name)
-        if isinstance(value, float):
-            for odd in (math.nan, math.inf, -math.inf):
-                with pytest.raises(ConfigError, match=rf"^{each.name}: got {odd}"):
-                    replace(section, **{each.name: odd})
-        elif isinstance(value, tuple) and isinstance(value[0], float):
-            with pytest.raises(ConfigError, match=rf"^{each.name}: got .*nan"):
-                replace(section, **{each.name: (math.nan,) * len(value)})
+def with_value(section, name, value):
+    first, _, rest = name.partition(".")
+    changed = with_value(getattr(section, first), rest, value) if rest else value
+    return replace(section, **{first: changed})
 
 
 @pytest.mark.parametrize(
-    ("section", "name", "value", "message"),
+    ("name", "value", "message"),
     [
-        (Env, "num_envs", 0, "num_envs: got 0; expected an integer >= 1"),
-        (Env, "num_envs", 2.0, "num_envs: got 2.0; expected an integer"),
-        (Env, "num_envs", True, "num_envs: got True; expected an integer"),
-        (Env, "episode_length_s", 0, "expected a number > 0 and <= 1000000"),
-        (Env, "num_threads", -1, "num_threads: got -1; expected an integer from 0 to 4096"),
-        (Terrain, "collision", "mesh", "expected one of: auto, hfield, boxes, plane"),
-        (Terrain, "curriculum", True, "curriculum: got True; expected one of: levels, uniform, "),
-        (Terrain, "curriculum", "level", "expected one of: .*, or none; did you mean 'levels'?"),
-        (Terrain, "measured_points_x", [], r"measured_points_x: got \[\]; expected a non-empty"),
-        (InitState, "reset_range", (0.5, -1), "reset_range: got .*each a number >= 0"),
-        (InitState, "reset_range", (1.5, 0.5), "the lower one first, or none"),
-        (InitState, "position", -0.1, "position: got -0.1; expected a number >= 0"),
-        (Control, "decimation", 0, "decimation: got 0; expected an integer from 1 to 1000"),
-        (Control, "decimation", 10**9, "decimation: got 1000000000; expected"),
-        (Control, "action_scale", 0.0, "action_scale: got 0.0; expected a number > 0, or none"),
-        (Control, "control_type", "X", "expected one of: P, V, T"),
-        (Commands, "lin_vel_x", (1, -1), "lin_vel_x: got .*, the lower one first"),
-        (Commands, "lin_vel_x", (1, 2, 3), "lin_vel_x: got .*; expected 2 values"),
-        (Commands, "standing", 1.5, "standing: got 1.5; expected a number from 0 to 1"),
-        (Commands, "resampling_time", 0, "expected a number > 0"),
-        (DomainRand, "friction", (-0.1, 1), "friction: got .*each a number >= 0"),
-        (DomainRand, "com_shift", -1, "com_shift: got -1; expected a number >= 0"),
-        (DomainRand, "action_delay", (0.02, 0), "action_delay: got .*, the lower one first"),
-        (DomainRand, "action_delay", (-0.01, 0), "action_delay: got .*each a number >= 0"),
-        (DomainRand, "action_delay", 0.02, "action_delay: got 0.02; expected 2 values"),
-        (Observations, "history_length", 0, "got 0; expected an integer from 1 to 100"),
-        (Observations, "history_length", 1.5, "history_length: got 1.5; expected an integer"),
-        (Observations, "foot_contact", 1, "foot_contact: got 1; expected true or false"),
-        (Rewards, "tracking_sigma", 0, "tracking_sigma: got 0; expected a number > 0"),
-        (Rewards, "tracking_lin_vel", "much", "tracking_lin_vel: got 'much'; expected a number"),
-        (Termination, "tilt", 4, "tilt: got 4; expected a number > 0 and <= 3.14159"),
-        (Sim, "dt", 1, "dt: got 1; expected a number > 0 and <= 0.1"),
-        (Policy, "actor_hidden_dims", (), r"actor_hidden_dims: got \[\]"),
-        (Policy, "critic_hidden_dims", (128, 10**12), "critic_hidden_dims: .* from 1 to 65536"),
-        (Policy, "activation", "relu6", "got 'relu6'; expected one of: elu, .*mean 'relu'"),
-        (Algorithm, "gamma", 1.01, "gamma: got 1.01; expected a number from 0 to 1"),
-        (Algorithm, "symmetry", "loss", "symmetry: got 'loss'; expected true or false"),
-        (Runner, "seed", -1, "seed: got -1; expected an integer from 0"),
+        ("env.num_envs", 0, "num_envs: got 0; expected an integer >= 1"),
+        ("env.episode_length_s", 0, "expected a number > 0 and <= 1000000"),
+        ("env.num_threads", -1, "num_threads: got -1; expected an integer from 0 to 4096"),
+        ("terrain.collision", "mesh", "expected one of: auto, hfield, boxes, plane"),
+        ("terrain.curriculum", True, "curriculum: got True; expected one of: levels, uniform, "),
+        ("terrain.curriculum", "level", "expected one of: .*, or none; did you mean 'levels'?"),
+        ("terrain.measured_points_x", [], r"measured_points_x: got \[\]; expected a non-empty"),
+        ("init_state.reset_range", (0.5, -1), "reset_range: got .*each a number >= 0"),
+        ("init_state.reset_range", (1.5, 0.5), "the lower one first, or none"),
+        ("init_state.position", -0.1, "position: got -0.1; expected a number >= 0"),
+        ("control.decimation", 0, "decimation: got 0; expected an integer from 1 to 1000"),
+        ("control.action_scale", 0.0, "action_scale: got 0.0; expected a number > 0, or none"),
+        ("control.control_type", "X", "expected one of: P, V, T"),
+        ("commands.lin_vel_x", (1, -1), "lin_vel_x: got .*, the lower one first"),
+        ("commands.lin_vel_x", (math.nan, 1), "lin_vel_x: got .nan, 1.; expected 2 values"),
+        ("commands.standing", 1.5, "standing: got 1.5; expected a number from 0 to 1"),
+        ("commands.resampling_time", 0, "expected a number > 0"),
+        ("domain_rand.friction", (-0.1, 1), "friction: got .*each a number >= 0"),
+        ("domain_rand.com_shift", -1, "com_shift: got -1; expected a number >= 0"),
+        ("domain_rand.com_shift", None, "com_shift: got None; expected a number"),
+        ("domain_rand.action_delay", (0.02, 0), "action_delay: got .*, the lower one first"),
+        ("domain_rand.action_delay", (-0.01, 0), "action_delay: got .*each a number >= 0"),
+        ("observations.history_length", 0, "got 0; expected an integer from 1 to 100"),
+        ("rewards.tracking_sigma", 0, "tracking_sigma: got 0; expected a number > 0"),
+        ("rewards.tracking_lin_vel", math.inf, "tracking_lin_vel: got inf; expected a number"),
+        ("termination.tilt", 4, "tilt: got 4; expected a number > 0 and <= 3.14159"),
+        ("sim.dt", 1, "dt: got 1; expected a number > 0 and <= 0.1"),
+        ("policy.actor_hidden_dims", (), r"actor_hidden_dims: got \[\]"),
+        ("policy.critic_hidden_dims", (128, 10**12), "critic_hidden_dims: .* from 1 to 65536"),
+        ("policy.activation", "relu6", "got 'relu6'; expected one of: elu, .*mean 'relu'"),
+        ("algorithm.gamma", 1.01, "gamma: got 1.01; expected a number from 0 to 1"),
+        ("runner.seed", -1, "seed: got -1; expected an integer from 0"),
+        ("rewards", Sim(), r"rewards: got Sim; expected a table \(Rewards\)"),
     ],
 )
-def test_out_of_range_value_is_named(section, name, value, message):
+def test_out_of_range_value_is_named(name, value, message):
     with pytest.raises(ConfigError, match=message):
-        section(**{name: value})
-
-
-def test_integers_and_lists_are_converted():
-    made = Commands(lin_vel_x=[-2, 3], resampling_time=5)
-    assert made.lin_vel_x == (-2.0, 3.0)
-    assert type(made.lin_vel_x[0]) is type(made.resampling_time) is float
-
-
-def test_none_is_accepted_where_declared():
-    assert DomainRand(friction=None).friction is None
-    with pytest.raises(ConfigError, match="com_shift: got None; expected a number"):
-        DomainRand(com_shift=None)
+        with_value(Task(), name, value)
 
 
 def test_episode_has_at_least_one_step():
@@ -160,40 +121,115 @@ def test_action_delay_has_at_least_one_simulation_step():
     assert Task().max_delay_steps == 0
 
 
-def test_section_of_other_class_is_rejected():
-    with pytest.raises(ConfigError, match=r"rewards: got Noisy; expected a table \(Rewards\)"):
-        Task(rewards=Noisy())
+@dataclass(frozen=True, kw_only=True)
+class RoverRewards(Rewards):
+    """What a rover is rewarded for."""
+
+    wheel_slip: float = -0.5
+    """Wheels that slide."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Noisy(Config):
-    """Not a part of a task."""
+class Wheels(Config):
+    """The wheels."""
 
-    level: PositiveFloat = 1.0
-    """How loud."""
+    names: tuple[str, ...] = ("front", 'say "rear"')
+    """What they are called."""
 
-    names: tuple[str, ...] = ()
-    """What of."""
-
-    ends: "Annotated[tuple[float, Annotated[float, Meta(le=5)]], SORTED] | None" = None
-    """Where it ends; an annotation that is a text, as with `from __future__ import annotations`."""
+    note: "str | None" = "rubber"
+    """What they are made of; an annotation that is a text, as with `annotations` imported."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class NoisyTask(Task):
-    """A task with a section of its own."""
+class RoverTask(Task):
+    """A task with fields of its own."""
 
-    din: Noisy = field(default_factory=Noisy)
-    """How loud it is."""
+    rewards: RoverRewards = field(default_factory=RoverRewards)
+    """What is rewarded."""
+
+    wheels: Wheels = field(default_factory=Wheels)
+    """The wheels."""
+
+    commands: Commands = field(default_factory=lambda: Commands(standing=0.5))
+    """Commands that often are zero."""
+
+    laps: int = 3
+    """A value that is in no section."""
 
 
-def test_fields_of_subclass_are_validated():
-    assert NoisyTask(din=Noisy(level=2, ends=[0, 1])).din.ends == (0.0, 1.0)
-    for values, told in {
-        (("level", 0),): "level: got 0; expected a number > 0",
-        (("names", (1,)),): "names: got .1.; expected a list, each value a string",
-        (("ends", (0, 6)),): "ends: got .*; expected",
-        (("ends", (1, 0)),): "the lower one first",
-    }.items():
-        with pytest.raises(ConfigError, match=told):
-            Noisy(**dict(values))
+@pytest.mark.parametrize(("name", "value"), list(flatten(RoverTask())))
+def test_toml_round_trip_of_each_value(name, value):
+    task, tried = RoverTask(), 0
+    numbers = (7, 0.1 + 0.2, 0.05 + 2**-40, (0.3 + 0.1, 0.5), (7,))
+    for other in (None, False, True, "T", ('a\n"b"',), *numbers):
+        try:
+            changed = with_value(task, name, other)
+        except ConfigError:
+            continue  # of another type, or out of range
+        tried += changed != task
+        assert Task.from_toml(changed.to_toml(), task) == changed
+        assert Task.from_toml(task.to_toml(), changed) == task
+    assert tried or isinstance(value, str)
+
+
+@pytest.mark.parametrize("kind", [Task, RoverTask])
+def test_toml_round_trip_of_a_task(kind):
+    assert kind.from_toml(kind().to_toml()) == kind.from_toml("") == kind()
+
+
+def test_toml_has_every_value_with_its_doc():
+    text = Task().to_toml()
+    table = tomllib.loads(text)
+    assert list(table) == [each.name for each in dataclasses.fields(Task)]
+    for name, _ in flatten(Task()):
+        inner = table
+        for part in name.split("."):
+            inner = inner[part]
+    assert "tracking_lin_vel = 1.5  # Tracking of the linear velocity command.\n" in text
+    assert "\n# Scales of the observations.\n[normalization.obs_scales]\n" in text
+
+
+def test_missing_keys_are_those_of_the_default():
+    mine = Task.from_toml("[rewards]\ntracking_lin_vel = 3")
+    assert mine == replace(Task(), rewards=Rewards(tracking_lin_vel=3.0))
+    both = Task.from_toml("[rewards]\ntracking_ang_vel = 2", mine)
+    assert both.rewards == Rewards(tracking_lin_vel=3.0, tracking_ang_vel=2.0)
+
+
+def test_subclass_adds_keys():
+    text = "laps = 5\n[rewards]\nwheel_slip = -1\n[wheels]\nnote = 'none'"
+    made = Task.from_toml(text, RoverTask())
+    assert type(made) is RoverTask
+    assert (made.laps, made.rewards.wheel_slip, made.wheels.note) == (5, -1.0, None)
+    with pytest.raises(ConfigError, match=r"rewards has no key 'wheel_slip'; it has: tracking"):
+        Task.from_toml("[rewards]\nwheel_slip = -1")
+    with pytest.raises(ConfigError, match=r"wheels\.note: got 3; expected a string, or none"):
+        Task.from_toml("[wheels]\nnote = 3", RoverTask())
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[[rewards]]\nx = 1", r"rewards: got \[.*; expected a table"),
+        ("tracking_lin_vel = 1", r"no key 'tracking_lin_vel'; did you mean 'rewards\.track"),
+        ("[reward]\nx = 1", r"no key 'reward'; did you mean 'rewards'\? It has: env, terrain"),
+        ("[rewards]\ntracking_lin_vel.x = 1", r"rewards\.tracking_lin_vel: got a table; exp"),
+        ("[rewards]\ntracking_sigma = 0", r"rewards\.tracking_sigma: got 0; expected a number > 0"),
+        ("[normalization.obs_scales]\nlin_vel = -1", r"normalization\.obs_scales\.lin_vel: got -1"),
+        ("[algorithm]\nnum_mini_batches = 1000000", r"^algorithm\.num_mini_batches: got 1000000"),
+        ("[domain_rand]\ncom_shift = 'none'", r"domain_rand\.com_shift: got 'none'; expected a nu"),
+        ("[rewards]\n'a b' = 1", "rewards has no key 'a b'; it has"),
+        ("a.b" * 9999, "not a TOML file"),
+        (f"[rewards]\n{'a' * 9999} = 1", "rewards has no key 'aaaa"),
+    ],
+)
+def test_error_is_one_short_line(text, told):
+    with pytest.raises(ConfigError, match=told) as error:
+        Task.from_toml(text, Task())
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) <= 500
+
+
+def test_path_with_a_null_byte_is_rejected():
+    with pytest.raises(ConfigError, match="cannot read "):
+        Task.load("a\0b")

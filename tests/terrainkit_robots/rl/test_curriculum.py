@@ -1,21 +1,16 @@
 """The terrain curriculum in training; tests/terrainkit/curriculum has its rules."""
 
-from pathlib import Path
-from typing import Any
+import copy
 
 import numpy as np
 import pytest
 import torch
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.config import Commands, DomainRand, Env, InitState, Task, Terrain
+from terrainkit_robots.checkpoint import save_checkpoint
+from terrainkit_robots.rl.config import Commands, Env, InitState, Terrain
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
-from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
-
-torch.set_num_threads(1)
 
 
 class Patches(Plane):
@@ -23,7 +18,7 @@ class Patches(Plane):
 
     is_flat = False
 
-    def __init__(self, rows: int = 10, names: tuple[str, ...] = ("flat", "rough")) -> None:
+    def __init__(self, rows=10, names=("flat", "rough")):
         self.spawns = np.zeros((rows, len(names), 1, 4), np.float32)
         self.env_origins = self.spawns[:, :, 0, :3]
         self.env_origins[..., 0] = 8 * np.arange(rows)[:, None] + 4
@@ -31,11 +26,11 @@ class Patches(Plane):
         self.terrain_names = np.tile(np.array(names), (rows, 1))
 
 
-def make(terrain: Plane | None = None, num_envs: int = 4, **options: Any) -> TerrainCurriculum:
+def make(terrain=None, num_envs=4, **options):
     return TerrainCurriculum(terrain or Patches(), num_envs, Terrain(**options), seed=1)
 
 
-def test_robots_of_a_patch_have_different_spawns() -> None:
+def test_robots_of_a_patch_have_different_spawns():
     terrain = Patches(rows=2)
     terrain.spawns = np.repeat(terrain.spawns, 3, axis=2)
     terrain.spawns[:, :, :, 0] += [0, 1, 2]
@@ -44,11 +39,11 @@ def test_robots_of_a_patch_have_different_spawns() -> None:
     assert curriculum.env_origins[:, 1].tolist() == [4] * 4 + [12] * 4
 
 
-def test_initial_levels_fit_the_map() -> None:
+def test_initial_levels_fit_the_map():
     assert set(make(Patches(rows=3), 100, max_init_level=5).levels.tolist()) == {0, 1, 2}
 
 
-def test_plane_has_one_level() -> None:
+def test_plane_has_one_level():
     curriculum = make(Plane())
     curriculum.sampler.update(np.arange(4), np.ones(4))
     assert curriculum.levels.tolist() == [0] * 4
@@ -57,14 +52,14 @@ def test_plane_has_one_level() -> None:
 @pytest.mark.parametrize(
     ("name", "levels"), [("levels", {1}), ("uniform", set(range(10))), (None, {0})]
 )
-def test_option_selects_the_sampler(name: Any, levels: set[int]) -> None:
+def test_option_selects_the_sampler(name, levels):
     curriculum = make(num_envs=100, curriculum=name, max_init_level=0)
     curriculum.sampler.update(np.arange(100), np.ones(100))
     assert set(curriculum.levels.tolist()) == levels
 
 
 class TestLog:
-    def test_log_has_values_of_each_terrain(self) -> None:
+    def test_log_has_values_of_each_terrain(self):
         curriculum = make()
         curriculum.levels[:] = [2, 3, 9, 7]
         statistics = curriculum.sampler.statistics
@@ -80,7 +75,7 @@ class TestLog:
             "Curriculum/visits_rough": 0,
         }
 
-    def test_log_combines_patches_of_the_same_terrain(self) -> None:
+    def test_log_combines_patches_of_the_same_terrain(self):
         terrain = Patches(rows=2)
         terrain.terrain_names = np.array([["flat", "rough"], ["rough", "flat"]])
         curriculum = make(terrain)
@@ -92,65 +87,68 @@ class TestLog:
         assert log["Curriculum/level_rough"] == 1
         assert log["Curriculum/success_rough"] == pytest.approx(0.3)
 
-    def test_log_leaves_out_levels_without_robots(self) -> None:
+    def test_log_leaves_out_levels_without_robots(self):
         log = make(num_envs=1, max_init_level=0).log()
         assert "Curriculum/level_flat" in log
         assert "Curriculum/level_rough" not in log
 
 
 class TestCheckpoint:
-    def test_state_dict_has_tensors_and_restores(self) -> None:
-        curriculum, other = (
-            make(curriculum="learning_progress"),
-            make(curriculum="learning_progress"),
-        )
-        curriculum.sampler.update(np.arange(4), np.array([1.0, 0, 0, 1]), np.ones(4))
-        state = curriculum.state_dict()
-        assert {type(value) for value in state.values()} == {torch.Tensor, int}
-        other.sampler.load_state_dict(state)
-        assert other.levels.tolist() == curriculum.levels.tolist()
-        assert other.columns.tolist() == curriculum.columns.tolist()
-        np.testing.assert_array_equal(other.log(), curriculum.log())
+    def test_state_of_a_file_restores_exactly(self, tmp_path):
+        one, other = (make(curriculum="learning_progress") for _ in "ab")
+        one.sampler.update(np.arange(4), np.array([1.0, 1 / 3, 0, 0.7]), np.full(4, 0.1))
+        before = copy.deepcopy(one.sampler.state_dict())
+        save_checkpoint(tmp_path / "model_1.pt", one.state_dict())
+        other.sampler.load_state_dict(torch.load(tmp_path / "model_1.pt", weights_only=True))
+        one.sampler.update(np.arange(4), np.ones(4), np.ones(4))  # what is saved is no view
+        for name, value in other.sampler.state_dict().items():
+            np.testing.assert_array_equal(value, before[name], err_msg=name, strict=True)
 
     @pytest.mark.parametrize("other", [Patches(rows=9), Patches(names=("flat",))])
-    def test_load_rejects_another_map(self, other: Patches) -> None:
+    def test_load_rejects_another_map(self, other):
         with pytest.raises(ConfigError, match="curriculum: got 10 x 2 patches; expected"):
             make(other).sampler.load_state_dict(make().state_dict())
+
+
+FORWARD = Commands(lin_vel_x=(1, 1), lin_vel_y=(0, 0), ang_vel_yaw=(0, 0), standing=0)
 
 
 class TestInEnvironment:
     """The curriculum in an environment whose robots only stand."""
 
-    def make(self, **terrain: Any) -> LeggedEnv:
-        task = Task(
-            env=Env(num_envs=6, num_threads=1, episode_length_s=0.2),
-            terrain=Terrain(measure_heights=False, **terrain),
-            commands=Commands(lin_vel_x=(1, 1), lin_vel_y=(0, 0), ang_vel_yaw=(0, 0), standing=0),
-            init_state=InitState(lin_vel=0, ang_vel=0, yaw=0),
-            domain_rand=DomainRand(push_interval_s=0),
-        )
-        env = LeggedEnv(
-            task, Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent), Patches()
-        )
-        env.curriculum.levels[:] = 4
-        env.reset()
-        return env
+    @pytest.fixture
+    def make_env(self, nominal_env):
+        def make(**terrain):
+            env = nominal_env(
+                6,
+                Patches(),
+                env=Env(num_envs=6, num_threads=1, episode_length_s=0.2),
+                terrain=Terrain(measure_heights=False, **terrain),
+                commands=FORWARD,
+                init_state=InitState(lin_vel=0, ang_vel=0, yaw=0),
+            )
+            env.curriculum.levels[:] = 4
+            env.reset()
+            return env
 
-    def walk(self, env: LeggedEnv, steps: int) -> dict[str, float]:
-        extras: dict[str, Any] = {}
+        return make
+
+    @pytest.fixture
+    def env(self, make_env):
+        return make_env()
+
+    def walk(self, env, steps):
+        """Return the log of the last step."""
         for _ in range(steps):
             *_, extras = env.step(torch.zeros(6, 12))
-        log: dict[str, float] = extras.get("log", {})
-        return log
+        return extras.get("log", {})
 
-    def test_robots_start_at_their_level(self) -> None:
-        env = self.make()
+    def test_robots_start_at_their_level(self, env):
         off = env.state.base_pos[:, :2] - env.curriculum.env_origins[:, :2]
         assert np.abs(off).max() <= 0.5
         assert (env.curriculum.env_origins[:, 0] == 36).all()
 
-    def test_commanded_displacement_in_env(self) -> None:
-        env = self.make()
+    def test_commanded_displacement_in_env(self, env):
         self.walk(env, 5)
         progress = env.curriculum.progress
         np.testing.assert_allclose(progress.target, [[0.1, 0]] * 6, atol=1e-3)
@@ -158,8 +156,7 @@ class TestInEnvironment:
         moved = env.state.base_pos[:, 0] - env.curriculum.progress.start[:, 0]
         np.testing.assert_allclose(progress.along, moved, atol=1e-3)
 
-    def test_idle_robots_move_down(self) -> None:
-        env = self.make()
+    def test_idle_robots_move_down(self, env):
         self.walk(env, 9)
         assert env.curriculum.levels.tolist() == [4] * 6
         log = self.walk(env, 1)
@@ -173,9 +170,8 @@ class TestInEnvironment:
         assert log["Curriculum/visits_flat"] == 3
         assert np.abs(env.state.base_pos[:, 0] - 28).max() <= 0.55
 
-    def test_cut_episodes_keep_levels(self) -> None:
+    def test_cut_episodes_keep_levels(self, env):
         """rsl-rl cuts the first episodes with `init_at_random_ep_len`."""
-        env = self.make()
         env.episode_length_buf = torch.tensor([0, 1, 2, 3, 5, 9])
         self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [3, 4, 4, 4, 4, 4]
@@ -183,8 +179,7 @@ class TestInEnvironment:
         self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [2, 3, 3, 3, 3, 3]
 
-    def test_crossing_a_patch_moves_up(self) -> None:
-        env = self.make()
+    def test_crossing_a_patch_moves_up(self, env):
         env.terrain.patch_length = 0.2
         for _ in range(10):
             env.sim.qpos[2, 0] += 0.015
@@ -193,15 +188,13 @@ class TestInEnvironment:
         assert env.curriculum.levels.tolist() == [3, 3, 5, 3, 3, 3]
         assert env.curriculum.sampler.statistics.success[4].tolist() == pytest.approx([1 / 3, 0])
 
-    def test_jump_is_no_progress(self) -> None:
-        env = self.make()
+    def test_jump_is_no_progress(self, env):
         env.sim.qpos[2, 0] += 5
         self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [3] * 6
 
-    def test_leaving_the_map_moves_up(self) -> None:
+    def test_leaving_the_map_moves_up(self, env):
         """An edge of the map may be closer than half of a patch."""
-        env = self.make()
         first = env.curriculum.progress.start[:, 0].argmax()
         env.terrain.upper = (float(env.curriculum.progress.start[first, 0]) + 0.05, np.inf)
         for _ in range(3):
@@ -210,15 +203,14 @@ class TestInEnvironment:
         assert extras["log"]["Episode/falls"] == 1
         assert env.curriculum.levels.tolist() == [4 + (robot == first) for robot in range(6)]
 
-    def test_falls_move_down(self) -> None:
-        env = self.make()
+    def test_falls_move_down(self, env):
         self.walk(env, 2)
         env.sim.qpos[1, 3:7] = (0, 1, 0, 0)
         self.walk(env, 1)
         assert env.curriculum.levels.tolist() == [4, 3, 4, 4, 4, 4]
 
-    def test_levels_are_fixed_without_curriculum(self) -> None:
-        env = self.make(curriculum=None)
+    def test_levels_are_fixed_without_curriculum(self, make_env):
+        env = make_env(curriculum=None)
         log = self.walk(env, 10)
         assert env.curriculum.levels.tolist() == [4] * 6
         assert log["Curriculum/success_flat"] == 0

@@ -17,8 +17,7 @@ from terrainkit_robots.rl.config import (
     Runner,
     Terrain,
 )
-from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.rl.terrain import MapTerrain
 from terrainkit_robots.spec.robot import Robot
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
@@ -37,12 +36,17 @@ class TestLeggedEnv(VecEnvContract):
     )
     def env(self, request, random_env, map_ground):
         robot, on_map, sections = request.param
-        ground = map_ground if on_map else None
-        return random_env(5, ground, request.getfixturevalue(robot), env=SHORT, **sections)
+        robot = request.getfixturevalue(robot)
+        return random_env(5, on_map and map_ground, robot, env=SHORT, **sections)
 
 
 def stand(env):
     return env.step(torch.zeros(env.num_envs, env.num_actions))
+
+
+def observed_commands(env):
+    """Return the commands that the policy observes, without their scales."""
+    return env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
 
 
 def acts(env, count, seed=0):
@@ -61,29 +65,25 @@ def record(env, actions):
 
 
 class TestObservations:
-    def test_widths(self, quadruped, biped, nominal_task, map_ground):
-        env = LeggedEnv(nominal_task(), quadruped, Plane())
-        assert env.get_observations()["policy"].shape == (4, 47)
-        # Velocity 3, mean 3, friction, mass, center of mass 3, offsets 12, push 3, forces 12.
-        privileged = 3 + 3 + 1 + 1 + 3 + 12 + 3 + 12
-        assert env.get_observations()["privileged"].shape == (4, 47 + privileged)
-        env = LeggedEnv(nominal_task(), quadruped, map_ground)
-        assert env.get_observations()["policy"].shape == (4, 47 + 187)
-        env = LeggedEnv(nominal_task(), biped, Plane())
-        joints = len(biped.default_pose)
-        assert env.get_observations()["policy"].shape == (4, 14 + 3 * joints)
+    # The critic also knows the velocity 3, mean velocity 3, friction, mass, center of mass 3,
+    # joint offsets 12, push 3 and forces on the feet 12.
+    @pytest.mark.parametrize(
+        ("on_map", "measured", "width"),
+        [(False, None, 47), (True, None, 234), (False, True, 234), (True, False, 47)],
+    )
+    def test_widths(self, nominal_env, map_ground, on_map, measured, width):
+        env = nominal_env(4, on_map and map_ground, terrain=Terrain(measure_heights=measured))
+        assert env.num_obs == {"policy": width, "privileged": width + 38}
+        assert env.state.height_scan.shape == (4, width - 47)
 
-    def test_height_scan_follows_the_setting(self, quadruped, nominal_task, map_ground):
-        seen = nominal_task(terrain=Terrain(measure_heights=True))
-        assert LeggedEnv(seen, quadruped, Plane()).get_observations()["policy"].shape == (4, 234)
-        unseen = nominal_task(terrain=Terrain(measure_heights=False))
-        env = LeggedEnv(unseen, quadruped, map_ground)
-        assert env.get_observations()["policy"].shape == (4, 47)
+    def test_width_of_another_robot(self, nominal_env, biped):
+        env = nominal_env(robot=biped)
+        assert env.get_observations()["policy"].shape == (4, 14 + 3 * len(biped.default_pose))
 
     @pytest.mark.parametrize("on_map", [False, True])
-    def test_foot_forces_are_in_units_of_weight(self, quadruped, nominal_task, map_ground, on_map):
+    def test_foot_forces_are_in_units_of_weight(self, nominal_env, map_ground, on_map):
         # The model's total mass includes that of the ground, thousands of tons.
-        env = LeggedEnv(nominal_task(), quadruped, map_ground if on_map else Plane())
+        env = nominal_env(4, on_map and map_ground)
         env.curriculum.levels[:] = 0
         env.reset()
         for _ in range(50):
@@ -91,12 +91,10 @@ class TestObservations:
         up = observed["privileged"][:, -12:].reshape(4, 4, 3)[..., 2]
         np.testing.assert_allclose(up.sum(axis=1), 1, atol=0.03)
 
-    def test_commands_are_those_of_the_next_step(self, quadruped, random_task):
-        task = random_task(commands=Commands(resampling_time=0.06), num_envs=8)
-        env = LeggedEnv(task, quadruped, Plane())
+    def test_commands_are_those_of_the_next_step(self, random_env):
+        env = random_env(8, commands=Commands(resampling_time=0.06))
         for _ in range(10):
-            observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
-            np.testing.assert_allclose(observed, env.commands, atol=1e-6)
+            np.testing.assert_allclose(observed_commands(env), env.commands, atol=1e-6)
             stand(env)
 
 
@@ -105,11 +103,8 @@ class TestHistory:
     WIDTH = 47 + 3 + 4
 
     @pytest.mark.parametrize("on_map", [False, True])
-    def test_previous_observations_follow_the_current_one(
-        self, quadruped, random_task, map_ground, on_map
-    ):
-        task = random_task(env=SHORT, observations=self.OPTIONS)
-        env = LeggedEnv(task, quadruped, map_ground if on_map else Plane())
+    def test_previous_observations_follow_the_current_one(self, random_env, map_ground, on_map):
+        env = random_env(5, on_map and map_ground, env=SHORT, observations=self.OPTIONS)
         assert env.num_obs["policy"] == 3 * self.WIDTH + 187 * on_map
         assert env.num_obs["privileged"] == 85 + 4 + 187 * on_map
         seen, length = [env.get_observations()["policy"]], np.ones(5, int)
@@ -125,9 +120,9 @@ class TestHistory:
                     assert torch.equal(seen[-1][k, part], source[k, : self.WIDTH])
         assert (length < 30).all()
 
-    def test_values_by_hand(self, quadruped, nominal_task):
+    def test_values_by_hand(self, nominal_env):
         options = Observations(history_length=2)
-        env = LeggedEnv(nominal_task(2, observations=options), quadruped, Plane())
+        env = nominal_env(2, observations=options)
         for k in (1, 2, 3):
             env.step(torch.full((2, 12), 0.1 * k))
         actions = slice(33, 45)
@@ -135,8 +130,8 @@ class TestHistory:
         np.testing.assert_allclose(observed[:, :47][:, actions], 0.3)
         np.testing.assert_allclose(observed[:, 47:][:, actions], 0.2)
 
-    def test_new_commands_do_not_shift_the_history(self, quadruped, random_task):
-        env = LeggedEnv(random_task(2, observations=self.OPTIONS), quadruped, Plane())
+    def test_new_commands_do_not_shift_the_history(self, random_env):
+        env = random_env(2, observations=self.OPTIONS)
         record(env, acts(env, 2))
         before = env.get_observations()["policy"]
         env.set_commands(np.float32([[1, 0, 0]] * 2))
@@ -144,34 +139,39 @@ class TestHistory:
         assert after[:, :3].tolist() == [[2, 0, 0]] * 2
         assert torch.equal(after[:, self.WIDTH :], before[:, self.WIDTH :])
 
-    def test_base_lin_vel_has_its_noise(self, quadruped, nominal_task):
-        task = nominal_task(400, observations=self.OPTIONS, noise=Noise(lin_vel=0.3))
-        env = LeggedEnv(task, quadruped, Plane())
+    def test_base_lin_vel_has_its_noise(self, nominal_env):
+        env = nominal_env(400, observations=self.OPTIONS, noise=Noise(lin_vel=0.3))
         noise = env.get_observations()["policy"][:, 47:50].numpy()  # of robots at rest, scale 2
         assert 0.55 < noise.max() <= 0.6
         assert -0.6 <= noise.min() < -0.55
 
 
 class TestActionDelay:
-    def make(self, robot, nominal_task, delay, num_envs=3, **sections):
-        still = nominal_task().domain_rand
-        sections["domain_rand"] = replace(still, action_delay=delay)
-        return LeggedEnv(nominal_task(num_envs, **sections), robot, Plane())
+    TORQUE = Control(control_type="T", decimation=1)
+
+    @pytest.fixture
+    def make(self, nominal_env, no_randomization):
+        """Return a function that makes environments with an action delay."""
+
+        def make(delay, num_envs=3, **sections):
+            delayed = replace(no_randomization, action_delay=delay)
+            return nominal_env(num_envs, domain_rand=delayed, **sections)
+
+        return make
 
     @pytest.mark.parametrize("steps", [1, 3, 4, 7])
-    def test_step_input_arrives_late(self, quadruped, nominal_task, steps):
-        control = Control(control_type="T", decimation=1)
+    def test_step_input_arrives_late(self, make, quadruped, steps):
         delay = 0.005 * steps
-        env = self.make(quadruped, nominal_task, (delay, delay), control=control)
+        env = make((delay, delay), control=self.TORQUE)
         effort = 0.1 * quadruped.effort
         for step in range(12):
             env.step(torch.full((3, 12), 0.1))
             expected = effort if step >= steps else 0 * effort
             np.testing.assert_allclose(env.sim.torque, [expected] * 3, atol=1e-6)
 
-    def test_delay_ends_within_a_policy_step(self, quadruped, nominal_task):
+    def test_delay_ends_within_a_policy_step(self, make, quadruped):
         # After 2 of 4 simulation steps; the motors are at rest until then.
-        env = self.make(quadruped, nominal_task, (0.01, 0.01), control=Control(control_type="T"))
+        env = make((0.01, 0.01), control=Control(control_type="T"))
         env._apply_actions(torch.full((3, 12), 0.1))
         seen = []
         for _ in range(4):
@@ -179,9 +179,8 @@ class TestActionDelay:
             seen.append(env.sim.torque[0, 0] / quadruped.effort[0])
         np.testing.assert_allclose(seen, [0, 0, 0.1, 0.1], atol=1e-6)
 
-    def test_delay_stays_exact_in_long_episodes(self, quadruped, nominal_task):
-        control = Control(control_type="T", decimation=1)
-        env = self.make(quadruped, nominal_task, (0.015, 0.015), 1, control=control)
+    def test_delay_stays_exact_in_long_episodes(self, make, quadruped):
+        env = make((0.015, 0.015), 1, control=self.TORQUE)
         applied = []
         for step in range(1500):  # the time accumulates rounding errors
             env._apply_actions(torch.full((1, 12), 1e-4 * step))
@@ -189,9 +188,9 @@ class TestActionDelay:
             applied.append(env.sim.torque[0, 0] / quadruped.effort[0] * 1e4)
         np.testing.assert_allclose(applied[3:], np.arange(1497), rtol=1e-4, atol=1e-3)
 
-    def test_motors_hold_the_default_pose_first(self, quadruped, nominal_task):
-        still = LeggedEnv(nominal_task(3), quadruped, Plane())
-        late = self.make(quadruped, nominal_task, (0.02, 0.02))
+    def test_motors_hold_the_default_pose_first(self, nominal_env, make):
+        still = nominal_env(3)
+        late = make((0.02, 0.02))
         stand(still)
         late.step(torch.ones(3, 12))  # arrives in the next policy step
         np.testing.assert_array_equal(late.sim.qpos, still.sim.qpos)
@@ -199,8 +198,8 @@ class TestActionDelay:
         stand(still)
         assert not np.array_equal(late.sim.qpos, still.sim.qpos)
 
-    def test_delays_are_sampled_at_reset(self, quadruped, nominal_task):
-        env = self.make(quadruped, nominal_task, (0.0, 0.02), 200)
+    def test_delays_are_sampled_at_reset(self, make):
+        env = make((0.0, 0.02), 200)
         first = env.sim.batch.expand("actuator_delay").copy()
         assert (first == first[:, :1]).all()  # one delay per robot
         np.testing.assert_allclose(np.unique(first), [0, 0.0025, 0.0075, 0.0125, 0.0175])
@@ -209,43 +208,29 @@ class TestActionDelay:
         assert (first[:100] != second[:100]).any()
         np.testing.assert_array_equal(first[100:], second[100:])
 
-    def test_no_delay_has_no_buffer(self, quadruped, nominal_task):
-        assert LeggedEnv(nominal_task(), quadruped, Plane()).scene.model.nhistory == 0
+    def test_no_delay_has_no_buffer(self, nominal_env):
+        assert nominal_env().scene.model.nhistory == 0
 
 
 class TestTermination:
-    def test_time_out_is_not_a_fall(self, quadruped, nominal_task):
-        env = LeggedEnv(nominal_task(2), quadruped, Plane())
-        assert env.max_episode_length == 1000
-        env.episode_length_buf[:] = 900
-        for k in range(99):
-            _, _, dones, extras = stand(env)
-            assert not dones.any(), k
-        _, _, dones, extras = stand(env)
-        assert dones.all()
-        assert extras["time_outs"].all()
-        assert extras["log"]["Episode/falls"] == 0
-
-    @pytest.mark.parametrize("how", ["back", "side", "outside", "velocity", "position"])
-    def test_fall_resets_only_its_environment(self, quadruped, nominal_task, mixed_map, how):
-        env = LeggedEnv(nominal_task(4), quadruped, MapTerrain(mixed_map))
-        twin = LeggedEnv(nominal_task(4), quadruped, MapTerrain(mixed_map))
+    @pytest.mark.parametrize(
+        ("array", "values"),
+        [
+            ("qpos", {2: 1.3, 3: 0, 4: 1}),  # on its back
+            ("qpos", {2: 1.3, 3: np.sqrt(0.5), 4: np.sqrt(0.5)}),  # on its side
+            ("qpos", {0: -1.3}),  # outside of the map
+            ("qvel", {8: 1e12}),
+            ("qpos", {9: np.nan}),
+        ],
+        ids=["back", "side", "outside", "velocity", "position"],
+    )
+    def test_fall_resets_only_its_environment(self, nominal_env, mixed_map, array, values):
+        env, twin = (nominal_env(4, MapTerrain(mixed_map)) for _ in "ab")
         for each in (env, twin):
             for _ in range(5):
                 stand(each)
-        qpos, qvel = env.sim.qpos[2], env.sim.qvel[2]
-        if how == "back":
-            qpos[3:7] = (0, 1, 0, 0)
-            qpos[2] += 1
-        elif how == "side":
-            qpos[3:7] = (np.sqrt(0.5), np.sqrt(0.5), 0, 0)
-            qpos[2] += 1
-        elif how == "outside":
-            qpos[0] = -1.3
-        elif how == "velocity":
-            qvel[8] = 1e12
-        else:
-            qpos[9] = np.nan
+        for index, value in values.items():
+            getattr(env.sim, array)[2, index] = value
         observed, rewards, dones, extras = stand(env)
         expected, expected_rewards, *_ = stand(twin)
         assert dones.tolist() == [False, False, True, False]
@@ -260,21 +245,30 @@ class TestTermination:
         assert torch.equal(rewards[others], expected_rewards[others])
         np.testing.assert_array_equal(env.sim.qpos[others], twin.sim.qpos[others])
 
-    def test_unstable_state_gets_only_termination_reward(self, quadruped, nominal_task):
-        # Its state is that of MuJoCo's reset, which must not be rewarded.
-        env = LeggedEnv(nominal_task(3, rewards=Rewards(termination=-3.0)), quadruped, Plane())
-        env.sim.qvel[1, 7] = np.nan
-        _, rewards, dones, extras = stand(env)
-        assert dones.tolist() == [False, True, False]
-        assert rewards[1] == pytest.approx(-3 * 0.02)
-        paid = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
-        assert paid.pop("Episode/rew_termination") == pytest.approx(-3)
-        assert set(paid.values()) == {0}
-        assert (rewards[[0, 2]] > 0).all()
+    def test_termination_reward_has_the_tasks_scale(self, nominal_env):
+        env = nominal_env(2, rewards=Rewards(termination=-100.0))
+        env.sim.qpos[1, 2:7] = (1.0, 0, 1, 0, 0)
+        _, rewards, dones, _ = stand(env)
+        assert dones.tolist() == [False, True]
+        assert abs(rewards[0]) < 0.1
+        assert rewards[1] == pytest.approx(-2.0, abs=0.1)
 
-    def test_unstable_state_is_no_curriculum_success(self, quadruped, nominal_task, map_ground):
+    def test_unstable_state_gets_only_termination_reward(self, nominal_env):
+        # Its state is that of MuJoCo's reset, which must not be rewarded.
+        env = nominal_env(3, rewards=Rewards(termination=-3.0))
+        for value in (np.nan, 1e12, np.inf):  # each time
+            env.sim.qvel[1, 7] = value
+            _, rewards, dones, extras = stand(env)
+            assert dones.tolist() == [False, True, False]
+            assert rewards[1] == pytest.approx(-3 * 0.02)
+            paid = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
+            assert paid.pop("Episode/rew_termination") == pytest.approx(-3)
+            assert set(paid.values()) == {0}
+            assert (rewards[[0, 2]] > 0).all()
+
+    def test_unstable_state_is_no_curriculum_success(self, nominal_env, map_ground):
         # MuJoCo moves the robot to the world's origin, far from its start.
-        env = LeggedEnv(nominal_task(4), quadruped, map_ground)
+        env = nominal_env(4, map_ground)
         env.curriculum.levels[:] = 1
         env.reset()
         env.sim.qvel[2, 7] = np.nan
@@ -284,39 +278,23 @@ class TestTermination:
         assert np.nansum(env.curriculum.sampler.statistics.success) == 0
 
 
-class TestLog:
-    def test_logged_rewards_are_per_second(self, quadruped, nominal_task):
-        env = LeggedEnv(nominal_task(2), quadruped, Plane())
-        total = sum(stand(env)[1] for _ in range(9))
-        env.episode_length_buf = torch.tensor([0, 999])
-        _, rewards, _, extras = stand(env)
-        total = total + rewards
-        logged = {k: v for k, v in extras["log"].items() if k.startswith("Episode/rew_")}
-        assert sum(logged.values()) == pytest.approx(float(total[1]) / (10 * 0.02), rel=1e-4)
-
-
 class TestSeeds:
-    def test_same_seed_gives_same_rollout(self, quadruped, random_task, map_ground):
-        task = random_task(6, runner=Runner(seed=3))
-        first, second = (LeggedEnv(task, quadruped, map_ground) for _ in range(2))
+    def test_same_seed_gives_same_rollout(self, random_env, map_ground):
+        first, second = (random_env(6, map_ground, runner=Runner(seed=3)) for _ in "ab")
         actions = acts(first, 25)
         assert record(first, actions) == record(second, actions)
 
-    def test_other_seed_gives_other_rollout(self, quadruped, random_task, map_ground):
-        first, second = (
-            LeggedEnv(random_task(6, runner=Runner(seed=seed)), quadruped, map_ground)
-            for seed in (3, 4)
-        )
-        assert not torch.equal(
-            first.get_observations()["policy"], second.get_observations()["policy"]
-        )
+    def test_other_seed_gives_other_rollout(self, random_env, map_ground):
+        first, second = (random_env(6, map_ground, runner=Runner(seed=seed)) for seed in (3, 4))
+        one, other = (env.get_observations()["policy"] for env in (first, second))
+        assert not torch.equal(one, other)
         assert not np.array_equal(first.params.friction, second.params.friction)
 
-    def test_global_random_states_are_untouched(self, quadruped, random_task):
+    def test_global_random_states_are_untouched(self, random_env):
         np.random.seed(0)  # noqa: NPY002
         torch.manual_seed(0)
         before = np.random.get_state()[1].copy(), torch.get_rng_state().clone()  # noqa: NPY002
-        env = LeggedEnv(random_task(3), quadruped, Plane())
+        env = random_env(3)
         stand(env)
         assert np.array_equal(np.random.get_state()[1], before[0])  # noqa: NPY002
         assert torch.equal(torch.get_rng_state(), before[1])
@@ -326,8 +304,8 @@ class TestWaypoints:
     COMMANDS = Commands(waypoints=True, lin_vel_x=(0.6, 0.6), standing=0.0)
 
     @pytest.fixture
-    def env(self, quadruped, nominal_task, course_ground):
-        return LeggedEnv(nominal_task(4, commands=self.COMMANDS), quadruped, course_ground)
+    def env(self, nominal_env, course_ground):
+        return nominal_env(4, course_ground, commands=self.COMMANDS)
 
     def move(self, env, robot, x, y):
         env.sim.qpos[robot, :2] = x, y
@@ -336,19 +314,16 @@ class TestWaypoints:
 
     def test_commands_lead_to_the_next_goal(self, env):
         assert env.commands[0] == pytest.approx([0.6, 0, 0], abs=1e-6)
-        self.move(env, 0, 1.0, 1.0)
-        bearing = np.arctan2(1.0, 3.0)
-        assert env.commands[0] == pytest.approx([0.6 * np.cos(bearing), 0, bearing / 2], abs=0.01)
-        self.move(env, 0, 3.8, 1.8)  # 0.28 m from the first goal
-        bearing = np.arctan2(0.2, 3.2)
-        assert env.waypoints.index.tolist() == [1, 0, 0, 0]
-        assert env.commands[0] == pytest.approx([0.6 * np.cos(bearing), 0, bearing / 2], abs=0.01)
+        # The second place is 0.28 m from the first goal.
+        for place, way, goals in (((1, 1), (3, 1), 0), ((3.8, 1.8), (3.2, 0.2), 1)):
+            self.move(env, 0, *place)
+            bearing = np.arctan2(way[1], way[0])
+            expected = [0.6 * np.cos(bearing), 0, bearing / 2]
+            assert env.commands[0] == pytest.approx(expected, abs=0.01)
+            assert env.waypoints.index.tolist() == [goals, 0, 0, 0]
 
     def test_commands_are_observed_and_sampled_without_goals(self, env):
-        policy = env.get_observations()["policy"]
-        scaled = env.commands * [2.0, 2.0, 0.25]
-        names = [slice(k, k + 3) for k in range(policy.shape[1] - 2)]
-        assert any(np.allclose(policy[:, each], scaled, atol=1e-5) for each in names)
+        np.testing.assert_allclose(observed_commands(env), env.commands, atol=1e-5)
         assert (env.commands[2:, 2] != 0).all()  # a heading
         assert np.isnan(env.waypoints.progress[2:]).all()
 
@@ -357,9 +332,8 @@ class TestWaypoints:
         done, extras = self.move(env, 0, 7.0, 2.0)
         assert done.tolist() == extras["time_outs"].tolist() == [1, 0, 0, 0]
         assert extras["log"]["Episode/goals_reached"] == 1.0
-        assert env.curriculum.sampler.statistics.success[0].tolist() == pytest.approx(
-            [1.0, np.nan], nan_ok=True
-        )
+        success = env.curriculum.sampler.statistics.success
+        np.testing.assert_array_equal(success[0], [1.0, np.nan])
         assert env.waypoints.index.tolist() == [0, 0, 0, 0]
 
     @pytest.mark.parametrize(("goals", "progress"), [(0, 0.0), (1, 0.625), (2, 1.0)])
@@ -376,13 +350,13 @@ class TestWaypoints:
         assert updates[-1][0].tolist() == [0]
         assert updates[-1][1].tolist() == pytest.approx([progress])
 
-    def test_terrain_without_goals_is_rejected(self, quadruped, nominal_task):
+    def test_terrain_without_goals_is_rejected(self, nominal_env):
         with pytest.raises(ConfigError, match="without goals; expected a map with terrains such"):
-            LeggedEnv(nominal_task(4, commands=self.COMMANDS), quadruped, Plane())
+            nominal_env(4, commands=self.COMMANDS)
 
-    def test_robots_told_to_stand_do_not_walk(self, quadruped, nominal_task, course_ground):
+    def test_robots_told_to_stand_do_not_walk(self, nominal_env, course_ground):
         commands = replace(self.COMMANDS, standing=1.0)
-        env = LeggedEnv(nominal_task(4, commands=commands), quadruped, course_ground)
+        env = nominal_env(4, course_ground, commands=commands)
         env.step(torch.zeros(4, 12))
         assert not env.commands.any()
 
@@ -392,9 +366,9 @@ class TestWaypoints:
         assert env.waypoints.index[0] == 0
         assert not env.commands.any()
 
-    def test_resume_is_bit_identical(self, env, quadruped, random_task, course_ground):
-        task = random_task(4, commands=replace(self.COMMANDS, resampling_time=0.1))
-        env, other = (LeggedEnv(task, quadruped, course_ground) for _ in "ab")
+    def test_resume_is_bit_identical(self, random_env, course_ground):
+        commands = replace(self.COMMANDS, resampling_time=0.1)
+        env, other = (random_env(4, course_ground, commands=commands) for _ in "ab")
         self.move(env, 0, 4.0, 2.0)
         actions = acts(env, 10)
         record(other, actions[:5])
@@ -405,90 +379,90 @@ class TestWaypoints:
 class TestStateDict:
     @pytest.mark.parametrize("on_map", [False, True])
     @pytest.mark.parametrize("more", [False, True])
-    def test_resume_is_bit_identical(self, quadruped, random_task, map_ground, on_map, more):
-        ground = map_ground if on_map else Plane()
-        domain_rand = DomainRand(push_interval_s=0.3, action_delay=(0, 0.03) if more else None)
-        observations = TestHistory.OPTIONS if more else Observations()
+    def test_resume_is_bit_identical(self, random_env, map_ground, on_map, more):
         # Short commands and episodes, so that everything random is sampled again.
-        task = random_task(
-            env=Env(num_envs=6, num_threads=1, episode_length_s=0.7),
-            commands=Commands(resampling_time=0.2, heading_command=True),
-            domain_rand=domain_rand,
-            observations=observations,
-        )
-        env = LeggedEnv(task, quadruped, ground)
+        sections = {
+            "env": Env(num_envs=6, num_threads=1, episode_length_s=0.7),
+            "commands": Commands(resampling_time=0.2, heading_command=True),
+            "domain_rand": DomainRand(
+                push_interval_s=0.3, action_delay=(0, 0.03) if more else None
+            ),
+            "observations": TestHistory.OPTIONS if more else Observations(),
+        }
+        env, other = (random_env(6, on_map and map_ground, **sections) for _ in "ab")
         actions = acts(env, 80)
         record(env, actions[:21])
         saved, seen = env.state_dict(), env.get_observations()
         expected = record(env, actions[21:])
-        other = LeggedEnv(task, quadruped, ground)
         record(other, actions[40:50])  # another past
         other.load_state_dict(saved)
         for name, group in seen.items():
             assert torch.equal(other.get_observations()[name], group), name
         assert record(other, actions[21:]) == expected
 
-    def test_load_keeps_replaced_episode_lengths(self, quadruped, random_task):
-        env = LeggedEnv(random_task(3), quadruped, Plane())
+    def test_load_keeps_replaced_episode_lengths(self, random_env):
+        env, other = (random_env(3) for _ in "ab")
         env.episode_length_buf = torch.tensor([5, 6, 7])
         stand(env)
-        saved = env.state_dict()
-        other = LeggedEnv(random_task(3), quadruped, Plane())
-        other.load_state_dict(saved)
+        other.load_state_dict(env.state_dict())
         assert other.episode_length_buf.tolist() == [6, 7, 8]
 
-    def test_other_num_envs_keeps_only_curricula(self, quadruped, random_task, map_ground):
-        env = LeggedEnv(random_task(4), quadruped, map_ground)
+    def test_other_num_envs_keeps_only_curricula(self, random_env, map_ground):
+        env = random_env(4, map_ground)
         env.curriculum.levels[:] = 2
-        other = LeggedEnv(random_task(7), quadruped, map_ground)
+        other = random_env(7, map_ground)
         other.load_state_dict(env.state_dict())
         assert (other.curriculum.levels == 2).all()
         assert (other.episode_length_buf == 0).all()
         stand(other)
 
     @pytest.mark.parametrize("name", ["steps_until_push", "state_push_vel"])
-    def test_load_rejects_other_version(self, quadruped, random_task, name):
-        saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
+    def test_load_rejects_other_version(self, random_env, name):
+        saved = random_env(3).state_dict()
         del saved["arrays"][name]
         with pytest.raises(ConfigError, match=f"{name} belongs .* version of terrainkit"):
-            LeggedEnv(random_task(3), quadruped, Plane()).load_state_dict(saved)
-        LeggedEnv(random_task(4), quadruped, Plane()).load_state_dict(saved)
+            random_env(3).load_state_dict(saved)
+        random_env(4).load_state_dict(saved)
 
-    def test_load_rejects_other_robot_or_map(self, quadruped, biped, random_task, map_ground):
-        saved = LeggedEnv(random_task(3), quadruped, Plane()).state_dict()
+    def test_load_rejects_other_robot_or_map(self, random_env, biped, map_ground):
+        saved = random_env(3).state_dict()
         with pytest.raises(ConfigError, match="another robot"):
-            LeggedEnv(random_task(3), biped, Plane()).load_state_dict(saved)
+            random_env(3, robot=biped).load_state_dict(saved)
         with pytest.raises(ConfigError, match="state of the curriculum: got 1 x 1 patches"):
-            LeggedEnv(random_task(3), quadruped, map_ground).load_state_dict(saved)
+            random_env(3, map_ground).load_state_dict(saved)
 
 
 class TestSetCommands:
     HELD = np.float32([[0.5, -0.3, 0.2]] * 4)
 
-    def test_fixed_commands_are_never_resampled(self, quadruped, random_task):
-        task = random_task(commands=Commands(resampling_time=0.04, heading_command=True))
-        env = LeggedEnv(task, quadruped, Plane())
+    def test_fixed_commands_are_never_resampled(self, random_env):
+        env = random_env(commands=Commands(resampling_time=0.04, heading_command=True))
         env.set_commands(self.HELD)
         for step in range(10):
             if step == 5:
                 env.reset()
-            observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
-            np.testing.assert_allclose(observed, self.HELD, atol=1e-6)
-            stand(env)
+            if step == 7:
+                env.sim.qpos[1, 3:7] = (0, 1, 0, 0)
+            np.testing.assert_allclose(observed_commands(env), self.HELD, atol=1e-6)
+            dones = stand(env)[2]
+            assert dones.tolist() == [False, step == 7, False, False]
             np.testing.assert_allclose(env.state.commands, self.HELD)
 
-    def test_none_returns_to_random_commands(self, quadruped, random_task):
-        env = LeggedEnv(random_task(commands=Commands(standing=0.0)), quadruped, Plane())
+    def test_none_returns_to_random_commands(self, random_env):
+        env = random_env(commands=Commands(standing=0.0, resampling_time=0.06))
         env.set_commands(self.HELD)
+        stand(env)
         env.set_commands(None)
         assert (env.commands[:, :2] != self.HELD[:, :2]).any(axis=1).all()
         np.testing.assert_array_equal(env.state.commands, env.commands)
-        observed = env.get_observations()["policy"][:, :3] / torch.tensor([2, 2, 0.25])
-        np.testing.assert_allclose(observed, env.commands, atol=1e-6)
+        np.testing.assert_allclose(observed_commands(env), env.commands, atol=1e-6)
         drawn = env.commands.copy()
         env.set_commands(None)  # there is nothing to let go
         stand(env)
         np.testing.assert_array_equal(env.commands, drawn)
+        stand(env)  # the time to sample again
+        assert (env.commands != drawn).any(axis=1).all()
+        assert (env.commands[:, :2] != self.HELD[:, :2]).any(axis=1).all()
 
 
 # Joints of the cart: wheel_axle, rear_hinge, front_hinge.
@@ -497,11 +471,11 @@ DQ = np.array([2.0, -1.0, 0.5])
 
 
 @pytest.fixture
-def torques(cart, nominal_task):
+def torques(nominal_env, cart):
     """Return the torques of an action in one physics step, from `Q` and `DQ` in the air."""
 
     def act(action, offset=(0.0, 0.0, 0.0), **settings):
-        env = LeggedEnv(nominal_task(1, control=Control(**settings)), cart, Plane())
+        env = nominal_env(1, robot=cart, control=Control(**settings))
         sim, scene = env.sim, env.scene
         sim.qpos[0] = scene.default_qpos
         sim.qpos[0, 2] = 5.0
@@ -516,97 +490,81 @@ def torques(cart, nominal_task):
     return act
 
 
-class TestPositionControl:
-    def test_torques_of_the_specs_gains(self, torques):
-        # Hinges: kp (default + scale a - q) - kd dq. Wheel, without stiffness: kd (12 a - dq).
-        expected = [
-            0.4 * (12 * 0.2 - 2.0),
-            20 * (-0.2 + 0.25 * 0.4 - -0.3) - 1.5 * -1.0,
-            20 * (0.3 + 0.5 * 0.1 - 0.5) - 1.5 * 0.5,
-        ]
-        expected[1] = min(expected[1], 5.0)
-        np.testing.assert_allclose(torques((0.2, 0.4, 0.1)), expected, rtol=1e-5)
+class TestControl:
+    @pytest.mark.parametrize(
+        ("action", "settings", "expected"),
+        [
+            # Hinges: kp (default + scale a - q) - kd dq. Wheel, without stiffness: kd (12 a - dq).
+            (
+                (0.2, 0.4, 0.1),
+                {},
+                [
+                    0.4 * (12 * 0.2 - 2.0),
+                    5.0,  # the effort; 20 * (-0.2 + 0.25 * 0.4 - -0.3) - 1.5 * -1.0 is 5.5
+                    20 * (0.3 + 0.5 * 0.1 - 0.5) - 1.5 * 0.5,
+                ],
+            ),
+            (
+                (0.5, 0.2, 0.1),
+                {"stiffness": 10.0, "damping": 0.2, "action_scale": 1.0},
+                [
+                    0.2 * (0.5 - 2.0),
+                    10 * (-0.2 + 0.2 - -0.3) - 0.2 * -1.0,
+                    10 * (0.3 + 0.1 - 0.5) - 0.2 * 0.5,
+                ],
+            ),
+            # Without stiffness, every joint is controlled like a wheel: by its velocity.
+            (
+                (0.5, 0.2, 0.1),
+                {"stiffness": 0.0},
+                [0.4 * (6 - 2.0), 1.5 * (0.25 * 0.2 - -1.0), 1.5 * (0.5 * 0.1 - 0.5)],
+            ),
+            # An action of 1 is the joint's velocity limit.
+            (
+                (0.1, 0.1, -0.1),
+                {"control_type": "V"},
+                [0.4 * (3.0 - 2.0), 1.5 * (1.0 - -1.0), 1.5 * (-1.0 - 0.5)],
+            ),
+            # An action of 1 is the effort, or the task's scale.
+            ((0.5, -0.2, 1.0), {"control_type": "T"}, [1.5, -1.0, 6.0]),
+            ((0.5, -0.2, 0.1), {"control_type": "T", "action_scale": 2.0}, [1.0, -0.4, 0.2]),
+        ],
+    )
+    def test_torques_by_hand(self, torques, action, settings, expected):
+        np.testing.assert_allclose(torques(action, **settings), expected, rtol=1e-6)
 
-    def test_torques_are_clipped_at_effort(self, torques):
-        np.testing.assert_allclose(torques((9, 9, 9)), [3, 5, 6])
-        np.testing.assert_allclose(torques((-9, -9, -9)), [-3, -5, -6])
+    @pytest.mark.parametrize("kind", ["P", "V", "T"])
+    def test_torques_are_clipped_at_effort(self, torques, kind):
+        np.testing.assert_allclose(torques((9, 9, 9), control_type=kind), [3, 5, 6])
+        np.testing.assert_allclose(torques((-9, -9, -9), control_type=kind), [-3, -5, -6])
 
-    def test_joint_offset_shifts_the_target(self, torques):
-        # A motor that measures 0.05 rad too much moves 0.05 rad too little.
-        plain = torques((0.2, 0.0, 0.1))
-        shifted = torques((0.2, 0.0, 0.1), offset=(0.05, 0.05, 0.05))
-        np.testing.assert_allclose(shifted - plain, [0, -20 * 0.05, -20 * 0.05], atol=1e-5)
-
-    def test_task_overrides_gains_and_scale(self, torques):
-        found = torques((0.5, 0.2, 0.1), stiffness=10.0, damping=0.2, action_scale=1.0)
-        expected = [
-            0.2 * (0.5 - 2.0),
-            10 * (-0.2 + 0.2 - -0.3) - 0.2 * -1.0,
-            10 * (0.3 + 0.1 - 0.5) - 0.2 * 0.5,
-        ]
-        np.testing.assert_allclose(found, expected, rtol=1e-5)
-
-    def test_zero_stiffness_controls_velocity(self, torques):
-        # Without stiffness, every joint is controlled like a wheel: by its velocity.
-        found = torques((0.5, 0.2, 0.1), stiffness=0.0)
-        expected = [0.4 * (6 - 2.0), 1.5 * (0.25 * 0.2 - -1.0), 1.5 * (0.5 * 0.1 - 0.5)]
-        np.testing.assert_allclose(found, expected, rtol=1e-5)
-
-
-class TestVelocityControl:
-    def test_torques_follow_velocity_targets(self, torques):
-        # An action of 1 is the joint's velocity limit.
-        found = torques((0.1, 0.1, -0.1), control_type="V")
-        expected = [0.4 * (3.0 - 2.0), 1.5 * (1.0 - -1.0), 1.5 * (-1.0 - 0.5)]
-        np.testing.assert_allclose(found, expected, rtol=1e-5)
-
-    def test_torques_are_clipped_at_effort(self, torques):
-        np.testing.assert_allclose(torques((9, 9, -9), control_type="V"), [3, 5, -6])
-
-    def test_joint_offset_has_no_effect(self, torques):
-        plain = torques((0.1, 0.1, -0.1), control_type="V")
-        found = torques((0.1, 0.1, -0.1), offset=(0.1, 0.1, 0.1), control_type="V")
-        np.testing.assert_array_equal(found, plain)
-
-
-class TestTorqueControl:
-    def test_unit_action_is_the_effort(self, torques):
-        found = torques((0.5, -0.2, 1.0), control_type="T")
-        np.testing.assert_allclose(found, [1.5, -1.0, 6.0], rtol=1e-6)
-
-    def test_task_scale_is_a_torque(self, torques):
-        found = torques((0.5, -0.2, 0.1), control_type="T", action_scale=2.0)
-        np.testing.assert_allclose(found, [1.0, -0.4, 0.2], rtol=1e-6)
-
-    def test_torques_are_clipped_at_effort(self, torques):
-        np.testing.assert_allclose(torques((-9, 9, 9), control_type="T"), [-3, 5, 6])
+    # A motor that measures 0.05 rad too much moves 0.05 rad too little.
+    @pytest.mark.parametrize(("kind", "less"), [("P", [0, 20 * 0.05, 20 * 0.05]), ("V", [0, 0, 0])])
+    def test_joint_offset_shifts_the_target_position(self, torques, kind, less):
+        plain = torques((0.2, 0.0, 0.1), control_type=kind)
+        shifted = torques((0.2, 0.0, 0.1), offset=(0.05, 0.05, 0.05), control_type=kind)
+        np.testing.assert_allclose(plain - shifted, less, rtol=1e-5)
 
 
 class TestJointsWithoutAction:
     @pytest.mark.parametrize("control", [Control(), Control(action_scale=0.5)])
-    def test_joints_with_a_scale_of_zero_hold_the_default_pose(
-        self, held_calves, nominal_task, control
-    ):
+    def test_they_hold_the_default_pose(self, nominal_env, held_calves, control):
         robot = Robot.load(held_calves)
-        env = LeggedEnv(nominal_task(2, control=control), robot, Plane())
+        env = nominal_env(2, robot=robot, control=control)
         calves = np.array([name.endswith("calf_joint") for name in robot.spec.joint_order])
         np.testing.assert_array_equal(env.action_joints, np.flatnonzero(~calves))
         actions = np.arange(-8, 8, dtype=np.float32).reshape(2, 8) / 10
         moved = env.to_ctrl(actions) - robot.default_pose
         np.testing.assert_array_equal(moved[:, calves], 0)
-        np.testing.assert_allclose(
-            moved[:, ~calves], actions * (control.action_scale or 0.25), atol=1e-6
-        )
+        scaled = actions * (control.action_scale or 0.25)
+        np.testing.assert_allclose(moved[:, ~calves], scaled, atol=1e-6)
         observations = env.step(torch.from_numpy(actions))[0]["policy"]
         assert observations.shape == (2, 47 - 4)
         np.testing.assert_array_equal(env.state.actions, actions)
-
-    def test_other_numbers_of_actions_are_rejected(self, held_calves, nominal_task):
-        env = LeggedEnv(nominal_task(2), Robot.load(held_calves), Plane())
         with pytest.raises(ConfigError, match=r"got \(2, 12\); expected \(2, 8\)"):
             env.step(torch.zeros(2, 12))
 
-    def test_a_robot_without_actions_is_rejected(self, quadruped, nominal_task):
+    def test_a_robot_without_actions_is_rejected(self, nominal_env, quadruped):
         robot = replace(quadruped, action_scale=np.zeros(12, np.float32))
         with pytest.raises(ConfigError, match="action_scale of quadruped: got 0 for every joint"):
-            LeggedEnv(nominal_task(2), robot, Plane())
+            nominal_env(2, robot=robot)

@@ -1,18 +1,14 @@
 """Observations: values computed by hand, order, widths and noise."""
 
 from dataclasses import fields, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 from made_states import made_state, shapes
 
-from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import (
     Commands,
-    Env,
     Noise,
     Normalization,
     Observations,
@@ -20,9 +16,7 @@ from terrainkit_robots.rl.config import (
     Task,
     Terrain,
 )
-from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import (
-    ObservationTerm,
     compute_observations,
     history_width,
     policy_group,
@@ -30,10 +24,7 @@ from terrainkit_robots.rl.observations import (
 )
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
-
-torch.set_num_threads(1)
 
 _SHAPES = shapes(joints=12, feet=4, penalized=8, points=187)
 
@@ -61,32 +52,26 @@ _SECRETS = [
 ]
 
 
-def state(n: int = 1, **arrays: Any) -> State:
+def state(n=1, **arrays):
     """Return a state of n quadrupeds that is 0 except for the given arrays."""
     return made_state(_SHAPES, n, **arrays)
 
 
-@pytest.fixture(scope="module")
-def robot() -> Robot:
-    return Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
-
-
-def group_of(robot: Robot, task: Task | None = None) -> tuple[ObservationTerm, ...]:
+def group_of(robot, task=None):
     return policy_group(robot, task or Task(), scan=True)
 
 
-def privileged_of(robot: Robot, task: Task | None = None) -> tuple[ObservationTerm, ...]:
+def privileged_of(robot, task=None):
     return privileged_group(robot, task or Task(), scan=True, weight=100.0)
 
 
-def observed(group: tuple[ObservationTerm, ...], name: str, given: State) -> list[float]:
+def observed(group, name, given):
     """Return the values of one term, without noise."""
     [only] = [each for each in group if each.name == name]
-    values: list[float] = compute_observations([only], given, 100.0)[0].tolist()
-    return values
+    return compute_observations([only], given, 100.0)[0].tolist()
 
 
-def slices(group: tuple[ObservationTerm, ...], given: State) -> dict[str, slice]:
+def slices(group, given):
     found, start = {}, 0
     for each in group:
         stop = start + each.function(given).shape[1]
@@ -126,53 +111,51 @@ _BY_HAND = {
 
 
 @pytest.mark.parametrize("name", _BY_HAND)
-def test_term_by_hand(robot, name):
+def test_term_by_hand(quadruped, name):
     arrays, expected = _BY_HAND[name]
-    assert observed(privileged_of(robot), name, state(**arrays)) == pytest.approx(
-        expected, abs=1e-6
-    )
+    found = observed(privileged_of(quadruped), name, state(**arrays))
+    assert found == pytest.approx(expected, abs=1e-6)
 
 
-def test_dof_pos_by_hand(robot):
+def test_dof_pos_by_hand(quadruped):
     # Measured position, including the joint offset, minus the default pose.
-    given = state(dof_pos=robot.default_pose + np.float32(0.5), joint_offset=0.125)
-    assert observed(group_of(robot), "dof_pos", given) == pytest.approx([0.625] * 12)
+    given = state(dof_pos=quadruped.default_pose + np.float32(0.5), joint_offset=0.125)
+    assert observed(group_of(quadruped), "dof_pos", given) == pytest.approx([0.625] * 12)
     # Wheels are observed as 0; 100 is the clipping limit.
-    wheeled = replace(robot, wheels=np.arange(12) % 3 == 2)
-    given = state(dof_pos=robot.default_pose + np.float32(400))
+    wheeled = replace(quadruped, wheels=np.arange(12) % 3 == 2)
+    given = state(dof_pos=quadruped.default_pose + np.float32(400))
     assert observed(group_of(wheeled), "dof_pos", given) == pytest.approx([100, 100, 0] * 4)
 
 
-def test_every_term_is_tested_by_hand(robot):
-    assert {each.name for each in privileged_of(robot)} == {*_BY_HAND, "dof_pos"}
+def test_every_term_is_tested_by_hand(quadruped):
+    assert {each.name for each in privileged_of(quadruped)} == {*_BY_HAND, "dof_pos"}
 
 
 class TestGroups:
-    def test_policy_group_has_the_documented_terms(self, robot: Robot) -> None:
-        group = group_of(robot)
+    def test_policy_group_has_the_documented_terms(self, quadruped):
+        group = group_of(quadruped)
         found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE
-        assert compute_observations(group, state(2), 100.0).shape == (2, 234)
-        assert compute_observations(
-            policy_group(robot, Task(), scan=False), state(2), 100.0
-        ).shape == (2, 47)
+        for scan, width in ((True, 234), (False, 47)):
+            group = policy_group(quadruped, Task(), scan=scan)
+            assert compute_observations(group, state(2), 100.0).shape == (2, width)
 
-    def test_privileged_group_extends_the_policy_group(self, robot: Robot) -> None:
-        group = privileged_of(robot)
+    def test_privileged_group_extends_the_policy_group(self, quadruped):
+        group = privileged_of(quadruped)
         found = [(each.name, each.function(state()).shape[1]) for each in group]
         assert found == _TASK_TABLE + _SECRETS
 
-    def test_additional_terms_of_the_policy(self, robot: Robot) -> None:
+    def test_additional_terms_of_the_policy(self, quadruped):
         options = Observations(base_lin_vel=True, foot_contact=True, history_length=3)
         force = [[9, 9, 1.5], [9, 9, 0.5], [0, 0, 50], [0, 0, -50]]
         given = state(base_lin_vel=[[1, -0.5, 0.25]], foot_force=[force])
-        group = group_of(robot, Task(observations=options))
+        group = group_of(quadruped, Task(observations=options))
         assert observed(group, "base_lin_vel", given) == [2, -1, 0.5]
         assert observed(group, "foot_contact", given) == [1, 0, 1, 0]
         names = [each.name for each in group]
         assert names[6:] == ["gait_phase", "base_lin_vel", "foot_contact", "history", "height_scan"]
         # The critic knows the velocity anyway, and needs no history.
-        names = [each.name for each in privileged_of(robot, Task(observations=options))]
+        names = [each.name for each in privileged_of(quadruped, Task(observations=options))]
         assert names.count("base_lin_vel") == names.count("foot_contact") == 1
         assert "history" not in names
 
@@ -185,9 +168,7 @@ class TestGroups:
             ("biped", False, False),
         ],
     )
-    def test_two_legs_observe_the_linear_velocity(
-        self, name: str, setting: bool | None, observed: bool
-    ) -> None:
+    def test_two_legs_observe_the_linear_velocity(self, name, setting, observed):
         task = Task(observations=Observations(base_lin_vel=setting, history_length=2))
         legged = Robot.load(get_task(name).folder)
         names = [each.name for each in policy_group(legged, task, scan=False)]
@@ -197,26 +178,28 @@ class TestGroups:
 
     @pytest.mark.parametrize("gait_period", [0, None])
     @pytest.mark.parametrize("more", [False, True])
-    def test_history_repeats_the_terms_before_it(
-        self, robot: Robot, gait_period: float | None, more: bool
-    ) -> None:
+    def test_history_repeats_the_terms_before_it(self, quadruped, gait_period, more):
         options = Observations(base_lin_vel=more, foot_contact=more, history_length=4)
         task = Task(observations=options, commands=Commands(gait_period=gait_period))
-        before = [t for t in group_of(robot, task) if t.name not in ("history", "height_scan")]
+        before = [t for t in group_of(quadruped, task) if t.name not in ("history", "height_scan")]
         width = sum(term.function(state()).shape[1] for term in before)
         assert width == 45 + 2 * (gait_period is None) + 7 * more
-        assert history_width(robot, task, 12) == 3 * width
-        assert history_width(robot, Task(), 12) == 0
+        assert history_width(quadruped, task, 12) == 3 * width
+        assert history_width(quadruped, Task(), 12) == 0
 
-    def test_scales_are_the_tasks(self, robot: Robot) -> None:
+    def test_scales_are_the_tasks(self, quadruped):
         scales = ObsScales(lin_vel=3, ang_vel=5, dof_pos=7, dof_vel=11, height_measurements=13)
         task = Task(normalization=Normalization(obs_scales=scales))
         given = state(
-            commands=1, base_lin_vel=1, base_ang_vel=1, dof_vel=1, dof_pos=robot.default_pose + 1
+            commands=1,
+            base_lin_vel=1,
+            base_ang_vel=1,
+            dof_vel=1,
+            dof_pos=quadruped.default_pose + 1,
         )
         given.height_scan[:] = 1.5
-        seen = compute_observations(privileged_of(robot, task), given, 100.0)[0]
-        here = slices(privileged_of(robot), given)
+        seen = compute_observations(privileged_of(quadruped, task), given, 100.0)[0]
+        here = slices(privileged_of(quadruped), given)
         assert seen[here["commands"]].tolist() == [3, 3, 5]
         assert seen[here["base_ang_vel"]].tolist() == [5] * 3
         assert seen[here["dof_pos"]].tolist() == pytest.approx([7] * 12)
@@ -224,15 +207,15 @@ class TestGroups:
         assert seen[here["height_scan"]].tolist() == [13] * 187
         assert seen[here["base_lin_vel"]].tolist() == [3] * 3
 
-    def test_values_are_clipped(self, robot: Robot) -> None:
+    def test_values_are_clipped(self, quadruped):
         given = state(dof_vel=[[1e6, -1e6, 30, *[0] * 9]])
-        seen = compute_observations(group_of(robot), given, 1.25)
+        seen = compute_observations(group_of(quadruped), given, 1.25)
         assert seen[0, 21:24].tolist() == [1.25, -1.25, 1.25]
         assert np.abs(seen).max() == 1.25
 
-    def test_state_is_not_modified(self, robot: Robot) -> None:
+    def test_state_is_not_modified(self, quadruped):
         given, twin = state(3, commands=2, height_scan=2), state(3, commands=2, height_scan=2)
-        seen = compute_observations(privileged_of(robot), given, 100.0)
+        seen = compute_observations(privileged_of(quadruped), given, 100.0)
         seen += 1
         for each in fields(State):
             np.testing.assert_array_equal(getattr(given, each.name), getattr(twin, each.name))
@@ -250,13 +233,12 @@ _NOISE = {
 
 class TestNoise:
     @pytest.mark.parametrize("level", [1.0, 0.5])
-    def test_noise_is_uniform(self, robot: Robot, level: float) -> None:
-        group = group_of(robot, Task(noise=Noise(noise_level=level)))
-        given = state(4000, projected_gravity=[0, 0, -1], dof_pos=robot.default_pose)
+    def test_noise_is_uniform(self, quadruped, level):
+        group = group_of(quadruped, Task(noise=Noise(noise_level=level)))
+        given = state(4000, projected_gravity=[0, 0, -1], dof_pos=quadruped.default_pose)
         given.height_scan[:] = 0.5
-        off = compute_observations(
-            group, given, 100.0, np.random.default_rng(0)
-        ) - compute_observations(group, given, 100.0)
+        noisy = compute_observations(group, given, 100.0, np.random.default_rng(0))
+        off = noisy - compute_observations(group, given, 100.0)
         for name, here in slices(group, given).items():
             drawn = off[:, here]
             most = level * _NOISE.get(name, 0.0)
@@ -272,53 +254,41 @@ class TestNoise:
             together = np.corrcoef(drawn[:, 0], drawn[:, 1])[0, 1]
             assert abs(together) < 0.1, name
 
-    def test_noise_levels_are_the_tasks(self, robot: Robot) -> None:
+    def test_noise_levels_are_the_tasks(self, quadruped):
         noise = Noise(dof_pos=1, dof_vel=2, ang_vel=3, gravity=4, height_measurements=5)
-        found = {each.name: each.noise for each in group_of(robot, Task(noise=noise))}
-        assert found == {
-            "commands": 0,
-            "projected_gravity": 4,
-            "base_ang_vel": 3,
-            "dof_pos": 1,
-            "dof_vel": 2,
-            "actions": 0,
-            "gait_phase": 0,
-            "height_scan": 5,
-        }
+        found = {each.name: each.noise for each in group_of(quadruped, Task(noise=noise))}
+        levels = {"projected_gravity": 4, "base_ang_vel": 3, "dof_pos": 1, "dof_vel": 2}
+        without = {"commands": 0, "actions": 0, "gait_phase": 0}
+        assert found == levels | without | {"height_scan": 5}
 
-    def test_noise_level_zero_samples_nothing(self, robot: Robot) -> None:
-        group = group_of(robot, Task(noise=Noise(noise_level=0)))
+    def test_noise_level_zero_samples_nothing(self, quadruped):
+        group = group_of(quadruped, Task(noise=Noise(noise_level=0)))
         rng = np.random.default_rng(0)
         seen = compute_observations(group, state(5), 100.0, rng)
         np.testing.assert_array_equal(seen, compute_observations(group, state(5), 100.0))
         # The random generator is not used.
         assert rng.bit_generator.state == np.random.default_rng(0).bit_generator.state
 
-    def test_privileged_group_has_no_noise(self, robot: Robot) -> None:
-        assert {each.noise for each in privileged_of(robot)} == {0.0}
+    def test_privileged_group_has_no_noise(self, quadruped):
+        assert {each.noise for each in privileged_of(quadruped)} == {0.0}
 
-    def test_noise_is_added_before_clipping(self, robot: Robot) -> None:
-        group = group_of(robot, Task(noise=Noise(dof_vel=1e6)))
+    def test_noise_is_added_before_clipping(self, quadruped):
+        group = group_of(quadruped, Task(noise=Noise(dof_vel=1e6)))
         seen = compute_observations(group, state(50), 2.0, np.random.default_rng(0))
         assert np.abs(seen).max() == 2.0
 
 
 class TestInEnvironment:
-    def make(self, **changes: Any) -> LeggedEnv:
-        robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
-        task = replace(Task(env=Env(num_envs=3, num_threads=1)), **changes)
-        return LeggedEnv(task, robot, Plane())
-
-    def test_height_scan_on_request(self) -> None:
-        env = self.make(terrain=Terrain(measure_heights=True))
+    def test_height_scan_on_request(self, random_env):
+        env = random_env(3, terrain=Terrain(measure_heights=True))
         assert env.get_observations()["policy"].shape == (3, 234)
         # On a plane, every point is at the height of the base.
         scan = env.get_observations()["privileged"][:, 47:234].numpy()
         height = env.state.base_pos[:, 2:]
         np.testing.assert_allclose(scan, np.tile(5 * (height - 0.5), 187), atol=1e-5)
 
-    def test_policy_is_privileged_with_noise(self) -> None:
-        obs = self.make().get_observations()
+    def test_policy_is_privileged_with_noise(self, random_env):
+        obs = random_env(3).get_observations()
         policy, known = obs["policy"], obs["privileged"][:, :47]
         quiet = [*range(3), *range(33, 47)]
         noisy = [k for k in range(47) if k not in quiet]
@@ -326,8 +296,8 @@ class TestInEnvironment:
         assert (policy[:, noisy] != known[:, noisy]).float().mean() > 0.95
         assert (policy - known).abs().max() <= 0.0751
 
-    def test_noise_changes_every_step(self) -> None:
-        env = self.make()
+    def test_noise_changes_every_step(self, random_env):
+        env = random_env(3)
         noises = []
         for _ in range(2):
             env.step(torch.zeros(3, 12))
@@ -335,9 +305,9 @@ class TestInEnvironment:
             noises.append(obs["policy"] - obs["privileged"][:, :47])
         assert not torch.equal(*noises)
 
-    def test_observations_of_known_state(self) -> None:
+    def test_observations_of_known_state(self, random_env):
         """An upright robot in the default pose with the commands 1, 0, 0.5."""
-        env = self.make(noise=Noise(noise_level=0.0))
+        env = random_env(3, noise=Noise(noise_level=0.0))
         env.set_commands(np.tile(np.array([1, 0, 0.5], np.float32), (3, 1)))
         env.joint_offset[:] = 0
         env.sim.qpos[:] = env.scene.default_qpos

@@ -29,12 +29,18 @@ from terrainkit_robots.spec.robot import Robot
 
 
 @pytest.fixture
-def task() -> Task:
+def mine(tmp_path):
+    """Return a copy of the folder of a robot."""
+    return shutil.copytree(tasks.get_task("quadruped").folder, tmp_path / "mine")
+
+
+@pytest.fixture
+def task():
     return Task(rewards=Rewards(tracking_lin_vel=3.25))
 
 
 @pytest.fixture
-def run(tmp_path, task) -> Path:
+def run(tmp_path, task):
     return create_run(tmp_path / "run", task, "quadruped", "plane").folder
 
 
@@ -54,9 +60,7 @@ def test_run_file_records_versions(run):
     assert set(about["versions"]) == {"terrainkit", "mujoco", "rsl-rl-lib", "torch"}
 
 
-def test_open_run_uses_the_trained_spec(tmp_path, task, quadruped):
-    mine = tmp_path / "mine"
-    shutil.copytree(tasks.get_task("quadruped").folder, mine)
+def test_open_run_uses_the_trained_spec(tmp_path, task, mine, quadruped):
     folder = create_run(tmp_path / "run", task, mine, "plane").folder
     spec = mine / "robot.toml"
     spec.write_text(re.sub("spawn_height = [0-9.]+", "spawn_height = 7.5", spec.read_text()))
@@ -66,18 +70,14 @@ def test_open_run_uses_the_trained_spec(tmp_path, task, quadruped):
     assert opened.robot.spec == quadruped.spec
 
 
-def test_open_run_rejects_a_missing_robot(tmp_path, task):
-    mine = tmp_path / "mine"
-    shutil.copytree(tasks.get_task("quadruped").folder, mine)
+def test_open_run_rejects_a_missing_robot(tmp_path, task, mine):
     folder = create_run(tmp_path / "run", task, mine, "plane").folder
     (mine / "quadruped.xml").unlink()
     with pytest.raises(ConfigError, match=r"is missing: there is no file .*quadruped\.xml"):
         open_run(folder)
 
 
-def test_changed_robot_files_names_the_files(tmp_path, task):
-    mine = tmp_path / "mine"
-    shutil.copytree(tasks.get_task("quadruped").folder, mine)
+def test_changed_robot_files_names_the_files(tmp_path, task, mine):
     run = open_run(create_run(tmp_path / "run", task, mine, "plane").folder)
     assert changed_robot_files(run) == ()
     for name in ("quadruped.xml", "robot.toml"):
@@ -139,9 +139,8 @@ def test_checkpoints_are_ordered_by_iteration(run):
 
 def test_create_run_never_overwrites(run, task):
     before = sorted((path.name, path.read_bytes()) for path in run.iterdir())
-    with pytest.raises(
-        ExportError, match="exists; choose another folder, or continue with --resume"
-    ):
+    told = "exists; choose another folder, or continue with --resume"
+    with pytest.raises(ExportError, match=told):
         create_run(run, task, "quadruped", "plane")
     assert sorted((path.name, path.read_bytes()) for path in run.iterdir()) == before
 
@@ -155,9 +154,8 @@ def test_create_run_failure_leaves_nothing(tmp_path, task):
 
 def test_default_folders_are_unique(tmp_path, monkeypatch, task):
     monkeypatch.chdir(tmp_path)
-    folders = set()
-    for _ in range(3):
-        folders.add(create_run(default_folder("quadruped"), task, "quadruped", "plane").folder)
+    made = [create_run(default_folder("quadruped"), task, "quadruped", "plane") for _ in "abc"]
+    folders = {each.folder for each in made}
     assert len(folders) == 3
     assert {folder.parent for folder in folders} == {Path("logs/quadruped")}
 
@@ -176,10 +174,8 @@ def test_run_folder_replaces_the_task(run, task):
     assert open_run(run).task == other
 
 
-def test_open_run_finds_bundled_policy_by_name(tmp_path, task, monkeypatch):
+def test_open_run_finds_bundled_policy_by_name(task, mine, monkeypatch):
     monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
-    mine = tmp_path / "mine"
-    shutil.copytree(tasks.get_task("quadruped").folder, mine)
     shipped = tasks.register_task("rover_of_this_test", mine).trained_run
     with pytest.raises(ConfigError, match="no policy is shipped with rover_of_this_test"):
         open_run("rover_of_this_test")
@@ -223,36 +219,33 @@ def test_local_run_precedes_bundled_policy(tmp_path, task, monkeypatch):
     assert open_run("quadruped").info.robot == "biped"
 
 
-def test_open_run_rejects_other_folders(tmp_path):
-    with pytest.raises(
-        ConfigError, match=r"run: got nothing; expected a folder .* biped, quadruped"
-    ):
-        open_run("nothing")
-    with pytest.raises(ConfigError, match=r"has no run\.toml; terrainkit train writes"):
-        open_run(tmp_path)
-    with pytest.raises(ConfigError, match=r"cannot read|run: got"):
-        open_run("a\0b")
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("nothing", r"run: got nothing; expected a folder .* biped, quadruped"),
+        (".", r"has no run\.toml; terrainkit train writes"),
+        ("a\0b", r"cannot read|run: got"),
+    ],
+)
+def test_open_run_rejects_other_folders(tmp_path, monkeypatch, name, told):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=told):
+        open_run(name)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("file", "old", "new", "told"),
     [
-        ("format_version = 1", "format_version = 2", "format_version: got 2; expected one of: 1"),
-        ('robot = "quadruped"', "robot = 3", "robot: got 3; expected a string"),
-        ('robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
-        ('terrain = "plane"', "", "terrain: missing; expected a string"),
-        ("seed", "seed =", "not a TOML file"),
+        (RUN_FILE, "version = 1", "version = 2", "format_version: got 2; expected one of: 1"),
+        (RUN_FILE, 'robot = "quadruped"', "robot = 3", "robot: got 3; expected a string"),
+        (RUN_FILE, 'robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
+        (RUN_FILE, 'terrain = "plane"', "", "terrain: missing; expected a string"),
+        (RUN_FILE, "seed", "seed =", "not a TOML file"),
+        (TASK_FILE, "tracking_lin_vel", "tracking_lin_vle", "tracking_lin_vle"),
     ],
 )
-def test_open_run_rejects_malformed_run_file(run, old, new, said):
-    path = run / RUN_FILE
+def test_open_run_rejects_malformed_files(run, file, old, new, told):
+    path = run / file
     path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(ConfigError, match=said):
-        open_run(run)
-
-
-def test_open_run_names_the_wrong_key(run):
-    path = run / TASK_FILE
-    path.write_text(path.read_text().replace("tracking_lin_vel", "tracking_lin_vle"))
-    with pytest.raises(ConfigError, match="tracking_lin_vle"):
+    with pytest.raises(ConfigError, match=told):
         open_run(run)

@@ -1,4 +1,4 @@
-from dataclasses import fields
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -6,16 +6,13 @@ import pytest
 import torch
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.config import Commands, DomainRand, InitState
-from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.terrain import Plane
+from terrainkit_robots.rl.config import Commands, InitState
 
 
 @pytest.fixture
-def moving(cart, nominal_task):
+def moving(nominal_env, cart):
     """Return carts that tumble in the air."""
-    env = LeggedEnv(nominal_task(5), cart, Plane())
+    env = nominal_env(5, robot=cart)
     rng = np.random.default_rng(2)
     env.sim.qpos[:, 2] = 2.0
     env.sim.qvel[:] = rng.normal(size=env.sim.qvel.shape)
@@ -25,7 +22,7 @@ def moving(cart, nominal_task):
 
 @pytest.fixture
 def sensed(cart, moving):
-    """Return the values of MuJoCo's own sensors for those carts, one dictionary each."""
+    """Return the values of MuJoCo's own sensors for those carts, by name."""
     with quiet_mujoco():
         spec = mujoco.MjSpec.from_file(str(cart.mjcf))
         kind, site, body = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_SITE, mujoco.mjtObj.mjOBJ_BODY
@@ -46,49 +43,33 @@ def sensed(cart, moving):
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = qpos, qvel
         mujoco.mj_forward(model, data)
-        found.append(
-            {model.sensor(k).name: data.sensor(k).data.copy() for k in range(model.nsensor)}
-            | {"ball": data.geom("front_ball").xpos.copy(), "wheel": data.body("wheel").xpos.copy()}
-        )
-    return found
+        sensors = {model.sensor(k).name: data.sensor(k).data.copy() for k in range(model.nsensor)}
+        found.append(sensors | {"wheel": data.body("wheel").xpos.copy()})
+    return {name: np.array([each[name] for each in found]) for name in found[0]}
 
 
-class TestStateAgainstMujoco:
-    def test_base_lin_vel_matches_velocimeter(self, moving, sensed):
-        expected = [each["velocity"] for each in sensed]
-        np.testing.assert_allclose(moving.state.base_lin_vel, expected, atol=1e-5)
-        assert np.abs(expected).max() > 0.5
-
-    def test_base_ang_vel_matches_gyro(self, moving, sensed):
-        expected = [each["turn"] for each in sensed]
-        np.testing.assert_allclose(moving.state.base_ang_vel, expected, atol=1e-5)
-
-    def test_projected_gravity_matches_frame_axis(self, moving, sensed):
-        expected = [-each["up"] for each in sensed]
-        np.testing.assert_allclose(moving.state.projected_gravity, expected, atol=1e-5)
-
-    def test_dof_vel_is_in_spec_order(self, moving, sensed):
-        joints = ("wheel_axle", "rear_hinge", "front_hinge")
-        expected = [[each[name][0] for name in joints] for each in sensed]
-        np.testing.assert_allclose(moving.state.dof_vel, expected, atol=1e-5)
-
-    def test_foot_height_is_at_the_sole(self, moving, sensed):
+def test_state_matches_sensors(moving, sensed):
+    joints = ("wheel_axle", "rear_hinge", "front_hinge")  # in the order of the spec
+    for found, expected in (
+        (moving.state.base_lin_vel, sensed["velocity"]),
+        (moving.state.base_ang_vel, sensed["turn"]),
+        (moving.state.projected_gravity, -sensed["up"]),
+        (moving.state.dof_vel, np.hstack([sensed[joint] for joint in joints])),
         # The radius of the foot is subtracted.
-        expected = [each["wheel"][2] - 0.03 for each in sensed]
-        np.testing.assert_allclose(moving.state.foot_height[:, 0], expected, atol=1e-5)
+        (moving.state.foot_height[:, :1], sensed["wheel"][:, 2:] - 0.03),
+    ):
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+    assert np.abs(sensed["velocity"]).max() > 0.5
 
 
 class TestByHand:
     @pytest.mark.parametrize(("name", "weight"), [("biped", 1 / 100), ("quadruped", 1.0)])
     def test_mean_vel_is_averaged_over_the_gait_on_two_legs(
-        self, request, nominal_task, name, weight
+        self, request, nominal_env, name, weight
     ):
         # 2 s at 50 Hz: each step moves the mean by 1 / 100 of its distance to the velocity.
-        task, robot = (
-            nominal_task(2, commands=Commands(gait_period=2.0)),
-            request.getfixturevalue(name),
-        )
-        env = LeggedEnv(task, robot, Plane())
+        robot = request.getfixturevalue(name)
+        env = nominal_env(2, robot=robot, commands=Commands(gait_period=2.0))
         expected = env.state.mean_vel
         assert not expected.any()
         for _ in range(5):
@@ -101,8 +82,8 @@ class TestByHand:
         env.reset()
         assert not env.state.mean_vel.any()
 
-    def test_state_at_rest(self, cart, nominal_task):
-        state = LeggedEnv(nominal_task(2), cart, Plane()).state
+    def test_state_at_rest(self, nominal_env, cart):
+        state = nominal_env(2, robot=cart).state
         np.testing.assert_allclose(state.base_pos, [[0, 0, 0.24]] * 2, atol=1e-6)
         np.testing.assert_allclose(state.base_height, [0.24] * 2, atol=1e-6)
         np.testing.assert_allclose(state.projected_gravity, [[0, 0, -1]] * 2, atol=1e-7)
@@ -114,8 +95,8 @@ class TestByHand:
         wheel = 0.24 - 0.2 * np.cos(0.2) - 0.03
         np.testing.assert_allclose(state.foot_height[:, 0], wheel, atol=1e-5)
 
-    def test_dof_acc_is_finite_difference(self, cart, nominal_task):
-        env = LeggedEnv(nominal_task(2), cart, Plane())
+    def test_dof_acc_is_finite_difference(self, nominal_env, cart):
+        env = nominal_env(2, robot=cart)
         before = env.state.dof_vel.copy()
         for _ in range(3):
             env.step(torch.full((2, 3), 0.2))
@@ -123,29 +104,23 @@ class TestByHand:
             np.testing.assert_allclose(env.state.dof_acc, expected, rtol=1e-4, atol=1e-4)
             before = env.state.dof_vel.copy()
 
-    def test_last_actions_are_kept(self, cart, nominal_task):
-        env = LeggedEnv(nominal_task(2), cart, Plane())
+    def test_last_actions_are_kept(self, nominal_env, cart):
+        env = nominal_env(2, robot=cart)
         for value in (0.1, 0.2, 0.3):
             env.step(torch.full((2, 3), value))
         np.testing.assert_allclose(env.state.actions, 0.3)
         np.testing.assert_allclose(env.state.last_actions, 0.2)
 
-    def test_torques_are_in_spec_order(self, cart, nominal_task):
-        env = LeggedEnv(nominal_task(1), cart, Plane())
+    def test_torques_are_in_spec_order(self, nominal_env, cart):
+        env = nominal_env(1, robot=cart)
         env.sim.qpos[:, 2] = 2.0
         env.step(torch.tensor([[50.0, 0.0, 0.0]]))  # the wheel only
         assert env.state.torques[0, 0] == pytest.approx(3.0)
         assert np.abs(env.state.torques[0, 1:]).max() < 1.0
 
-    def test_push_adds_to_world_velocity(self, cart, nominal_task):
-        task = nominal_task(
-            64,
-            domain_rand=DomainRand(
-                friction=None, added_mass=None, com_shift=0, gains=None, motor_strength=None,
-                joint_offset=0, push_interval_s=0.04, max_push_vel_xy=0.8,
-            ),
-        )  # fmt: skip
-        env = LeggedEnv(task, cart, Plane())
+    def test_push_adds_to_world_velocity(self, nominal_env, cart, no_randomization):
+        pushed = replace(no_randomization, push_interval_s=0.04, max_push_vel_xy=0.8)
+        env = nominal_env(64, robot=cart, domain_rand=pushed)
         env.sim.qpos[:, 2] = 3.0
         seen = []
         for _ in range(4):
@@ -162,56 +137,51 @@ class TestByHand:
 
 
 class TestStateCopies:
-    def test_state_is_unchanged_by_later_steps(self, quadruped, random_task):
-        env = LeggedEnv(random_task(3), quadruped, Plane())
+    def test_state_is_unchanged_by_later_steps(self, random_env):
+        env = random_env(3)
         env.step(torch.zeros(3, 12))
         kept = env.state
-        before = {field.name: getattr(kept, field.name).copy() for field in fields(State)}
+        before = {name: value.copy() for name, value in vars(kept).items()}
         for _ in range(5):
             env.step(torch.full((3, 12), 0.3))
         for name, value in before.items():
             np.testing.assert_array_equal(getattr(kept, name), value, err_msg=name)
 
-    def test_state_shares_no_memory(self, quadruped, random_task):
+    def test_state_shares_no_memory(self, random_env):
         # A reward that modifies the state must not change the simulation.
-        env = LeggedEnv(random_task(3), quadruped, Plane())
+        env = random_env(3)
         env.step(torch.zeros(3, 12))
         own = [env.sim.batch.state, *vars(env.params).values(), env.commands]
         own += [env.joint_offset, env.pushes.velocity, env.actions]
-        for field in fields(State):
-            value = getattr(env.state, field.name)
-            assert not any(np.shares_memory(value, other) for other in own), field.name
+        for name, value in vars(env.state).items():
+            assert not any(np.shares_memory(value, other) for other in own), name
 
-    def test_state_is_single_precision(self, quadruped, nominal_task, map_ground):
-        env = LeggedEnv(nominal_task(3), quadruped, map_ground)
+    def test_state_is_single_precision(self, nominal_env, map_ground):
+        env = nominal_env(3, map_ground)
         env.step(torch.zeros(3, 12))
-        for field in fields(State):
-            value = getattr(env.state, field.name)
-            assert value.dtype in (np.float32, np.bool_), field.name
+        for name, value in vars(env.state).items():
+            assert value.dtype in (np.float32, np.bool_), name
 
-    def test_update_replaces_some_rows(self, quadruped, random_task):
-        first = LeggedEnv(random_task(4), quadruped, Plane()).state
+    def test_update_replaces_some_rows(self, random_env):
+        first = random_env(4).state
         before = first.base_pos.copy()
-        other = LeggedEnv(
-            random_task(2, init_state=InitState(position=3.0)), quadruped, Plane()
-        ).state
+        other = random_env(2, init_state=InitState(position=3.0)).state
         first.update(np.array([1, 3]), other)
         np.testing.assert_array_equal(first.base_pos[[1, 3]], other.base_pos)
         np.testing.assert_array_equal(first.base_pos[[0, 2]], before[[0, 2]])
 
-    def test_state_after_reset_is_fresh(self, quadruped, nominal_task):
-        env = LeggedEnv(nominal_task(3), quadruped, Plane())
+    def test_state_after_reset_is_fresh(self, nominal_env, quadruped):
+        env = nominal_env(3)
         for _ in range(30):
             env.step(torch.full((3, 12), 0.5))
         env.sim.qpos[1, 3:7] = (0, 1, 0, 0)  # on its back: a fall
         _, _, dones, _ = env.step(torch.zeros(3, 12))
         assert dones.tolist() == [False, True, False]
-        new = LeggedEnv(nominal_task(3), quadruped, Plane()).state
-        for field in fields(State):
-            if field.name in ("commands", "foot_height", "foot_vel"):
-                continue
-            found, fresh = getattr(env.state, field.name)[1], getattr(new, field.name)[1]
-            np.testing.assert_allclose(found, fresh, atol=1e-6, err_msg=field.name)
+        new = nominal_env(3).state
+        for name, fresh in vars(new).items():
+            if name not in ("commands", "foot_height", "foot_vel"):
+                found = getattr(env.state, name)[1]
+                np.testing.assert_allclose(found, fresh[1], atol=1e-6, err_msg=name)
         where = np.array([1])
         env.sim.batch.forward(where, stage=mujoco.mjtStage.mjSTAGE_VEL)
         feet = env.sim.sensor("foot_position", where)[0]

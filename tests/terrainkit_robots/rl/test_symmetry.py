@@ -1,24 +1,19 @@
 """Left-right symmetry: mirrored robots behave like mirror images."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import config as sections
-from terrainkit_robots.rl.config import Commands, DomainRand, Env, Noise, Observations, Sim, Task
+from terrainkit_robots.rl.config import Commands, DomainRand, Observations, Sim
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.symmetry import MirrorMaps, augment
-from terrainkit_robots.rl.terrain import Plane, Terrain
+from terrainkit_robots.rl.symmetry import augment
+from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.spec.robot_spec import MirrorJoint
-
-torch.set_num_threads(1)
 
 _PAIRS = 4
 """Robots k and k + 4 of each environment are mirror images."""
@@ -29,33 +24,38 @@ class Valley(Plane):
 
     is_flat = False
 
-    def height(self, x: Any, y: Any, *_: Any, **__: Any) -> Any:
+    def height(self, x, y, *_, **__):
         return (0.3 * np.abs(y) + 0.1 * np.sin(3 * x)).astype(np.float32)
 
 
-def make_env(
-    name: str, ground: Terrain | None = None, robot: Robot | None = None, **options: Any
-) -> LeggedEnv:
-    task = Task(
-        observations=Observations(**options),
-        env=Env(num_envs=2 * _PAIRS, num_threads=1),
-        noise=Noise(noise_level=0.0),
-        commands=Commands(gait_period=0.4),
-        domain_rand=DomainRand(push_interval_s=0.0),
-        sim=Sim(iterations=100, ls_iterations=50),  # so that both sides converge to the same
-    )
-    return LeggedEnv(task, robot or robot_named(name), ground or Plane())
+@pytest.fixture
+def make_env(request, nominal_env):
+    """Return a function that makes environments of a named or given robot."""
+
+    def make(robot="quadruped", ground=None, **options):
+        if robot == "held_calves":  # joints without an action
+            robot = Robot.load(request.getfixturevalue(robot))
+        elif isinstance(robot, str):
+            robot = request.getfixturevalue(robot)
+        return nominal_env(
+            2 * _PAIRS,
+            ground,
+            robot,
+            observations=Observations(**options),
+            commands=Commands(gait_period=0.4),
+            domain_rand=DomainRand(push_interval_s=0.0),
+            sim=Sim(iterations=100, ls_iterations=50),  # so that both sides converge to the same
+        )
+
+    return make
 
 
-def robot_named(name: str) -> Robot:
-    if name == "held_calves":  # joints without an action
-        scale = {".*_(hip|thigh)_joint": 0.25, ".*_calf_joint": 0.0}
-        robot = robot_named("quadruped")
-        return Robot.from_spec(replace(robot.spec, action_scale=scale), robot.folder)
-    return Robot.load(Path(str(bundled.urdf_path(name))).parent)
+@pytest.fixture
+def env(make_env):
+    return make_env()
 
 
-def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> None:
+def mirror_physics(env, mirror, *, turn=True):
     """Set random states in half of the environments, and mirror images in the others."""
     rng, p, scene = np.random.default_rng(3), env.sim, env.scene
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
@@ -69,26 +69,22 @@ def mirror_physics(env: LeggedEnv, mirror: MirrorMaps, *, turn: bool = True) -> 
     p.qpos[a, scene.joint_qpos] = bent
     p.qvel[a] = rng.uniform(-0.5, 0.5, (_PAIRS, scene.model.nv))
     # The mirror image: y is negated, and so are rotations about x and z.
-    p.qpos[b] = p.qpos[a]
-    p.qpos[b, 1] *= -1
-    p.qpos[b, 4] *= -1
-    p.qpos[b, 6] *= -1
-    p.qvel[b] = p.qvel[a]
-    p.qvel[b, 1] *= -1
-    p.qvel[b, 3] *= -1
-    p.qvel[b, 5] *= -1
+    p.qpos[b], p.qvel[b] = p.qpos[a], p.qvel[a]
+    for k in (1, 4, 6):
+        p.qpos[b, k] *= -1
+    for k in (1, 3, 5):
+        p.qvel[b, k] *= -1
     p.qpos[b, scene.joint_qpos] = mirror.joints(p.qpos[a, scene.joint_qpos])
     p.qvel[b, scene.joint_qvel] = mirror.joints(p.qvel[a, scene.joint_qvel])
 
 
-def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
+def mirror_memory(env, mirror):
     """Mirror the commands, actions and parameters of one half to the other."""
     from terrainkit_robots.rl.events import apply_params
 
     rng = np.random.default_rng(4)
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
     env.set_commands(rng.uniform(-1, 1, (2 * _PAIRS, 3)).astype(np.float32))
-    assert env.velocity_command.fixed is not None
     env.velocity_command.fixed[b] = env.velocity_command.fixed[a] * np.array([1, -1, -1])
     env.actions[:, a] = rng.uniform(-0.2, 0.2, env.actions[:, a].shape)
     env.actions[:, b] = [mirror.actions(each) for each in env.actions[:, a]]
@@ -106,7 +102,7 @@ def mirror_memory(env: LeggedEnv, mirror: MirrorMaps) -> None:
     apply_params(env.sim, env.params)
 
 
-def assert_images(env: LeggedEnv, mirror: MirrorMaps, tolerance: float) -> None:
+def assert_images(env, mirror, tolerance):
     for name, image in mirror.groups.items():
         values = env.get_observations()[name].numpy()
         one, other = values[:_PAIRS], values[_PAIRS:]
@@ -122,7 +118,7 @@ def assert_images(env: LeggedEnv, mirror: MirrorMaps, tolerance: float) -> None:
 
 @pytest.mark.parametrize("name", ["quadruped", "biped", "held_calves"])
 class TestRobot:
-    def test_maps_are_involutions(self, name: str) -> None:
+    def test_maps_are_involutions(self, make_env, name):
         env = make_env(name, Valley())
         mirror = env.mirror_maps
         for image in (*mirror.groups.values(), mirror.joints, mirror.actions):
@@ -133,7 +129,7 @@ class TestRobot:
             assert set(image.sign) == {-1, 1}
 
     @pytest.mark.parametrize("more", [False, True])
-    def test_mirrored_states_give_mirrored_observations(self, name: str, more: bool) -> None:
+    def test_mirrored_states_give_mirrored_observations(self, make_env, name, more):
         options = {"base_lin_vel": True, "foot_contact": True, "history_length": 3} if more else {}
         env = make_env(name, Valley(), **options)
         mirror = env.mirror_maps
@@ -153,7 +149,7 @@ class TestRobot:
         assert np.ptp(scan[0]) > 0.1
         assert not np.allclose(scan[0], scan[_PAIRS])
 
-    def test_mirrored_actions_lead_to_mirrored_states(self, name: str) -> None:
+    def test_mirrored_actions_lead_to_mirrored_states(self, make_env, name):
         env = make_env(name)
         mirror = env.mirror_maps
         mirror_physics(env, mirror)
@@ -176,13 +172,10 @@ class TestRobot:
 
 
 class TestAugment:
-    def test_originals_precede_images(self) -> None:
-        env = make_env("quadruped")
+    def test_originals_precede_images(self, env):
         mirror, obs = env.mirror_maps, env.get_observations()
         actions = torch.randn(8, 12)
         both, acted = augment(env, obs, actions)
-        assert both is not None
-        assert acted is not None
         assert both.batch_size == torch.Size([16])
         assert set(both.keys()) == {"policy", "privileged"}
         for name, image in mirror.groups.items():
@@ -191,32 +184,25 @@ class TestAugment:
         np.testing.assert_array_equal(acted[:8], actions)
         np.testing.assert_array_equal(acted[8:], mirror.actions(actions.numpy()))
 
-    def test_obs_or_actions_may_be_none(self) -> None:
-        env = make_env("quadruped")
+    def test_obs_or_actions_may_be_none(self, env):
         both, acted = augment(env, None, torch.zeros(2, 12))
         assert both is None
-        assert acted is not None
         assert acted.shape == (4, 12)
         both, acted = augment(env, env.get_observations()[:3], None)
         assert acted is None
-        assert both is not None
         assert both["policy"].shape == (6, 47)
 
-    def test_gradients_flow(self) -> None:
-        env = make_env("quadruped")
+    def test_gradients_flow(self, env):
         actions = torch.zeros(1, 12, requires_grad=True)
         _, acted = augment(env, None, actions)
-        assert acted is not None
         acted.sum().backward()
-        assert actions.grad is not None
         # Only the hip joints of a quadruped change their sign: 1 - 1, otherwise 1 + 1.
         assert sorted(actions.grad[0].tolist()) == [0] * 4 + [2] * 8
 
-    def test_rsl_rl_accepts_augment(self) -> None:
+    def test_rsl_rl_accepts_augment(self, env):
         from rsl_rl.extensions.symmetry import Symmetry
         from rsl_rl.storage import RolloutStorage
 
-        env = make_env("quadruped")
         symmetry = Symmetry(env, augment, use_data_augmentation=True)
         batch = RolloutStorage.Batch()
         batch.observations, batch.actions = env.get_observations(), torch.zeros(8, 12)
@@ -228,39 +214,39 @@ class TestAugment:
         assert batch.values[:, 0].tolist() == 2 * list(range(8))
 
 
+def twin(name):
+    """Return the name on the other side: FR_foot for FL_foot."""
+    return name[0] + {"L": "R", "R": "L"}[name[1]] + name[2:]
+
+
 class TestNames:
     """The mirror maps of the quadruped, by the names of its joints and feet."""
 
-    def test_joints(self) -> None:
-        env = make_env("quadruped")
+    def test_joints(self, env):
         names, image = env.robot.spec.joint_order, env.mirror_maps.actions
         for k, (index, sign) in enumerate(zip(image.index, image.sign, strict=True)):
-            swapped = {"L": "R", "R": "L"}[names[k][1]]
-            assert names[index] == names[k][0] + swapped + names[k][2:]
+            assert names[index] == twin(names[k])
             assert sign == (-1 if "hip" in names[k] else 1)
 
-    def test_signs_of_commands_and_vectors(self) -> None:
-        image = make_env("quadruped").mirror_maps.groups["policy"]
+    def test_signs_of_commands_and_vectors(self, env):
+        image = env.mirror_maps.groups["policy"]
         np.testing.assert_array_equal(image.index[:9], range(9))
         np.testing.assert_array_equal(image.sign[:9], [1, -1, -1, 1, -1, 1, -1, 1, -1])
 
-    def test_feet(self) -> None:
-        env = make_env("quadruped")
+    def test_feet(self, env):
         feet = list(env.robot.spec.feet)
         image = env.mirror_maps.groups["privileged"]
-        width = len(image.index)
-        own = image.index[-12:] - (width - 12)
-        for k, foot in enumerate(feet):
-            twin = feet.index(foot[0] + {"L": "R", "R": "L"}[foot[1]] + foot[2:])
-            assert own[3 * k : 3 * k + 3].tolist() == [3 * twin, 3 * twin + 1, 3 * twin + 2]
+        own = (image.index[-12:] - (len(image.index) - 12)).reshape(4, 3)
+        for row, foot in zip(own.tolist(), feet, strict=True):
+            first = 3 * feet.index(twin(foot))
+            assert row == [first, first + 1, first + 2]
         assert image.sign[-12:].tolist() == [1, -1, 1] * 4
 
-    def test_contacts_and_history(self) -> None:
+    def test_contacts_and_history(self, make_env):
         env = make_env("quadruped", Valley(), foot_contact=True, history_length=3)
         image = env.mirror_maps.groups["policy"]
         feet, width = list(env.robot.spec.feet), 47 + 4
-        twins = [feet.index(f[0] + {"L": "R", "R": "L"}[f[1]] + f[2:]) for f in feet]
-        assert image.index[47:51].tolist() == [47 + k for k in twins]
+        assert image.index[47:51].tolist() == [47 + feet.index(twin(foot)) for foot in feet]
         assert image.sign[47:51].tolist() == [1] * 4
         for step in range(3):  # the same map for each step
             part = slice(step * width, (step + 1) * width)
@@ -268,7 +254,7 @@ class TestNames:
             np.testing.assert_array_equal(image.sign[part], image.sign[:width])
         assert image.index[3 * width] == 3 * width + 10  # the first row of the scan, reversed
 
-    def test_scan(self) -> None:
+    def test_scan(self, make_env):
         env = make_env("quadruped", Valley())
         image = env.mirror_maps.groups["policy"]
         rows = (image.index[-187:] - 47).reshape(17, 11)
@@ -277,74 +263,68 @@ class TestNames:
 
 
 class TestErrors:
-    def test_joint_without_pair_is_rejected(self) -> None:
-        robot = robot_named("quadruped")
-        mirror = {k: v for k, v in robot.spec.mirror.items() if k != "FL_hip_joint"}
-        env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
-        with pytest.raises(ConfigError, match="FL_hip_joint is paired with nothing"):
+    @pytest.mark.parametrize(
+        ("twin", "message"),
+        [
+            ({}, "FL_hip_joint is paired with nothing"),
+            (
+                {"FL_hip_joint": MirrorJoint(joint="RR_hip_joint", sign=-1)},
+                "FL_hip_joint is paired with RR_hip_joint",
+            ),
+        ],
+    )
+    def test_joint_without_pair_is_rejected(self, make_env, quadruped, twin, message):
+        mirror = {k: v for k, v in quadruped.spec.mirror.items() if k != "FL_hip_joint"} | twin
+        env = make_env(replace(quadruped, spec=replace(quadruped.spec, mirror=mirror)))
+        with pytest.raises(ConfigError, match=message):
             _ = env.mirror_maps
 
-    def test_inconsistent_pair_is_rejected(self) -> None:
-        robot = robot_named("quadruped")
-        mirror = dict(robot.spec.mirror) | {
-            "FL_hip_joint": MirrorJoint(joint="RR_hip_joint", sign=-1)
-        }
-        env = make_env("", robot=replace(robot, spec=replace(robot.spec, mirror=mirror)))
-        with pytest.raises(ConfigError, match="FL_hip_joint is paired with RR_hip_joint"):
-            _ = env.mirror_maps
-
-    def test_asymmetric_default_pose_is_rejected(self) -> None:
-        robot = robot_named("quadruped")
-        pose = robot.default_pose.copy()
+    def test_asymmetric_default_pose_is_rejected(self, make_env, quadruped):
+        pose = quadruped.default_pose.copy()
         pose[1] += 0.1
         with pytest.raises(ConfigError, match="default_pose differs between left and right"):
-            _ = make_env("", robot=replace(robot, default_pose=pose)).mirror_maps
+            _ = make_env(replace(quadruped, default_pose=pose)).mirror_maps
 
     @pytest.mark.parametrize("table", ["stiffness", "damping", "effort"])
-    def test_asymmetric_control_is_rejected(self, table: str) -> None:
-        robot = robot_named("quadruped")
-        values = robot.spec.per_joint(table)
+    def test_asymmetric_control_is_rejected(self, make_env, quadruped, table):
+        values = quadruped.spec.per_joint(table)
         other = {**values, "RR_hip_joint": 1.1 * values["RR_hip_joint"]}
-        robot = replace(robot, spec=replace(robot.spec, **{table: other}))
+        env = make_env(replace(quadruped, spec=replace(quadruped.spec, **{table: other})))
         with pytest.raises(ConfigError, match=f"{table} differs between left and right: RL_hip"):
-            _ = make_env("", robot=robot).mirror_maps
+            _ = env.mirror_maps
 
-    def test_feet_without_pairs_are_rejected(self) -> None:
-        env = make_env("quadruped")
+    def test_feet_without_pairs_are_rejected(self, env):
         position = env.scene.foot_pos.copy()
         position[0] = position[2]  # two feet have the same mirror image
         env.scene = replace(env.scene, foot_pos=position)
         with pytest.raises(ConfigError, match=f"symmetry: the foot {env.robot.spec.feet[2]} is"):
             _ = env.mirror_maps
 
-    def test_asymmetric_scan_is_rejected(self) -> None:
-        env = make_env("quadruped", Valley())
+    def test_asymmetric_scan_is_rejected(self, env):
         terrain = sections.Terrain(measured_points_y=(-0.5, 0.0, 0.4))
         leaning = LeggedEnv(replace(env.cfg, terrain=terrain), env.robot, Valley())
         with pytest.raises(ConfigError, match=r"measured_points_y: got -0\.5 without 0\.5"):
             _ = leaning.mirror_maps
 
-    def test_wrong_term_width_is_rejected(self) -> None:
-        env = make_env("quadruped")
+    def test_wrong_term_width_is_rejected(self, env):
         first, *others = env.obs_groups["policy"]
         env.obs_groups["policy"] = (replace(first, symmetry="joints"), *others)
         with pytest.raises(ConfigError, match="commands: got 3 numbers; the symmetry 'joints'"):
             _ = env.mirror_maps
 
 
-def _recompute(env: LeggedEnv) -> None:
+def _recompute(env):
     """Compute state and observations from the simulations."""
     import mujoco
 
     everyone = np.arange(env.num_envs)
     env.sim.batch.forward(everyone, mujoco.mjtStage.mjSTAGE_VEL)
-    assert env.velocity_command.fixed is not None
     env.commands[:] = env.velocity_command.fixed
     env.state = env._compute_state(everyone, after_reset=True)
     env._compute_observations()
 
 
-def _mirrored_feet(feet: Any) -> list[int]:
+def _mirrored_feet(feet):
     """Return the index of the mirrored foot of each foot, by position."""
     image = feet[:_PAIRS] * np.array([1, -1, 1])
     far = np.linalg.norm(feet[_PAIRS:, :, None] - image[:, None], axis=-1).max(axis=0)

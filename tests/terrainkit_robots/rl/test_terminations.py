@@ -1,25 +1,17 @@
 """Terminations, as functions and in the environment."""
 
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.config import DomainRand, Env, InitState, Task, Termination
-from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.config import Env, Termination
 from terrainkit_robots.rl.terminations import (
     bad_orientation,
     illegal_contact,
     terrain_out_of_bounds,
 )
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import projected_gravity
-
-torch.set_num_threads(1)
 
 
 class Field(Plane):
@@ -29,7 +21,7 @@ class Field(Plane):
 
 
 class TestIllegalContact:
-    def test_by_hand(self) -> None:
+    def test_by_hand(self):
         force = np.zeros((5, 2, 3), np.float32)
         force[1, 0] = (0.6, 0, 0.79)  # just under 1 N
         force[2, 1] = (0, -0.7, 0.75)  # just over
@@ -39,15 +31,14 @@ class TestIllegalContact:
         harder = illegal_contact(force, Termination(contact_force=300.5))
         assert harder.tolist() == [False] * 5
 
-    def test_no_termination_bodies(self) -> None:
-        assert (
-            illegal_contact(np.zeros((3, 0, 3), np.float32), Termination()).tolist() == [False] * 3
-        )
+    def test_no_termination_bodies(self):
+        none = np.zeros((3, 0, 3), np.float32)
+        assert illegal_contact(none, Termination()).tolist() == [False] * 3
 
 
 class TestBadOrientation:
     @pytest.mark.parametrize("around", [1, 2])
-    def test_tilt_limit(self, around: int) -> None:
+    def test_tilt_limit(self, around):
         """The angle counts for roll and for pitch."""
         angles = np.array([0, 0.5, 1.29, 1.31, 2, np.pi, -1.29, -1.31], np.float32)
         quat = np.zeros((len(angles), 4), np.float32)
@@ -57,7 +48,7 @@ class TestBadOrientation:
         less = bad_orientation(projected_gravity(quat), Termination(tilt=0.4))
         assert less.tolist() == [False] + [True] * 7
 
-    def test_yaw_is_no_tilt(self) -> None:
+    def test_yaw_is_no_tilt(self):
         yaw = np.linspace(-3, 3, 9, dtype=np.float32)
         quat = np.zeros((9, 4), np.float32)
         quat[:, 0], quat[:, 3] = np.cos(yaw / 2), np.sin(yaw / 2)
@@ -65,50 +56,36 @@ class TestBadOrientation:
 
 
 class TestTerrainOutOfBounds:
-    def test_by_hand(self) -> None:
+    def test_by_hand(self):
         places = [[0, 0, 9], [4.9, 2.9, 0], [5.1, 0, 0], [-5.1, 0, 0], [0, 3.1, 0], [0, -1.1, 0]]
         found = terrain_out_of_bounds(np.array(places, np.float32), Field())
         assert found.tolist() == [False, False, True, True, True, True]
-
-    def test_plane_is_unbounded(self) -> None:
+        # A plane is unbounded.
         assert not terrain_out_of_bounds(np.array([[1e6, -1e6, 0]], np.float32), Plane()).any()
 
 
-def make_env(ground: Plane | None = None, **changes: Any) -> LeggedEnv:
-    task = Task(
-        env=Env(num_envs=4, num_threads=1, episode_length_s=0.2),
-        init_state=InitState(lin_vel=0, ang_vel=0, yaw=0, reset_range=(1, 1)),
-        domain_rand=DomainRand(push_interval_s=0),
-        **changes,
-    )
-    robot = Robot.load(Path(str(bundled.urdf_path("quadruped"))).parent)
-    return LeggedEnv(task, robot, ground or Plane())
+@pytest.fixture
+def env(nominal_env):
+    """Return robots whose episodes last 10 steps."""
+    return nominal_env(env=Env(num_envs=4, num_threads=1, episode_length_s=0.2))
 
 
-def step(env: LeggedEnv) -> tuple[list[bool], list[bool]]:
+def step(env):
     """Return dones and time-outs of a step."""
     _, _, dones, extras = env.step(torch.zeros(4, 12))
     return dones.tolist(), extras["time_outs"].tolist()
 
 
 class TestInEnvironment:
-    def test_trunk_contact_terminates(self) -> None:
-        env = make_env()
+    @pytest.mark.parametrize(("limit", "falls"), [(1.0, True), (1e9, False)])
+    def test_trunk_contact_terminates(self, nominal_env, limit, falls):
+        env = nominal_env(termination=Termination(contact_force=limit))
         env.sim.qpos[1, 2] = 0.05
         env.sim.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
-        dones, time_outs = step(env)
-        assert dones == [False, True, False, False]
-        assert time_outs == [False] * 4
+        assert step(env) == ([False, falls, False, False], [False] * 4)
 
-    def test_high_contact_limit_never_terminates(self) -> None:
-        env = make_env(termination=Termination(contact_force=1e9))
-        env.sim.qpos[1, 2] = 0.05
-        env.sim.qpos[1, env.scene.joint_qpos] = [0, 1.5, -2.5] * 4
-        assert step(env)[0] == [False] * 4
-
-    def test_fall_precedes_time_out(self) -> None:
-        env = make_env()
+    def test_fall_precedes_time_out(self, env):
         for _ in range(9):
-            step(env)
+            assert step(env) == ([False] * 4, [False] * 4)
         env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
         assert step(env) == ([True] * 4, [False, True, True, True])

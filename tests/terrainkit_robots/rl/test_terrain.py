@@ -7,10 +7,10 @@ from terrainkit.errors import TerrainkitError
 from terrainkit.geometry.surface import HeightfieldSurface
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import InitState
-from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import MapTerrain, Plane, load_terrain
 
 EXACT = 1e-3
+ONLY_GROUND = np.array([1, 0, 0, 0, 0, 0], np.uint8)  # groups of geoms
 
 
 def rays(model, xy, group=None):
@@ -37,36 +37,21 @@ def anywhere(ground, count, seed=0):
 
 
 class TestHeightfieldSurface:
+    HEIGHTS = np.float32([[0, 1], [2, 4]])
+
     def test_height_on_both_triangles(self):
         # The diagonal runs from (0, 0) to (1, 1).
-        grid = HeightfieldSurface(
-            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32),
-            first_sample=(10.0, 20.0),
-            cell=0.5,
-        )
-        x = np.array([10.0, 10.5, 10.0, 10.5, 10.25, 10.375, 10.125], np.float32)
-        y = np.array([20.0, 20.0, 20.5, 20.5, 20.25, 20.125, 20.375], np.float32)
+        grid = HeightfieldSurface(heights=self.HEIGHTS, first_sample=(10.0, 20.0), cell=0.5)
+        x = np.float32([10.0, 10.5, 10.0, 10.5, 10.25, 10.375, 10.125])
+        y = np.float32([20.0, 20.0, 20.5, 20.5, 20.25, 20.125, 20.375])
         # (0.75, 0.25): 0 + 0.75 * 2 + 0.25 * (4 - 2); (0.25, 0.75): 0 + 0.75 * 1 + 0.25 * (4 - 1)
         np.testing.assert_allclose(grid.height(x, y), [0, 2, 1, 4, 2, 2.0, 1.5], atol=1e-6)
 
     def test_height_is_constant_outside(self):
-        grid = HeightfieldSurface(
-            heights=np.array([[0.0, 1.0], [2.0, 4.0]], np.float32),
-            first_sample=(0.0, 0.0),
-            cell=1.0,
-        )
+        grid = HeightfieldSurface(heights=self.HEIGHTS, first_sample=(0.0, 0.0), cell=1.0)
         x, y = np.float32([-5, 9, -5, 0.5]), np.float32([-5, 9, 9, 1e6])
         np.testing.assert_allclose(grid.height(x, y), [0, 4, 1, 2.5])
-
-    def test_height_is_single_precision(self):
-        # Double precision would take twice the time.
-        grid = HeightfieldSurface(
-            heights=np.zeros((4, 5), np.float32), first_sample=(0.0, 0.0), cell=1.0
-        )
-        assert (
-            grid.height(np.ones((2, 3), np.float32), np.ones((2, 3), np.float32)).dtype
-            == np.float32
-        )
+        assert grid.height(x, y).dtype == np.float32  # double precision would take twice the time
 
 
 class TestPlane:
@@ -75,8 +60,6 @@ class TestPlane:
         assert (Plane().height(xy[:, 0], xy[:, 1]) == 0).all()
         assert Plane().is_flat
         np.testing.assert_allclose(rays(compiled(Plane()), xy[:1]), [0], atol=1e-9)
-
-    def test_plane_has_one_origin(self):
         assert Plane().env_origins.shape == (1, 1, 3)
 
 
@@ -87,7 +70,7 @@ class TestMapTerrain:
         # In `auto`, stairs and obstacles become boxes, the rough patch a heightfield.
         ground = MapTerrain(request.getfixturevalue(name), collision)
         xy = anywhere(ground, 4000)
-        found = ground.height(xy[:, 0], xy[:, 1])
+        found = ground.height(*xy.T)
         off = np.abs(found - rays(compiled(ground), xy))
         # A point on a wall may be on either side of it.
         assert np.mean(off > EXACT) < 0.0005, xy[off > EXACT][:5]
@@ -99,7 +82,7 @@ class TestMapTerrain:
         cell, (x, y) = level_map.grid.cell, level_map.first_sample
         nearest = np.rint((xy - (x, y)) / cell).astype(int)
         nearest = np.clip(nearest, 0, np.array(level_map.heights.shape) - 1)
-        found = ground.height(xy[:, 0], xy[:, 1])
+        found = ground.height(*xy.T)
         np.testing.assert_array_equal(found, level_map.heights[nearest[:, 0], nearest[:, 1]])
 
     @pytest.mark.parametrize("collision", ["hfield", "boxes"])
@@ -120,9 +103,8 @@ class TestMapTerrain:
     def test_height_accepts_any_shape(self, map_ground):
         x = np.linspace(0, 5, 12, dtype=np.float32).reshape(3, 4)
         assert map_ground.height(x, x).shape == (3, 4)
-        np.testing.assert_array_equal(
-            map_ground.height(x, x).ravel(), map_ground.height(x.ravel(), x.ravel())
-        )
+        flat = map_ground.height(x.ravel(), x.ravel())
+        np.testing.assert_array_equal(map_ground.height(x, x).ravel(), flat)
 
     def test_attributes_match_the_map(self, mixed_map):
         ground = MapTerrain(mixed_map)
@@ -136,19 +118,15 @@ class TestMapTerrain:
 
     def test_terrain_names_of_randomized_map(self):
         choices = tuple(SubTerrain(terrain=name) for name in ("flat", "stairs"))
-        config = MapConfig(
-            mode="randomized", rows=4, cols=3, patch_size=(5, 4), border=0.5, terrains=choices
-        )
-        terrain_map = generate(config)
-        ground = MapTerrain(terrain_map)
+        size = {"rows": 4, "cols": 3, "patch_size": (5, 4), "border": 0.5}
+        ground = MapTerrain(generate(MapConfig(mode="randomized", terrains=choices, **size)))
         assert ground.terrain_names.shape == (4, 3)
         assert len({tuple(row) for row in ground.terrain_names}) > 1
-        for row in range(4):
-            for col in range(3):
-                x, y, _ = ground.env_origins[row, col]
-                near = np.linspace(-1.5, 1.5, 31, dtype=np.float32)
-                level = np.ptp(ground.height(x + near, np.full(31, y))) == 0
-                assert ground.terrain_names[row, col] == ("flat" if level else "stairs")
+        near = np.linspace(-1.5, 1.5, 31, dtype=np.float32)
+        for row, col in np.ndindex(4, 3):
+            x, y, _ = ground.env_origins[row, col]
+            level = np.ptp(ground.height(x + near, np.full(31, y))) == 0
+            assert ground.terrain_names[row, col] == ("flat" if level else "stairs")
 
     def test_geoms_have_the_material(self, map_ground):
         model = compiled(map_ground)
@@ -163,11 +141,11 @@ class TestMapTerrain:
 
 class TestLoadTerrain:
     def test_load_every_kind(self, mixed_map, tmp_path):
-        mixed_map.save(tmp_path / "map.npz")
+        path = mixed_map.save(tmp_path / "map.npz")
         assert isinstance(load_terrain("plane"), Plane)
-        assert isinstance(load_terrain(tmp_path / "map.npz"), MapTerrain)
-        assert isinstance(load_terrain(str(tmp_path / "map.npz")), MapTerrain)
-        assert isinstance(load_terrain(tmp_path / "map.npz", "plane"), Plane)
+        assert isinstance(load_terrain(path), MapTerrain)
+        assert isinstance(load_terrain(str(path)), MapTerrain)
+        assert isinstance(load_terrain(path, "plane"), Plane)
 
     def test_load_config_is_deterministic(self, tmp_path):
         config = tmp_path / "map.toml"
@@ -176,11 +154,9 @@ class TestLoadTerrain:
             '[[terrains]]\nterrain = "rough"\n'
         )
         first, second = load_terrain(config), load_terrain(config)
-        xy = anywhere(first, 100)
-        np.testing.assert_array_equal(
-            first.height(xy[:, 0], xy[:, 1]), second.height(xy[:, 0], xy[:, 1])
-        )
-        assert np.ptp(first.height(xy[:, 0], xy[:, 1])) > 0.01
+        xy = anywhere(first, 100).T
+        np.testing.assert_array_equal(first.height(*xy), second.height(*xy))
+        assert np.ptp(first.height(*xy)) > 0.01
 
     @pytest.mark.parametrize(
         ("name", "message"),
@@ -206,21 +182,16 @@ class TestHeightScan:
         """Return the expected height scan of a robot, by ray casting."""
         points = env.cfg.terrain
         x, y = np.meshgrid(points.measured_points_x, points.measured_points_y, indexing="ij")
-        x, y = x.ravel(), y.ravel()
         base = env.sim.qpos[0]
         # The y axis of the scan is 90 degrees to the left of the heading.
-        at = base[:2] + np.column_stack(
-            [x * np.cos(yaw) - y * np.sin(yaw), x * np.sin(yaw) + y * np.cos(yaw)]
-        )
-        only_ground = np.array([1, 0, 0, 0, 0, 0], np.uint8)
-        return base[2] - rays(compiled(env.terrain), at, only_ground)
+        turned = (x + 1j * y).ravel() * np.exp(1j * yaw)
+        at = base[:2] + np.column_stack([turned.real, turned.imag])
+        return base[2] - rays(compiled(env.terrain), at, ONLY_GROUND)
 
     @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, -1.6])
     @pytest.mark.parametrize("tilt", [0.0, 0.2])
-    def test_height_scan_matches_rays(self, quadruped, nominal_task, mixed_map, yaw, tilt):
-        env = LeggedEnv(
-            nominal_task(1, init_state=InitState(position=0)), quadruped, MapTerrain(mixed_map)
-        )
+    def test_height_scan_matches_rays(self, nominal_env, mixed_map, yaw, tilt):
+        env = nominal_env(1, MapTerrain(mixed_map), init_state=InitState(position=0))
         quat = np.zeros(4)
         turn = np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)])
         pitch = np.array([np.cos(tilt / 2), 0, np.sin(tilt / 2), 0])
@@ -232,11 +203,9 @@ class TestHeightScan:
         np.testing.assert_allclose(state.height_scan[0], self.cast(env, yaw), atol=EXACT)
         assert np.ptp(state.height_scan) > 0.05
 
-    def test_base_height_is_above_the_ground(self, quadruped, nominal_task, mixed_map):
-        env = LeggedEnv(nominal_task(6), quadruped, MapTerrain(mixed_map))
+    def test_base_height_is_above_the_ground(self, nominal_env, mixed_map):
+        env = nominal_env(6, MapTerrain(mixed_map))
         env.sim.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
         state = env._compute_state(np.arange(6))
-        under = rays(
-            compiled(env.terrain), env.sim.qpos[:, :2], np.array([1, 0, 0, 0, 0, 0], np.uint8)
-        )
+        under = rays(compiled(env.terrain), env.sim.qpos[:, :2], ONLY_GROUND)
         np.testing.assert_allclose(state.base_height, env.sim.qpos[:, 2] - under, atol=EXACT)

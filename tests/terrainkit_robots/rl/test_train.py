@@ -1,12 +1,9 @@
 import os
 import resource
 import shutil
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import pytest
@@ -16,14 +13,13 @@ import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import tasks
-from terrainkit_robots.rl.config import Task, Terrain
+from terrainkit_robots.rl.config import Commands, Env, Terrain
 from terrainkit_robots.rl.run import checkpoints, open_run
-from terrainkit_robots.rl.runner import TrainingProgress
 from terrainkit_robots.rl.train import train
 
 
 @pytest.fixture(scope="module")
-def trained_once(task: Task, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trained_once(task, tmp_path_factory):
     """Return a run of four iterations with a checkpoint of each; tests use copies of it."""
     each = replace(task, runner=replace(task.runner, save_interval=1))
     folder = tmp_path_factory.mktemp("trained") / "run"
@@ -32,10 +28,10 @@ def trained_once(task: Task, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def run_after(trained_once: Path, tmp_path: Path) -> Callable[..., Path]:
+def run_after(trained_once, tmp_path):
     """Return a function that copies the run with the checkpoints of some iterations."""
 
-    def copy(*iterations: int, name: str = "run") -> Path:
+    def copy(*iterations, name="run"):
         folder = tmp_path / name
         shutil.copytree(trained_once, folder)
         for iteration, path in checkpoints(folder).items():
@@ -46,27 +42,29 @@ def run_after(trained_once: Path, tmp_path: Path) -> Callable[..., Path]:
     return copy
 
 
-def with_iterations(task: Task, iterations: int) -> Task:
+def with_iterations(task, iterations):
     return replace(task, runner=replace(task.runner, max_iterations=iterations))
 
 
-def weights(path: Path) -> list[torch.Tensor]:
+def weights(path):
     return list(read_checkpoint(path)["actor_state_dict"].values())
 
 
-def same_weights(a: Path, b: Path) -> bool:
+def same_weights(a, b):
     return all(torch.equal(x, y) for x, y in zip(weights(a), weights(b), strict=True))
 
 
-@contextmanager
-def full_disk(size: int) -> Iterator[None]:
-    """Limit the size of files [bytes]."""
+@pytest.fixture
+def fill_disk():
+    """Return a function that limits the size of files [bytes]."""
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def after(iteration, act):
+    """Return a callback that acts once, after an iteration."""
+    return lambda progress: act() if progress.iteration == iteration else None
 
 
 def test_train_writes_a_run(task, tmp_path):
@@ -79,9 +77,11 @@ def test_train_writes_a_run(task, tmp_path):
 
 def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
     folder = train("quadruped", "plane", with_iterations(task, 1)).folder
     assert folder.parent == Path("logs/quadruped")
     assert (folder / "model_1.pt").exists()
+    assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
 
 
 def test_stopped_run_resumes_exactly(task, tmp_path, run_after):
@@ -98,15 +98,10 @@ def test_stopped_run_resumes_exactly(task, tmp_path, run_after):
 
 
 def test_train_runs_in_a_thread(task, tmp_path):
-    trained: list[Any] = []
-    work = threading.Thread(
-        target=lambda: trained.append(
-            train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
-        )
-    )
-    work.start()
-    work.join()
-    assert trained[0].current_learning_iteration == 1
+    once = with_iterations(task, 1)
+    with ThreadPoolExecutor() as pool:
+        trained = pool.submit(train, "quadruped", "plane", once, folder=tmp_path / "run").result()
+    assert trained.current_learning_iteration == 1
 
 
 def test_resume_accepts_other_num_envs(task, tmp_path, run_after):
@@ -148,36 +143,21 @@ def test_resume_rejects_a_modified_robot(task, tmp_path, name):
     with pytest.raises(ConfigError, match=rf"{name} of .*mine changed since .*run was trained"):
         train(mine, "plane", task, resume=open_run(run))
     assert list(checkpoints(run)) == [1]
-    other = tmp_path / "other"
-    shutil.copytree(mine, other)
-    done = train(
-        other, "plane", with_iterations(task, 1), resume=open_run(run), folder=tmp_path / "new"
-    )
+    other, once = shutil.copytree(mine, tmp_path / "other"), with_iterations(task, 1)
+    done = train(other, "plane", once, resume=open_run(run), folder=tmp_path / "new")
     assert list(checkpoints(done.folder)) == [1]
 
 
 def test_resume_with_other_task_starts_new_run(task, run_after, tmp_path, mixed_map):
     run = run_after(4)
     other = with_iterations(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
-    seen: list[int] = []
-    done = train(
-        "quadruped",
-        "plane",
-        other,
-        resume=open_run(run),
-        folder=tmp_path / "other",
-        progress_callback=lambda progress: seen.append(progress.iteration),
-    )
-    assert (done.folder, seen) == (tmp_path / "other", [1])
-    blind = replace(task.terrain, measure_heights=False)
+    seen, folder = [], tmp_path / "other"
+    options = {"resume": open_run(run), "progress_callback": seen.append}
+    assert train("quadruped", "plane", other, folder=folder, **options).folder == folder
+    assert [progress.iteration for progress in seen] == [1]
+    blind = with_iterations(replace(task, terrain=Terrain(measure_heights=False)), 1)
     path = mixed_map.save(tmp_path / "map.npz")
-    done = train(
-        "quadruped",
-        path,
-        with_iterations(replace(task, terrain=blind), 1),
-        resume=open_run(run),
-        folder=tmp_path / "map",
-    )
+    done = train("quadruped", path, blind, folder=tmp_path / "map", **options)
     assert open_run(done.folder).terrain == str(path)
 
 
@@ -264,9 +244,8 @@ def test_resume_from_policy_starts_new_run(task, run_after, tmp_path):
 
 def test_resume_rejects_a_completed_run(task, tmp_path, run_after):
     run_after(4)
-    with pytest.raises(
-        ConfigError, match=r"runner\.max_iterations: got 4; expected more than the 4"
-    ):
+    told = r"runner\.max_iterations: got 4; expected more than the 4"
+    with pytest.raises(ConfigError, match=told):
         train("quadruped", "plane", task, resume=open_run(tmp_path / "run"))
 
 
@@ -277,71 +256,77 @@ def test_resume_rejects_another_robot(task, tmp_path, run_after):
     assert not (tmp_path / "b").exists()
 
 
-def test_full_disk_keeps_the_last_checkpoint(task, tmp_path, capfd):
-    task = replace(task, runner=replace(task.runner, save_interval=2))
-    disk = full_disk(20_000)
-
-    def fill(progress: TrainingProgress) -> None:
-        if progress.iteration == 3:
-            disk.__enter__()
-
-    run = tmp_path / "run"
-    try:
-        with pytest.raises(
-            ExportError, match=r"cannot write .*model_4\.pt: File too large; .* is .*model_2\.pt"
-        ):
-            train("quadruped", "plane", task, folder=run, progress_callback=fill)
-    finally:
-        disk.__exit__(None, None, None)
+def test_full_disk_keeps_the_last_checkpoint(task, tmp_path, capfd, fill_disk):
+    task, run = replace(task, runner=replace(task.runner, save_interval=2)), tmp_path / "run"
+    fill = after(3, lambda: fill_disk(20_000))
+    told = r"cannot write .*model_4\.pt: File too large; .* is .*model_2\.pt"
+    with pytest.raises(ExportError, match=told):
+        train("quadruped", "plane", task, folder=run, progress_callback=fill)
     assert open_run(run).checkpoint == run / "model_2.pt"
     assert read_checkpoint(run / "model_2.pt")["iteration"] == 2
-    assert sorted(path.name for path in run.iterdir() if path.name.startswith(".")) == []
+    assert not list(run.glob(".*"))
     assert capfd.readouterr() == ("", "")
 
 
-def test_full_disk_for_logs_is_one_error(task, tmp_path, capfd):
-    disk = full_disk(200)
-
-    def fill(progress: TrainingProgress) -> None:
-        if progress.iteration == 1:
-            disk.__enter__()
-
-    try:
-        with pytest.raises(
-            ExportError, match=r"cannot write .*: File too large; there is no check"
-        ):
-            train("quadruped", "plane", task, folder=tmp_path / "run", progress_callback=fill)
-    finally:
-        disk.__exit__(None, None, None)
-    assert capfd.readouterr() == ("", "")
-
-
-def test_removed_folder_is_one_error(task, tmp_path, capfd):
+@pytest.mark.parametrize(
+    ("fails", "told"),
+    [("disk", "File too large; there is no check"), ("folder", "No such file or directory")],
+)
+def test_failure_to_log_is_one_error(task, tmp_path, capfd, fill_disk, fails, told):
     run = tmp_path / "run"
-
-    def remove(progress: TrainingProgress) -> None:
-        if progress.iteration == 1:
-            shutil.rmtree(run)
-
-    with pytest.raises(ExportError, match=r"cannot write .*: No such file or directory"):
-        train("quadruped", "plane", task, folder=run, progress_callback=remove)
+    harm = after(1, lambda: fill_disk(200) if fails == "disk" else shutil.rmtree(run))
+    with pytest.raises(ExportError, match=f"cannot write .*: {told}"):
+        train("quadruped", "plane", task, folder=run, progress_callback=harm)
     assert capfd.readouterr() == ("", "")
 
 
 def test_divergence_names_the_last_checkpoint(task, tmp_path):
     algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
     diverging = replace(task, algorithm=algorithm)
-    with pytest.raises(
-        ConfigError, match=r"iteration 1: the networks have diver.*; there is no check"
-    ):
+    told = r"iteration 1: the networks have diverged.*; there is no checkpoint"
+    with pytest.raises(ConfigError, match=told):
         train("quadruped", "plane", diverging, folder=tmp_path / "run")
 
 
-def test_too_many_environments_write_nothing(task, tmp_path):
-    many = replace(task, env=replace(task.env, num_envs=100_000_000))
-    with pytest.raises(MemoryLimitError, match=r"env.num_envs 100000000, .* MB each, needs .* GB"):
-        train("quadruped", "plane", many, folder=tmp_path / "run")
+@pytest.mark.parametrize(
+    ("sections", "device", "error", "told"),
+    [
+        (
+            {"env": Env(num_envs=10**8)},
+            "cpu",
+            MemoryLimitError,
+            r"num_envs 100000000, .* MB each, needs .* GB",
+        ),
+        (
+            {"commands": Commands(waypoints=True)},
+            "cpu",
+            ConfigError,
+            "waypoints: got a terrain without goals",
+        ),
+        ({}, "gpu", ConfigError, "device: got 'gpu'; expected one of: cpu"),
+    ],
+)
+def test_invalid_arguments_write_nothing(task, tmp_path, sections, device, error, told):
+    changed = replace(task, **sections)
+    with pytest.raises(error, match=told):
+        train("quadruped", "plane", changed, folder=tmp_path / "run", device=device)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_mismatched_spec_writes_nothing(task, tmp_path):
+    mine = shutil.copytree(tasks.get_task("quadruped").folder, tmp_path / "mine")
+    model = mine / "quadruped.xml"
+    model.write_text(model.read_text().replace("FL_hip_joint", "FL_shoulder_joint"))
+    with pytest.raises(ConfigError, match="joint_order of quadruped: got 'FL_hip_joint'"):
+        train(mine, "plane", task, folder=tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_nonempty_folder_is_unchanged(task, tmp_path):
+    (tmp_path / "mine.txt").touch()
+    with pytest.raises(ExportError, match="exists"):
+        train("quadruped", "plane", task, folder=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
 def test_missing_wandb_is_reported(task, tmp_path, monkeypatch):
@@ -353,13 +338,6 @@ def test_missing_wandb_is_reported(task, tmp_path, monkeypatch):
 
 def test_train_rejects_more_processes_than_environments(task, tmp_path, monkeypatch):
     monkeypatch.setenv("WORLD_SIZE", "9")
-    with pytest.raises(
-        ConfigError, match=r"env\.num_envs: got 4; expected one for each of 9 processes"
-    ):
+    told = r"env\.num_envs: got 4; expected one for each of 9 processes"
+    with pytest.raises(ConfigError, match=told):
         train("quadruped", "plane", task, folder=tmp_path / "run")
-
-
-def test_train_sets_passive_wait_policy(task, tmp_path, monkeypatch):
-    monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
-    train("quadruped", "plane", with_iterations(task, 1), folder=tmp_path / "run")
-    assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
