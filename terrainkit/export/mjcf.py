@@ -97,10 +97,14 @@ def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -
     world = ET.SubElement(root, "worldbody")
     heights, static = terrain_map.heights, float(terrain_map.config.static_friction)
     if cover is None:
-        x, y = _patch_edges(terrain_map)
-        parts = [(slice(x[0], x[-1]), slice(y[0], y[-1]))]
-        for box in _border_boxes(terrain_map):
-            _add_box(world, *box)
+        height = _border_height(terrain_map)
+        if height is None:
+            x, y = (n + 2 * _RINGS for n in heights.shape)
+            parts = [(slice(0, x), slice(0, y))]
+        else:
+            parts = [_patches_part(terrain_map)]
+            for box in _border_boxes(terrain_map, height):
+                _add_box(world, *box)
     else:
         heights = without_boxes(heights, cover)
         parts = _uncovered_parts(terrain_map, cover)
@@ -133,8 +137,8 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
     if collision == "auto":
         if not _is_flat(terrain_map):
             return None
-        cover, (x, y) = terrain_map.boxes(), _patch_edges(terrain_map)
-        num_hfields = len(_split_by_friction(terrain_map, (slice(x[0], x[-1]), slice(y[0], y[-1]))))
+        cover = terrain_map.boxes()
+        num_hfields = len(_split_by_friction(terrain_map, _patches_part(terrain_map)))
         # Of two geoms of either kind, a box was measured to be faster than a heightfield.
         return cover if len(cover.centers) <= max(MAX_BOXES, 2 * num_hfields) else None
     return terrain_map.boxes()
@@ -191,6 +195,12 @@ def _patch_edges(terrain_map: "TerrainMap") -> list[NDArray[np.int64]]:
         each[0] -= _RINGS
         each[-1] += _RINGS
     return edges
+
+
+def _patches_part(terrain_map: "TerrainMap") -> _Part:
+    """Return the rectangle of all patches."""
+    x, y = _patch_edges(terrain_map)
+    return slice(x[0], x[-1]), slice(y[0], y[-1])
 
 
 def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list[_Part]:
@@ -307,8 +317,19 @@ def _levels(heights: Any, low: float) -> NDArray[np.int32]:
     return np.asarray(np.rint((heights - low) / _QUANTUM), dtype=np.int32)
 
 
+def _border_height(terrain_map: "TerrainMap") -> float | None:
+    """Return the height of the border [m]; None if it is not level, as in some edited maps."""
+    (x, *_, x1), (y, *_, y1) = terrain_map.config.patch_edges
+    is_border = np.ones(terrain_map.heights.shape, dtype=bool)
+    is_border[x:x1, y:y1] = False
+    heights = terrain_map.heights[is_border]
+    if not heights.size:
+        return 0.0
+    return float(heights[0]) if (heights == heights[0]).all() else None
+
+
 def _border_boxes(
-    terrain_map: "TerrainMap",
+    terrain_map: "TerrainMap", height: float
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Return the centers and half sizes of the boxes around the heightfield."""
     grid, config = terrain_map.grid, terrain_map.config
@@ -324,7 +345,7 @@ def _border_boxes(
         (x0 + margin, x1 - margin, y0, y0 + margin),
         (x0 + margin, x1 - margin, y1 - margin, y1),
     ):
-        lower, upper = np.array([a, c, bottom]), np.array([b, d, 0.0])
+        lower, upper = np.array([a, c, bottom]), np.array([b, d, height])
         boxes.append(((lower + upper) / 2, (upper - lower) / 2))
     return boxes
 

@@ -63,6 +63,17 @@ def test_mjcf_hfield_matches_away_from_walls(terrain_map, tmp_path, collision):
     np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
 
 
+@pytest.mark.parametrize("border", [1.0, "sloped"])
+def test_mjcf_hfield_matches_an_edited_border(level_map, tmp_path, border):
+    heights = level_map.heights.copy()
+    ground = 0.1 * level_map.grid.axis(0)[:, None] if border == "sloped" else border
+    heights += np.float32(ground)
+    terrain_map = dataclasses.replace(level_map, heights=heights)
+    model = loaded(terrain_map, tmp_path, collision="hfield")
+    xy = points_in(terrain_map, away_from_walls(terrain_map))
+    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+
+
 @pytest.mark.parametrize("collision", ["boxes", "auto"])
 def test_mjcf_boxes_match_up_to_walls(level_map, tmp_path, collision):
     model = loaded(level_map, tmp_path, collision=collision)
