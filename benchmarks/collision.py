@@ -14,7 +14,7 @@ import numpy as np
 import terrainkit
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
 
 _NUM_PLACES = 20
@@ -62,7 +62,7 @@ def _flat_map(rows: int) -> terrainkit.TerrainMap:
 
 def _step_times(terrain_map: terrainkit.TerrainMap) -> tuple[float, float]:
     """Return the times of a step on boxes and on a heightfield, relative to a plane."""
-    terrains = (Plane(), MapTerrain(terrain_map, "boxes"), MapTerrain(terrain_map, "hfield"))
+    terrains = (Plane(), MapGround(terrain_map, "boxes"), MapGround(terrain_map, "hfield"))
     rollouts = [_standing(terrain, terrain_map.env_origins.reshape(-1, 3)) for terrain in terrains]
     times = np.empty((_NUM_RUNS, 3, _NUM_PLACES))
     for k, i, j in np.ndindex(times.shape):
@@ -74,7 +74,7 @@ def _step_times(terrain_map: terrainkit.TerrainMap) -> tuple[float, float]:
     return boxes / plane, hfield / plane
 
 
-def _standing(terrain: Terrain, origins: np.ndarray) -> tuple[mujoco.MjModel, list[mujoco.MjData]]:
+def _standing(terrain: Ground, origins: np.ndarray) -> tuple[mujoco.MjModel, list[mujoco.MjData]]:
     """Return the training scene, and states in which the robot stands at some of the origins."""
     spec = get_task("quadruped")
     robot = Robot.load(spec.folder)

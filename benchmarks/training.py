@@ -18,7 +18,7 @@ import terrainkit
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
 
 _NUM_ENVS = 512
@@ -30,9 +30,9 @@ def run() -> Iterator[tuple[str, float]]:
     spec = get_task("quadruped")
     task = replace(spec.task, env=replace(spec.task.env, num_envs=_NUM_ENVS))
     robot = Robot.load(spec.folder)
-    terrains: dict[str, tuple[Terrain, str]] = {
+    terrains: dict[str, tuple[Ground, str]] = {
         "plane": (Plane(), "at least 0.75"),
-        "default_map": (MapTerrain(terrainkit.generate(terrainkit.MapConfig())), "at least 0.7"),
+        "default_map": (MapGround(terrainkit.generate(terrainkit.MapConfig())), "at least 0.7"),
     }
     for name, (terrain, limit) in terrains.items():
         env = LeggedEnv(task, robot, terrain)

@@ -125,15 +125,15 @@ class EpisodeEnv(LeggedEnv):
     def __init__(
         self, robot: str | Path, terrain: str | Path, task: Task | None, num_envs: int
     ) -> None:
-        spec = get_task(robot)
-        task = task or spec.task
+        registered = get_task(robot)
+        task = task or registered.task
         task = replace(
             task,
             env=replace(task.env, num_envs=num_envs),
             algorithm=replace(task.algorithm, num_mini_batches=1),  # one robot allows no more
         )
         ground = load_terrain(terrain, task.terrain.collision)
-        super().__init__(task, Robot.load(spec.folder), ground)
+        super().__init__(task, Robot.load(registered.folder), ground)
         self.final = self.policy_observations()
 
     def start(self, rng: np.random.Generator, seed: int | None) -> FloatArray:
@@ -174,7 +174,7 @@ class EpisodeEnv(LeggedEnv):
 def spaces(env: LeggedEnv) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
     """Return the spaces of the observations and the actions of one robot."""
     limits = env.cfg.normalization
-    size, clip = env.num_obs["policy"], limits.clip_observations
+    size, clip = env.obs_sizes["policy"], limits.clip_observations
     observation = gymnasium.spaces.Box(-clip, clip, (size,), np.float32)
     clip = limits.clip_actions
     return observation, gymnasium.spaces.Box(-clip, clip, (env.num_actions,), np.float32)

@@ -5,12 +5,20 @@ from pathlib import Path
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl import run as runs
+from terrainkit_robots.rl.run import (
+    MAP_FILE,
+    RUN_FILE,
+    TASK_FILE,
+    Run,
+    last_checkpoint,
+    open_run,
+    write_run_folder,
+)
 from terrainkit_robots.rl.tasks import task_names
 from terrainkit_robots.spec.robot import SPEC_FILE
 
 
-def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
+def bundle_policy(run: Run, folder: Path) -> Run:
     """Write a run without its training state and without paths of this machine.
 
     Raises:
@@ -19,10 +27,10 @@ def bundle_policy(run: runs.Run, folder: Path) -> runs.Run:
     """
     if run.info.robot not in task_names():
         raise ConfigError(f"robot: got {run.info.robot}; expected one of {listing(task_names())}")
-    info = replace(run.info, terrain="plane" if run.terrain == "plane" else runs.MAP_FILE)
-    names = [runs.TASK_FILE, SPEC_FILE] + [runs.MAP_FILE] * (info.terrain != "plane")
-    state = policy_state(read_checkpoint(runs.last_checkpoint(run)))
+    info = replace(run.info, terrain="plane" if run.terrain == "plane" else MAP_FILE)
+    names = [TASK_FILE, SPEC_FILE] + [MAP_FILE] * (info.terrain != "plane")
+    state = policy_state(read_checkpoint(last_checkpoint(run)))
     files = {name: (run.folder / name).read_bytes() for name in names}
-    runs.write_run_folder(folder, files | {runs.RUN_FILE: info.to_toml().encode()})
+    write_run_folder(folder, files | {RUN_FILE: info.to_toml().encode()})
     save_checkpoint(folder / f"model_{state['iteration']}.pt", state)
-    return runs.open_run(folder)
+    return open_run(folder)

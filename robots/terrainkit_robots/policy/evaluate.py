@@ -22,7 +22,7 @@ from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import PolicySpec, Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
 from terrainkit_robots.rl.symmetry import mirror_feet
-from terrainkit_robots.rl.terrain import Terrain, load_terrain
+from terrainkit_robots.rl.terrain import Ground, load_terrain
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
 Progress = Callable[[float], object]
@@ -201,7 +201,7 @@ def make_eval_env(
 
 
 def build_eval_env(
-    spec: PolicySpec, terrain: Terrain, num_envs: int, config: EvaluationConfig
+    spec: PolicySpec, terrain: Ground, num_envs: int, config: EvaluationConfig
 ) -> LeggedEnv:
     """Return an environment on a terrain, for a policy with the observations of its training."""
     device = resolve_device(config.device)

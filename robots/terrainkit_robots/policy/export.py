@@ -227,7 +227,7 @@ def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str,
     units |= {"commands": ["m/s", "m/s", "rad/s"], "base_ang_vel": "rad/s", "height_scan": "m"}
     units["base_lin_vel"] = "m/s"
     parts, start = [], 0
-    for term in env.obs_groups["policy"]:
+    for term in env.obs_terms["policy"]:
         size = term.function(env.state).shape[1]
         part: dict[str, Any] = {"name": term.name, "start": start, "stop": start + size}
         part["unit"] = units.get(term.name, "1")

@@ -40,8 +40,8 @@ def load_actor(run: Run, env: LeggedEnv) -> MLPModel:
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
         message = f"{run.info.robot}: {' and '.join(files)} changed after {run.folder} was trained"
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
-    num_obs = {"policy": env.num_obs["policy"]}  # the critic's do not matter
-    with open_checkpoint(last_checkpoint(run), env.robot.spec.joint_order, num_obs) as state:
+    obs_sizes = {"policy": env.obs_sizes["policy"]}  # the critic's do not matter
+    with open_checkpoint(last_checkpoint(run), env.robot.spec.joint_order, obs_sizes) as state:
         config = runner_config(run.task)["actor"]
         config.pop("class_name")
         actor = MLPModel(env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **config)

@@ -160,7 +160,7 @@ class PoseRecorder:
         if terrain.is_flat:
             side = int(np.ceil(np.sqrt(n)))
             row, col = np.divmod(np.arange(n), side)
-            spacing = 2.4 * max(0.5, float(env.robot.spec.base_height_target or 0.5))
+            spacing = 2.4 * max(0.5, env.robot.base_height_target)
             poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
             shots.append(Shot(robot=n // 2, captions=captions))

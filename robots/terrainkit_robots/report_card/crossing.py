@@ -16,7 +16,7 @@ from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.report_card.route import GOAL_RADIUS, HEADING_STIFFNESS, SPEED, patch_routes
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec
-from terrainkit_robots.rl.terrain import MapTerrain
+from terrainkit_robots.rl.terrain import MapGround
 from terrainkit_robots.transforms import quat_to_yaw
 
 OUTCOMES = ("crossed", "fell", "left", "timed out")
@@ -71,7 +71,7 @@ class Crossing:
         start = replace(spec.task.init_state, position=START_OFFSET, yaw=START_YAW)
         spec = replace(spec, task=replace(spec.task, init_state=start))
         collision = spec.task.terrain.collision
-        terrain = MapTerrain(terrain_map, "auto" if collision == "plane" else collision)
+        terrain = MapGround(terrain_map, "auto" if collision == "plane" else collision)
         config = replace(config, seconds=3600.0)  # episodes have no time-out; attempts do
         self._map, self._env = terrain_map, build_eval_env(spec, terrain, num_envs, config)
         self._policy = load_policy(spec, self._env)

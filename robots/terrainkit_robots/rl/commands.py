@@ -59,9 +59,7 @@ class VelocityCommand:
 
     def resample_due(self, rng: np.random.Generator, steps: Ids) -> None:
         """Resample where the resampling time has passed; `steps` since reset, shape (n,)."""
-        env_ids = np.flatnonzero((steps % self._interval == 0) & (steps > 0))
-        if len(env_ids):
-            self.resample(rng, env_ids)
+        self.resample(rng, np.flatnonzero((steps % self._interval == 0) & (steps > 0)))
 
     def yaw_rate(self, yaw: FloatArray) -> FloatArray:
         """Return the commanded yaw rate of robots with the heading `yaw` [rad], shape (n,)."""
@@ -70,7 +68,7 @@ class VelocityCommand:
         rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
         return np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
 
-    def update_heading(self, yaw: FloatArray, position: FloatArray) -> None:
+    def update(self, yaw: FloatArray, position: FloatArray) -> None:
         """Apply the fixed commands, or compute those that depend on headings and waypoints.
 
         Yaw [rad] has the shape (n,), the position, x and y [m], (n, 2).

@@ -1,5 +1,6 @@
 """The terrain curriculum: the patches that robots are reset on, and what came of the episodes."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,14 +9,14 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum import SAMPLERS, CommandProgress, assign_spawns
 from terrainkit.views.curriculum_picture import draw_statistics
-from terrainkit_robots.rl import config
-from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.rl.config import Terrain
+from terrainkit_robots.rl.terrain import Ground
 
 
 class TerrainCurriculum:
     """The patches of n robots and the progress of their episodes; see `terrainkit.curriculum`."""
 
-    def __init__(self, terrain: Terrain, num_envs: int, cfg: config.Terrain, seed: int) -> None:
+    def __init__(self, terrain: Ground, num_envs: int, cfg: Terrain, seed: int) -> None:
         rows, cols = terrain.env_origins.shape[:2]
         highest = min(cfg.max_init_level, rows - 1)
         sampler = SAMPLERS[cfg.curriculum]
@@ -49,6 +50,10 @@ class TerrainCurriculum:
         return draw_statistics(self.sampler.statistics, self._terrain.terrain_names)
 
     def state_dict(self) -> dict[str, Any]:
-        """Return the state of the sampler, for a checkpoint; the sampler loads it."""
+        """Return the state of the sampler, for a checkpoint."""
         state = self.sampler.state_dict().items()
         return {k: torch.from_numpy(v) if isinstance(v, np.ndarray) else v for k, v in state}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore a state; the number of robots may differ."""
+        self.sampler.load_state_dict(state)

@@ -23,7 +23,7 @@ from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
 from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
 from terrainkit_robots.rl.terminations import terrain_out_of_bounds
-from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 
@@ -31,7 +31,7 @@ from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 class LeggedEnv(VecEnv):
     """An rsl-rl `VecEnv` of legged robots. Later steps do not modify returned tensors."""
 
-    def __init__(self, task: Task, robot: Robot, terrain: Terrain, device: str = "cpu") -> None:
+    def __init__(self, task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> None:
         """Build the simulations and reset every environment."""
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
         self.num_envs = n = task.env.num_envs
@@ -56,10 +56,10 @@ class LeggedEnv(VecEnv):
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
         self.sensors = Sensors(self.sim, terrain, task, self.gait.averaging_time, scan=scan)
         self.pushes = Pushes(task.domain_rand, n, task.dt)
-        weight = float(self.scene.model.body_subtreemass[self.scene.base] * 9.81)
-        self.obs_groups = {
+        mass = float(self.scene.model.body_subtreemass[self.scene.base])
+        self.obs_terms = {
             "policy": observations.policy_group(robot, task, scan=scan),
-            "privileged": observations.privileged_group(robot, task, scan=scan, weight=weight),
+            "privileged": observations.privileged_group(robot, task, scan=scan, weight=9.81 * mass),
         }
         self.params = sample_params(self.rng, n, self.sim, task.domain_rand)
         apply_params(self.sim, self.params)
@@ -67,8 +67,8 @@ class LeggedEnv(VecEnv):
         self.episode_length_buf = torch.zeros(n, dtype=torch.int64)  # rsl-rl may replace it
         self.steps_since_reset = np.zeros(n, np.int64)
         self.path_length = np.zeros(n)  # since the last reset [m]
-        self.rewards = active_rewards(task.rewards, weight / 9.81, robot.leg_length)
-        self.episode_sums = {name: np.zeros(n, np.float32) for name in self.rewards}
+        self.reward_terms = active_rewards(task.rewards, mass, robot.leg_length)
+        self.episode_sums = {name: np.zeros(n, np.float32) for name in self.reward_terms}
         self.commands = self.velocity_command.commands  # a view of the current commands
 
         # A motor receives offset + scale * action; without a scale, there is no action.
@@ -80,7 +80,7 @@ class LeggedEnv(VecEnv):
         self.num_actions = len(self.action_joints)
         if not self.num_actions:
             raise ConfigError(f"action_scale of {robot.spec.name}: got 0 for every joint")
-        self.actions = np.zeros((2, n, self.num_actions), np.float32)  # of the last two steps
+        self.action_history = np.zeros((2, n, self.num_actions), np.float32)  # the newest first
         self.joint_offset = np.zeros((n, len(robot.default_pose)), np.float32)
         width = observations.history_width(robot, task, self.num_actions)
         self.obs_history = np.zeros((n, width), np.float32)
@@ -92,10 +92,10 @@ class LeggedEnv(VecEnv):
     def mirror_maps(self) -> MirrorMaps:
         """Left-right symmetry of observations and actions."""
         robot, scene, scale = self.robot, self.scene, self.action_scale
-        return mirror_maps(robot, scene, scale, self.obs_groups, self.state, self.cfg.terrain)
+        return mirror_maps(robot, scene, scale, self.obs_terms, self.state, self.cfg.terrain)
 
     @property
-    def num_obs(self) -> dict[str, int]:
+    def obs_sizes(self) -> dict[str, int]:
         """Number of observations in each group."""
         return {name: group.shape[1] for name, group in self.get_observations().items()}
 
@@ -134,10 +134,11 @@ class LeggedEnv(VecEnv):
             extras["log"] = self._end_episodes(env_ids, state, unstable)
             self._reset_idx(env_ids)
         self.velocity_command.resample_due(self.rng, self.steps_since_reset)
-        self._update_heading()
+        self._update_velocity_command()
         if len(env_ids):
             state.update(env_ids, self._compute_state(env_ids, after_reset=True))
-        self._update_commands()
+        self._update_command_state()
+        self._compute_observations()
         rewards_tensor = torch.from_numpy(rewards).to(self.device)
         return self._observations, rewards_tensor, torch.from_numpy(done).to(self.device), extras
 
@@ -145,7 +146,7 @@ class LeggedEnv(VecEnv):
         """Reset every environment."""
         env_ids = np.arange(self.num_envs)
         self._reset_idx(env_ids)
-        self._update_heading()
+        self._update_velocity_command()
         self.state = self._compute_state(env_ids, after_reset=True)
         self._compute_observations()
 
@@ -156,8 +157,9 @@ class LeggedEnv(VecEnv):
         self.velocity_command.fixed = commands
         if commands is None:
             self.velocity_command.resample(self.rng, np.arange(self.num_envs))
-        self._update_heading()
-        self._update_commands()
+        self._update_velocity_command()
+        self._update_command_state()
+        self._compute_observations()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
         """Return the actuator controls (n, j) for actions of shape (n, a)."""
@@ -174,9 +176,9 @@ class LeggedEnv(VecEnv):
             first = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
             raise ConfigError(f"actions of environment {first} are not finite: the policy diverged")
         clip = self.cfg.normalization.clip_actions
-        self.actions[1:] = self.actions[:-1]
-        np.clip(array, -clip, clip, out=self.actions[0])
-        self.sim.ctrl[:] = self.to_ctrl(self.actions[0])
+        self.action_history[1:] = self.action_history[:-1]
+        np.clip(array, -clip, clip, out=self.action_history[0])
+        self.sim.ctrl[:] = self.to_ctrl(self.action_history[0])
 
     def _compute_state(
         self, env_ids: Ids, unstable: BoolArray | None = None, *, after_reset: bool = False
@@ -188,8 +190,8 @@ class LeggedEnv(VecEnv):
             measured["fallen"] |= unstable
         return State(
             **measured,
-            actions=self.actions[0, rows].copy(),
-            last_actions=self.actions[1, rows].copy(),
+            actions=self.action_history[0, rows].copy(),
+            last_actions=self.action_history[1, rows].copy(),
             **self._command_state(rows),
             push_vel=self.pushes.velocity[rows].copy(),
             friction=self.params.friction[rows].copy(),
@@ -205,11 +207,10 @@ class LeggedEnv(VecEnv):
         gait_phase, swing_phase = self.gait.phases(time, is_moving(commands))
         return {"commands": commands, "gait_phase": gait_phase, "swing_phase": swing_phase}
 
-    def _update_commands(self) -> None:
-        """Apply new commands to the state, and observe it."""
+    def _update_command_state(self) -> None:
+        """Write the current commands into the state."""
         for name, values in self._command_state(slice(None)).items():
             np.copyto(getattr(self.state, name), values)
-        self._compute_observations()
 
     def _compute_rewards(self, state: State, unstable: BoolArray) -> FloatArray:
         """Return the rewards of a step, shape (n,), and add them to the episode sums.
@@ -219,7 +220,7 @@ class LeggedEnv(VecEnv):
         settings, dt = self.cfg.rewards, np.float32(self.cfg.dt)
         total = np.zeros(self.num_envs, np.float32)
         termination = np.zeros_like(total)
-        for name, (function, scale) in self.rewards.items():
+        for name, (function, scale) in self.reward_terms.items():
             term = function(state, self.robot, settings) * np.float32(scale) * dt
             if name == "termination":
                 termination += term
@@ -231,7 +232,7 @@ class LeggedEnv(VecEnv):
 
     def _compute_observations(self) -> None:
         clip, groups = self.cfg.normalization.clip_observations, {}
-        for name, terms in self.obs_groups.items():
+        for name, terms in self.obs_terms.items():
             rng = self.rng if name == "policy" else None  # noise for the policy only
             values = observations.compute_observations(terms, self.state, clip, rng)
             groups[name] = torch.from_numpy(values)
@@ -252,8 +253,8 @@ class LeggedEnv(VecEnv):
     def _yaw(self) -> FloatArray:
         return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
 
-    def _update_heading(self) -> None:
-        self.velocity_command.update_heading(self._yaw(), self.sim.qpos[:, :2].astype(np.float32))
+    def _update_velocity_command(self) -> None:
+        self.velocity_command.update(self._yaw(), self.sim.qpos[:, :2].astype(np.float32))
 
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
         """Update the curricula at the end of episodes, and return the values to log."""
@@ -300,14 +301,15 @@ class LeggedEnv(VecEnv):
             level, column = self.curriculum.levels[env_ids], self.curriculum.columns[env_ids]
             self.waypoints.reset(env_ids, self.terrain.goals[level, column, :, :2])
         self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
-        self.path_length[env_ids] = self.actions[:, env_ids] = 0
+        self.path_length[env_ids] = self.action_history[:, env_ids] = 0
         self.pushes.reset(self.rng, env_ids)
         self.sensors.reset(env_ids)
         limit, shape = self.cfg.domain_rand.joint_offset, (len(env_ids), self.joint_offset.shape[1])
         self.joint_offset[env_ids] = self.rng.uniform(-limit, limit, shape)
         if limits := self.cfg.domain_rand.action_delay:
             delay = self.rng.uniform(*limits, len(env_ids))
-            self.sim.reset_action_delay(env_ids, delay, self.to_ctrl(self.actions[0])[env_ids])
+            ctrl = self.to_ctrl(self.action_history[0])[env_ids]
+            self.sim.reset_action_delay(env_ids, delay, ctrl)
         for total in self.episode_sums.values():
             total[env_ids] = 0
         self.velocity_command.resample(self.rng, env_ids)
@@ -323,13 +325,12 @@ class LeggedEnv(VecEnv):
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore a state; if the number of environments differs, restore only the curricula."""
-        self.curriculum.sampler.load_state_dict(state["curriculum"])
+        self.curriculum.load_state_dict(state["curriculum"])
         arrays, saved = self._arrays(), state["arrays"]
         if len(saved["episode_length"]) != self.num_envs:
             self.reset()
             return
-        wrong = [k for k, a in arrays.items() if k not in saved or saved[k].shape != a.shape]
-        if wrong:
+        if wrong := [k for k, a in arrays.items() if k not in saved or saved[k].shape != a.shape]:
             raise ConfigError(
                 f"the checkpoint's {wrong[0]} belongs to another robot, task or version of "
                 "terrainkit; with another env.num_envs, its networks and curricula can be used"
@@ -342,8 +343,10 @@ class LeggedEnv(VecEnv):
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""
-        names = "commands actions joint_offset steps_since_reset path_length"
+        # Names are checkpoint keys; renaming a field breaks resume.
+        names = "commands joint_offset steps_since_reset path_length"
         arrays = {name: getattr(self, name) for name in names.split()} | {
+            "actions": self.action_history,
             "physics": self.sim.batch.state,
             "episode_length": self.episode_length_buf.numpy(),
             "heading": self.velocity_command.heading,

@@ -10,7 +10,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import DomainRand, InitState
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Ids, Simulation
-from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
 
@@ -113,7 +113,7 @@ def sample_reset_state(
     env_origins: FloatArray,
     scene: Scene,
     robot: Robot,
-    terrain: Terrain,
+    terrain: Ground,
     cfg: InitState,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sample positions and velocities at reset, shapes (k, nq) and (k, nv).
@@ -125,7 +125,7 @@ def sample_reset_state(
     qpos = np.tile(scene.default_qpos, (count, 1))
     offset = rng.uniform(-limit, limit, (count, 2)).astype(np.float32)
     # Points that cover the area of the feet at any heading.
-    radius = 0.5 * max(robot.spec.leg_length or 0.4, robot.spec.stance_width or 0.2)
+    radius = 0.5 * max(robot.leg_length, robot.spec.stance_width or 0.2)
     circle = np.exp(0.25j * np.pi * np.arange(8))
     rings = radius * np.concatenate([[0], circle / 2, circle])
     ring_x, ring_y = rings.real.astype(np.float32), rings.imag.astype(np.float32)
@@ -138,7 +138,7 @@ def sample_reset_state(
             break
         offset[uneven] *= factor
     qpos[:, :2] = env_origins[:, :2] + offset
-    qpos[:, 2] = highest + (robot.spec.spawn_height or 0.0)
+    qpos[:, 2] = highest + robot.spawn_height
     yaw = rng.uniform(-cfg.yaw, cfg.yaw, count)
     qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
     low, high = cfg.reset_range or robot.spec.reset_range

@@ -45,7 +45,7 @@ class ObservationTerm:
     noise: float = 0.0  # half range of the uniform noise, added before scaling
 
 
-ObsGroups = Mapping[str, Sequence[ObservationTerm]]
+ObsTerms = Mapping[str, Sequence[ObservationTerm]]
 """The terms of each observation group by its name."""
 
 
@@ -62,7 +62,7 @@ def observes_lin_vel(robot: Robot, task: Task) -> bool:
 
 
 def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTerm, ...]:
-    """Return the policy's terms: 47 numbers for a quadruped, and 187 with the height scan."""
+    """Return the policy's terms: 47 numbers for a quadruped; a height scan adds 187."""
     term, scales = ObservationTerm, task.normalization.obs_scales
     noise = {key: task.noise.noise_level * value for key, value in vars(task.noise).items()}
     command_scale = (scales.lin_vel, scales.lin_vel, scales.ang_vel)
@@ -99,9 +99,10 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
 
 def history_width(robot: Robot, task: Task, num_actions: int) -> int:
     """Return the size of the history: the previous observations, without the height scan."""
-    cfg, width = task.observations, 9 + 2 * len(robot.default_pose) + num_actions
-    width += 2 * (task.commands.gait_period != 0) + 3 * observes_lin_vel(robot, task)
-    return (cfg.history_length - 1) * (width + len(robot.spec.feet) * cfg.foot_contact)
+    widths = {"command": 3, "vector": 3, "axial": 3, "phase": 2, "actions": num_actions}
+    widths |= {"joints": len(robot.default_pose), "contacts": len(robot.spec.feet), "history": 0}
+    total = sum(widths[term.symmetry] for term in policy_group(robot, task, scan=False))
+    return (task.observations.history_length - 1) * total
 
 
 def privileged_group(

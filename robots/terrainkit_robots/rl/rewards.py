@@ -81,8 +81,9 @@ def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     squared = np.square(commands - state.mean_vel)
     errors = squared[:, :2].sum(axis=1), squared[:, 2]
     squares = _sum_squares(commands[:, :2]), np.square(commands[:, 2])
-    log, rest = np.float32(np.log(STANDING_TRACKING)), np.float32(cfg.tracking_sigma)
-    widths = (np.where(square > 0, -square / log, rest) for square in squares)
+    log_standing = np.float32(np.log(STANDING_TRACKING))
+    width_at_rest = np.float32(cfg.tracking_sigma)
+    widths = (np.where(s > 0, -s / log_standing, width_at_rest) for s in squares)
     lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
     moving = is_moving(commands)
     only_yaw, only_lin = moving & (squares[0] == 0), moving & (squares[1] < MIN_YAW_RATE**2)
@@ -104,8 +105,8 @@ def tracking_ang_vel(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def progress(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Reward velocity along the command, as a fraction of it, -1 to 1; the mean of both parts."""
-    along, squares = state.mean_vel * state.commands, np.square(state.commands)
-    along, squares = (np.array([a[:, :2].sum(axis=1), a[:, 2]]) for a in (along, squares))
+    products = state.mean_vel * state.commands, np.square(state.commands)
+    along, squares = (np.array([p[:, :2].sum(axis=1), p[:, 2]]) for p in products)
     fractions = along / np.where(squares > 0, squares, np.inf)
     total = np.clip(fractions, -1, 1).sum(axis=0) / np.maximum((squares > 0).sum(axis=0), 1)
     return total.astype(np.float32)
@@ -132,7 +133,7 @@ def ang_vel_xy(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 @reward
 def base_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize a base off its target height, squared; bounded over a pit [m2]."""
-    target = np.float32(robot.spec.base_height_target or 0.0)
+    target = np.float32(robot.base_height_target)
     return np.square(np.minimum(state.base_height, 2 * target) - target)
 
 

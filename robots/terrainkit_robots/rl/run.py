@@ -250,7 +250,7 @@ def last_checkpoint(run: Run) -> Path:
     return run.checkpoint
 
 
-def run_folder(
+def prepare_run_folder(
     folder: Path | None, robot: str | Path, terrain: str | Path, task: Task, continued: Run | None
 ) -> Path:
     """Return the folder to write: that of the continued run, unless it has later checkpoints."""

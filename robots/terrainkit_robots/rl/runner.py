@@ -92,7 +92,10 @@ class MetricsLogger(Logger):
         super().process_env_step(rewards, *args, **kwargs)
 
     def log(self, **values: Any) -> None:
-        """Log an iteration, and finish it."""
+        """Log an iteration, save a checkpoint if one is due, and end training by raising `_Stop`.
+
+        rsl-rl calls this after each update.
+        """
         self._runner.check_weights()
         for key in dict.fromkeys(key for log in self.ep_extras for key in log):
             self.means[key] = statistics.mean(log[key] for log in self.ep_extras if key in log)
@@ -209,7 +212,7 @@ class LeggedRunner(OnPolicyRunner):
         """
         parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
         joints = self.env.robot.spec.joint_order
-        with open_checkpoint(Path(path), joints, self.env.num_obs) as state:
+        with open_checkpoint(Path(path), joints, self.env.obs_sizes) as state:
             if "processes" not in state:
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
@@ -218,7 +221,7 @@ class LeggedRunner(OnPolicyRunner):
             process = processes[min(self.gpu_global_rank, len(processes) - 1)]
             if load_cfg is not None:
                 if load_cfg.get("curriculum"):
-                    self.env.curriculum.sampler.load_state_dict(process["env"]["curriculum"])
+                    self.env.curriculum.load_state_dict(process["env"]["curriculum"])
                     self.env.reset()
                 return {}
             self.current_learning_iteration = state["iteration"]
@@ -247,7 +250,7 @@ class LeggedRunner(OnPolicyRunner):
             "iteration": self.current_learning_iteration,
             "robot": self.env.robot.spec.name,
             "joints": list(self.env.robot.spec.joint_order),
-            "observed": self.env.num_obs,
+            "observed": self.env.obs_sizes,
             **self.alg.save(),
             "processes": processes,
             "logger": self.logger.state_dict(),

@@ -14,7 +14,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.simulation.geoms import collides, lowest_point
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
@@ -48,17 +48,16 @@ class Scene:
     sensors: dict[str, slice]  # range of each kind in sensordata
 
 
-def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
+def build_scene(robot: Robot, terrain: Ground, task: Task) -> Scene:
     """Build the scene of a task; raise ConfigError if MuJoCo rejects it, or the spec differs."""
     with quiet_mujoco():
-        scene = _attach(robot, terrain, task)
-        base = _base(robot, scene)
-        _set_joints_and_collisions(robot, base, task)
-        _add_actuators(robot, scene, task)
-        sensors = _add_sensors(robot, scene)
-        set_appearance(scene)  # for videos and the viewer
+        mjspec = _attach(robot, terrain, task)
+        _set_joints_and_collisions(robot, _checked_base(robot, mjspec), task)
+        _add_actuators(robot, mjspec, task)
+        sensors = _add_sensors(robot, mjspec)
+        set_appearance(mjspec)  # for videos and the viewer
         try:
-            model = scene.compile()
+            model = mjspec.compile()
         except ValueError as error:
             raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
     joints = [model.joint(name).id for name in robot.spec.joint_order]
@@ -81,17 +80,17 @@ def build_scene(robot: Robot, terrain: Terrain, task: Task) -> Scene:
     )
 
 
-def _attach(robot: Robot, terrain: Terrain, task: Task) -> Any:
+def _attach(robot: Robot, terrain: Ground, task: Task) -> Any:
     """Return the MjSpec of robot and terrain."""
     try:
-        spec = mujoco.MjSpec.from_file(str(robot.mjcf))
+        mjspec = mujoco.MjSpec.from_file(str(robot.mjcf))
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise ConfigError(f"MuJoCo cannot read {robot.mjcf}: {reason}") from None
-    ground = terrain.spec()
-    for element in (*spec.actuators, *spec.sensors, *spec.keys, *spec.cameras):
-        spec.delete(element)
-    for each in (spec, ground):  # options of both, or MuJoCo warns about differences
+    ground_mjspec = terrain.spec()
+    for element in (*mjspec.actuators, *mjspec.sensors, *mjspec.keys, *mjspec.cameras):
+        mjspec.delete(element)
+    for each in (mjspec, ground_mjspec):  # options of both, or MuJoCo warns about differences
         each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
         each.option.timestep = task.sim.dt
         each.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -99,21 +98,21 @@ def _attach(robot: Robot, terrain: Terrain, task: Task) -> Any:
         each.option.iterations = task.sim.iterations
         each.option.ls_iterations = task.sim.ls_iterations
     # The terrain is attached to the robot, so the robot's names keep their form.
-    spec.attach(ground, frame=spec.worldbody.add_frame(), prefix="ground/")
-    return spec
+    mjspec.attach(ground_mjspec, frame=mjspec.worldbody.add_frame(), prefix="ground/")
+    return mjspec
 
 
-def _base(robot: Robot, scene: Any) -> Any:
+def _checked_base(robot: Robot, mjspec: Any) -> Any:
     """Return the robot's base after checking that the spec matches the model."""
     spec, file, free = robot.spec, robot.mjcf, mujoco.mjtJoint.mjJNT_FREE
-    base = scene.body(spec.base)
+    base = mjspec.body(spec.base)
     if base is None:
         raise ConfigError(f"{file} has no body {spec.base!r}, the base of its spec")
     if [joint.type for joint in base.joints] != [free]:
         raise ConfigError(f"{file}: {spec.base} has no freejoint of its own; expected one")
-    if scene.joints[0].parent.name != spec.base:
+    if mjspec.joints[0].parent.name != spec.base:
         raise ConfigError(f"{file}: a joint precedes {spec.base}; expected the base first")
-    joints = [joint.name for joint in scene.joints if joint.type != free]
+    joints = [joint.name for joint in mjspec.joints if joint.type != free]
     bodies = [body.name for body in base.find_all("body")] + [base.name]
     fields = dict.fromkeys(("feet", "termination_contacts", "penalized_contacts"), bodies)
     for field, known in {"joint_order": joints, **fields}.items():
@@ -140,7 +139,7 @@ def _set_joints_and_collisions(robot: Robot, base: Any, task: Task) -> None:
         geom.priority = 1  # the robot's friction counts, not the larger of two
 
 
-def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
+def _add_actuators(robot: Robot, mjspec: Any, task: Task) -> None:
     """Add a motor for each joint; MuJoCo evaluates its controller in every physics step."""
     spec, control = robot.spec, task.control
     default, joint = mujoco.MjSpec().default.actuator, mujoco.mjtTrn.mjTRN_JOINT
@@ -149,7 +148,7 @@ def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
         kp, kd = stiffness[name], damping[name] if control.damping is None else control.damping
         if control.stiffness is not None and kp > 0:
             kp = control.stiffness
-        motor = scene.add_actuator(name=name, target=name, trntype=joint, forcelimited=True)
+        motor = mjspec.add_actuator(name=name, target=name, trntype=joint, forcelimited=True)
         # A new motor inherits from the defaults in the robot's file.
         for attribute in ("gear", "ctrllimited", "ctrlrange", "actlimited", "actrange", "interp"):
             setattr(motor, attribute, getattr(default, attribute))
@@ -164,13 +163,13 @@ def _add_actuators(robot: Robot, scene: Any, task: Task) -> None:
             motor.set_to_position(kp=kp, kv=kd)
 
 
-def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
+def _add_sensors(robot: Robot, mjspec: Any) -> dict[str, slice]:
     """Add the sensors, and return the range of each kind in sensordata."""
     spec, soles = robot.spec, [SOLE + foot for foot in robot.spec.feet]
     for foot in spec.feet:
-        geoms = [geom for geom in scene.body(foot).geoms if geom.contype or geom.conaffinity]
+        geoms = [geom for geom in mjspec.body(foot).geoms if geom.contype or geom.conaffinity]
         center = np.mean([geom.pos for geom in geoms], axis=0) if geoms else np.zeros(3)
-        scene.body(foot).add_site(name=SOLE + foot, pos=center, group=4)
+        mjspec.body(foot).add_site(name=SOLE + foot, pos=center, group=4)
     sensor, body, site = mujoco.mjtSensor, mujoco.mjtObj.mjOBJ_BODY, mujoco.mjtObj.mjOBJ_SITE
     kinds = {
         "foot_position": (sensor.mjSENS_FRAMEPOS, site, soles),
@@ -182,7 +181,7 @@ def _add_sensors(robot: Robot, scene: Any) -> dict[str, slice]:
     ranges, start = {}, 0
     for kind, (type_, objtype, names) in kinds.items():
         for name in names:
-            made = scene.add_sensor(type=type_, objtype=objtype, objname=name)
+            made = mjspec.add_sensor(type=type_, objtype=objtype, objname=name)
             if type_ == sensor.mjSENS_CONTACT:
                 made.intprm[:3] = [CONTACT_FORCE_BIT, NET_FORCE, 1]
         ranges[kind] = slice(start, start := start + 3 * len(names))

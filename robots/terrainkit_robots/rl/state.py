@@ -6,16 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit_robots import transforms
 from terrainkit_robots.rl import terminations
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.terrain import Terrain
-from terrainkit_robots.transforms import (
-    FloatArray,
-    projected_gravity,
-    quat_rotate_inverse,
-    quat_to_yaw,
-)
+from terrainkit_robots.rl.terrain import Ground
+from terrainkit_robots.transforms import FloatArray
 
 CONTACT_FORCE = 1.0
 """Vertical force from which a foot is in contact [N], as in legged_gym."""
@@ -72,7 +68,7 @@ class Sensors:
     """Measure n robots; keep the values that the next measurement is compared with."""
 
     def __init__(
-        self, sim: Simulation, terrain: Terrain, task: Task, averaging_time: float, *, scan: bool
+        self, sim: Simulation, terrain: Ground, task: Task, averaging_time: float, *, scan: bool
     ) -> None:
         n, joints = len(sim.qpos), len(sim.scene.joint_qvel)
         self.last_dof_vel = np.zeros((n, joints), np.float32)  # of the previous step [rad/s]
@@ -93,7 +89,7 @@ class Sensors:
         sim, scene = self._sim, self._sim.scene
         qpos, qvel = sim.qpos[rows].astype(np.float32), sim.qvel[rows].astype(np.float32)
         quat, pos = qpos[:, 3:7], qpos[:, :3]
-        gravity = projected_gravity(quat)
+        gravity = transforms.projected_gravity(quat)
         dof_vel = qvel[:, scene.joint_qvel]
         foot_pos = sim.sensor("foot_position", rows)
         foot_force = -sim.sensor("foot_force", rows)
@@ -103,11 +99,11 @@ class Sensors:
             foot_force[:] = penalized[:] = terminating[:] = 0
         dof_acc = (dof_vel - self.last_dof_vel[rows]) / self._dt
         self.last_dof_vel[rows] = dof_vel
-        lin_vel, ang_vel = quat_rotate_inverse(quat, qvel[:, :3]), qvel[:, 3:6]
+        lin_vel, ang_vel = transforms.quat_rotate_inverse(quat, qvel[:, :3]), qvel[:, 3:6]
         vel = np.concatenate([lin_vel[:, :2], ang_vel[:, 2:]], axis=1)
         self.mean_vel[rows] += self._mean_weight * (vel - self.mean_vel[rows])
         # The scan points turn with the yaw.
-        (x, y), yaw = self._scan_points, quat_to_yaw(quat)[:, None]
+        (x, y), yaw = self._scan_points, transforms.quat_to_yaw(quat)[:, None]
         c, s = np.cos(yaw), np.sin(yaw)
         x, y = pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y
         scan = self._terrain.height(x, y, pos[:, 2:], scan=True)

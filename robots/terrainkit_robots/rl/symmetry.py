@@ -17,7 +17,7 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Terrain
-from terrainkit_robots.rl.observations import ObsGroups
+from terrainkit_robots.rl.observations import ObsTerms
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.spec.robot import Robot
@@ -57,7 +57,7 @@ class MirroredEnv(Protocol):
 
 
 def mirror_maps(
-    robot: Robot, scene: Scene, scale: FloatArray, groups: ObsGroups, state: State, cfg: Terrain
+    robot: Robot, scene: Scene, scale: FloatArray, groups: ObsTerms, state: State, cfg: Terrain
 ) -> MirrorMaps:
     """Return the mirror maps of an environment.
 

@@ -24,11 +24,11 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 ENTRY_POINTS = "terrainkit.tasks"
 """Entry point group in which other packages name their tasks."""
 
-_registered: dict[str, "TaskSpec"] = {}
+_registered: dict[str, "RegisteredTask"] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaskSpec:
+class RegisteredTask:
     """A robot, and the configuration of its training."""
 
     name: str  # of the task; for a folder, that in its robot.toml, which a task may have too
@@ -41,7 +41,7 @@ class TaskSpec:
         return self.folder / "trained" / self.name
 
 
-def register_task(name: str, folder: str | Path, task: Task | None = None) -> TaskSpec:
+def register_task(name: str, folder: str | Path, task: Task | None = None) -> RegisteredTask:
     """Register a task; a second call replaces the configuration.
 
     Args:
@@ -56,11 +56,11 @@ def register_task(name: str, folder: str | Path, task: Task | None = None) -> Ta
         raise ConfigError(f"task name: got {name!r}; expected a name without slashes")
     if not isinstance(task, Task | None):
         raise ConfigError(f"task {name}: got {task!r}; expected an instance of Task")
-    spec = TaskSpec(name=name, folder=Path(folder).absolute(), task=task or Task())
-    if (other := _registered.get(name, spec)).folder != spec.folder:
+    new = RegisteredTask(name=name, folder=Path(folder).absolute(), task=task or Task())
+    if (other := _registered.get(name, new)).folder != new.folder:
         raise ConfigError(f"task {name}: registered with {other.folder}; expected a new name")
-    _registered[name] = spec
-    return spec
+    _registered[name] = new
+    return new
 
 
 def task_names() -> tuple[str, ...]:
@@ -68,7 +68,7 @@ def task_names() -> tuple[str, ...]:
     return tuple(sorted({*_registered, *metadata.entry_points(group=ENTRY_POINTS).names}))
 
 
-def get_task(name_or_folder: str | Path) -> TaskSpec:
+def get_task(name_or_folder: str | Path) -> RegisteredTask:
     """Return the task of that name, or the default task of the robot in that folder.
 
     A name has priority over a folder of that name; `./quadruped` is always a folder.
@@ -95,7 +95,7 @@ def get_task(name_or_folder: str | Path) -> TaskSpec:
     if not (folder / SPEC_FILE).exists():
         raise ConfigError(f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard")
     spec = RobotSpec.load(folder / SPEC_FILE)
-    return TaskSpec(name=spec.name, folder=folder.absolute(), task=Task())
+    return RegisteredTask(name=spec.name, folder=folder.absolute(), task=Task())
 
 
 for _path in Path(bundled.__file__).parent.glob("*/tasks/*.toml"):

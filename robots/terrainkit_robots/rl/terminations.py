@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Termination
-from terrainkit_robots.rl.terrain import Terrain
+from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.transforms import FloatArray
 
 
@@ -18,7 +18,7 @@ def bad_orientation(projected_gravity: FloatArray, cfg: Termination) -> NDArray[
     return -projected_gravity[:, 2] < np.cos(cfg.tilt)
 
 
-def terrain_out_of_bounds(base_pos: FloatArray, terrain: Terrain) -> NDArray[np.bool_]:
+def terrain_out_of_bounds(base_pos: FloatArray, terrain: Ground) -> NDArray[np.bool_]:
     """Return which robots have left the map; positions [m], shape (n, 3)."""
     outside = (base_pos[:, :2] < terrain.lower) | (base_pos[:, :2] > terrain.upper)
     return np.asarray(outside.any(axis=1))

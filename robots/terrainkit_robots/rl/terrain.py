@@ -17,8 +17,8 @@ from terrainkit.settings.text import closest
 from terrainkit_robots.transforms import FloatArray
 
 
-class Terrain(ABC):
-    """A terrain to train on."""
+class Ground(ABC):
+    """The ground that robots walk on: its MuJoCo model, its heights, and its spawn origins."""
 
     # Shapes are (rows, cols) and more, spawns padded with NaN; rows are levels.
     env_origins: FloatArray = np.zeros((1, 1, 3), np.float32)  # spawn origins [m]
@@ -33,7 +33,7 @@ class Terrain(ABC):
 
     @abstractmethod
     def spec(self) -> Any:
-        """Return the terrain as an `mujoco.MjSpec`."""
+        """Return the ground as an `mujoco.MjSpec`."""
 
     def height(
         self, x: FloatArray, y: FloatArray, z: FloatArray | float = np.inf, *, scan: bool = False
@@ -44,7 +44,7 @@ class Terrain(ABC):
         return self.surface.height(x, y, z, scan=scan)
 
 
-class Plane(Terrain):
+class Plane(Ground):
     """An infinite plane at height 0."""
 
     is_flat = True
@@ -53,14 +53,14 @@ class Plane(Terrain):
 
     def spec(self) -> Any:
         """Return a plane with a checkered surface."""
-        spec = mujoco.MjSpec()
-        _add_material(spec)
+        mjspec = mujoco.MjSpec()
+        _add_material(mjspec)
         plane = mujoco.mjtGeom.mjGEOM_PLANE
-        spec.worldbody.add_geom(name="ground", type=plane, size=[0, 0, 0.1], material="ground")
-        return spec
+        mjspec.worldbody.add_geom(name="ground", type=plane, size=[0, 0, 0.1], material="ground")
+        return mjspec
 
 
-class MapTerrain(Terrain):
+class MapGround(Ground):
     """A terrainkit map."""
 
     is_flat = False
@@ -78,27 +78,27 @@ class MapTerrain(Terrain):
         """Return the map as terrainkit exports it for MuJoCo."""
         with tempfile.TemporaryDirectory() as folder:
             path = self.terrain_map.save(Path(folder) / "ground.xml", collision=self._collision)
-            spec = mujoco.MjSpec.from_file(str(path))
-        for goal in spec.sites:  # every step would compute their positions
-            spec.delete(goal)
-        _add_material(spec)
-        for geom in spec.geoms:
+            mjspec = mujoco.MjSpec.from_file(str(path))
+        for goal in mjspec.sites:  # every step would compute their positions
+            mjspec.delete(goal)
+        _add_material(mjspec)
+        for geom in mjspec.geoms:
             geom.material, geom.rgba = "ground", [1, 1, 1, 1]
-        return spec
+        return mjspec
 
 
-def _add_material(spec: Any) -> None:
+def _add_material(mjspec: Any) -> None:
     """Add a checkered material, on which motion is visible."""
-    texture = spec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D)
+    texture = mjspec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D)
     texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
     texture.rgb1, texture.rgb2 = [0.62, 0.65, 0.68], [0.54, 0.57, 0.6]
     texture.width = texture.height = 300
-    material = spec.add_material(name="ground", texrepeat=[1, 1], texuniform=True)
+    material = mjspec.add_material(name="ground", texrepeat=[1, 1], texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
 
 
-def load_terrain(source: str | Path, collision: str = "auto") -> Terrain:
-    """Load the terrain that `source` names.
+def load_terrain(source: str | Path, collision: str = "auto") -> Ground:
+    """Load the ground that `source` names.
 
     Args:
         source: `plane`, a map (.npz), or the config of a map (.toml), which is generated.
@@ -114,7 +114,7 @@ def load_terrain(source: str | Path, collision: str = "auto") -> Terrain:
     if path.suffix in (".npz", ".toml"):
         is_map = path.suffix == ".npz"
         terrain_map = TerrainMap.load(path) if is_map else generate(MapConfig.load(path))
-        return MapTerrain(terrain_map, collision)
+        return MapGround(terrain_map, collision)
     suggestion = " did you mean 'plane'?" if closest(str(source), ["plane"]) else ""
     expected = "expected plane, a map (.npz), or the config of a map (.toml)"
     raise ConfigError(f"terrain: got {str(source)!r};{suggestion} {expected}")

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, ExportError, TerrainkitError
-from terrainkit_robots.rl import run as runs
-from terrainkit_robots.rl import tasks
+from terrainkit_robots.rl import run, tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import Robot
 
@@ -21,7 +20,7 @@ def train(
     task: Task | None = None,
     *,
     folder: Path | None = None,
-    resume: runs.Run | None = None,
+    resume: run.Run | None = None,
     device: str = "cpu",
     start_callback: "Callable[[LeggedRunner], object]" = lambda _: None,
     progress_callback: "ProgressCallback | None" = None,
@@ -55,41 +54,41 @@ def train(
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is imported
     import torch
 
-    from terrainkit_robots.rl import runner as runners
     from terrainkit_robots.rl.env import LeggedEnv
+    from terrainkit_robots.rl.runner import LeggedRunner, process_share, resolve_device
     from terrainkit_robots.rl.terrain import load_terrain
 
     task = tasks.get_task(robot).task if task is None else task
     ground = load_terrain(terrain, task.terrain.collision)
-    parts = runs.parts_to_load(resume, robot, terrain, task) if resume else None
+    parts = run.parts_to_load(resume, robot, terrain, task) if resume else None
     continued = resume if parts is None else None
-    share = runners.process_share(task)
-    device = runners.resolve_device(device)
-    model = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
-    torch.set_num_threads(share.env.num_threads)
-    torch.manual_seed(share.runner.seed)
-    env = LeggedEnv(share, model, ground, device)
-    runner = runners.LeggedRunner(
+    process_task = process_share(task)
+    device = resolve_device(device)
+    loaded_robot = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
+    torch.set_num_threads(process_task.env.num_threads)
+    torch.manual_seed(process_task.runner.seed)
+    env = LeggedEnv(process_task, loaded_robot, ground, device)
+    runner = LeggedRunner(
         env, device=device, progress_callback=progress_callback, should_stop=should_stop
     )
     try:
         if resume is not None:
-            runner.load(runs.last_checkpoint(resume), parts)
+            runner.load(run.last_checkpoint(resume), parts)
         completed, total = runner.current_learning_iteration, task.runner.max_iterations
         if completed >= total:
             expected = f"expected more than the {completed} iterations that are completed"
             raise ConfigError(f"runner.max_iterations: got {total}; {expected}")
         if runner.is_main_process:
-            runner.folder = runs.run_folder(folder, robot, terrain, task, continued)
+            runner.folder = run.prepare_run_folder(folder, robot, terrain, task, continued)
             start_callback(runner)
         # Resets of a new run would otherwise all time out in the same step.
         runner.learn(total - completed, init_at_random_ep_len=not env.steps_since_reset.any())
         if runner.folder is not None and not ground.is_flat:
-            (runner.folder / runs.CURRICULUM_FILE).write_bytes(env.curriculum.draw())
+            (runner.folder / run.CURRICULUM_FILE).write_bytes(env.curriculum.draw())
     except (TerrainkitError, OSError) as error:
         if runner.folder is None:
             raise
-        saved = runs.checkpoints(runner.folder)
+        saved = run.checkpoints(runner.folder)
         hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
         if isinstance(error, TerrainkitError):
             raise type(error)(f"{error}; {hint}") from error

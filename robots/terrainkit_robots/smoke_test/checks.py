@@ -158,14 +158,14 @@ def check_observations(env: LeggedEnv) -> Iterator[Check]:
     for name, obs in env.get_observations().items():
         finite = bool(torch.isfinite(obs).all())
         measured = f"{obs.shape[1]} numbers{'' if finite else ', some not finite'}"
-        expected = f"finite numbers ({len(env.obs_groups[name])} terms, {env.num_actions} joints)"
+        expected = f"finite numbers ({len(env.obs_terms[name])} terms, {env.num_actions} joints)"
         yield Check(f"observation {name}", finite, measured, expected)
 
 
 def check_stand(env: LeggedEnv) -> Check:
     """Check that the robots stand for one second with zero action."""
     env.set_commands(np.zeros((env.num_envs, 3), np.float32))
-    target, dt = float(env.robot.spec.base_height_target or 1.0), env.cfg.dt
+    target, dt = env.robot.base_height_target, env.cfg.dt
     for step in range(round(1 / dt)):
         _, _, dones, extras = env.step(torch.zeros(env.num_envs, env.num_actions))
         height = float(env.state.base_height.min())
@@ -183,7 +183,7 @@ def check_standing(env: LeggedEnv) -> Check:
     env.reset()
     walking = replace(env.cfg.commands, standing=0.0)
     env.set_commands(sample_commands(env.rng, env.num_envs, walking)[0])
-    terms = [each for name, each in env.rewards.items() if name.startswith("tracking_")]
+    terms = [each for name, each in env.reward_terms.items() if name.startswith("tracking_")]
     earned = np.zeros(env.num_envs)
     for function, scale in terms:
         earned += scale * function(env.state, env.robot, env.cfg.rewards)
@@ -212,15 +212,15 @@ def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Chec
     commands = env.commands.copy()
     commands[::4] = 0  # for the rewards of standing robots
     env.set_commands(commands)
-    values: dict[str, list[Any]] = {name: [] for name in env.rewards}
+    values: dict[str, list[Any]] = {name: [] for name in env.reward_terms}
     generator = torch.Generator().manual_seed(env.cfg.runner.seed)
     for _ in range(RANDOM_STEPS):
         env.step(torch.randn(env.num_envs, env.num_actions, generator=generator))
-        for name, (reward, _) in env.rewards.items():
+        for name, (reward, _) in env.reward_terms.items():
             values[name].append(reward(env.state, env.robot, env.cfg.rewards))
     env.set_commands(None)
     state = random_state(env.state, env.cfg.runner.seed)
-    for name, (reward, _) in env.rewards.items():
+    for name, (reward, _) in env.reward_terms.items():
         low, high = np.min(values[name]), np.max(values[name])
         passed, measured = bool(np.isfinite([low, high]).all()), f"{low:.3g} to {high:.3g}"
         if not passed:

@@ -77,7 +77,7 @@ def train_briefly(robot: Robot, task: Task, samples: int, progress: Progress) ->
     history = np.array(env.recorded[steps_of_start:] or env.recorded or [[np.nan]])
     quarter = -(-len(history) // 4)
     first, last = (
-        dict(zip(("falls", *env.rewards), part.mean(axis=0).tolist(), strict=False))
+        dict(zip(("falls", *env.reward_terms), part.mean(axis=0).tolist(), strict=False))
         for part in (history[:quarter], history[-quarter:])
     )
     return TrainingRecord(

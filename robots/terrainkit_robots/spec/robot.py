@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +30,8 @@ class Robot:
     wheels: NDArray[np.bool_]
     """Joints with damping but no stiffness, shape (j,)."""
     action_scale: FloatArray
-    """Change of each joint's position target [rad] for an action of 1, shape (j,); a joint
-    with 0 has no action."""
+    """Change of each joint's target for an action of 1, shape (j,): a position [rad], or the speed
+    of a wheel [rad/s]. A joint with 0 has no action."""
     effort: FloatArray
     """Torque limits [N m], shape (j,)."""
     velocity: FloatArray
@@ -43,7 +44,17 @@ class Robot:
     @property
     def leg_length(self) -> float:
         """Length of the legs [m], or the height of the base if it is unknown."""
-        return self.spec.leg_length or self.spec.base_height_target or 1.0
+        return self.spec.leg_length or self.base_height_target
+
+    @property
+    def base_height_target(self) -> float:
+        """Height of the standing base above the ground [m]."""
+        return cast("float", self.spec.base_height_target)  # `from_spec` requires it
+
+    @property
+    def spawn_height(self) -> float:
+        """Height of the base above the ground at a reset [m]."""
+        return cast("float", self.spec.spawn_height)  # `from_spec` requires it
 
     @property
     def folder(self) -> Path:

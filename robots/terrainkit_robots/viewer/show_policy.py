@@ -12,7 +12,7 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig, rollout
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.policy.play import demo_commands, make_play_env
 from terrainkit_robots.rl.run import Run
-from terrainkit_robots.rl.terrain import MapTerrain
+from terrainkit_robots.rl.terrain import MapGround
 from terrainkit_robots.viewer.robot_scene import RobotScene
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class PolicyView:
         self._policy = load_policy(run, self.env)
         self._server = server
         ground = self.env.terrain
-        if isinstance(ground, MapTerrain):
+        if isinstance(ground, MapGround):
             show_map(server, ground.terrain_map)
         else:
             server.scene.set_up_direction("+z")

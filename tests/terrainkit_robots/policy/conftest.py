@@ -19,7 +19,7 @@ from terrainkit_robots.rl.config import Control, Env, Normalization, Policy, Run
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
 
 torch.set_num_threads(1)
@@ -41,8 +41,8 @@ def small_map() -> TerrainMap:
 
 
 @pytest.fixture(scope="session")
-def map_terrain(small_map: TerrainMap) -> Terrain:
-    return MapTerrain(small_map)
+def map_terrain(small_map: TerrainMap) -> Ground:
+    return MapGround(small_map)
 
 
 @pytest.fixture
@@ -104,7 +104,7 @@ class SlidingEnv(LeggedEnv):
 @pytest.fixture
 def make_sliding(quadruped: Robot) -> Callable[..., SlidingEnv]:
     def make(
-        velocities: Any, fall_times: Any = None, terrain: Terrain | None = None, **parts: Any
+        velocities: Any, fall_times: Any = None, terrain: Ground | None = None, **parts: Any
     ) -> SlidingEnv:
         # One physics step per policy step, since the physics does not matter.
         task = replace(SMALL, sim=Sim(dt=0.02), control=Control(decimation=1), **parts)

@@ -118,7 +118,7 @@ def measure_terms(env, config):
         "base_ang_vel": qvel[:, 3:6],
         "dof_pos": qpos[:, env.scene.joint_qpos],
         "dof_vel": qvel[:, env.scene.joint_qvel],
-        "actions": env.actions[0],
+        "actions": env.action_history[0],
         "base_lin_vel": np.einsum("nij,ni->nj", rotations, qvel[:, :3]),
         "foot_contact": env.state.foot_force[..., 2] > 1,
     }
@@ -264,7 +264,7 @@ def test_example_computes_the_observations(exported, trained, monkeypatch):
     data.qpos[:], data.qvel[:], data.time = env.sim.qpos[0], env.sim.qvel[0], 2 * env.cfg.dt
     rotation = names["rotation"]
     mujoco.mju_quat2Mat(rotation.reshape(9), data.qpos[3:7])
-    obs = names["observe"](env.commands[0], env.actions[0, 0], rotation)
+    obs = names["observe"](env.commands[0], env.action_history[0, 0], rotation)
     np.testing.assert_allclose(obs, env.get_observations()["policy"][0], atol=1e-4)
 
 
@@ -285,7 +285,7 @@ def test_example_observes_contacts_as_the_training(quadruped, trained, tmp_path,
     for _ in range(40):
         data.qpos[:], data.qvel[:] = env.sim.qpos[0], env.sim.qvel[0]
         env.step(0.5 * torch.randn(1, 12, generator=generator))
-        data.ctrl[:] = env.to_ctrl(env.actions[0])[0]
+        data.ctrl[:] = env.to_ctrl(env.action_history[0])[0]
         mujoco.mj_step(scene.model, data, task.control.decimation)
         observed = names["observe"](np.zeros(3), np.zeros(12), np.eye(3))
         np.testing.assert_array_equal(observed, env.state.foot_contact[0])

@@ -27,7 +27,7 @@ from terrainkit_robots.rl.config import (
     Task,
 )
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.terrain import MapTerrain, Plane, Terrain
+from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -137,19 +137,19 @@ def mixed_map() -> TerrainMap:
 
 
 @pytest.fixture(scope="session")
-def map_ground(mixed_map: TerrainMap) -> Terrain:
-    return MapTerrain(mixed_map)
+def map_ground(mixed_map: TerrainMap) -> Ground:
+    return MapGround(mixed_map)
 
 
 @pytest.fixture(scope="session")
-def course_ground() -> Terrain:
+def course_ground() -> Ground:
     """Return one patch 8 m long with goals at x = 4 m and 7 m, and one without goals."""
     lanes = (
         SubTerrain(terrain="course", parameters={"elements": [{"terrain": "flat"}] * 2}),
         SubTerrain(terrain="flat"),
     )
     config = MapConfig(rows=1, cols=2, patch_size=(8.0, 4.0), border=1.0, terrains=lanes)
-    return MapTerrain(generate(config))
+    return MapGround(generate(config))
 
 
 @pytest.fixture(scope="session")
@@ -184,7 +184,7 @@ def nominal_task(no_randomization: DomainRand) -> Callable[..., Task]:
 
 def env_maker(make_task: Callable[..., Task], quadruped: Robot) -> Callable[..., LeggedEnv]:
     def make(
-        num_envs: int = 4, ground: Terrain | None = None, robot: Robot = quadruped, **sections: Any
+        num_envs: int = 4, ground: Ground | None = None, robot: Robot = quadruped, **sections: Any
     ) -> LeggedEnv:
         return LeggedEnv(make_task(num_envs, **sections), robot, ground or Plane())
 

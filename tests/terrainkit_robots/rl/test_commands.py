@@ -86,14 +86,14 @@ class TestHeading:
     def test_yaw_rate_by_hand(self, heading, yaw, cfg, rate):
         command = VelocityCommand(cfg, 1, 0.02, heading_command=True)
         command.heading[:] = heading
-        command.update_heading(np.float32([yaw]), np.zeros((1, 2), np.float32))
+        command.update(np.float32([yaw]), np.zeros((1, 2), np.float32))
         assert command.commands[0, 2] == pytest.approx(rate, abs=1e-4)
 
     def test_yaw_rate_of_fixed_commands(self):
         command = VelocityCommand(Commands(), 2, 0.02, heading_command=True)
         command.heading[:] = 1.0
         command.fixed = np.float32([[1, 0, 0.25], [0, 0, -0.5]])
-        command.update_heading(np.zeros(2, np.float32), np.zeros((2, 2), np.float32))
+        command.update(np.zeros(2, np.float32), np.zeros((2, 2), np.float32))
         assert command.yaw_rate(np.zeros(2, np.float32)).tolist() == [0.25, -0.5]
 
     def test_heading_control_converges(self):
@@ -101,7 +101,7 @@ class TestHeading:
         command = VelocityCommand(Commands(), 3, 0.02, heading_command=True)
         command.heading[:] = heading
         for _ in range(1000):
-            command.update_heading(yaw, np.zeros((3, 2), np.float32))
+            command.update(yaw, np.zeros((3, 2), np.float32))
             yaw += np.float32(0.02) * command.commands[:, 2]
         np.testing.assert_allclose(wrap_to_pi(heading - yaw), 0, atol=1e-3)
 
@@ -115,7 +115,7 @@ class TestHeading:
         env = random_env(ground=ground, commands=Commands(heading_command=setting, standing=0.0))
         before = env.commands[:, 2].copy()
         yaw = quat_to_yaw(env.state.base_quat) + np.float32(0.5)
-        env.velocity_command.update_heading(yaw, env.state.base_pos[:, :2])
+        env.velocity_command.update(yaw, env.state.base_pos[:, :2])
         assert (env.commands[:, 2] != before).any() == expected
 
     @pytest.mark.parametrize("steps", [0, 2])

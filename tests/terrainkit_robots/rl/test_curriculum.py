@@ -99,7 +99,7 @@ class TestCheckpoint:
         one.sampler.update(np.arange(4), np.array([1.0, 1 / 3, 0, 0.7]), np.full(4, 0.1))
         before = copy.deepcopy(one.sampler.state_dict())
         save_checkpoint(tmp_path / "model_1.pt", one.state_dict())
-        other.sampler.load_state_dict(torch.load(tmp_path / "model_1.pt", weights_only=True))
+        other.load_state_dict(torch.load(tmp_path / "model_1.pt", weights_only=True))
         one.sampler.update(np.arange(4), np.ones(4), np.ones(4))  # what is saved is no view
         for name, value in other.sampler.state_dict().items():
             np.testing.assert_array_equal(value, before[name], err_msg=name, strict=True)
@@ -107,7 +107,7 @@ class TestCheckpoint:
     @pytest.mark.parametrize("other", [Patches(rows=9), Patches(names=("flat",))])
     def test_load_rejects_another_map(self, other):
         with pytest.raises(ConfigError, match="curriculum: got 10 x 2 patches; expected"):
-            make(other).sampler.load_state_dict(make().state_dict())
+            make(other).load_state_dict(make().state_dict())
 
 
 FORWARD = Commands(lin_vel_x=(1, 1), lin_vel_y=(0, 0), ang_vel_yaw=(0, 0), standing=0)

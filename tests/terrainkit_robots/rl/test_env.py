@@ -17,7 +17,7 @@ from terrainkit_robots.rl.config import (
     Runner,
     Terrain,
 )
-from terrainkit_robots.rl.terrain import MapTerrain
+from terrainkit_robots.rl.terrain import MapGround
 from terrainkit_robots.spec.robot import Robot
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
@@ -73,7 +73,7 @@ class TestObservations:
     )
     def test_widths(self, nominal_env, map_ground, on_map, measured, width):
         env = nominal_env(4, on_map and map_ground, terrain=Terrain(measure_heights=measured))
-        assert env.num_obs == {"policy": width, "privileged": width + 38}
+        assert env.obs_sizes == {"policy": width, "privileged": width + 38}
         assert env.state.height_scan.shape == (4, width - 47)
 
     def test_width_of_another_robot(self, nominal_env, biped):
@@ -105,8 +105,8 @@ class TestHistory:
     @pytest.mark.parametrize("on_map", [False, True])
     def test_previous_observations_follow_the_current_one(self, random_env, map_ground, on_map):
         env = random_env(5, on_map and map_ground, env=SHORT, observations=self.OPTIONS)
-        assert env.num_obs["policy"] == 3 * self.WIDTH + 187 * on_map
-        assert env.num_obs["privileged"] == 85 + 4 + 187 * on_map
+        assert env.obs_sizes["policy"] == 3 * self.WIDTH + 187 * on_map
+        assert env.obs_sizes["privileged"] == 85 + 4 + 187 * on_map
         seen, length = [env.get_observations()["policy"]], np.ones(5, int)
         for action in acts(env, 30):
             observed, _, dones, _ = env.step(action)
@@ -225,7 +225,7 @@ class TestTermination:
         ids=["back", "side", "outside", "velocity", "position"],
     )
     def test_fall_resets_only_its_environment(self, nominal_env, mixed_map, array, values):
-        env, twin = (nominal_env(4, MapTerrain(mixed_map)) for _ in "ab")
+        env, twin = (nominal_env(4, MapGround(mixed_map)) for _ in "ab")
         for each in (env, twin):
             for _ in range(5):
                 stand(each)

@@ -18,7 +18,7 @@ from terrainkit_robots.rl.events import (
 )
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.rl.terrain import MapGround, Plane
 from terrainkit_robots.transforms import quat_to_yaw
 
 
@@ -186,7 +186,7 @@ class TestInEnvironment:
         env = nominal_env(6, domain_rand=DomainRand())
         seen = env.get_observations()["privileged"].numpy()
         here, start = {}, 0
-        for each in env.obs_groups["privileged"]:
+        for each in env.obs_terms["privileged"]:
             stop = start + each.function(env.state).shape[1]
             here[each.name], start = seen[:, start:stop], stop
         np.testing.assert_array_equal(here["friction"], env.params.friction)
@@ -236,7 +236,7 @@ class TestInEnvironment:
 @pytest.fixture(scope="module")
 def default_ground():
     """Return a map with every default terrain at three difficulties."""
-    return MapTerrain(generate(MapConfig(rows=3, seed=5)))
+    return MapGround(generate(MapConfig(rows=3, seed=5)))
 
 
 @pytest.fixture(scope="module")

@@ -314,7 +314,7 @@ class TestInEnvironment:
         env.sim.qpos[:, 2] = 0.4
         env.sim.qvel[:] = 0
         env.sim.qvel[:, 6 + 2] = 2.0
-        env.actions[0] = 0.25
+        env.action_history[0] = 0.25
         env.steps_since_reset[:] = 0
         env.state = env._compute_state(np.arange(3), after_reset=True)
         env._compute_observations()

@@ -337,4 +337,4 @@ class TestUserReward:
 
     @pytest.mark.parametrize("rewards", [Rewards(), MyRewards()])
     def test_user_reward_without_scale_is_ignored(self, random_env, rewards):
-        assert "headway" not in random_env(rewards=rewards).rewards
+        assert "headway" not in random_env(rewards=rewards).reward_terms

@@ -22,7 +22,7 @@ from terrainkit_robots.rl.run import (
     is_same_terrain,
     open_run,
     parts_to_load,
-    run_folder,
+    prepare_run_folder,
 )
 from terrainkit_robots.rl.terrain import load_terrain
 from terrainkit_robots.spec.robot import Robot
@@ -170,7 +170,7 @@ def test_default_folder_is_inside_logs(name):
 def test_run_folder_replaces_the_task(run, task):
     (run / "model_1.pt").touch()
     other = replace(task, runner=replace(task.runner, max_iterations=77))
-    assert run_folder(None, "quadruped", "plane", other, open_run(run)) == run
+    assert prepare_run_folder(None, "quadruped", "plane", other, open_run(run)) == run
     assert open_run(run).task == other
 
 

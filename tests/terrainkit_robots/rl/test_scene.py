@@ -9,7 +9,7 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Asset, Control, Sim
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation
-from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.rl.terrain import MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES
 
@@ -156,7 +156,7 @@ class TestForces:
     @pytest.mark.parametrize("collision", ["hfield", "boxes"])
     def test_feet_carry_the_robot_on_a_map(self, nominal_env, mixed_map, collision):
         # The order of the two geoms depends on their types; the force must not.
-        env = nominal_env(6, MapTerrain(mixed_map, collision))
+        env = nominal_env(6, MapGround(mixed_map, collision))
         env.curriculum.levels[:] = 0
         env.reset()
         for _ in range(60):

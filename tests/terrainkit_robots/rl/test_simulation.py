@@ -12,7 +12,7 @@ from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit_robots.rl.config import Algorithm, DomainRand, Env, Runner, Task
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation, check_env_memory
-from terrainkit_robots.rl.terrain import MapTerrain, Plane
+from terrainkit_robots.rl.terrain import MapGround, Plane
 
 
 @pytest.fixture
@@ -117,7 +117,7 @@ class TestUnstable:
 
 def test_num_threads_does_not_change_results(random_env, mixed_map):
     def run(threads):
-        env = random_env(9, MapTerrain(mixed_map), num_threads=threads)
+        env = random_env(9, MapGround(mixed_map), num_threads=threads)
         made = torch.Generator().manual_seed(0)
         return [
             (observed["privileged"].numpy().tobytes(), rewards.numpy().tobytes())

@@ -152,7 +152,7 @@ class TestStateCopies:
         env = random_env(3)
         env.step(torch.zeros(3, 12))
         own = [env.sim.batch.state, *vars(env.params).values(), env.commands]
-        own += [env.joint_offset, env.pushes.velocity, env.actions]
+        own += [env.joint_offset, env.pushes.velocity, env.action_history]
         for name, value in vars(env.state).items():
             assert not any(np.shares_memory(value, other) for other in own), name
 

@@ -59,7 +59,7 @@ def mirror_physics(env, mirror, *, turn=True):
     """Set random states in half of the environments, and mirror images in the others."""
     rng, p, scene = np.random.default_rng(3), env.sim, env.scene
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
-    height = float(env.robot.spec.spawn_height or 0.0)
+    height = env.robot.spawn_height
     p.qpos[a, :2] = rng.uniform(-1, 1, (_PAIRS, 2))
     p.qpos[a, 2] = height + rng.uniform(0, 0.02, _PAIRS)
     quat = np.array([1.0, 0, 0, 0]) + rng.uniform(-0.1, 0.1, (_PAIRS, 4))
@@ -86,8 +86,8 @@ def mirror_memory(env, mirror):
     a, b = slice(0, _PAIRS), slice(_PAIRS, 2 * _PAIRS)
     env.set_commands(rng.uniform(-1, 1, (2 * _PAIRS, 3)).astype(np.float32))
     env.velocity_command.fixed[b] = env.velocity_command.fixed[a] * np.array([1, -1, -1])
-    env.actions[:, a] = rng.uniform(-0.2, 0.2, env.actions[:, a].shape)
-    env.actions[:, b] = [mirror.actions(each) for each in env.actions[:, a]]
+    env.action_history[:, a] = rng.uniform(-0.2, 0.2, env.action_history[:, a].shape)
+    env.action_history[:, b] = [mirror.actions(each) for each in env.action_history[:, a]]
     env.pushes.velocity[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
     env.pushes.velocity[b] = env.pushes.velocity[a] * np.array([1, -1, 1])
     env.joint_offset[b] = mirror.joints(env.joint_offset[a])
@@ -107,7 +107,7 @@ def assert_images(env, mirror, tolerance):
         values = env.get_observations()[name].numpy()
         one, other = values[:_PAIRS], values[_PAIRS:]
         width = 0
-        for each in env.obs_groups[name]:
+        for each in env.obs_terms[name]:
             here = slice(width, width + each.function(env.state).shape[1])
             width = here.stop
             np.testing.assert_allclose(
@@ -307,8 +307,8 @@ class TestErrors:
             _ = leaning.mirror_maps
 
     def test_wrong_term_width_is_rejected(self, env):
-        first, *others = env.obs_groups["policy"]
-        env.obs_groups["policy"] = (replace(first, symmetry="joints"), *others)
+        first, *others = env.obs_terms["policy"]
+        env.obs_terms["policy"] = (replace(first, symmetry="joints"), *others)
         with pytest.raises(ConfigError, match="commands: got 3 numbers; the symmetry 'joints'"):
             _ = env.mirror_maps
 

@@ -179,7 +179,7 @@ def test_task_of_the_guide_can_be_trained(guide):
     assert Task.from_toml(text.replace("trot = 0.5", "trot = 2.0"), guide.task).rewards.trot == 2.0
     task = replace(guide.task, env=Env(num_envs=4, num_threads=1))
     env = LeggedEnv(task, scene.Robot.load(guide.folder), Plane())
-    function, scale = env.rewards["trot"]
+    function, scale = env.reward_terms["trot"]
     assert scale == 0.5
     env.state.foot_force[..., 2] = [[9, 0, 0, 9], [9, 9, 9, 9], [0, 6, 6, 0], [0, 4, 4, 0]]
     got = function(env.state, env.robot, task.rewards)

@@ -7,7 +7,7 @@ from terrainkit.errors import TerrainkitError
 from terrainkit.geometry.surface import HeightfieldSurface
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import InitState
-from terrainkit_robots.rl.terrain import MapTerrain, Plane, load_terrain
+from terrainkit_robots.rl.terrain import MapGround, Plane, load_terrain
 
 EXACT = 1e-3
 ONLY_GROUND = np.array([1, 0, 0, 0, 0, 0], np.uint8)  # groups of geoms
@@ -68,7 +68,7 @@ class TestMapTerrain:
     @pytest.mark.parametrize("name", ["terrain_map", "level_map"])
     def test_height_matches_rays(self, request, name, collision):
         # In `auto`, stairs and obstacles become boxes, the rough patch a heightfield.
-        ground = MapTerrain(request.getfixturevalue(name), collision)
+        ground = MapGround(request.getfixturevalue(name), collision)
         xy = anywhere(ground, 4000)
         found = ground.height(*xy.T)
         off = np.abs(found - rays(compiled(ground), xy))
@@ -77,7 +77,7 @@ class TestMapTerrain:
 
     def test_boxes_are_level_up_to_walls(self, level_map):
         # Each point has the height of its nearest sample.
-        ground = MapTerrain(level_map, "boxes")
+        ground = MapGround(level_map, "boxes")
         xy = anywhere(ground, 2000, seed=2)
         cell, (x, y) = level_map.grid.cell, level_map.first_sample
         nearest = np.rint((xy - (x, y)) / cell).astype(int)
@@ -88,7 +88,7 @@ class TestMapTerrain:
     @pytest.mark.parametrize("collision", ["hfield", "boxes"])
     def test_height_of_solids_depends_on_the_robot(self, solid_map, collision):
         """The box hangs from 0.4 to 0.6 m, one does not collide, and the cylinder is invisible."""
-        terrain = MapTerrain(solid_map, collision)
+        terrain = MapGround(solid_map, collision)
         x, y = np.float32([1, 5, 2]), np.float32([6, 6, 6])
         for z, scan, expected in (
             (0.3, True, [0, 0, 0]),
@@ -107,7 +107,7 @@ class TestMapTerrain:
         np.testing.assert_array_equal(map_ground.height(x, x).ravel(), flat)
 
     def test_attributes_match_the_map(self, mixed_map):
-        ground = MapTerrain(mixed_map)
+        ground = MapGround(mixed_map)
         assert ground.env_origins.shape == (3, 2, 3)
         assert ground.spawns.shape == (3, 2, 1, 4)
         assert ground.terrain_names.tolist() == [["stairs", "rough_slope"]] * 3
@@ -119,7 +119,7 @@ class TestMapTerrain:
     def test_terrain_names_of_randomized_map(self):
         choices = tuple(SubTerrain(terrain=name) for name in ("flat", "stairs"))
         size = {"rows": 4, "cols": 3, "patch_size": (5, 4), "border": 0.5}
-        ground = MapTerrain(generate(MapConfig(mode="randomized", terrains=choices, **size)))
+        ground = MapGround(generate(MapConfig(mode="randomized", terrains=choices, **size)))
         assert ground.terrain_names.shape == (4, 3)
         assert len({tuple(row) for row in ground.terrain_names}) > 1
         near = np.linspace(-1.5, 1.5, 31, dtype=np.float32)
@@ -143,8 +143,8 @@ class TestLoadTerrain:
     def test_load_every_kind(self, mixed_map, tmp_path):
         path = mixed_map.save(tmp_path / "map.npz")
         assert isinstance(load_terrain("plane"), Plane)
-        assert isinstance(load_terrain(path), MapTerrain)
-        assert isinstance(load_terrain(str(path)), MapTerrain)
+        assert isinstance(load_terrain(path), MapGround)
+        assert isinstance(load_terrain(str(path)), MapGround)
         assert isinstance(load_terrain(path, "plane"), Plane)
 
     def test_load_config_is_deterministic(self, tmp_path):
@@ -191,7 +191,7 @@ class TestHeightScan:
     @pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5, -1.6])
     @pytest.mark.parametrize("tilt", [0.0, 0.2])
     def test_height_scan_matches_rays(self, nominal_env, mixed_map, yaw, tilt):
-        env = nominal_env(1, MapTerrain(mixed_map), init_state=InitState(position=0))
+        env = nominal_env(1, MapGround(mixed_map), init_state=InitState(position=0))
         quat = np.zeros(4)
         turn = np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)])
         pitch = np.array([np.cos(tilt / 2), 0, np.sin(tilt / 2), 0])
@@ -204,7 +204,7 @@ class TestHeightScan:
         assert np.ptp(state.height_scan) > 0.05
 
     def test_base_height_is_above_the_ground(self, nominal_env, mixed_map):
-        env = nominal_env(6, MapTerrain(mixed_map))
+        env = nominal_env(6, MapGround(mixed_map))
         env.sim.qpos[:, :2] += np.random.default_rng(0).uniform(-1, 1, (6, 2))
         state = env._compute_state(np.arange(6))
         under = rays(compiled(env.terrain), env.sim.qpos[:, :2], ONLY_GROUND)

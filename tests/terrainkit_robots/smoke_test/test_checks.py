@@ -162,7 +162,7 @@ def test_sunken_robot_does_not_stand(quadruped):
 
 def test_each_reward_is_checked(env):
     checks = list(check_rewards(env, {}))
-    assert [check.name for check in checks] == [f"reward {name}" for name in env.rewards]
+    assert [check.name for check in checks] == [f"reward {name}" for name in env.reward_terms]
     assert all(check.passed for check in checks)
 
 
@@ -176,7 +176,7 @@ def test_each_reward_is_checked(env):
     ],
 )
 def test_constant_rewards_fail(env, reward, passed, measured):
-    env.rewards["torques"] = (lambda state, *_: reward(state), -0.1)
+    env.reward_terms["torques"] = (lambda state, *_: reward(state), -0.1)
     (check,) = (check for check in check_rewards(env, {}) if check.name == "reward torques")
     assert (check.passed, check.measured) == (passed, measured)
 
@@ -201,7 +201,7 @@ def test_standing_earns_a_quarter_of_the_tracking(quadruped):
     assert check_standing(env).measured == "25%"
     wide = Rewards(tracking_ang_vel=0.0)
     robust = lambda state, *_: np.exp(-np.square(state.commands[:, 0]))  # noqa: E731
-    env.rewards = {"tracking_lin_vel": (robust, wide.tracking_lin_vel)}
+    env.reward_terms = {"tracking_lin_vel": (robust, wide.tracking_lin_vel)}
     assert not check_standing(env).passed
 
 
@@ -234,7 +234,7 @@ def test_excessive_penalties_fail_with_their_names(quadruped, monkeypatch):
 
 
 def test_falls_may_outweigh_the_rewards(env):
-    trained = dict.fromkeys(env.rewards, 0.1) | {"termination": -50.0, "torques": -50.0}
+    trained = dict.fromkeys(env.reward_terms, 0.1) | {"termination": -50.0, "torques": -50.0}
     checks = {check.name: check for check in check_rewards(env, trained)}
     assert checks["reward termination"].passed
     assert not checks["reward torques"].passed
