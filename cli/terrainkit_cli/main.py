@@ -49,7 +49,7 @@ COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module i
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit code.
 
-    0: success. 1: a check found errors. 2: invalid input; one line on stderr says what and why.
+    0: success. 1: a check found errors. 2: any other error; one line on stderr says what and why.
     128 + n: ended by signal n.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)

@@ -155,7 +155,7 @@ def evaluate(
     env, commands = make_eval_env(spec, config)
     rollout = EvaluationRollout(env)
     rollout.run(load_policy(spec, env), config.seconds, commands, progress)
-    has_grid = env.terrain.is_flat and config.command is None
+    has_grid = env.terrain.is_plane and config.command is None
     return summarize(spec, config, rollout, commands if has_grid else None)
 
 
@@ -168,7 +168,7 @@ def make_eval_env(
     robots on a patch of a map.
     """
     task = spec.task
-    is_run_terrain = config.terrain is None and not is_flat(spec)
+    is_run_terrain = config.terrain is None and not is_plane(spec)
     if is_run_terrain and isinstance(spec, Run) and not is_same_terrain(spec, spec.terrain):
         changed = f"{spec.terrain} changed after {spec.folder} was trained"
         raise ConfigError(f"terrain: {changed}; expected --terrain")
@@ -181,10 +181,10 @@ def make_eval_env(
         commands = np.array([config.command], np.float32)
     elif not config.random_commands:
         directions = direction_commands(task.commands).values()
-        commands = command_grid(task.commands) if terrain.is_flat else np.array([*directions])
+        commands = command_grid(task.commands) if terrain.is_plane else np.array([*directions])
     rows, cols = terrain.env_origins.shape[:2]
     n, patches = config.num_envs, rows * cols
-    if n is None and terrain.is_flat and commands is not None and len(commands) > 1:
+    if n is None and terrain.is_plane and commands is not None and len(commands) > 1:
         n = len(commands)
     elif n is None:
         per_patch = max(1, min(max_patch_envs, MAX_MAP_ENVS // patches))
@@ -195,7 +195,7 @@ def make_eval_env(
     env.reset()
     if commands is None:
         return env, None
-    if not terrain.is_flat:  # every direction on every patch
+    if not terrain.is_plane:  # every direction on every patch
         return env, commands[np.arange(n) // patches % len(commands)]
     return env, commands[_assign(len(commands), n, config.seed)]
 
@@ -205,13 +205,13 @@ def build_eval_env(
 ) -> LeggedEnv:
     """Return an environment on a terrain, for a policy with the observations of its training."""
     device = resolve_device(config.device)
-    scan = uses_height_scan(spec.task, is_flat=is_flat(spec))
+    scan = uses_height_scan(spec.task, is_plane=is_plane(spec))
     task = eval_task(spec.task, num_envs, seconds=config.seconds, seed=config.seed)
     task = replace(task, terrain=replace(task.terrain, measure_heights=scan))
     return LeggedEnv(task, spec.robot, terrain, device)
 
 
-def is_flat(spec: PolicySpec, terrain: str | None = None) -> bool:
+def is_plane(spec: PolicySpec, terrain: str | None = None) -> bool:
     """Return whether a terrain, or else that of the training, is a plane."""
     return "plane" in ([terrain] if terrain else [spec.terrain, spec.task.terrain.collision])
 
@@ -366,7 +366,7 @@ class EvaluationRollout:
     def __init__(self, env: LeggedEnv) -> None:
         n, dt = env.num_envs, env.cfg.dt
         self.env, self.start_pos = env, env.curriculum.progress.start.copy()
-        self.half_patch = np.inf if env.terrain.is_flat else env.terrain.patch_length / 2
+        self.half_patch = np.inf if env.terrain.is_plane else env.terrain.patch_length / 2
         self.falls, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
         self.distance, self.commanded_distance = np.zeros(n), np.zeros(n)
         names = "lin_vel_error", "lin_vel_error_1s", "ang_vel_error", "ang_vel_error_1s"
@@ -464,7 +464,7 @@ class EvaluationRollout:
             **key,
             robots=int(mask.sum()),
             falls=int(self.falls[mask].sum()),
-            success=None if self.env.terrain.is_flat else float(success[mask].mean()),
+            success=None if self.env.terrain.is_plane else float(success[mask].mean()),
             **errors,
             **self._gait_metrics(mask),
         )
@@ -530,7 +530,7 @@ def summarize(
     keys = [] if commands is None else [tuple(round(float(v), 4) for v in c) for c in commands]
     for key in dict.fromkeys(keys):
         add_group("by_command", np.array([k == key for k in keys]), command=key)
-    if not env.terrain.is_flat:
+    if not env.terrain.is_plane:
         types, all_levels = dict.fromkeys(names.ravel().tolist()), np.unique(levels).tolist()
         for name, command in direction_commands(env.cfg.commands).items():
             mask = (rollout.last_commands == command).all(axis=1)

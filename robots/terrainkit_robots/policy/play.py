@@ -15,7 +15,7 @@ from terrainkit_robots.policy.evaluate import (
     EvaluationRollout,
     Progress,
     command_schedule,
-    is_flat,
+    is_plane,
     make_eval_env,
     rollout,
     summarize,
@@ -111,7 +111,7 @@ def make_play_env(
     spec: PolicySpec, config: EvaluationConfig
 ) -> tuple[LeggedEnv, FloatArray | None]:
     """Return the environment, and the commands of its robots for :func:`command_schedule`."""
-    if not is_flat(spec, config.terrain):
+    if not is_plane(spec, config.terrain):
         return make_eval_env(spec, config, max_patch_envs=1)
     start = replace(spec.task.init_state, position=0.0, yaw=0.0)  # the formation sets them
     spec = replace(spec, task=replace(spec.task, init_state=start))
@@ -157,7 +157,7 @@ class PoseRecorder:
         """
         env, terrain, poses, shots = self.env, self.env.terrain, np.stack(self.poses), []
         frames, n = poses.shape[:2]
-        if terrain.is_flat:
+        if terrain.is_plane:
             side = int(np.ceil(np.sqrt(n)))
             row, col = np.divmod(np.arange(n), side)
             spacing = 2.4 * max(0.5, env.robot.base_height_target)
@@ -165,7 +165,7 @@ class PoseRecorder:
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
             shots.append(Shot(robot=n // 2, captions=captions))
         tracked, rows = select_tracked_robots(env, robots), len(terrain.env_origins)
-        for robot in tracked if not terrain.is_flat else ():
+        for robot in tracked if not terrain.is_plane else ():
             level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
             caption = str(terrain.terrain_names[level, column])
             caption += f", level {level} of {rows - 1}" if rows > 1 else ""

@@ -55,9 +55,10 @@ class VelocityCommand:
         """Sample new commands for some environments."""
         sample = sample_commands(rng, len(env_ids), self._cfg)
         self.commands[env_ids], self.heading[env_ids] = sample
-        self.speed[env_ids] = np.abs(sample[0][:, 0]) + 0 * sample[1]
+        forward = np.abs(self.commands[env_ids, 0])
+        self.speed[env_ids] = np.where(np.isnan(self.heading[env_ids]), np.nan, forward)
 
-    def resample_due(self, rng: np.random.Generator, steps: Ids) -> None:
+    def resample_due(self, rng: np.random.Generator, steps: NDArray[np.int64]) -> None:
         """Resample where the resampling time has passed; `steps` since reset, shape (n,)."""
         self.resample(rng, np.flatnonzero((steps % self._interval == 0) & (steps > 0)))
 

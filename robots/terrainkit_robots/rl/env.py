@@ -37,12 +37,12 @@ class LeggedEnv(VecEnv):
         self.num_envs = n = task.env.num_envs
         self.max_episode_length = task.max_episode_length
         self.scene = build_scene(robot, terrain, task)
-        scan = observations.uses_height_scan(task, is_flat=terrain.is_flat)
+        scan = observations.uses_height_scan(task, is_plane=terrain.is_plane)
         check_env_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
         self.sim = Simulation(self.scene, n, task.env.num_threads)
         self.rng = np.random.default_rng(task.runner.seed)
         heading = task.commands.heading_command
-        heading = not terrain.is_flat if heading is None else heading
+        heading = not terrain.is_plane if heading is None else heading
         self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
         self.waypoints = None
         if task.commands.waypoints:
@@ -64,7 +64,8 @@ class LeggedEnv(VecEnv):
         self.params = sample_params(self.rng, n, self.sim, task.domain_rand)
         apply_params(self.sim, self.params)
         self.curriculum = TerrainCurriculum(terrain, n, task.terrain, task.runner.seed)
-        self.episode_length_buf = torch.zeros(n, dtype=torch.int64)  # rsl-rl may replace it
+        self.episode_length_buf = torch.zeros(n, dtype=torch.int64)
+        # rsl-rl starts the first episodes at random lengths; this counts the real steps.
         self.steps_since_reset = np.zeros(n, np.int64)
         self.path_length = np.zeros(n)  # since the last reset [m]
         self.reward_terms = active_rewards(task.rewards, mass, robot.leg_length)
@@ -257,7 +258,7 @@ class LeggedEnv(VecEnv):
         self.velocity_command.update(self._yaw(), self.sim.qpos[:, :2].astype(np.float32))
 
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
-        """Update the curricula at the end of episodes, and return the values to log."""
+        """Update the curriculum at the end of episodes, and return the values to log."""
         seconds, fallen = self.steps_since_reset[env_ids] * self.cfg.dt, state.fallen[env_ids]
         log = {
             f"Episode/rew_{name}": float((total[env_ids] / seconds).mean())
@@ -281,7 +282,7 @@ class LeggedEnv(VecEnv):
                 log["Episode/goals_reached"] = float(np.nanmean(reached))
         returns = np.sum([total[env_ids] for total in self.episode_sums.values()], axis=0)
         self.curriculum.sampler.update(env_ids[complete], progress[complete], returns[complete])
-        return log if self.terrain.is_flat else log | self.curriculum.log()
+        return log if self.terrain.is_plane else log | self.curriculum.log()
 
     def _reset_idx(self, env_ids: Ids) -> None:
         """Start new episodes."""
@@ -324,7 +325,7 @@ class LeggedEnv(VecEnv):
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore a state; if the number of environments differs, restore only the curricula."""
+        """Restore a state; if the number of environments differs, restore only the curriculum."""
         self.curriculum.load_state_dict(state["curriculum"])
         arrays, saved = self._arrays(), state["arrays"]
         if len(saved["episode_length"]) != self.num_envs:

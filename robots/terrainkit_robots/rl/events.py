@@ -129,7 +129,7 @@ def sample_reset_state(
     circle = np.exp(0.25j * np.pi * np.arange(8))
     rings = radius * np.concatenate([[0], circle / 2, circle])
     ring_x, ring_y = rings.real.astype(np.float32), rings.imag.astype(np.float32)
-    for factor in (0.5, 0.0, 1.0):  # the last pass checks the origin itself
+    for factor in (0.5, 0.0, 1.0):  # the last pass only measures the origin
         x, y = (env_origins[:, :2] + offset).T
         height = terrain.height(x[:, None] + ring_x, y[:, None] + ring_y, env_origins[:, 2:])
         highest = height.max(axis=1)

@@ -49,10 +49,10 @@ ObsTerms = Mapping[str, Sequence[ObservationTerm]]
 """The terms of each observation group by its name."""
 
 
-def uses_height_scan(task: Task, *, is_flat: bool) -> bool:
+def uses_height_scan(task: Task, *, is_plane: bool) -> bool:
     """Return whether the policy has a height scan; the default is True except on flat ground."""
     setting = task.terrain.measure_heights
-    return not is_flat if setting is None else setting
+    return not is_plane if setting is None else setting
 
 
 def observes_lin_vel(robot: Robot, task: Task) -> bool:

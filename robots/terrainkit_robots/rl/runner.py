@@ -207,7 +207,8 @@ class LeggedRunner(OnPolicyRunner):
         """Load a checkpoint.
 
         By default training continues exactly; with another number of environments, only the
-        networks and the curricula do. A checkpoint of a policy alone has only networks.
+        networks, the optimizer and the curriculum do. A checkpoint of a policy alone has only
+        networks.
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
         """
         parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}

@@ -29,7 +29,7 @@ class Ground(ABC):
     lower: tuple[float, float]  # lower corner, x and y [m]
     upper: tuple[float, float]  # upper corner, x and y [m]
     surface: HeightfieldSurface | None = None  # of ground and solids; None for a plane at height 0
-    is_flat: bool  # whether the ground is level everywhere: a height scan carries no information
+    is_plane: bool  # an infinite plane, without patches: a height scan carries no information
 
     @abstractmethod
     def spec(self) -> Any:
@@ -47,7 +47,7 @@ class Ground(ABC):
 class Plane(Ground):
     """An infinite plane at height 0."""
 
-    is_flat = True
+    is_plane = True
     terrain_names = np.array([["plane"]])
     lower, upper = (-np.inf, -np.inf), (np.inf, np.inf)
 
@@ -63,7 +63,7 @@ class Plane(Ground):
 class MapGround(Ground):
     """A terrainkit map."""
 
-    is_flat = False
+    is_plane = False
 
     def __init__(self, terrain_map: TerrainMap, collision: Any = "auto") -> None:
         self.env_origins, self.spawns = terrain_map.env_origins, terrain_map.spawns

@@ -33,10 +33,11 @@ def train(
         terrain: `plane`, a map (.npz), or a map config (.toml).
         task: The task; by default, the registered task of the robot.
         folder: Folder of the run; by default, `logs/<robot>/<date-time>`.
-        resume: A run to continue. With the same robot, terrain and task (`env.num_envs` and
-            `runner` may differ), it continues exactly. Otherwise, a new run starts with its
-            networks, its optimizer state if the learning rate and its schedule are the same, and
-            its terrain levels if the map is the same.
+        resume: A run to continue. With the same robot, terrain and task it continues, exactly if
+            `env.num_envs` and the number of processes are also the same; otherwise the episodes
+            start again. With another robot, terrain or task, a new run starts with its networks,
+            its optimizer state if the learning rate and its schedule are the same, and its terrain
+            levels if the map is the same.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
         start_callback: Called before the first iteration.
         progress_callback: Called after each iteration.
@@ -83,7 +84,7 @@ def train(
             start_callback(runner)
         # Resets of a new run would otherwise all time out in the same step.
         runner.learn(total - completed, init_at_random_ep_len=not env.steps_since_reset.any())
-        if runner.folder is not None and not ground.is_flat:
+        if runner.folder is not None and not ground.is_plane:
             (runner.folder / run.CURRICULUM_FILE).write_bytes(env.curriculum.draw())
     except (TerrainkitError, OSError) as error:
         if runner.folder is None:

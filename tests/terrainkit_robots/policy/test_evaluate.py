@@ -103,7 +103,7 @@ def test_policy_keeps_its_observations_on_another_terrain(make_run, map_file):
     for run, terrain, width in cases:
         env, _ = make_eval_env(run, EvaluationConfig(num_envs=1, terrain=terrain))
         assert env.get_observations()["policy"].shape == (1, width)
-        assert env.terrain.is_flat == (terrain in ("plane", None))
+        assert env.terrain.is_plane == (terrain in ("plane", None))
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_evaluation_env_ignores_the_map_of_a_flat_run(make_run, map_file):
     (run.folder / "map.toml").unlink()
     map_file.write_text("gone")
     env, _ = make_eval_env(run, EvaluationConfig(num_envs=1))
-    assert env.terrain.is_flat
+    assert env.terrain.is_plane
 
 
 def test_evaluate_requires_a_checkpoint(make_run):

@@ -106,12 +106,12 @@ class TestHeading:
         np.testing.assert_allclose(wrap_to_pi(heading - yaw), 0, atol=1e-3)
 
     @pytest.mark.parametrize(
-        ("setting", "is_flat", "expected"),
+        ("setting", "is_plane", "expected"),
         [(None, True, False), (None, False, True), (True, True, True), (False, False, False)],
     )
-    def test_heading_is_commanded_on_uneven_ground(self, random_env, setting, is_flat, expected):
+    def test_heading_is_commanded_on_uneven_ground(self, random_env, setting, is_plane, expected):
         ground = Plane()
-        ground.is_flat = is_flat
+        ground.is_plane = is_plane
         env = random_env(ground=ground, commands=Commands(heading_command=setting, standing=0.0))
         before = env.commands[:, 2].copy()
         yaw = quat_to_yaw(env.state.base_quat) + np.float32(0.5)

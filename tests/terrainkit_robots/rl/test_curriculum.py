@@ -16,7 +16,7 @@ from terrainkit_robots.rl.terrain import Plane
 class Patches(Plane):
     """A plane that is divided into patches of 8 m."""
 
-    is_flat = False
+    is_plane = False
 
     def __init__(self, rows=10, names=("flat", "rough")):
         self.spawns = np.zeros((rows, len(names), 1, 4), np.float32)

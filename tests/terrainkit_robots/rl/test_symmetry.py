@@ -22,7 +22,7 @@ _PAIRS = 4
 class Valley(Plane):
     """A plane whose height scan sees a valley along x, symmetric about y = 0."""
 
-    is_flat = False
+    is_plane = False
 
     def height(self, x, y, *_, **__):
         return (0.3 * np.abs(y) + 0.1 * np.sin(3 * x)).astype(np.float32)

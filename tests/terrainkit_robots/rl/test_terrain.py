@@ -58,7 +58,7 @@ class TestPlane:
     def test_plane_is_flat_and_infinite(self):
         xy = np.float32([[0, 0], [1e4, -1e4]])
         assert (Plane().height(xy[:, 0], xy[:, 1]) == 0).all()
-        assert Plane().is_flat
+        assert Plane().is_plane
         np.testing.assert_allclose(rays(compiled(Plane()), xy[:1]), [0], atol=1e-9)
         assert Plane().env_origins.shape == (1, 1, 3)
 
@@ -114,7 +114,7 @@ class TestMapTerrain:
         assert ground.patch_length == 6.0
         np.testing.assert_allclose(ground.lower, (-1.2, -1.2))
         np.testing.assert_allclose(ground.upper, (3 * 6 + 1.2, 2 * 4 + 1.2))
-        assert not ground.is_flat
+        assert not ground.is_plane
 
     def test_terrain_names_of_randomized_map(self):
         choices = tuple(SubTerrain(terrain=name) for name in ("flat", "stairs"))
