@@ -32,6 +32,11 @@ OptionalFlag = Annotated[bool, option("")]
 """A flag whose default is None: a settings file may state the value."""
 
 
+def is_map(path: str | Path) -> bool:
+    """Return whether a path is that of a map: its suffix is .npz in any case."""
+    return Path(path).suffix.lower() == ".npz"
+
+
 def find_robot(name: str) -> Path:
     """Return the path of a robot file, or of a bundled robot.
 

@@ -9,7 +9,14 @@ from msgspec import Meta
 
 from terrainkit.errors import ConfigError
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import Checkpoint, Device, OutputPath, RobotName, TerrainName
+from terrainkit_cli.argument_types import (
+    Checkpoint,
+    Device,
+    OutputPath,
+    RobotName,
+    TerrainName,
+    is_map,
+)
 from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
@@ -198,7 +205,7 @@ class Evaluate(PolicyCommand):
         targets = report_card.targets(self.output, is_card=bool(self.suite)) if self.output else []
         for target in targets:
             check_target(target, overwrite=self.overwrite)
-        if self.suite and not report_card.is_map(self.suite):
+        if self.suite and not is_map(self.suite):
             get_suite(self.suite)  # an unknown name is reported before the run is loaded
         spec, config = self.load_spec(), self.eval_config(self.seconds)
         if self.suite:

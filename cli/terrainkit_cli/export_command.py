@@ -10,7 +10,7 @@ from terrainkit.export import export_files
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import Checkpoint, OutputPath
+from terrainkit_cli.argument_types import Checkpoint, OutputPath, is_map
 from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import Command, option, positional
 
@@ -144,7 +144,7 @@ def is_run(source: str) -> bool:
     """
     path = Path(source)
     try:
-        if path.suffix == ".npz":
+        if is_map(path):
             return False
         if path.is_dir() or path.suffix == ".pt":
             return True

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ConfigError
 from terrainkit.map.config import MapConfig
-from terrainkit.map.layout import terrain_columns
+from terrainkit.map.layout import column_types
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import Limits, MapFile, OutputPath, RobotName, parse_pairs
@@ -136,7 +136,7 @@ def solve_demand(
     if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
         raise ConfigError(f"--demand: got {demand!r}; expected LOW:HIGH, such as 0.2:0.9")
     derived = robot_limits(robot, limits)
-    terrains, columns = config.sub_terrains, terrain_columns(config)
+    terrains, columns = config.sub_terrains, column_types(config)
     if config.mode != "randomized":  # sub-terrains of a preset without a column are not solved
         terrains = tuple(terrains[k] for k in dict.fromkeys(columns))
     config = replace(config, terrains=terrains)

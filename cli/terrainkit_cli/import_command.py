@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from terrainkit.importing.options import ImportOptions
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import OutputPath
+from terrainkit_cli.argument_types import OutputPath, is_map
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import positional
@@ -50,7 +50,7 @@ class Import(ConfigCommand):
         render.result(written(imported.terrain_map, *files))
         for line in _report_lines(imported.report, has_solids=options.solids):
             render.result(line)
-        if self.output.suffix == ".npz":
+        if is_map(self.output):
             path = quote(str(self.output))
             render.result(f"next: terrainkit preview {path} -o preview.png  (render it)")
         return 0

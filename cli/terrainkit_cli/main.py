@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 COMMAND_GROUPS = {
     "Terrain": {
-        "generate": "terrain_commands",
+        "generate": "generate_command",
         "import": "import_command",
         "list": "terrain_commands",
         "suite": "suite_command",
@@ -141,7 +141,7 @@ def _print_overview() -> None:
 
 
 def command(name: str) -> "type[Command]":
-    """Return the class of the command `name`."""
+    """Return the class of the command `name`: `check-map` is the class `CheckMap` of its module."""
     module = importlib.import_module(f"terrainkit_cli.{COMMANDS[name]}")
     found: type[Command] = getattr(module, name.title().replace("-", ""))
     return found

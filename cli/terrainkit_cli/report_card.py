@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit_cli import render
+from terrainkit_cli.argument_types import is_map
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import EvaluationConfig
@@ -12,11 +13,6 @@ if TYPE_CHECKING:
 
 CARD_SUFFIXES = (".json", ".md", ".png")
 """Files of a report card."""
-
-
-def is_map(suite: str) -> bool:
-    """Return whether the value of --suite is a map, not the name of a suite."""
-    return Path(suite).suffix == ".npz"
 
 
 def report_suite(

@@ -20,6 +20,7 @@ from terrainkit_cli.argument_types import (
     Packages,
     TerrainName,
     XacroArguments,
+    is_map,
     parse_settings,
 )
 from terrainkit_cli.parse import Command, positional
@@ -187,7 +188,7 @@ def source_kind(source: str, *, policy: bool = False) -> Kind:
 
     path = Path(source)
     try:
-        if path.suffix == ".npz":
+        if is_map(path):
             return "map"
         if policy or (path / RUN_FILE).is_file() or path.suffix == ".pt":
             return "run"

@@ -22,13 +22,6 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 
-def export(
-    terrain_map: "TerrainMap", path: str | Path, *, overwrite: bool = False, **options: Any
-) -> Path:
-    """Write `terrain_map` to `path`, and return `path`; see :func:`export_files`."""
-    return export_files(terrain_map, path, overwrite=overwrite, **options)[0]
-
-
 def export_files(
     terrain_map: "TerrainMap", path: str | Path, *, overwrite: bool = False, **options: Any
 ) -> tuple[Path, ...]:
@@ -58,7 +51,7 @@ def export_files(
 
 
 def check_export(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
-    """Raise the errors that :func:`export` would raise for a map of `samples` samples."""
+    """Raise the errors that are known before the map is generated: suffix, target, memory."""
     exporter = get_exporter(Path(path))
     check_target(Path(path), overwrite=overwrite)
     check_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")

@@ -39,8 +39,9 @@ SUFFIXES = (".xml",)
 
 Collision = Literal["auto", "hfield", "boxes"]
 
-_QUANTUM = 1e-4
-"""Height of one unit of the elevation data [m]; integers are short to write and to parse."""
+_ELEVATION_UNIT = 1e-4
+"""Height of one unit of the elevation data [m]; integers are short to write and to parse. MuJoCo
+rescales the data to [0, 1], and the third value of `size` is the range in meters."""
 
 BYTES_PER_SAMPLE = 100
 """Peak memory per sample [bytes]: its elevation as a number and as text."""
@@ -48,7 +49,7 @@ BYTES_PER_SAMPLE = 100
 _ROWS_PER_BAND = 256
 """Samples along x that are searched for slopes at a time."""
 
-_RINGS = 2
+_MARGIN = 2
 """Samples around the patches that belong to the heightfield. The ground of the border's first cell
 slopes toward the patch, so the heightfield has to extend beyond that cell."""
 
@@ -57,7 +58,8 @@ _HFIELD_LENGTH = 16.0
 MuJoCo's bounding volume hierarchy."""
 
 _Part = tuple[slice, slice]
-"""A rectangle of samples, counted on the map with `_RINGS` more samples on each side."""
+"""A rectangle of samples, counted on the map with `_MARGIN` more samples on each side: sample i of
+the map is i + _MARGIN here."""
 
 MAX_BOXES = 100
 """Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
@@ -90,29 +92,30 @@ def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -
     collision = convert("collision", collision, Collision)
     samples = terrain_map.heights.size
     check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
-    cover = collision_boxes(terrain_map, collision)
-    root = ET.Element("mujoco", model="terrain")
-    _add_default_class(root, terrain_map)
+    decomposition = collision_boxes(terrain_map, collision)
+    root = ET.Element("mujoco")
+    _add_contact_settings(root, terrain_map)
     asset = ET.SubElement(root, "asset")
     world = ET.SubElement(root, "worldbody")
     heights, static = terrain_map.heights, float(terrain_map.config.static_friction)
-    if cover is None:
+    if decomposition is None:
         height = _border_height(terrain_map)
         if height is None:
-            x, y = (n + 2 * _RINGS for n in heights.shape)
+            x, y = (n + 2 * _MARGIN for n in heights.shape)
             parts = [(slice(0, x), slice(0, y))]
         else:
             parts = [_patches_part(terrain_map)]
             for box in _border_boxes(terrain_map, height):
                 _add_box(world, *box)
     else:
-        heights = without_boxes(heights, cover)
-        parts = _uncovered_parts(terrain_map, cover)
-        boxes = zip(cover.centers, cover.half_sizes, cover.friction, strict=True)
-        for center, half_size, friction in boxes:
+        heights = without_boxes(heights, decomposition)
+        parts = _uncovered_parts(terrain_map, decomposition)
+        for center, half_size, friction in zip(
+            decomposition.centers, decomposition.half_sizes, decomposition.friction, strict=True
+        ):
             _set_friction(_add_box(world, center, half_size), friction, static)
     split = [each for part in parts for each in _split_by_friction(terrain_map, part)]
-    is_single = cover is None and len(split) == 1
+    is_single = decomposition is None and len(split) == 1
     hfields = {"terrain" if is_single else f"terrain_{k}": each for k, each in enumerate(split)}
     for name, (part, friction) in hfields.items():
         geom = _add_hfield_geom(world, name, terrain_map.grid, heights, part)
@@ -137,10 +140,11 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
     if collision == "auto":
         if not _is_flat(terrain_map):
             return None
-        cover = terrain_map.boxes()
+        decomposition = terrain_map.boxes()
         num_hfields = len(_split_by_friction(terrain_map, _patches_part(terrain_map)))
         # Of two geoms of either kind, a box was measured to be faster than a heightfield.
-        return cover if len(cover.centers) <= max(MAX_BOXES, 2 * num_hfields) else None
+        max_boxes = max(MAX_BOXES, 2 * num_hfields)
+        return decomposition if len(decomposition.centers) <= max_boxes else None
     return terrain_map.boxes()
 
 
@@ -157,7 +161,8 @@ def _is_flat(terrain_map: "TerrainMap") -> bool:
     return True
 
 
-def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
+def _add_contact_settings(root: ET.Element, terrain_map: "TerrainMap") -> None:
+    """Add the friction and restitution of the ground, and the default class of all geoms."""
     config = terrain_map.config
     # MuJoCo has one sliding friction and no restitution; keep the values for other readers.
     custom = ET.SubElement(root, "custom")
@@ -185,31 +190,31 @@ def _add_default_class(root: ET.Element, terrain_map: "TerrainMap") -> None:
     )
 
 
-def _patch_edges(terrain_map: "TerrainMap") -> list[NDArray[np.int64]]:
+def _part_edges(terrain_map: "TerrainMap") -> list[NDArray[np.int64]]:
     """Return the samples where patches begin and end, counted as in `_Part`.
 
-    The first and the last patch include `_RINGS` samples of the border.
+    The first and the last patch include `_MARGIN` samples of the border.
     """
-    edges = [each + _RINGS for each in terrain_map.config.patch_edges]
+    edges = [each + _MARGIN for each in terrain_map.config.patch_edges]
     for each in edges:
-        each[0] -= _RINGS
-        each[-1] += _RINGS
+        each[0] -= _MARGIN
+        each[-1] += _MARGIN
     return edges
 
 
 def _patches_part(terrain_map: "TerrainMap") -> _Part:
     """Return the rectangle of all patches."""
-    x, y = _patch_edges(terrain_map)
+    x, y = _part_edges(terrain_map)
     return slice(x[0], x[-1]), slice(y[0], y[-1])
 
 
-def _uncovered_parts(terrain_map: "TerrainMap", cover: BoxDecomposition) -> list[_Part]:
+def _uncovered_parts(terrain_map: "TerrainMap", decomposition: BoxDecomposition) -> list[_Part]:
     """Return rectangles of samples around the patches that have cells without boxes.
 
     A heightfield costs time wherever a robot is above it, even if its ground there is far below.
     """
-    edges_x, edges_y = _patch_edges(terrain_map)
-    uncovered = np.pad(~cover.covered, _RINGS, mode="edge")[: edges_x[-1], : edges_y[-1]]
+    edges_x, edges_y = _part_edges(terrain_map)
+    uncovered = np.pad(~decomposition.covered, _MARGIN, mode="edge")[: edges_x[-1], : edges_y[-1]]
     patches = np.logical_or.reduceat(uncovered, edges_x[:-1], axis=0)
     patches = np.logical_or.reduceat(patches, edges_y[:-1], axis=1)
     row, col = np.nonzero(patches)
@@ -240,7 +245,7 @@ def _divide(part: _Part, max_length: float) -> list[_Part]:
 def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:
     """Return the samples of a part that are on the map, counted on the map."""
     x, y = (
-        slice(max(each.start - _RINGS, 0), min(each.stop - _RINGS, size))
+        slice(max(each.start - _MARGIN, 0), min(each.stop - _MARGIN, size))
         for each, size in zip(part, shape, strict=True)
     )
     return x, y
@@ -257,7 +262,7 @@ def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Pa
     values = friction[x[i], y[j]]
     for edges, samples in zip((x, y), part, strict=True):
         # The samples beyond the map have the friction of its edge.
-        edges[1:-1] += max(_RINGS - samples.start, 0)
+        edges[1:-1] += max(_MARGIN - samples.start, 0)
         edges[-1] = samples.stop - samples.start
     merged = merge_boxes(np.column_stack([values, x[i], x[i + 1], y[j], y[j + 1]]))
     first, last = ([each.start for each in part], [each.stop for each in part])
@@ -285,7 +290,7 @@ def _add_hfield_geom(
 ) -> ET.Element:
     """Add the geom of the heightfield of a part."""
     low = heights[_on_map(part, heights.shape)].min()
-    middle = [((each.start + each.stop) / 2 - _RINGS) * grid.cell for each in part]
+    middle = [((each.start + each.stop) / 2 - _MARGIN) * grid.cell for each in part]
     position = format_numbers(*np.add(grid.lower, middle), low)
     about = {"class": "terrain", "type": "hfield", "hfield": name, "pos": position}
     return ET.SubElement(world, "geom", about)
@@ -297,24 +302,26 @@ def _write_hfield(
     """Write the heightfield of a part, row by row; the first row is that of the largest y."""
     samples = heights[_on_map(part, heights.shape)]
     low = float(samples.min())
-    span = max(int(_levels(samples.max(), low)), 1) * _QUANTUM  # MuJoCo requires a range above 0
+    units = max(int(_elevation_units(samples.max(), low)), 1)  # MuJoCo requires a range above 0
     # Samples beyond the map, where there is no border, have the height of its edge.
     x, y = (
-        np.clip(np.arange(each.start, each.stop) - _RINGS, 0, size - 1)
+        np.clip(np.arange(each.start, each.stop) - _MARGIN, 0, size - 1)
         for each, size in zip(part, heights.shape, strict=True)
     )
     # MuJoCo's rows are along y, its columns along x.
-    size = format_numbers((len(x) - 1) * cell / 2, (len(y) - 1) * cell / 2, span, THICKNESS)
+    size = format_numbers(
+        (len(x) - 1) * cell / 2, (len(y) - 1) * cell / 2, units * _ELEVATION_UNIT, THICKNESS
+    )
     file.write(f'    <hfield name="{name}" nrow="{len(y)}" ncol="{len(x)}" size="{size}"')
     file.write(' elevation="')
     for j in y[::-1].tolist():
-        file.write(" ".join(map(str, _levels(heights[x, j], low).tolist())) + "\n")
+        file.write(" ".join(map(str, _elevation_units(heights[x, j], low).tolist())) + "\n")
     file.write('"/>\n')
 
 
-def _levels(heights: Any, low: float) -> NDArray[np.int32]:
-    """Return the heights above `low` in units of `_QUANTUM`."""
-    return np.asarray(np.rint((heights - low) / _QUANTUM), dtype=np.int32)
+def _elevation_units(heights: Any, low: float) -> NDArray[np.int32]:
+    """Return the heights above `low` in units of `_ELEVATION_UNIT`."""
+    return np.asarray(np.rint((heights - low) / _ELEVATION_UNIT), dtype=np.int32)
 
 
 def _border_height(terrain_map: "TerrainMap") -> float | None:
@@ -333,7 +340,7 @@ def _border_boxes(
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Return the centers and half sizes of the boxes around the heightfield."""
     grid, config = terrain_map.grid, terrain_map.config
-    margin = config.border - (_RINGS - 0.5) * config.cell  # a heightfield ends at a sample
+    margin = config.border - (_MARGIN - 0.5) * config.cell  # a heightfield ends at a sample
     if margin <= 0:
         return []
     bottom = float(terrain_map.heights.min()) - THICKNESS
@@ -353,10 +360,10 @@ def _border_boxes(
 def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> HeightfieldSurface:
     """Return the surface that MuJoCo collides with."""
     heights, tops = np.ascontiguousarray(terrain_map.heights), None
-    cover = collision_boxes(terrain_map, collision)
-    if cover is not None:
-        tops = np.where(cover.covered, heights, np.float32(-np.inf))
-        heights = without_boxes(heights, cover)
+    decomposition = collision_boxes(terrain_map, collision)
+    if decomposition is not None:
+        tops = np.where(decomposition.covered, heights, np.float32(-np.inf))
+        heights = without_boxes(heights, decomposition)
     solids = terrain_map.solids
     collides, visible = solids.select(solids.collides), solids.select(solids.visible)
     return HeightfieldSurface(
@@ -369,9 +376,11 @@ def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> Height
     )
 
 
-def without_boxes(heights: NDArray[np.float32], cover: BoxDecomposition) -> NDArray[np.float32]:
+def without_boxes(
+    heights: NDArray[np.float32], decomposition: BoxDecomposition
+) -> NDArray[np.float32]:
     """Return the heights, lowered at samples that only affect cells covered by boxes."""
-    lowered = np.logical_and.reduce(neighborhood(cover.covered))
+    lowered = np.logical_and.reduce(neighborhood(decomposition.covered))
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)
 
 

@@ -16,7 +16,7 @@ from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import MAX_HULL_VERTICES, MIN_SIZE, Solids, convex_hull
 from terrainkit.map.config import MapConfig
-from terrainkit.map.patch import Parameters
+from terrainkit.map.patch import PatchParameters
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.parameter import Value
 
@@ -55,7 +55,10 @@ _Map = TypeVar("_Map", bound="TerrainMap")
 
 
 def export(terrain_map: "TerrainMap", path: Path) -> None:
-    """Write the map: heights, trimesh, spawn origins, parameters and config.
+    """Write the map as arrays.
+
+    They are heights, ground friction, trimesh, solids, goals, spawn origins and spawns, terrain
+    types, difficulty, parameters and config.
 
     Args:
         terrain_map: The map.
@@ -95,7 +98,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
         MemoryLimitError: if its arrays would not fit in memory.
     """
     with open_archive(path) as archive:
-        config = _config(archive)
+        config = _read_config(archive)
         size, grid = (config.rows, config.cols), config.grid
         for key, expected in (
             ("cell", config.cell),
@@ -123,7 +126,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             terrain_types=terrain_types,
             terrain_names=tuple(str(name) for name in names),
             difficulty=archive.array("difficulty", "f4", size),
-            parameters=_all_parameters(archive, config, terrain_types),
+            parameters=_read_parameters(archive, config, terrain_types),
             solids=_read_solids(archive, size),
             goals=_read_poses(archive, "goals", size, MAX_GOALS),
         )
@@ -137,7 +140,8 @@ def read_mesh(path: str | Path) -> TriMesh:
         MemoryLimitError: if its arrays would not fit in memory.
     """
     with open_archive(path) as archive:
-        limit = MAX_FACES_PER_SAMPLE * 12 * math.prod(n + 2 for n in _config(archive).grid.shape)
+        shape = _read_config(archive).grid.shape
+        limit = MAX_FACES_PER_SAMPLE * 12 * math.prod(n + 2 for n in shape)
         vertices = archive.array("vertices", "f4", (None, 3), limit=limit)
         triangles = archive.array("triangles", "i4", (None, 3), limit=limit)
     if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
@@ -147,7 +151,7 @@ def read_mesh(path: str | Path) -> TriMesh:
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
-def _config(archive: Archive) -> MapConfig:
+def _read_config(archive: Archive) -> MapConfig:
     """Return the config of the map, after checking the format version."""
     if "format_version" not in archive.names():
         raise MapFileError(f"{archive.path}: not a terrainkit map; format_version is missing")
@@ -225,7 +229,11 @@ def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
 
 
 def _read_spawns(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
-    """Return the spawn positions, of which the first of each patch is its origin."""
+    """Return the spawn positions, of which the first of each patch is its origin.
+
+    A file has the origins twice. `env_origins`, which other programs read, replaces the first
+    spawns, so that the two cannot differ.
+    """
     size = (config.rows, config.cols)
     origins = archive.array("env_origins", "f4", (*size, 3))
     spawns = _read_poses(archive, "spawns", size, math.prod(config.patch_shape))
@@ -236,10 +244,10 @@ def _read_spawns(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
 
 
 def _read_poses(
-    archive: Archive, key: str, size: tuple[int, int], most: int
+    archive: Archive, key: str, size: tuple[int, int], max_poses: int
 ) -> NDArray[np.float32]:
-    """Return the poses (x, y, z, heading) of each patch, at most `most`, padded with NaN."""
-    limit = math.prod(size) * most * 16
+    """Return the poses (x, y, z, heading) of each patch, at most `max_poses`, padded with NaN."""
+    limit = math.prod(size) * max_poses * 16
     poses = archive.array(key, "f4", (*size, None, 4), limit=limit)
     is_padding = np.isnan(poses).all(axis=-1)
     if not (is_padding | (np.abs(poses) <= MAX_VALUE).all(axis=-1)).all():
@@ -250,11 +258,11 @@ def _read_poses(
 
 
 def _parameters_text(terrain_map: "TerrainMap") -> str:
-    rows = [[dataclasses.asdict(patch) for patch in row] for row in terrain_map.parameters]
+    rows = [[dataclasses.asdict(record) for record in row] for row in terrain_map.parameters]
     return json.dumps(rows, separators=(",", ":"))
 
 
-def _all_parameters(
+def _read_parameters(
     archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
@@ -264,27 +272,27 @@ def _all_parameters(
             archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
         )
         for row, col in np.ndindex(table.shape):
-            table[row, col] = _parameters(rows[row][col], names[terrain_types[row, col]])
+            table[row, col] = _to_parameters(rows[row][col], names[terrain_types[row, col]])
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise MapFileError(f"{archive.path}: parameters cannot be read: {error}") from error
     return table
 
 
-def _parameters(record: Mapping[str, Mapping[str, Any]], names: set[str]) -> Parameters:
-    requested = {name: _value(value) for name, value in record["requested"].items()}
-    realized = {name: _value(value) for name, value in record["realized"].items()}
+def _to_parameters(record: Mapping[str, Mapping[str, Any]], names: set[str]) -> PatchParameters:
+    requested = {name: _to_value(value) for name, value in record["requested"].items()}
+    realized = {name: _to_value(value) for name, value in record["realized"].items()}
     if not requested.keys() == realized.keys() == names:
         raise ValueError(f"expected {listing(sorted(names))}, requested and realized")
-    return Parameters(requested=requested, realized=realized)
+    return PatchParameters(requested=requested, realized=realized)
 
 
-def _value(value: Any) -> Value:
+def _to_value(value: Any) -> Value:
     if isinstance(value, list):
-        return tuple(_number(each) for each in value)
-    return value if isinstance(value, str) else _number(value)
+        return tuple(_to_number(each) for each in value)
+    return value if isinstance(value, str) else _to_number(value)
 
 
-def _number(value: Any) -> float:
+def _to_number(value: Any) -> float:
     if not isinstance(value, int | float) or not abs(value) <= MAX_VALUE:
         raise ValueError("expected numbers in range")
     return value

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain.parameter import Realized
+from terrainkit.terrain.parameter import Value
 
 STEP = 0.005
 """Default step of the heights [m], the vertical scale of Isaac Gym."""
@@ -44,7 +44,7 @@ class ValueNoise:
         along_y = _interpolate(np.ascontiguousarray(along_x.T), grid.shape[1])
         return np.ascontiguousarray(along_y.T)
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return amplitude and spacing as realized on `grid`."""
         counts = zip(grid.size, self._intervals(grid), strict=True)
         x, y = (round(extent / count, 9) for extent, count in counts)

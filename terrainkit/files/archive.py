@@ -31,18 +31,19 @@ def write_arrays(path: Path, arrays: Mapping[str, Any]) -> None:
     """
     with zipfile.ZipFile(path, "w", allowZip64=True) as file:
         for name, array in arrays.items():
+            # Opened by name, a member has the date 1980-01-01: equal maps have equal bytes.
             with file.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
 
 
 @contextmanager
-def open_archive(name: str | Path) -> Iterator["Archive"]:
-    """Open the .npz file `name`.
+def open_archive(path: str | Path) -> Iterator["Archive"]:
+    """Open the .npz file `path`.
 
     Raises:
         MapFileError: if the file is missing, truncated, or not an .npz file.
     """
-    path = Path(name)
+    path = Path(path)
     try:
         # Reading a FIFO would block, and a device may not end.
         if path.exists() and not path.is_file():

@@ -48,11 +48,6 @@ class BoxDecomposition:
     covered: NDArray[np.bool_]
     """Whether the whole cell is the top of a box, shape (nx, ny). The others need a heightfield."""
 
-    @property
-    def complete(self) -> bool:
-        """Whether the boxes cover all of the ground."""
-        return bool(self.covered.all())
-
 
 def decompose_boxes(
     heights: NDArray[np.float32],

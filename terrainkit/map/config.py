@@ -18,7 +18,7 @@ from terrainkit.terrain import presets
 from terrainkit.terrain.sub_terrain import SubTerrain
 
 if TYPE_CHECKING:
-    from terrainkit.map.spawn import Disk
+    from terrainkit.map.spawn import SpawnDisk
 
 MAX_CELLS = 10**6
 """Largest number of cells along a side of a map; memory would not hold more."""
@@ -178,11 +178,11 @@ class MapConfig(Config):
         return Grid(shape=shape, cell=self.cell, lower=lower)
 
     @cached_property
-    def spawn_disk(self) -> "Disk":
+    def spawn_disk(self) -> "SpawnDisk":
         """The free place that a robot needs."""
-        from terrainkit.map.spawn import Disk
+        from terrainkit.map.spawn import SpawnDisk
 
-        return Disk(
+        return SpawnDisk(
             radius=self.spawn_radius,
             tolerance=self.spawn_tolerance,
             headroom=self.spawn_headroom,

@@ -15,7 +15,7 @@ from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
-from terrainkit.map.layout import assign_patch, terrain_columns
+from terrainkit.map.layout import column_types, terrain_and_difficulty
 from terrainkit.map.patch import Patch, build_patch
 from terrainkit.map.seams import Seams, cliffs_text
 from terrainkit.map.terrain_map import TerrainMap
@@ -67,10 +67,11 @@ def generate(
     )
     builder = _MapBuilder(config)
     indices = itertools.product(range(config.rows), range(config.cols))
-    with closing(_build_patches(config, terrain_columns(config), executor)) as patches:
-        for row, col in progress(indices, config.rows * config.cols) if progress else indices:
-            builder.add(row, col, *next(patches))
-    _warn(config, builder.deviations, +builder.moved_spawns)
+    places = progress(indices, config.rows * config.cols) if progress else indices
+    with closing(_build_patches(config, column_types(config), executor)) as patches:
+        for (row, col), (terrain_type, patch) in zip(places, patches, strict=True):
+            builder.add(row, col, terrain_type, patch)
+    _warn_about_patches(config, builder.deviations, builder.moved_spawns)
     terrain_map = builder.build()
     _warn_about_map(terrain_map)
     return terrain_map
@@ -116,7 +117,8 @@ class _MapBuilder:
         self._spawns[row, col], self._goals[row, col] = patch.spawns, patch.goals
         self._solids.append(patch.solids)
         self.deviations.update(_deviations(patch, sub_terrain, config.cell))
-        self.moved_spawns[sub_terrain.name] += patch.spawn_offset > config.cell
+        if patch.spawn_offset > config.cell:
+            self.moved_spawns[sub_terrain.name] += 1
 
     def build(self) -> TerrainMap:
         """Return the map of all patches."""
@@ -157,8 +159,8 @@ def _build_task(
     """Return terrain type and patch of each (row, col) in `indices`."""
     patches = []
     for row, col in indices:
-        terrain_type, level = assign_patch(config, columns, row, col)
-        patch = build_patch(config, config.sub_terrains[terrain_type], level, row, col)
+        terrain_type, difficulty = terrain_and_difficulty(config, columns, row, col)
+        patch = build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
         patches.append((terrain_type, patch))
     return patches
 
@@ -185,7 +187,9 @@ def _deviations(patch: Patch, sub_terrain: SubTerrain, cell: float) -> list[str]
     ]
 
 
-def _warn(config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str]) -> None:
+def _warn_about_patches(
+    config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str]
+) -> None:
     if deviations:
         names = listing(f"{name} on {count} patches" for name, count in deviations.items())
         warnings.warn(
@@ -225,10 +229,10 @@ def _warn_about_map(terrain_map: TerrainMap) -> None:
 def _collapsed_ranges(terrain_map: TerrainMap) -> Iterator[str]:
     """Yield the parameters that have several requested values but only one realized value."""
     for terrain_type, sub_terrain in enumerate(terrain_map.config.sub_terrains):
-        patches = terrain_map.parameters[terrain_map.terrain_types == terrain_type].tolist()
-        for name in patches[0].requested if patches else ():
-            requested = {patch.requested[name] for patch in patches}
-            realized = {patch.realized[name] for patch in patches}
+        records = terrain_map.parameters[terrain_map.terrain_types == terrain_type].tolist()
+        for name in records[0].requested if records else ():
+            requested = {record.requested[name] for record in records}
+            realized = {record.realized[name] for record in records}
             if len(requested) > 1 and len(realized) == 1:
                 yield (
                     f"{sub_terrain.name}.{name} from {min(requested):g} to {max(requested):g} is "

@@ -21,7 +21,7 @@ from terrainkit.map.config import MapConfig
 from terrainkit.map.edit import assign_solids, place_patch_spawns
 from terrainkit.map.generation import pad_poses
 from terrainkit.map.measured_difficulty import measured_difficulty
-from terrainkit.map.patch import Parameters
+from terrainkit.map.patch import PatchParameters
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.parameter import MAX_TEXT_LENGTH
@@ -249,7 +249,7 @@ def _make_map(
         center = np.array([[*spawn_xy[row, col], 0.0, 0.0]], dtype=np.float32)
         spawns[row, col] = place_patch_spawns(config, heights, solids, row, col, center, _NO_GOALS)
         record = records[terrain_types[row, col]]
-        parameters[row, col] = Parameters(requested=record, realized=record)
+        parameters[row, col] = PatchParameters(requested=record, realized=record)
         (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
         start = float(spawns[row, col][0, 2])
         measured[row, col] = measured_difficulty(

@@ -1,4 +1,4 @@
-"""The terrain type and the difficulty of each patch."""
+"""The terrain type, the difficulty and the random numbers of each patch."""
 
 import warnings
 from typing import Any
@@ -9,12 +9,24 @@ from terrainkit.errors import ConfigError, TerrainkitWarning, listing
 from terrainkit.map.config import MapConfig
 from terrainkit.terrain import Terrain
 
-_LAYOUT_STREAM = (1,)
-"""Spawn key that separates the layout's random numbers from those of the terrain on the patch."""
+# The streams of random numbers of a patch are children of the seed sequence [seed, row, col], which
+# itself is for the heights. Changing a number changes the bytes of maps.
+SOLIDS_STREAM = 0
+"""Child for solids and goals."""
 
-_COLUMN_STREAM = (2,)
-"""Spawn key of the random numbers of a column. Without it, [seed, col] would equal [seed, col, 0].
-"""
+SPAWNS_STREAM = 1
+"""Child for the spawn positions."""
+
+OVERLAYS_STREAM = 2
+"""Child for the first overlay; the next ones follow."""
+
+_LAYOUT_KEY = (1,)
+"""Spawn key for the terrain type and the difficulty of a patch. It separates them from the heights,
+but is the stream of the spawn positions of the same patch, `SPAWNS_STREAM`."""
+
+_COLUMN_KEY = (2,)
+"""Spawn key of the random numbers of a column, since [seed, col] alone equals [seed, col, 0]. The
+stream is that of the first overlay on patch (col, 0), `OVERLAYS_STREAM`."""
 
 
 def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
@@ -37,7 +49,7 @@ def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
     return [int(n) for n in counts]
 
 
-def terrain_columns(config: MapConfig) -> list[int]:
+def column_types(config: MapConfig) -> list[int]:
     """Return the terrain type of each column as an index into `config.sub_terrains`.
 
     Warns:
@@ -66,12 +78,14 @@ def terrain_columns(config: MapConfig) -> list[int]:
     return [k for k, n in enumerate(counts) for _ in range(n)]
 
 
-def assign_patch(config: MapConfig, columns: list[int], row: int, col: int) -> tuple[int, float]:
+def terrain_and_difficulty(
+    config: MapConfig, columns: list[int], row: int, col: int
+) -> tuple[int, float]:
     """Return the terrain type and the difficulty of patch (row, col).
 
     Args:
         config: The configuration of the map.
-        columns: Result of :func:`terrain_columns` for `config`.
+        columns: Result of :func:`column_types` for `config`.
         row: Index along x.
         col: Index along y.
 
@@ -98,7 +112,7 @@ def patch_rng(config: MapConfig, terrain: Terrain, row: int, col: int) -> "np.ra
     words: Any = [config.seed, col] if is_column else [config.seed, row, col]
     if config.seed < 2**32:
         words = np.array(words, dtype=np.uint32)  # takes half as long to convert
-    seed = np.random.SeedSequence(words, spawn_key=_COLUMN_STREAM if is_column else ())
+    seed = np.random.SeedSequence(words, spawn_key=_COLUMN_KEY if is_column else ())
     return np.random.default_rng(seed)
 
 
@@ -114,5 +128,5 @@ def _row_difficulty(config: MapConfig, row: int, col: int) -> float:
 
 
 def _layout_rng(config: MapConfig, row: int, col: int) -> "np.random.Generator":
-    entropy = np.random.SeedSequence([config.seed, row, col], spawn_key=_LAYOUT_STREAM)
+    entropy = np.random.SeedSequence([config.seed, row, col], spawn_key=_LAYOUT_KEY)
     return np.random.default_rng(entropy)

@@ -13,12 +13,19 @@ from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
-from terrainkit.map.layout import assign_patch, patch_rng, terrain_columns
+from terrainkit.map.layout import (
+    OVERLAYS_STREAM,
+    SOLIDS_STREAM,
+    SPAWNS_STREAM,
+    column_types,
+    patch_rng,
+    terrain_and_difficulty,
+)
 from terrainkit.map.spawn import find_spawn, sample_spawns
 from terrainkit.terrain import Terrain
 from terrainkit.terrain.overlay import Overlay
-from terrainkit.terrain.parameter import Realized, Value
-from terrainkit.terrain.patch_geometry import PatchGeometry, uniform_friction
+from terrainkit.terrain.parameter import Value
+from terrainkit.terrain.patch_geometry import PatchGeometry, checked_heights, uniform_friction
 from terrainkit.terrain.sub_terrain import SubTerrain, overlay_path
 
 EDGE_TOLERANCE = 1e-3
@@ -26,13 +33,13 @@ EDGE_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters:
+class PatchParameters:
     """The parameters of a patch."""
 
     requested: Mapping[str, Value]
     """Values at the difficulty of the patch, by name."""
 
-    realized: Mapping[str, Realized]
+    realized: Mapping[str, Value]
     """Values after snapping to the cells, by name; (x, y) where the two axes differ."""
 
 
@@ -41,12 +48,12 @@ class Patch:
     """One patch of a map, in the frame of the map."""
 
     terrain: str
-    """Name of the sub-terrain."""
+    """Name of the sub-terrain, which may differ from the name of its terrain."""
 
     difficulty: float
     """Difficulty, 0 to 1."""
 
-    parameters: Parameters
+    parameters: PatchParameters
     """Requested and realized parameters."""
 
     grid: Grid
@@ -95,7 +102,7 @@ def make_patch(config: MapConfig, row: int, col: int) -> Patch:
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
     """
     config.check_patch(row, col)
-    terrain_type, difficulty = assign_patch(config, terrain_columns(config), row, col)
+    terrain_type, difficulty = terrain_and_difficulty(config, column_types(config), row, col)
     return build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
 
 
@@ -122,8 +129,10 @@ def build_patch(
     if overlays:
         geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
     heights, position = geometry.heights, geometry.spawn
-    solids, goals = _finish(config, name, geometry, (row, col))
-    spawns = place_spawns(config, name, grid, heights, solids, position, partial(child_rng, 1))
+    solids = _place_solids(name, geometry, (row, col))
+    goals = _place_goals(config, name, geometry)
+    spawns_rng = partial(child_rng, SPAWNS_STREAM)
+    spawns = place_spawns(config, name, grid, heights, solids, position, spawns_rng)
     x, y, _ = spawns[0].tolist()
     requested, realized = terrain.requested(), terrain.realized(grid)
     for k, overlay in enumerate(overlays):
@@ -132,7 +141,7 @@ def build_patch(
     return Patch(
         terrain=name,
         difficulty=difficulty,
-        parameters=Parameters(requested=requested, realized=realized),
+        parameters=PatchParameters(requested=requested, realized=realized),
         grid=grid,
         heights=heights,
         friction=geometry.friction,
@@ -144,14 +153,14 @@ def build_patch(
 
 
 def _child_rng(
-    config: MapConfig, terrain: Terrain, row: int, col: int, number: int
+    config: MapConfig, terrain: Terrain, row: int, col: int, stream: int
 ) -> "np.random.Generator":
     """Return a child of the generator of a patch, in its initial state.
 
-    Child 0 is for solids and goals, 1 for the spawn positions, and 2 + k for overlay k. The heights
-    of a terrain may use child 0, too, to have the layout of its solids.
+    The streams are numbered in :mod:`terrainkit.map.layout`. The heights of a terrain may use
+    `SOLIDS_STREAM`, too, to have the layout of its solids.
     """
-    return patch_rng(config, terrain, row, col).spawn(number + 1)[number]
+    return patch_rng(config, terrain, row, col).spawn(stream + 1)[stream]
 
 
 def _terrain_geometry(
@@ -167,9 +176,10 @@ def _terrain_geometry(
     solids, goals = _NO_SOLIDS, _NO_GOALS
     # Solids and goals start with the same random numbers, so that both can sample one layout.
     if type(terrain).solids is not Terrain.solids:
-        solids = terrain.solids(grid, heights, child_rng(0))
+        solids = terrain.solids(grid, heights, child_rng(SOLIDS_STREAM))
     if type(terrain).goals is not Terrain.goals:
-        goals = np.array(terrain.goals(grid, heights, child_rng(0)), dtype=float).reshape(-1, 4)
+        raw = terrain.goals(grid, heights, child_rng(SOLIDS_STREAM))
+        goals = np.array(raw, dtype=float).reshape(-1, 4)
     friction = sub_terrain.friction_at(difficulty)
     if friction is not None:
         own = np.where(np.isnan(solids.friction), friction, solids.friction).astype(np.float32)
@@ -202,13 +212,10 @@ def _apply_overlays(
     x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, position)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
     for k, overlay in enumerate(overlays):
-        geometry = overlay.apply(geometry, child_rng(2 + k))
-        heights = np.asarray(geometry.heights, dtype=np.float32) + np.float32(0)
-        if heights.shape != grid.shape or not np.isfinite(heights).all():
-            raise ConfigError(
-                f"{overlay.kind()}: apply(): got heights of shape {heights.shape}; expected "
-                f"{grid.shape} with finite values"
-            )
+        geometry = overlay.apply(geometry, child_rng(OVERLAYS_STREAM + k))
+        heights = checked_heights(
+            geometry.heights, grid, f"{overlay.kind()}: apply(): got heights of"
+        )
         geometry = dataclasses.replace(geometry, heights=heights)
     return geometry, max(abs(x - position[0]), abs(y - position[1]))
 
@@ -266,24 +273,32 @@ def _find_origin(
     return origin
 
 
-def _finish(
-    config: MapConfig, name: str, geometry: PatchGeometry, patch: tuple[int, int]
-) -> tuple[Solids, NDArray[np.float32]]:
-    """Return the solids with their patch, and the goals with their heights.
+def _place_solids(name: str, geometry: PatchGeometry, patch: tuple[int, int]) -> Solids:
+    """Return the solids with the row and column of their patch.
 
     Raises:
-        ConfigError: if a solid extends beyond the patch, or a goal is not on it.
+        ConfigError: if a solid extends beyond the patch.
     """
-    grid, solids, goals = geometry.grid, geometry.solids, geometry.goals
-    if len(solids):
-        lower, upper = (corner[:, :2] for corner in solids.bounds())
-        outside = np.maximum(grid.lower - lower, upper - grid.upper).max()
-        if outside > EDGE_TOLERANCE:
-            raise ConfigError(
-                f"{name}: solids(): got a solid {outside:.3f} m beyond its patch; expected solids "
-                "within it"
-            )
-        solids = dataclasses.replace(solids, patch=np.full((len(solids), 2), patch, np.int32))
+    grid, solids = geometry.grid, geometry.solids
+    if not len(solids):
+        return solids
+    lower, upper = (corner[:, :2] for corner in solids.bounds())
+    outside = np.maximum(grid.lower - lower, upper - grid.upper).max()
+    if outside > EDGE_TOLERANCE:
+        raise ConfigError(
+            f"{name}: solids(): got a solid {outside:.3f} m beyond its patch; expected solids "
+            "within it"
+        )
+    return dataclasses.replace(solids, patch=np.full((len(solids), 2), patch, np.int32))
+
+
+def _place_goals(config: MapConfig, name: str, geometry: PatchGeometry) -> NDArray[np.float32]:
+    """Return the goals, with the height of the ground in place of a z of NaN.
+
+    Raises:
+        ConfigError: if a goal is not on the patch.
+    """
+    grid, goals = geometry.grid, geometry.goals.copy()
     if len(goals):
         from terrainkit.geometry.surface import surface_at
 
@@ -291,9 +306,8 @@ def _finish(
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():
             raise ConfigError(f"{name}: goals(): got a goal outside of the patch")
         ground = surface_at(geometry.heights, index, threshold=config.wall_threshold).height
-        goals = goals.copy()
         goals[:, 2] = np.where(np.isnan(goals[:, 2]), ground, goals[:, 2])
-    return solids, goals.astype(np.float32)
+    return goals.astype(np.float32)
 
 
 _NO_SOLIDS = Solids.empty()

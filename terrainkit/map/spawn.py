@@ -14,7 +14,7 @@ from terrainkit.geometry.surface import surface_at
 
 
 @dataclass(frozen=True, kw_only=True)
-class Disk:
+class SpawnDisk:
     """The free place that a robot needs to be spawned."""
 
     radius: float
@@ -31,12 +31,15 @@ def find_spawn(
     heights: NDArray[np.float32],
     grid: Grid,
     position: tuple[float, float],
-    disk: Disk,
+    disk: SpawnDisk,
     *,
     solids: Solids,
     threshold: float,
 ) -> tuple[float, float, float] | None:
     """Return the spawn origin nearest to `position`.
+
+    It is exactly at `position` if the ground there is flat and free, and else at the center of a
+    cell.
 
     All samples that influence the surface within the disk around the origin differ by at most its
     tolerance, and no solid is above the disk within its headroom. The disk is therefore flat, and
@@ -74,7 +77,7 @@ def sample_spawns(
     heights: NDArray[np.float32],
     grid: Grid,
     origin: tuple[float, float, float],
-    disk: Disk,
+    disk: SpawnDisk,
     number: int,
     *,
     solids: Solids,
@@ -121,7 +124,7 @@ def sample_spawns(
 
 
 def _free_disks(
-    heights: NDArray[np.float32], grid: Grid, disk: Disk, solids: Solids
+    heights: NDArray[np.float32], grid: Grid, disk: SpawnDisk, solids: Solids
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the cells with a flat and free disk, shape (n, 2), and their centers, (n, 3)."""
     cells = _flat_cells(heights, disk.radius / grid.cell, disk.tolerance)
@@ -131,7 +134,7 @@ def _free_disks(
     return cells[is_free], places[is_free]
 
 
-def _is_free(origins: NDArray[np.float64], solids: Solids, disk: Disk) -> NDArray[np.bool_]:
+def _is_free(origins: NDArray[np.float64], solids: Solids, disk: SpawnDisk) -> NDArray[np.bool_]:
     """Return whether no solid is above each disk within the headroom, shape (n,)."""
     if not len(origins):
         return np.ones(0, dtype=bool)

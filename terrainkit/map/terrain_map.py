@@ -64,7 +64,7 @@ class TerrainMap:
     """Difficulty of each patch, 0 to 1, shape (rows, cols)."""
 
     parameters: NDArray[np.object_]
-    """:class:`~terrainkit.map.patch.Parameters` of each patch, shape (rows, cols)."""
+    """:class:`~terrainkit.map.patch.PatchParameters` of each patch, shape (rows, cols)."""
 
     solids: Solids
     """Solids of all patches."""
@@ -300,9 +300,9 @@ class TerrainMap:
 
     def save(self, path: "str | Path", *, overwrite: bool = False, **options: Any) -> "Path":
         """Write the map in the format of the suffix of `path`; see :mod:`terrainkit.export`."""
-        from terrainkit.export import export
+        from terrainkit.export import export_files
 
-        return export(self, path, overwrite=overwrite, **options)
+        return export_files(self, path, overwrite=overwrite, **options)[0]
 
     @classmethod
     def load(cls, path: "str | Path") -> Self:

@@ -17,8 +17,8 @@ from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
 from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.layout import assign_patch, terrain_columns
-from terrainkit.map.patch import Parameters, Patch, build_patch
+from terrainkit.map.layout import column_types, terrain_and_difficulty
+from terrainkit.map.patch import Patch, PatchParameters, build_patch
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain.parameter import format_value
 
@@ -107,11 +107,11 @@ def _check_patches(terrain_map: TerrainMap) -> Iterator[str]:
     border = np.ones(terrain_map.heights.shape, dtype=bool)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", TerrainkitWarning)
-        columns = terrain_columns(config)
+        columns = column_types(config)
     for row, col in np.ndindex(terrain_map.difficulty.shape):
         (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
         border[i : i + nx, j : j + ny] = False
-        terrain_type, difficulty = assign_patch(config, columns, row, col)
+        terrain_type, difficulty = terrain_and_difficulty(config, columns, row, col)
         try:
             expected = build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
         except TerrainkitError as error:
@@ -160,7 +160,7 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         )
 
 
-def _different(parameters: Parameters, expected: Parameters) -> str:
+def _different(parameters: PatchParameters, expected: PatchParameters) -> str:
     """Return the names of the parameters that differ."""
     pairs = (
         (parameters.requested, expected.requested),

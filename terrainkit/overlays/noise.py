@@ -12,7 +12,7 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.terrain import parameter
 from terrainkit.terrain.overlay import Overlay
-from terrainkit.terrain.parameter import Realized
+from terrainkit.terrain.parameter import Value
 from terrainkit.terrain.patch_geometry import PatchGeometry
 
 
@@ -35,7 +35,7 @@ class Noise(Overlay):
     platform: float = parameter.scalar(2.0)
     """Side of the unchanged square around the spawn position [m]; at least the spawn disk."""
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the realized parameters: whole intervals across the patch."""
         values = super().realized(grid)
         return values | self._uniform().realized(grid) if self.pattern == "uniform" else values

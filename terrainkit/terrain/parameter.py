@@ -21,7 +21,6 @@ from terrainkit.settings.type_hint import MAX_VALUE, convert, is_table, show
 Snap = Literal["none", "cells", "centered"]
 Value = float | int | bool | str | tuple[float, ...]
 Range = tuple[float, float]
-Realized = Value
 
 MAX_COUNT = 10_000
 """Largest integer that a parameter accepts, so that building a patch takes bounded time."""
@@ -102,7 +101,7 @@ class Parameter:
         """Return a value, or a range interpolated at `difficulty`, 0 to 1."""
         return at_difficulty(value, difficulty) if self.allow_range else value
 
-    def realized(self, value: Value, grid: Grid) -> Realized:
+    def realized(self, value: Value, grid: Grid) -> Value:
         """Return `value` snapped to the cells of `grid`; a pair (x, y) where the axes differ."""
         if self.snap == "none" or isinstance(value, str | tuple):
             return value
@@ -113,7 +112,7 @@ class Parameter:
         x, y = (grid.length(count - self.slopes_away) for count in counts)
         return x if x == y else (x, y)
 
-    def deviates(self, requested: Value, realized: Realized, cell: float) -> bool:
+    def deviates(self, requested: Value, realized: Value, cell: float) -> bool:
         """Return whether `realized` differs from `requested` by more than snapping requires.
 
         A length may differ by half a cell, and the side of a centered square by one cell; by twice

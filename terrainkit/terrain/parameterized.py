@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain.parameter import Parameter, Realized, Value, parameters_of
+from terrainkit.terrain.parameter import Parameter, Value, parameters_of
 
 _WORD_START = re.compile("(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
@@ -30,7 +30,7 @@ class Parameterized:
         kind: Any = type(self)  # mypy does not take it as hashable
         return {name: getattr(self, name) for name in parameters_of(kind)}
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the parameters after snapping to the cells of `grid`, by name."""
         kind: Any = type(self)
         realized = self.requested()

@@ -7,6 +7,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 
@@ -65,6 +66,24 @@ class PatchGeometry:
             spawn=(x, y),
             heading=float(_turn(np.array(self.heading), matrix)),
         )
+
+
+def checked_heights(heights: ArrayLike, grid: Grid, got: str) -> NDArray[np.float32]:
+    """Return the heights of a patch as float32.
+
+    Args:
+        heights: What a terrain or an overlay returned [m].
+        grid: Grid of the patch.
+        got: Start of the error message, which the shape follows.
+
+    Raises:
+        ConfigError: if the shape is not `grid.shape`, or a height is not finite.
+    """
+    # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
+    result = np.asarray(heights, dtype=np.float32) + np.float32(0)
+    if result.shape != grid.shape or not np.isfinite(result).all():
+        raise ConfigError(f"{got} shape {result.shape}; expected {grid.shape} with finite values")
+    return result
 
 
 @lru_cache(maxsize=16)

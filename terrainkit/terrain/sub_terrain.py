@@ -1,4 +1,4 @@
-"""SubTerrain: a terrain type of a map, with its proportion and parameters."""
+"""SubTerrain: an entry of a map's configuration."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,8 +20,9 @@ from terrainkit.terrain.parameter import Parameter, convert_range, parameters_of
 class SubTerrain(Config):
     """A terrain type of a map.
 
-    In Python, `terrain` may be a subclass of :class:`~terrainkit.terrain.Terrain`, which is
-    registered and replaced by its name. The classes of `overlays` are registered, too.
+    It is an entry of the map's configuration: a terrain with its parameters. In Python, `terrain`
+    may be a subclass of :class:`~terrainkit.terrain.Terrain`, which is registered and replaced by
+    its name. The classes of `overlays` are registered, too.
 
     Raises:
         ConfigError: if there is no such terrain, or a parameter is unknown or invalid.
@@ -77,7 +78,7 @@ class SubTerrain(Config):
                 object.__setattr__(self, "parameters", {**self.parameters, name: tables})
         if not self.name:
             object.__setattr__(self, "name", self.terrain)
-        for difficulty in (0.0, 1.0):
+        for difficulty in (0.0, 1.0):  # the constructor validates both ends of the ranges
             self.at(difficulty)
 
     @classmethod

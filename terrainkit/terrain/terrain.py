@@ -20,6 +20,7 @@ from terrainkit.terrain.parameter import (
     parameters_of,
 )
 from terrainkit.terrain.parameterized import Parameterized
+from terrainkit.terrain.patch_geometry import checked_heights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +34,8 @@ class Terrain(Parameterized, ABC):
     .. math:: p(d) = (1 - d)\, p_\text{easy} + d\, p_\text{hard},
 
     and returns a terrain with plain numbers. Fields are declared with the functions of
-    :mod:`terrainkit.parameter`; the docstring of a field is its help text. A terrain that is
-    constructed directly takes the hard end of each range by default.
+    :mod:`terrainkit.terrain.parameter`; the docstring of a field is its help text. A terrain that
+    is constructed directly takes the hard end of each range by default.
     """
 
     has_column_seed: ClassVar[bool] = False
@@ -89,17 +90,10 @@ class Terrain(Parameterized, ABC):
         Raises:
             ConfigError: if the grid is too small or its cells are too large for the terrain.
         """
-        self.check_fit(grid)
-        # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
-        heights = np.asarray(self.heights(grid, rng), dtype=np.float32) + np.float32(0)
-        if heights.shape != grid.shape or not np.isfinite(heights).all():
-            raise ConfigError(
-                f"{self.kind()}: heights(): got shape {heights.shape}; expected {grid.shape} with "
-                "finite values"
-            )
-        return heights
+        self._check_fit(grid)
+        return checked_heights(self.heights(grid, rng), grid, f"{self.kind()}: heights(): got")
 
-    def check_fit(self, grid: Grid) -> None:
+    def _check_fit(self, grid: Grid) -> None:
         """Raise ConfigError if a centered square of this terrain does not fit on `grid`."""
         for name, parameter in parameters_of(type(self)).items():
             if parameter.snap == "centered":

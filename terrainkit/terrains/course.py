@@ -17,7 +17,7 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Parameter, Range, Realized, Value, parameters_of
+from terrainkit.terrain.parameter import Parameter, Range, Value, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
 
 MAX_ELEMENTS = 100
@@ -122,7 +122,7 @@ class Course(Lane):
         names = ", ".join(each.terrain for each in self.elements)
         return {**super().requested(), "elements": names, **dict(self._element_values(None))}
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the parameters after snapping, those of the elements by path."""
         return {**super().realized(grid), **dict(self._element_values(grid))}
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Realized
+from terrainkit.terrain.parameter import Value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +26,7 @@ class Gap(Terrain):
     platform: float = parameter.platform(3.0)
     """Side of the flat square at the center [m]."""
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the realized parameters: the gap ends at the edge of the patch."""
         width, block = grid.cells(self.width, minimum=0), grid.centered(self.platform)
         x, y = (grid.length(min(width, margin)) for margin in grid.margins(block))

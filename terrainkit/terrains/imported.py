@@ -17,7 +17,7 @@ from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, read_raster
 from terrainkit.importing.source import check_file
 from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Range, Realized, Value
+from terrainkit.terrain.parameter import Range, Value
 
 _EXAMPLE = Path(__file__).parent.parent / "importing" / "example.npy"
 _EXAMPLE_CELL = 0.2
@@ -78,7 +78,7 @@ class Imported(Terrain):
             )
         return super().at(difficulty, values)
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the parameters, with the SHA-256 of the file."""
         digest = self._read(grid.cell)[1] if self.file else ""
         return {**super().realized(grid), "sha256": digest}

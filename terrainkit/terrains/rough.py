@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from terrainkit.features.noise import STEP, ValueNoise
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Realized
+from terrainkit.terrain.parameter import Value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class Rough(Terrain):
     platform: float = parameter.platform(2.0, slopes_away=True)
     """Side of the flat square at the center [m]."""
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the realized parameters: whole steps, and whole intervals across the patch."""
         return super().realized(grid) | self._noise().realized(grid)
 

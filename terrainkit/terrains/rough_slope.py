@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from terrainkit.features.noise import STEP, ValueNoise
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Realized
+from terrainkit.terrain.parameter import Value
 from terrainkit.terrains.pyramid_slope import PyramidSlope
 
 
@@ -37,7 +37,7 @@ class RoughSlope(Terrain):
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the realized parameters: whole steps, and whole intervals across the patch."""
         return super().realized(grid) | self._noise().realized(grid)
 

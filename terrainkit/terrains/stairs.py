@@ -41,13 +41,13 @@ class Stairs(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the treads, counted from the flat strips at both ends."""
         landing, width = grid.cells(self.landing), grid.cells(self.step_width)
-        top = grid.shape[0] - 2 * landing
-        if top < width:
+        flight = grid.shape[0] - 2 * landing  # cells between the landings
+        if flight < width:
             raise ConfigError(
                 f"stairs: two landings of {self.landing:g} m leave no step of "
                 f"{self.step_width:g} m in a patch {grid.size[0]:g} m long"
             )
-        risers = (top - width) // (2 * width) + 1
+        num_steps = (flight - width) // (2 * width) + 1
         from_end = np.minimum(np.arange(grid.shape[0]), np.arange(grid.shape[0])[::-1])
-        rise = self.step_height * np.clip((from_end - landing) // width + 1, 0, risers)
+        rise = self.step_height * np.clip((from_end - landing) // width + 1, 0, num_steps)
         return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

@@ -50,24 +50,26 @@ class SteppingStones(Terrain):
         is_covered[along] = True
         num_covered = across.stop - across.start
         free = nx * ny - int(is_covered.sum()) * num_covered
-        gaps = _gaps(nx, stone, pitch)
-        area = gaps @ (ny - num_covered * is_covered)
+        gaps_x = _gaps(nx, stone, pitch)
+        area = gaps_x @ (ny - num_covered * is_covered)
         start = int(np.argmin(np.abs(area - free * distance / pitch)))
-        row, x = np.divmod(np.arange(nx) + start, pitch)
+        stone_row, phase_x = np.divmod(np.arange(nx) + start, pitch)
         # The area of the holes along y in each row of stones, for each offset of its stones.
         counts = [
-            np.bincount(row, weights=mask, minlength=row[-1] + 1)
-            for mask in (x < stone, (x < stone) & is_covered)
+            np.bincount(stone_row, weights=mask, minlength=stone_row[-1] + 1)
+            for mask in (phase_x < stone, (phase_x < stone) & is_covered)
         ]
-        gaps = _gaps(ny, stone, pitch)
-        covered_gaps = gaps[:, across].sum(axis=1)
-        areas = np.outer(counts[0], gaps.sum(axis=1)) - np.outer(counts[1], covered_gaps)
+        gaps_y = _gaps(ny, stone, pitch)
+        covered_gaps = gaps_y[:, across].sum(axis=1)
+        areas = np.outer(counts[0], gaps_y.sum(axis=1)) - np.outer(counts[1], covered_gaps)
         sizes = counts[0] * ny - counts[1] * num_covered
         missing = free * (1 - (stone / pitch) ** 2) - area[start]
         shifts = _shifts(areas, missing * sizes / max(1, sizes.sum()), draws)
-        column, y = np.divmod(np.arange(ny)[None, :] + shifts[row, None], pitch)
-        top = tops[row[:, None] % nx, column % ny]
-        ground = np.where((x[:, None] < stone) & (y < stone), top, -self.depth)
+        # Each row of stones has its own offset along y.
+        stone_column, phase_y = np.divmod(np.arange(ny) + shifts[stone_row, None], pitch)
+        top = tops[stone_row[:, None] % nx, stone_column % ny]
+        is_stone = (phase_x[:, None] < stone) & (phase_y < stone)
+        ground = np.where(is_stone, top, -self.depth)
         ground[along, across] = 0.0
         return ground
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Realized
+from terrainkit.terrain.parameter import Value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class Wave(Terrain):
     platform: float = parameter.platform(1.5, slopes_away=True)
     """Side of the flat square at the center [m]."""
 
-    def realized(self, grid: Grid) -> dict[str, Realized]:
+    def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the realized parameters; the highest sample is slightly off the crest."""
         x, y = (np.abs(wave).max() for wave in self._waves(grid))
         return super().realized(grid) | {"amplitude": round(float(self.amplitude * x * y), 9)}

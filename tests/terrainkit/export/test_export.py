@@ -8,7 +8,6 @@ import pytest
 from terrainkit.errors import ExportError
 from terrainkit.export import (
     check_export,
-    export,
     export_options,
     exporters_by_suffix,
     get_exporter,
@@ -37,7 +36,7 @@ def test_exporter_signature_is_uniform(suffix):
 @every_suffix
 def test_export_writes_to_the_given_path(level_map, tmp_path, suffix):
     path = tmp_path / f"map{suffix}"
-    assert export(level_map, path) == path
+    assert level_map.save(path) == path
     assert path.stat().st_size > 0
     assert {Path(name).stem for name in names(tmp_path)} == {"map"}
 
@@ -45,7 +44,7 @@ def test_export_writes_to_the_given_path(level_map, tmp_path, suffix):
 @every_suffix
 def test_export_accepts_uppercase_suffix(level_map, tmp_path, suffix):
     path = tmp_path / f"MAP{suffix.upper()}"
-    assert export(level_map, str(path)) == path
+    assert level_map.save(str(path)) == path
     assert path.is_file()
 
 
@@ -54,7 +53,7 @@ def test_export_is_deterministic(level_map, tmp_path, suffix):
     folders = [tmp_path / "a", tmp_path / "b"]
     for folder in folders:
         folder.mkdir()
-    first, second = (export(level_map, folder / f"map{suffix}") for folder in folders)
+    first, second = (level_map.save(folder / f"map{suffix}") for folder in folders)
     assert first.read_bytes() == second.read_bytes()
 
 
@@ -63,17 +62,17 @@ def test_export_keeps_existing_file_by_default(level_map, tmp_path, suffix):
     path = tmp_path / f"map{suffix}"
     path.write_text("mine")
     with pytest.raises(ExportError, match=rf"map\{suffix} exists"):
-        export(level_map, path)
+        level_map.save(path)
     assert path.read_text() == "mine"
     assert names(tmp_path) == [f"map{suffix}"]
-    export(level_map, path, overwrite=True)
+    level_map.save(path, overwrite=True)
     assert path.read_bytes() != b"mine"
 
 
 @pytest.mark.parametrize("name", ["map.fbx", "map", "npz", "map.npz.bak", ".npz"])
 def test_export_unknown_suffix_lists_formats(level_map, tmp_path, name):
     with pytest.raises(ExportError, match=r"no format for .*; there are: ") as error:
-        export(level_map, tmp_path / name)
+        level_map.save(tmp_path / name)
     assert all(part in str(error.value) for part in (name, *exporters_by_suffix()))
     assert names(tmp_path) == []
 
@@ -88,7 +87,7 @@ def test_export_unknown_suffix_lists_formats(level_map, tmp_path, name):
 )
 def test_export_unknown_option_lists_options(level_map, tmp_path, name, option, known):
     with pytest.raises(ExportError, match=f"got '{option}'; expected {known}"):
-        export(level_map, tmp_path / name, **{option: True})
+        level_map.save(tmp_path / name, **{option: True})
     assert names(tmp_path) == []
 
 

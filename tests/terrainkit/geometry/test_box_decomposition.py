@@ -71,25 +71,25 @@ def test_flat_cells_are_flat_everywhere(heights, threshold):
 @given(heights=HEIGHTFIELDS)
 @settings(deadline=None, derandomize=True, max_examples=50)
 def test_boxes_cover_everything_with_walls_at_steps(heights):
-    assert cover_of(heights, 0.5).complete
+    assert cover_of(heights, 0.5).covered.all()
 
 
 def test_boxes_exclude_cells_at_ramps():
     heights = np.array([[0], [0], [0], [1], [1]], dtype=np.float32)
     assert level_of(heights, 2.0)[:, 0].tolist() == [True, True, False, False, True]
-    assert not cover_of(heights, 2.0).complete
+    assert not cover_of(heights, 2.0).covered.all()
 
 
 def test_boxes_match_a_level_map(level_map):
     cover = level_map.boxes()
-    assert cover.complete
+    assert cover.covered.all()
     place = points_in_cells(cover.covered, level_map.config.cell, level_map.grid.lower)
     np.testing.assert_allclose(top_at(cover, place), level_map.height(place), atol=1e-3)
 
 
 def test_boxes_never_exceed_a_map_with_slopes(terrain_map):
     cover = terrain_map.boxes()
-    assert not cover.complete
+    assert not cover.covered.all()
     assert 0.5 < cover.covered.mean() < 1.0
     cell, lower = terrain_map.config.cell, terrain_map.grid.lower
     on, off = (points_in_cells(cells, cell, lower) for cells in (cover.covered, ~cover.covered))
@@ -195,6 +195,6 @@ def test_boxes_of_many_heights_match():
     cover = decompose_boxes(
         heights, Grid(shape=(60, 20), cell=0.1), 0.075, (np.array([0, 60]), np.array([0, 20]))
     )
-    assert cover.complete
+    assert cover.covered.all()
     assert len(cover.centers) == 60
     assert sorted(cover.centers[:, 2] + cover.half_sizes[:, 2]) == pytest.approx(range(60))

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitWarning
-from terrainkit.map.layout import allocate_columns, assign_patch, terrain_columns
+from terrainkit.map.layout import allocate_columns, column_types, terrain_and_difficulty
 
 FLAT, GAP, PIT = (SubTerrain(terrain=name) for name in ("flat", "gap", "pit"))
 
@@ -18,14 +18,14 @@ def mix(**proportions):
 
 
 def difficulties(config, col=0):
-    columns = terrain_columns(config)
-    return [assign_patch(config, columns, row, col)[1] for row in range(config.rows)]
+    columns = column_types(config)
+    return [terrain_and_difficulty(config, columns, row, col)[1] for row in range(config.rows)]
 
 
 def drawn(config):
-    columns = terrain_columns(config)
+    columns = column_types(config)
     return [
-        assign_patch(config, columns, row, col)
+        terrain_and_difficulty(config, columns, row, col)
         for row in range(config.rows)
         for col in range(config.cols)
     ]
@@ -69,59 +69,59 @@ def test_allocate_columns_rounds_exact_shares(weights, num_columns):
         assert math.floor(share) <= n <= math.ceil(share)
 
 
-def test_terrain_columns_are_in_order():
+def test_column_types_are_in_order():
     config = MapConfig(cols=6, terrains=mix(gap=3, flat=1, pit=2))
-    assert terrain_columns(config) == [0, 0, 0, 1, 2, 2]
+    assert column_types(config) == [0, 0, 0, 1, 2, 2]
 
 
-def test_terrain_columns_of_legged_gym():
-    assert terrain_columns(MapConfig()) == [0, 1, 2, 3, 3, 4, 5, 6, 7, 8]
+def test_column_types_of_legged_gym():
+    assert column_types(MapConfig()) == [0, 1, 2, 3, 3, 4, 5, 6, 7, 8]
 
 
-def test_terrain_columns_reject_missing_custom_sub_terrain():
+def test_column_types_reject_missing_custom_sub_terrain():
     with pytest.raises(
         ConfigError, match=r"cols: got 2, too few for 3 sub-terrains .*: no column for pit$"
     ):
-        terrain_columns(MapConfig(cols=2, terrains=(FLAT, GAP, PIT)))
+        column_types(MapConfig(cols=2, terrains=(FLAT, GAP, PIT)))
 
 
-def test_terrain_columns_warn_of_missing_preset_sub_terrain():
+def test_column_types_warn_of_missing_preset_sub_terrain():
     with pytest.warns(
         TerrainkitWarning,
         match=r"cols: got 4, too few for 5 sub-terrains .*: no column for wave \(preset rough\)",
     ):
-        columns = terrain_columns(MapConfig(cols=4, preset="rough"))
+        columns = column_types(MapConfig(cols=4, preset="rough"))
     assert columns == [0, 1, 2, 3]
 
 
-def test_terrain_columns_allow_zero_proportion():
-    assert terrain_columns(MapConfig(cols=2, terrains=mix(flat=1, gap=0, pit=1))) == [0, 2]
+def test_column_types_allow_zero_proportion():
+    assert column_types(MapConfig(cols=2, terrains=mix(flat=1, gap=0, pit=1))) == [0, 2]
 
 
 @pytest.mark.parametrize("rows", [2, 3, 7, 10, 49])
 @pytest.mark.parametrize("jitter", [0.0, 1.0])
-def test_assign_patch_first_and_last_difficulty_are_exact(rows, jitter):
+def test_terrain_and_difficulty_first_and_last_difficulty_are_exact(rows, jitter):
     levels = difficulties(MapConfig(rows=rows, difficulty_jitter=jitter))
     assert levels[0] == 0.0
     assert levels[-1] == 1.0
 
 
-def test_assign_patch_uses_difficulty_range():
+def test_terrain_and_difficulty_uses_difficulty_range():
     levels = difficulties(MapConfig(rows=4, difficulty_range=(0.1, 0.7)))
     assert levels == pytest.approx([0.1, 0.3, 0.5, 0.7])
     assert (levels[0], levels[-1]) == (0.1, 0.7)
 
 
-def test_assign_patch_difficulty_is_linear():
+def test_terrain_and_difficulty_difficulty_is_linear():
     assert difficulties(MapConfig(rows=5)) == [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
-def test_assign_patch_single_row_is_easy():
+def test_terrain_and_difficulty_single_row_is_easy():
     assert difficulties(MapConfig(rows=1)) == [0.0]
     assert difficulties(MapConfig(rows=1, difficulty_range=(0.4, 0.9))) == [0.4]
 
 
-def test_assign_patch_jitter_is_limited():
+def test_terrain_and_difficulty_jitter_is_limited():
     config = MapConfig(rows=5, cols=40, difficulty_jitter=0.5)
     second = [difficulties(config, col)[1] for col in range(40)]
     assert len(set(second)) == 40
@@ -131,18 +131,18 @@ def test_assign_patch_jitter_is_limited():
     assert max(second) > 0.3
 
 
-def test_assign_patch_jitter_stays_in_range():
+def test_terrain_and_difficulty_jitter_stays_in_range():
     config = MapConfig(rows=3, cols=60, difficulty_jitter=1.0, difficulty_range=(0.2, 0.4))
     assert all(0.2 <= difficulties(config, col)[1] <= 0.4 for col in range(60))
 
 
-def test_assign_patch_jitter_is_seeded():
+def test_terrain_and_difficulty_jitter_is_seeded():
     one, other = (MapConfig(seed=seed, difficulty_jitter=0.5) for seed in (1, 2))
     assert difficulties(one) == difficulties(one)
     assert difficulties(one) != difficulties(other)
 
 
-def test_assign_patch_randomized_follows_proportions():
+def test_terrain_and_difficulty_randomized_follows_proportions():
     config = MapConfig(mode="randomized", rows=40, cols=40, terrains=mix(flat=3, gap=1, pit=0))
     kinds = Counter(kind for kind, _ in drawn(config))
     # 1600 draws at 3/4: 1200, with a standard deviation of 17.
@@ -150,14 +150,14 @@ def test_assign_patch_randomized_follows_proportions():
     assert kinds[2] == 0
 
 
-def test_assign_patch_randomized_uses_given_difficulties():
+def test_terrain_and_difficulty_randomized_uses_given_difficulties():
     config = MapConfig(mode="randomized", random_difficulties=(0.1, 0.6), terrains=(FLAT,))
     levels = Counter(level for _, level in drawn(config))
     assert set(levels) == {0.1, 0.6}
     assert min(levels.values()) > 25
 
 
-def test_assign_patch_randomized_is_seeded():
+def test_terrain_and_difficulty_randomized_is_seeded():
     one, other = (MapConfig(mode="randomized", seed=seed) for seed in (1, 2))
     assert drawn(one) == drawn(one)
     assert drawn(one) != drawn(other)

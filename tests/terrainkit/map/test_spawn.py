@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.geometry.surface import surface_at
-from terrainkit.map.spawn import Disk, find_spawn, sample_spawns
+from terrainkit.map.spawn import SpawnDisk, find_spawn, sample_spawns
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
 WALL = 0.075
@@ -29,7 +29,7 @@ def spawn(
     solids=None,
 ):
     solids = solids or Solids.empty()
-    needed = Disk(radius=radius, tolerance=tolerance, headroom=1.0)
+    needed = SpawnDisk(radius=radius, tolerance=tolerance, headroom=1.0)
     return find_spawn(heights, grid, wanted, needed, solids=solids, threshold=threshold)
 
 
@@ -178,7 +178,7 @@ def test_find_spawn_returns_none_under_a_low_roof():
 
 
 def sampled(heights, number, *, origin=(2.0, 2.0, 0.0), radius=0.5, solids=None, seed=0):
-    needed = Disk(radius=radius, tolerance=0.01, headroom=1.0)
+    needed = SpawnDisk(radius=radius, tolerance=0.01, headroom=1.0)
     solids = solids or Solids.empty()
     rng = np.random.default_rng(seed)
     return sample_spawns(heights, PLOT, origin, needed, number, solids=solids, rng=rng)

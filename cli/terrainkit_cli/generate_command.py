@@ -1,0 +1,164 @@
+"""The command that generates maps."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from shlex import quote
+from typing import Annotated, Any
+
+from msgspec import Meta
+
+from terrainkit.errors import ConfigError
+from terrainkit.map.config import MapConfig
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.terrain import registry
+from terrainkit.terrain.overlay import Overlay
+from terrainkit.terrain.parameter import Parameter, parameters_of
+from terrainkit.terrain.sub_terrain import SubTerrain
+from terrainkit_cli import render
+from terrainkit_cli.argument_types import Limits, OutputPath, RobotName, is_map
+from terrainkit_cli.config_options import ConfigCommand
+from terrainkit_cli.map_text import written
+from terrainkit_cli.parse import option, value_of
+from terrainkit_cli.worker_pool import MAX_JOBS, worker_pool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generate(ConfigCommand):
+    """Generate a map of terrain patches and write it to a file.
+
+    Rows of patches are difficulty levels, columns are terrains. --config, --terrain and --preset
+    select the terrains; --rows and the options after it override the map config.
+    """
+
+    defaults: MapConfig
+
+    output: OutputPath
+    """File to write. The suffix selects the format: .npz for a complete map, which the other
+    commands read; .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png for other
+    programs."""
+
+    config: Annotated[str, option("FILE")] = ""
+    """Map config (.toml), or a map (.npz) whose config is used; options override it."""
+
+    terrain: Annotated[str, option("NAME")] = ""
+    """Use only this terrain, not a preset; `terrainkit list` prints the names."""
+
+    set: Annotated[str, option("NAME=VALUE,...")] = ""
+    """Parameters of --terrain: NAME=VALUE, NAME=EASY:HARD for a range over the difficulty, or
+    NAME=[X,Y,...] for a tuple."""
+
+    overlay: Annotated[tuple[str, ...], option("[NAME[:PARAMETER=VALUE,...] ...]")] = ()
+    """Overlays on all terrains, in their order, such as `noise:amplitude=0:0.05 side_walls`;
+    `terrainkit list` prints the names."""
+
+    robot: RobotName = ""
+    """With --demand: name of a bundled robot, or a folder written by terrainkit onboard."""
+
+    demand: Annotated[str, option("LOW:HIGH")] = ""
+    """Replace the ranges of each terrain, so that they demand LOW to HIGH of --robot: 0 is level
+    ground, 1 the limit of the robot; see terrainkit feasibility."""
+
+    limit: Limits = ()
+    """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
+
+    jobs: Annotated[int, Meta(ge=1, le=MAX_JOBS), option("N")] = 1
+    """Number of processes that build patches; the map does not depend on it. More than one is
+    faster for maps that take several seconds."""
+
+    overwrite: bool = False
+    """Replace an existing file."""
+
+    @classmethod
+    def default_config(cls) -> MapConfig:
+        """Return the default config."""
+        return MapConfig()
+
+    @classmethod
+    def load_config(cls, words: Sequence[str]) -> MapConfig:
+        """Return the config in the file of --config, or the default one."""
+        path = cls.split(words)[0].get("config", "")
+        if is_map(path):
+            return TerrainMap.load(path).config
+        return MapConfig.load(path) if path else MapConfig()
+
+    def run(self) -> int:
+        """Generate the map, write it, and print the next commands."""
+        from terrainkit import export
+        from terrainkit.map.generation import generate
+        from terrainkit_cli.feasibility_command import solve_demand
+
+        config = self.changed_config()
+        samples = config.grid.shape[0] * config.grid.shape[1]
+        # Fail before generating.
+        export.check_export(self.output, samples, overwrite=self.overwrite)
+        if bool(self.robot) != bool(self.demand) or (self.limit and not self.robot):
+            raise ConfigError("--robot, --demand, --limit: expected --robot and --demand together")
+        with worker_pool(self.jobs) as executor:
+            if self.demand:
+                config = solve_demand(config, self.robot, self.limit, self.demand, executor)
+            terrain_map = generate(config, progress=render.progress, executor=executor)
+        files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
+        render.result(written(terrain_map, *files))
+        if is_map(self.output):
+            path = quote(str(self.output))
+            render.result(
+                f"next: terrainkit preview {path} -o preview.png  (render it)\n"
+                f"      terrainkit export {path} -o map.xml  (MuJoCo; or .stl, .ply, ...)\n"
+                f"      terrainkit.TerrainMap.load({str(self.output)!r})  (Python; or numpy.load)"
+            )
+        return 0
+
+    def changed_config(self) -> Any:
+        """Return the config with the values, terrain and overlays on the command line."""
+        values = dict(self.changes)
+        if self.terrain and "preset" in values:
+            raise ConfigError("--terrain, --preset: got both; expected one of them")
+        if self.set and not self.terrain:
+            raise ConfigError("--set: got parameters without a terrain; expected --terrain")
+        if self.terrain:
+            terrain = registry.get_terrain(self.terrain)
+            parameters = _parameters("--set", self.set, terrain)
+            values["terrains"] = (SubTerrain(terrain=self.terrain, parameters=parameters),)
+        elif "preset" in values:
+            values["terrains"] = ()
+        config = replace(self.defaults, **values)
+        overlays = tuple(map(_overlay, self.overlay))
+        if not overlays:
+            return config
+        terrains = [
+            replace(each, overlays=each.overlays + overlays) for each in config.sub_terrains
+        ]
+        return replace(config, terrains=tuple(terrains))
+
+
+def _overlay(text: str) -> Overlay:
+    """Return the overlay that NAME:PARAMETER=VALUE,... describes."""
+    name, _, values = text.partition(":")
+    parameters = _parameters("--overlay", values, registry.get_overlay(name))
+    return registry.make_overlay(name, parameters)
+
+
+def _parameters(option: str, text: str, owner: Any) -> dict[str, Any]:
+    """Return the values in NAME=VALUE,... of parameters of a terrain or overlay."""
+    parameters: dict[str, Any] = {}
+    known = parameters_of(owner)
+    for word in re.split(r",(?![^\[]*\])", text) if text else []:  # not in [1, 2]
+        name, equals, value = word.partition("=")
+        name = name.strip()
+        if not equals:
+            raise ConfigError(f"{option}: got {word!r}; expected name=value or name=easy:hard")
+        if name in parameters:
+            raise ConfigError(f"{option}: got {name} twice; expected it once")
+        parameters[name] = _parameter_value(value, known.get(name))
+    return parameters
+
+
+def _parameter_value(text: str, parameter: Parameter | None) -> Any:
+    """Return the value or range that `text` describes."""
+    if parameter and (text in parameter.choices or isinstance(parameter.easy, str)):
+        return text
+    if text.startswith("[") and text.endswith("]"):
+        return tuple(value_of(part.strip()) for part in text[1:-1].split(","))
+    values = tuple(value_of(part) for part in text.split(":"))
+    return values if len(values) > 1 else values[0]
