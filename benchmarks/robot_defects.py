@@ -35,7 +35,8 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import Finding
-from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 DEFECTS = Path(__file__).parent / "defects"
@@ -141,7 +142,7 @@ def _load_source(path: Path) -> tuple[SourceRobot, tuple[Finding, ...], SourceRe
         meshes = Meshes()
         start = time.perf_counter()
         facts = Facts(load_robot(file), meshes)
-        report = lint(facts, simulate=False)
+        report = lint_selected(facts, Settings(simulate=False))
         times.append(time.perf_counter() - start)
     counts = Counter(finding.severity for finding in report.findings)
     result = SourceResult(
@@ -213,7 +214,7 @@ def _check(
     signal.alarm(_MAX_SECONDS)
     try:
         model = load_robot(file, contents={file: text})
-        findings = lint(Facts(model, meshes), simulate=False).findings
+        findings = lint_selected(Facts(model, meshes), Settings(simulate=False)).findings
     except Exception as exception:  # a crash or a timeout counts as a miss
         error = f"{type(exception).__name__}: {exception}"
         return MutantResult(

@@ -100,17 +100,17 @@ class CheckRobot(Command):
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
         if len(self.files) > 1 and (self.against or self.spec):
             raise ConfigError(f"--against and --spec: got {len(self.files)} files; expected one")
-        options = self._settings()
+        settings = self._settings()
         if self.output:
             _check_output(self.output, [Path(name) for name in self.files])
-        checks = [check for name in self.files if (check := self._check_file(name, options))]
-        self._print([check.report for check in checks], "".join(c.diff for c in checks))
-        crashed = [rule for check in checks for rule in check.report.crashed]
+        results = [result for name in self.files if (result := self._check_file(name, settings))]
+        self._print([result.report for result in results], "".join(r.diff for r in results))
+        crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
             render.error(f"{rule.code}: {rule.reason}")
-        if crashed or len(checks) < len(self.files):
+        if crashed or len(results) < len(self.files):
             return 2
-        return int(any(check.failed for check in checks))
+        return int(any(result.failed for result in results))
 
     def _settings(self) -> "Settings":
         from terrainkit_robots.lint.selection import select_rules
@@ -121,19 +121,19 @@ class CheckRobot(Command):
             strict=self.strict,
             simulate=self.simulation,
         )
-        select_rules(settings)
+        select_rules(settings)  # reject unknown codes before reading files
         return settings
 
-    def _check_file(self, name: str, options: "Settings") -> "_Check | None":
+    def _check_file(self, name: str, settings: "Settings") -> "_FileResult | None":
         """Return the result for a file; print an error and return None if the check fails."""
         from terrainkit_robots.lint.report.facts_json import facts_json
         from terrainkit_robots.lint.runner import INTERNAL_ERROR
 
         try:
-            check = self._check_robot(name, options)
+            result = self._lint_and_fix(name, settings)
             # Errors in computing facts must be reported here, not while a report is written.
-            facts_json(check.report.facts, simulated=check.report.simulated)
-            return check
+            facts_json(result.report.facts, may_simulate=result.report.may_simulate)
+            return result
         except TerrainkitError as error:
             render.error(str(error))
         except OSError as error:
@@ -144,34 +144,34 @@ class CheckRobot(Command):
             render.error(f"{name}: {INTERNAL_ERROR}: {type(error).__name__}: {error}")
         return None
 
-    def _check_robot(self, name: str, options: "Settings") -> "_Check":
+    def _lint_and_fix(self, name: str, settings: "Settings") -> "_FileResult":
         from terrainkit_robots.description import bundled
         from terrainkit_robots.lint.check import check_robot
         from terrainkit_robots.lint.settings import read_settings
 
         path = find_robot(name)
-        is_bundled = path == bundled.urdf_path(name)
-        settings = options.over(read_settings(Path() if is_bundled else path.parent))
+        is_name = path == bundled.urdf_path(name)
+        settings = settings.over(read_settings(Path() if is_name else path.parent))
         against = find_robot(self.against) if self.against else None
 
-        def check(contents: Mapping[Path, bytes]) -> "Report":
+        def lint_contents(contents: Mapping[Path, bytes]) -> "Report":
             return check_robot(path, settings, against=against, spec=self.spec, contents=contents)
 
-        report, diff = check({}), ""
+        report, diff = lint_contents({}), ""
         if self.fix or self.unsafe_fixes or self.diff:
             from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff
 
-            if is_bundled:
+            if bundled.is_bundled(path):
                 raise ConfigError(f"{name} is a bundled robot and cannot be changed; copy it first")
             if report.facts.model.kind == "xacro":
                 raise ConfigError(f"{name}: xacro files cannot be fixed; edit the reported lines")
-            result = fix_robot(path, check, report=report, unsafe=self.unsafe_fixes)
+            result = fix_robot(path, lint_contents, report=report, unsafe=self.unsafe_fixes)
             if self.diff:
                 diff = unified_diff(result)
             else:
                 report = _write_fixes(result, unsafe=self.unsafe_fixes)
         failing = ("fail", "warn") if settings.strict else ("fail",)
-        return _Check(report=report, failed=report.verdict in failing, diff=diff)
+        return _FileResult(report=report, failed=report.verdict in failing, diff=diff)
 
     def _print(self, reports: "Sequence[Report]", diff: str) -> None:
         from terrainkit_robots.lint.report import to_text
@@ -203,7 +203,7 @@ class CheckRobot(Command):
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Check:
+class _FileResult:
     """The result of checking a file."""
 
     report: "Report"

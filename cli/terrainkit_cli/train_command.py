@@ -80,7 +80,7 @@ class Train(ConfigCommand):
         else:
             from terrainkit_robots.rl.tasks import get_task
 
-            task = get_task(_find_robot(rest)).task
+            task = get_task(_task_word(rest)).task
         path = given.get("config")
         return type(task).load(path, task) if path else task
 
@@ -109,12 +109,12 @@ class Train(ConfigCommand):
                 should_stop=stop_signal,
             )
             completed = runner.current_learning_iteration
-            number = stop_signal() if completed < task.runner.max_iterations else 0
+            signal_number = stop_signal() if completed < task.runner.max_iterations else 0
         _print_result(runner, task)
-        return 128 + number if number else 0
+        return 128 + signal_number if signal_number else 0
 
 
-def _find_robot(words: Sequence[str]) -> str:
+def _task_word(words: Sequence[str]) -> str:
     """Return ROBOT among words.
 
     An option that only the task of ROBOT has may precede it. How many of the words in between are

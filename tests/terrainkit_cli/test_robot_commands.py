@@ -136,7 +136,6 @@ def test_check_robot_formats_several_files(here):
         (("good.urdf", "-o", "."), "it is a folder"),
         (("good.urdf", "-o", "/proc/report.txt"), "cannot write /proc/report.txt"),
         (("good.urdf", "-o", "good.urdf"), "would replace the checked file good.urdf"),
-        (("quadruped", "--fix"), "quadruped is a bundled robot and cannot be changed"),
     ],
     ids=lambda value: " ".join(map(str, value))[:60] if isinstance(value, tuple) else "",
 )
@@ -281,6 +280,19 @@ def test_check_robot_diff_writes_nothing(here, folder):
     assert run.stdout.startswith("--- unnamed.urdf\n+++ unnamed.urdf\n")
     assert "\n-<robot>\n+<robot name=" in run.stdout
     assert (folder / "unnamed.urdf").read_text() == UNNAMED
+
+
+@pytest.mark.parametrize("option", ["--fix", "--unsafe-fixes", "--diff"])
+@pytest.mark.parametrize("is_path", [False, True])
+def test_check_robot_fix_rejects_bundled_robot(here, option, is_path):
+    file = bundled.urdf_path("quadruped")
+    name, text = str(file) if is_path else "quadruped", file.read_bytes()
+    run = here("check-robot", name, option)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr == (
+        f"terrainkit: error: {name} is a bundled robot and cannot be changed; copy it first\n"
+    )
+    assert file.read_bytes() == text
 
 
 @pytest.mark.usefixtures("folder")

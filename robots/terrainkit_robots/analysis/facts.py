@@ -11,8 +11,7 @@ from terrainkit_robots.analysis.bodies.overlap import OverlapScene
 from terrainkit_robots.analysis.bodies.tree import Tree, build_tree
 from terrainkit_robots.analysis.inertia.repair import InertiaRepair
 from terrainkit_robots.analysis.legs.default_pose import default_positions
-from terrainkit_robots.analysis.legs.effort import effort_limit
-from terrainkit_robots.analysis.legs.joint_roles import is_wheel, leg_joints
+from terrainkit_robots.analysis.legs.joint_roles import is_wheel, leg_joints, robot_joints
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg, detect_legs
 from terrainkit_robots.analysis.legs.limbs import Limb, detect_limbs
@@ -45,9 +44,9 @@ _T = TypeVar("_T")
 
 
 class Facts:
-    """Facts about a robot, in SI units and radians, in the frame of the trunk.
+    """Derived quantities of a robot, each computed once.
 
-    This class only passes facts to the functions that compute others.
+    SI units, radians; each states its frame.
     """
 
     def __init__(
@@ -208,6 +207,11 @@ class Facts:
         return leg_joints(self.legs, self.bodies)
 
     @cached_property
+    def robot_joints(self) -> list[Joint]:
+        """The moving joints without those that move the base of a planar model."""
+        return robot_joints(self.bodies)
+
+    @cached_property
     def leg_model(self) -> LegModel:
         """The facts that pose and stance are computed from."""
         return LegModel(
@@ -221,13 +225,13 @@ class Facts:
 
     @cached_property
     def stance(self) -> Stance | None:
-        """The stance at `positions`. None without legs."""
+        """The stance at `default_pose`. None without legs."""
         if not self.legs:
             return None
-        return compute_stance(self.leg_model, self.positions, total_mass=self.total_mass)
+        return compute_stance(self.leg_model, self.default_pose, total_mass=self.total_mass)
 
     @cached_property
-    def positions(self) -> Mapping[str, float]:
+    def default_pose(self) -> Mapping[str, float]:
         """Default joint positions [rad] or [m], by name.
 
         A position comes from the spec, the first keyframe, the solved standing pose, or is the
@@ -236,10 +240,6 @@ class Facts:
         spec_pose = None if self.spec is None else self.spec.default_pose
         actuated = [joint.name for joint in self.actuated]
         return default_positions(self.leg_model, spec_pose, actuated)
-
-    def effort_limit(self, joint: Joint) -> float | None:
-        """Return the effort limit of a joint [N m] or [N]. None if it is unlimited."""
-        return effort_limit(self.model, joint)
 
     # Symmetry
 

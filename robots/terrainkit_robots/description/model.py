@@ -19,6 +19,9 @@ MOVING = frozenset({"revolute", "continuous", "prismatic"})
 """Joint types with one degree of freedom, in URDF's terms. MJCF's hinge and slide are mapped to
 these."""
 
+WORLD = "world"
+"""Name of the world: the parent of the root bodies of an MJCF, or a root link of a URDF."""
+
 JOINT_TYPES = MOVING | {"fixed", "floating", "planar", "ball"}
 
 
@@ -201,7 +204,8 @@ class Limit:
     """Upper position limit [rad] or [m]."""
 
     effort: float | None = None
-    """Maximum torque [N m] or force [N]."""
+    """Maximum torque [N m] or force [N]. In MJCF, the sum of the limits of the actuators on the
+    joint, or the limit of the joint if that is lower."""
 
     velocity: float | None = None
     """Maximum speed [rad/s] or [m/s]; MJCF has none."""
@@ -263,7 +267,7 @@ class Joint:
     continuous otherwise; a slide is prismatic and a free joint floating."""
 
     parent: str
-    """Name of the parent link; empty if missing, `world` for a root body of an MJCF."""
+    """Name of the parent link; empty if missing, WORLD for a root body of an MJCF."""
 
     child: str
     """Name of the child link; empty if missing."""
@@ -307,6 +311,11 @@ class Joint:
     def friction(self) -> float:
         """Return the Coulomb friction [N m] or [N]; 0 if it is missing."""
         return (self.dynamics and self.dynamics.friction) or 0.0
+
+    @property
+    def effort(self) -> float | None:
+        """Return the effort limit [N m] or [N]; None if it is unlimited."""
+        return self.limit.effort if self.limit else None
 
     @property
     def velocity(self) -> float | None:

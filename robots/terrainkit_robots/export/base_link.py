@@ -8,13 +8,10 @@ import itertools
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from terrainkit_robots.description.model import Joint, Link
+from terrainkit_robots.description.model import WORLD, Joint, Link
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
-
-WORLD = "world"
-"""Name of the parent of root bodies in MJCF."""
 
 
 def with_world_base(facts: "Facts", *, floating: bool | None = None) -> "Facts":

@@ -17,6 +17,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_motion
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints
 from terrainkit_robots.description.model import (
+    WORLD,
     Actuator,
     Dynamics,
     Inertial,
@@ -27,7 +28,7 @@ from terrainkit_robots.description.model import (
     RobotModel,
 )
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.export.base_link import WORLD, with_world_base
+from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
 from terrainkit_robots.transforms import quat_to_matrix
@@ -97,7 +98,9 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
             if joint.moves and name_before in actuated
         ),
         floating=floating,
-        keyframe={name: q for name, q in facts.model.keyframe.items() if name in facts.positions},
+        keyframe={
+            name: q for name, q in facts.model.keyframe.items() if name in facts.default_pose
+        },
         imu=imu if imu is not None and imu[0] in link_names else None,
         excluded=frozenset(pair for pair in facts.model.excluded if pair <= link_names),
         sources=facts.model.sources,
@@ -254,14 +257,12 @@ def _joints(facts: "Facts", changes: list[str]) -> list[tuple[Joint, str]]:
             changes.append(
                 f"removed the mimic of {joint.name}: {_mimic_problem(facts, joint.mimic)}"
             )
-        moved = _canonical_joint(
-            facts, replace(joint, mimic=mimic), bodies.get(joint.child), changes
-        )
+        moved = _canonical_joint(replace(joint, mimic=mimic), bodies.get(joint.child), changes)
         result.append((replace(moved, name=name), joint.name))
     return result
 
 
-def _canonical_joint(facts: "Facts", joint: Joint, body: Body | None, changes: list[str]) -> Joint:
+def _canonical_joint(joint: Joint, body: Body | None, changes: list[str]) -> Joint:
     if not joint.moves or body is None:
         if joint.kind != "fixed":
             changes.append(f"fixed {joint.name}: joint type {joint.kind!r} is not supported")
@@ -281,8 +282,8 @@ def _canonical_joint(facts: "Facts", joint: Joint, body: Body | None, changes: l
             source=joint.limit.source if joint.limit else joint.source,
             lower=lower,
             upper=upper,
-            effort=_positive(facts.effort_limit(joint)),
-            velocity=_positive(joint.limit.velocity if joint.limit else None),
+            effort=_positive(joint.effort),
+            velocity=_positive(joint.velocity),
         ),
         dynamics=Dynamics(
             source=joint.dynamics.source if joint.dynamics else joint.source,

@@ -28,7 +28,7 @@ def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
         facts: The robot.
         feet: Names of the feet, links that are fixed to them; empty to use the detected ones.
     """
-    poses = body_poses(facts.bodies, facts.positions)
+    poses = body_poses(facts.bodies, facts.default_pose)
     foot_names = {facts.body_of[name].index: name for name in feet}
     return tuple(
         _foot_site(leg, foot_names.get(leg.limb.chain[-1], leg.foot), facts, poses)

@@ -292,8 +292,8 @@ def get_rule(code_or_name: str) -> Rule:
     raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")
 
 
-def violations(robot: "Facts", *codes: str) -> Iterator[Finding]:
-    """Yield the violations of the rules with these codes, with their severities.
+def findings_of(robot: "Facts", *codes: str) -> Iterator[Finding]:
+    """Yield the findings of the rules with these codes.
 
     For rules that depend on what other rules report.
     """

@@ -7,7 +7,7 @@ from typing import Literal
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import IMPORTANCE, Finding, Need, Rule, rules
+from terrainkit_robots.lint.rule import IMPORTANCE, Finding, Need, Rule
 
 Verdict = Literal["pass", "warn", "fail"]
 
@@ -54,7 +54,7 @@ class Report:
     skipped: tuple[Skipped, ...] = ()
     """Rules that could not run or were ignored, and suppressed findings."""
 
-    simulated: bool = False
+    may_simulate: bool = False
     """Whether rules were allowed to simulate the robot."""
 
     fixed: tuple[Finding, ...] = ()
@@ -89,20 +89,18 @@ _NEEDS_COMPLETE_TREE = ("LEG", "SYM", "DYN")
 the tree's own errors."""
 
 
-def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool = True) -> Report:
+def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Report:
     """Return the report of the selected rules on a robot.
 
     An exception in one rule does not affect the others. It is recorded in `Report.skipped`.
 
     Args:
         facts: The robot.
-        selected: Rules to run. By default, all rules whose inputs are available.
+        selected: Rules to run. One that lacks an input is skipped, with the reason.
         simulate: Whether rules may simulate the robot, which takes one or two seconds.
     """
     findings: list[Finding] = []
     skipped: list[Skipped] = []
-    if selected is None:
-        selected = [rule for rule in rules() if is_applicable(rule, facts, simulate=simulate)]
     if not facts.model.links and any(p.code in _UNREADABLE for p in facts.model.problems):
         selected = [rule for rule in selected if rule.family == "XML"]  # no robot was read
     for rule in selected:
@@ -127,7 +125,9 @@ def lint(facts: Facts, selected: Sequence[Rule] | None = None, *, simulate: bool
             reason = f"{INTERNAL_ERROR}: {type(error).__name__}: {error}"
             skipped.append(Skipped(code=rule.code, kind="crashed", reason=reason))
     findings.sort(key=_importance)
-    return Report(facts=facts, findings=tuple(findings), skipped=tuple(skipped), simulated=simulate)
+    return Report(
+        facts=facts, findings=tuple(findings), skipped=tuple(skipped), may_simulate=simulate
+    )
 
 
 def _require_complete(rule: Rule, facts: Facts) -> None:
@@ -146,7 +146,7 @@ def _importance(finding: Finding) -> tuple[int, int, str, str, int]:
     return severity, family, finding.code, str(finding.file), finding.line
 
 
-def is_applicable(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
+def has_inputs(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
     """Return whether the user provided the inputs of a rule: other file, spec, simulation."""
     return _missing_need(rule, facts, simulate=simulate) in (None, "legs")
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.lint.rule import Finding, Rule, rules
-from terrainkit_robots.lint.runner import Report, Skipped, is_applicable, lint
+from terrainkit_robots.lint.runner import Report, Skipped, has_inputs, lint
 from terrainkit_robots.lint.settings import Settings, matching
 from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
 from terrainkit_robots.text import display_path
@@ -50,7 +50,7 @@ def lint_selected(
 
     Args:
         facts: The robot.
-        settings: Which rules to run.
+        settings: Which rules to run. If they select none by name, all whose inputs are available.
         contents: Bytes that replace the content of files, by path.
 
     Raises:
@@ -59,7 +59,7 @@ def lint_selected(
     selected, ignored = select_rules(settings)
     simulate = settings.simulate is not False
     if not settings.select:
-        selected = tuple(r for r in selected if is_applicable(r, facts, simulate=simulate))
+        selected = tuple(r for r in selected if has_inputs(r, facts, simulate=simulate))
     report = lint(facts, selected, simulate=simulate)
     comments = [
         comment

@@ -6,10 +6,8 @@ from pathlib import Path
 
 from terrainkit.errors import ExportError
 from terrainkit.files.atomic_write import atomic_folder
+from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.text import free_name, names
-
-SPEC = "robot.toml"
-"""A folder that contains this file is an onboarded robot."""
 
 _BACKUP_SUFFIX = ".before"
 """Suffix of backups of edited files."""
@@ -38,9 +36,9 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
         return
     if not overwrite:
         raise ExportError(f"{target} exists; use another name, or --overwrite")
-    if SPEC not in contents:
+    if SPEC_FILE not in contents:
         raise ExportError(
-            f"{target} contains no {SPEC}; only folders of onboarded robots are overwritten"
+            f"{target} contains no {SPEC_FILE}; only folders of onboarded robots are overwritten"
         )
     editable = _editable_files()
     foreign = [
@@ -58,7 +56,7 @@ def _editable_files() -> frozenset[str]:
     from terrainkit_robots.onboarding.frameworks import frameworks
 
     file_names = map(frameworks.config_file_name, frameworks.framework_names())
-    return frozenset({SPEC, *file_names})
+    return frozenset({SPEC_FILE, *file_names})
 
 
 def _original_name(name: str) -> str:

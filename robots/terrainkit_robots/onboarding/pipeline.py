@@ -15,7 +15,7 @@ from terrainkit_robots.lint.settings import Settings, read_settings
 from terrainkit_robots.onboarding.folder import check_folder, find_edits, new_folder, write_files
 from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
 from terrainkit_robots.onboarding.placeholder_effort import placeholder_effort
-from terrainkit_robots.onboarding.repairs import with_onboarding_repairs
+from terrainkit_robots.onboarding.repairs import with_repairs_marked_safe
 from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.robot_files import (
@@ -134,7 +134,7 @@ def onboard(
     target = Path(output or plain_name(report.facts.model))
     check_folder(target, overwrite=options.overwrite)
     options.on_step("deriving the default pose and the gains")
-    robot = make_robot_files(
+    robot_files = make_robot_files(
         report.facts,
         collision=options.collision,
         floating=options.floating,
@@ -144,16 +144,16 @@ def onboard(
         cache_dir=options.cache_dir,
         progress=options.progress,
     )
-    configs, skipped_configs = _config_files(config_names, robot)
+    configs, skipped_configs = _config_files(config_names, robot_files)
     result = OnboardResult(
         report=report,
         fixed=fixed,
         folder=target,
-        robot=robot,
+        robot=robot_files,
         configs=tuple(configs),
         skipped_configs=skipped_configs,
     )
-    return _write_folder(result, target, {**robot.files, **configs}, options)
+    return _write_folder(result, target, {**robot_files.files, **configs}, options)
 
 
 def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[Finding, ...]]:
@@ -163,12 +163,12 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
     settings = options.settings.over(read_settings(path.parent))
     # All rules are needed to find blocking errors. The written files are simulated, not this one.
     settings = replace(settings, select=(), simulate=False)
-    report = with_onboarding_repairs(check_robot(path, settings))
+    report = with_repairs_marked_safe(check_robot(path, settings))
     fixed: tuple[Finding, ...] = ()
     if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
 
         def check(contents: Mapping[Path, bytes]) -> Report:
-            return with_onboarding_repairs(check_robot(path, settings, contents=contents))
+            return with_repairs_marked_safe(check_robot(path, settings, contents=contents))
 
         result = fix_robot(path, check, report=report, unsafe=options.unsafe_fixes)
         report, fixed = result.report, result.fixed
@@ -180,19 +180,19 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
 
 
 def _config_files(
-    file_names: Mapping[str, str], robot: RobotFiles
+    file_names: Mapping[str, str], robot_files: RobotFiles
 ) -> tuple[dict[str, bytes], dict[str, str]]:
     """Return the configurations by file name, and why frameworks are skipped.
 
     Args:
         file_names: File of the configuration of each framework.
-        robot: The robot.
+        robot_files: The robot.
     """
     configs: dict[str, bytes] = {}
     skipped: dict[str, str] = {}
     for name, file in file_names.items():
         try:
-            configs[file] = robot_config_text(name, robot.facts, robot.spec).encode()
+            configs[file] = robot_config_text(name, robot_files.facts, robot_files.spec).encode()
         except ConfigError as error:
             skipped[name] = str(error)
     return configs, skipped

@@ -1,4 +1,4 @@
-"""Repairs that onboarding applies by itself, since it works on a copy and reports them."""
+"""Mark the fixes that onboarding applies by itself as safe: it works on a copy and reports them."""
 
 from dataclasses import replace
 
@@ -13,8 +13,8 @@ _MAX_CHANGE = 0.01
 are less accurate than this."""
 
 
-def with_onboarding_repairs(report: Report) -> Report:
-    """Return a report in which the fixes of negligible inertias and of mesh paths are safe.
+def with_repairs_marked_safe(report: Report) -> Report:
+    """Return a report in which the fixes of mesh paths and negligible inertias are safe.
 
     A sensor frame with a placeholder inertia prevents MuJoCo from loading a robot, but has no
     effect on the motion of the body that it is fixed to. A missing mesh is replaced by the file of

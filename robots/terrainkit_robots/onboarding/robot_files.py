@@ -21,6 +21,7 @@ from terrainkit_robots.export.sites import foot_sites, imu_changes, imu_site
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.onboarding.placeholder_effort import without_effort
 from terrainkit_robots.spec.column import rounded_length
+from terrainkit_robots.spec.robot import SPEC_FILE
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from terrainkit_robots.simulation.gain import GainSet
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
-URDF, MJCF, SCENE, SPEC = "robot.urdf", "robot.xml", "scene.xml", "robot.toml"
-"""Names of the files in the folder."""
+URDF, MJCF, SCENE = "robot.urdf", "robot.xml", "scene.xml"
+"""Names of the files in the folder, besides SPEC_FILE."""
 
 _MAX_PENETRATION = 1e-4
 """Links that penetrate each other by more than this at the default pose do not collide [m]."""
@@ -120,7 +121,7 @@ def make_robot_files(
         SCENE: scene_text(
             facts.model.name, MJCF, height=max(rounded_length(_base_height(facts)), 0.1)
         ),
-        SPEC: spec.to_toml(),
+        SPEC_FILE: spec.to_toml(),
     }
     return RobotFiles(
         facts=facts,
@@ -226,7 +227,7 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         imu=imu,
         frames=tuple(frames),
         excluded=merged.model.excluded,
-        keyframe=facts.positions,
+        keyframe=facts.default_pose,
         height=height,
         height_at_zero=max(height, rounded_length(_clearance(facts, {}))) if facts.stance else None,
     )
@@ -252,7 +253,7 @@ def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[s
     """Return the pairs of links that must not collide, and a line for each derived pair."""
     from_file = facts.model.excluded
     try:
-        overlaps = facts.overlap_scene.detect(facts.positions)
+        overlaps = facts.overlap_scene.detect(facts.default_pose)
     except CannotCheckError as error:
         return from_file, (f"links that penetrate each other were not searched for: {error}",)
     pairs = {
@@ -276,7 +277,7 @@ def _base_height(facts: Facts) -> float:
         return facts.stance.height
     if not facts.model.floating:
         return 0.0
-    return max(0.0, _clearance(facts, facts.positions))
+    return max(0.0, _clearance(facts, facts.default_pose))
 
 
 def _clearance(facts: Facts, positions: Mapping[str, float]) -> float:

@@ -101,7 +101,7 @@ def verify(
     test = partial(
         stand_test,
         SimModel.from_mujoco(scene.result(), base=robot.facts.bodies[0].top.name),
-        positions=robot.facts.positions,
+        positions=robot.facts.default_pose,
         areas=contact_areas(robot.facts),
         seconds=_DURATION,
     )

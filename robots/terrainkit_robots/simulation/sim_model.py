@@ -143,7 +143,7 @@ def make_sim_model(facts: Facts) -> SimModel:
     extras = Extras(
         actuators=actuators,
         excluded=model.excluded,
-        keyframe=facts.positions,
+        keyframe=facts.default_pose,
         height=facts.stance.height if facts.stance else 1.0,
         time_step=TIME_STEP,
     )

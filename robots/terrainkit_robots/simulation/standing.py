@@ -101,7 +101,7 @@ def contact_areas(facts: "Facts") -> tuple[ContactArea, ...]:
     if facts.stance is None:
         return ()
     found = []
-    poses = body_poses(facts.bodies, facts.positions)
+    poses = body_poses(facts.bodies, facts.default_pose)
     for leg, contact in zip(facts.legs, facts.stance.contacts, strict=True):
         body = facts.bodies[leg.limb.chain[-1]]
         has_ankle = "knee" in leg.roles[:-1]  # the body below an ankle is a foot

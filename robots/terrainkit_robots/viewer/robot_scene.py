@@ -50,7 +50,7 @@ class RobotScene:
         for k, body in enumerate(facts.bodies):
             self.visuals += self._add_shapes(k, "visual", body.visuals or body.collisions)
             self.collisions += self._add_shapes(k, "collision", body.collisions)
-        self.set_positions(facts.positions)
+        self.set_positions(facts.default_pose)
         self.set_base((0.0, 0.0, default_height(facts)), (1.0, 0.0, 0.0, 0.0))
 
     def set_positions(self, positions: Mapping[str, float]) -> None:
@@ -98,7 +98,7 @@ def body_node(index: int) -> str:
 
 def default_height(facts: Facts) -> float:
     """Return the height of the trunk [m] at which the default pose touches the plane z = 0."""
-    poses = body_poses(facts.bodies, facts.positions)
+    poses = body_poses(facts.bodies, facts.default_pose)
     heights = [
         min_height(shape, pose, facts.meshes)
         for body, pose in zip(facts.bodies, poses, strict=True)

@@ -65,7 +65,7 @@ class JointSliders:
         set_positions: Callable[[Mapping[str, float]], None],
     ) -> None:
         """Add the sliders, in the order of the joints, to the GUI of a server."""
-        self._default, self._mirror = facts.positions, facts.mirror_map
+        self._default, self._mirror = facts.default_pose, facts.mirror_map
         self._set_positions = set_positions
         self._lock, self._is_updating = threading.RLock(), False
         self.mirrored = server.gui.add_checkbox("move mirrored joints", initial_value=False)

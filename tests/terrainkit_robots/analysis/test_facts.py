@@ -6,7 +6,8 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 URDF, MJCF = Path("/robots/robot.urdf"), Path("/robots/robot.xml")
@@ -56,13 +57,13 @@ def test_facts_of_small_robot():
     }
     assert robot.limbs == robot.legs == ()
     assert robot.stance is None
-    assert robot.positions["bc"] == 0.2
+    assert robot.default_pose["bc"] == 0.2
 
 
 def test_facts_of_empty_robot():
     robot = facts('<robot name="r"/>')
     assert robot.bodies == robot.links == robot.joints == robot.actuated == ()
-    assert robot.body_of == robot.positions == {}
+    assert robot.body_of == robot.default_pose == {}
     assert robot.total_mass == 0
     assert robot.limbs == robot.legs == robot.mirror.pairs == ()
     assert robot.stance is None
@@ -83,7 +84,7 @@ def test_facts_are_cached():
         "limbs",
         "legs",
         "mirror",
-        "positions",
+        "default_pose",
         "overlap_scene",
     ):
         assert getattr(robot, name) is getattr(robot, name)
@@ -139,8 +140,10 @@ def test_actuated_joints_of_mjcf(actuators, driven):
 def test_positions_equal_keyframe():
     path = bundled.urdf_path("quadruped").with_suffix(".xml")
     robot = Facts(load_robot(path))
-    assert robot.positions == {each.name: robot.model.keyframe[each.name] for each in robot.joints}
-    assert robot.stance.positions == robot.positions
+    assert robot.default_pose == {
+        each.name: robot.model.keyframe[each.name] for each in robot.joints
+    }
+    assert robot.stance.positions == robot.default_pose
 
 
 # Meshes
@@ -183,7 +186,7 @@ def test_facts_of_thousands_of_links():
     robot = facts(f'<robot name="r">{"".join(parts)}</robot>')
     assert robot.legs == ()
     assert len(robot.mirror.pairs) == 1000
-    assert robot.positions
+    assert robot.default_pose
 
 
 @pytest.mark.parametrize("value", ["1e29", "-1e29", "1e-300", "0"])
@@ -196,7 +199,7 @@ def test_facts_and_rules_survive_extreme_numbers(value, attribute):
     end = text.index('"', begin)
     count = len(text[begin:end].split())
     robot = facts(text[:begin] + " ".join([value] * count) + text[end:])
-    report = lint(robot)
+    report = lint_selected(robot, Settings())
     assert report.crashed == ()
 
 

@@ -13,7 +13,9 @@ from hypothesis import strategies as st
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.runner import INTERNAL_ERROR, lint
+from terrainkit_robots.lint.runner import INTERNAL_ERROR
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 
 URDF = (bundled.urdf_path("quadruped") or Path()).read_text()
 MJCF = (bundled.urdf_path("quadruped") or Path()).with_suffix(".xml").read_text()
@@ -31,7 +33,7 @@ NASTY = [
 
 def check(path: Path) -> set[str]:
     """Return the codes of all findings; fails if a rule failed."""
-    report = lint(Facts(load_robot(path)), simulate=False)
+    report = lint_selected(Facts(load_robot(path)), Settings(simulate=False))
     assert not report.crashed
     return {finding.code for finding in report.findings}
 

@@ -10,7 +10,8 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.onboarding.robot_files import make_robot_files
 from terrainkit_robots.spec.per_joint import by_joint
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec
@@ -323,7 +324,7 @@ def test_biped_pelvis_is_published_upper_body(robot_file):
 @every_robot
 @every_format
 def test_check_robot_has_no_findings(name, suffix):
-    report = lint(facts(name, suffix))
+    report = lint_selected(facts(name, suffix), Settings())
     loud = [f for f in report.findings if f.severity != "info"]
     assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
 
@@ -372,7 +373,7 @@ def test_check_robot_has_no_findings_for_spec(name, suffix):
     path = bundled.urdf_path(name)
     spec = RobotSpec.load(path.with_name("robot.toml"))
     robot = Facts(load_robot(path.with_suffix(suffix)), spec=spec)
-    loud = [f for f in lint(robot).findings if f.severity != "info"]
+    loud = [f for f in lint_selected(robot, Settings()).findings if f.severity != "info"]
     assert not loud, "\n".join(f"{f.code} {f.subject}: {f.message}" for f in loud)
 
 

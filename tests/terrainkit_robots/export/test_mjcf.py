@@ -81,7 +81,7 @@ def test_actuator_order(quadruped):
         name: ActuatorConfig(stiffness=20 + k, damping=0.5, effort=5.0 + k, armature=0.01)
         for k, name in enumerate(names)
     }
-    model = written(quadruped.model, actuators=drives, keyframe=quadruped.positions, height=0.3)
+    model = written(quadruped.model, actuators=drives, keyframe=quadruped.default_pose, height=0.3)
     assert [model.actuator(k).name for k in range(model.nu)] == names
     for k, name in enumerate(names):
         motor, joint = model.actuator(k), model.joint(name)
@@ -93,7 +93,7 @@ def test_actuator_order(quadruped):
         assert model.dof_armature[joint.dofadr[0]] == 0.01
     key = model.key("home")
     assert key.qpos[2] == 0.3
-    assert list(key.ctrl) == pytest.approx([quadruped.positions[name] for name in names])
+    assert list(key.ctrl) == pytest.approx([quadruped.default_pose[name] for name in names])
 
 
 def test_actuator_without_effort_is_unlimited(quadruped):
@@ -113,7 +113,7 @@ def test_touch_sensors_of_feet(quadruped):
         actuators=drives,
         feet=foot_sites(quadruped),
         imu=imu_site(quadruped),
-        keyframe=quadruped.positions,
+        keyframe=quadruped.default_pose,
         height=quadruped.stance.height,
     )
     text = mjcf_text(quadruped.model, extras)

@@ -15,6 +15,8 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot, write_fixes
 from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 CASES = Path(__file__).parent / "cases"
@@ -223,7 +225,10 @@ def lint_case(case, path, contents=None, selected=None):
 
     Simulation is enabled only if rules are selected.
     """
-    return lint(case.facts(path, contents), selected, simulate=selected is not None)
+    facts = case.facts(path, contents)
+    if selected is None:
+        return lint_selected(facts, Settings(simulate=False), contents)
+    return lint(facts, selected)
 
 
 def messages(report):

@@ -9,7 +9,9 @@ from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.rule import Rule, Violation, rules
-from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, Skipped, is_applicable, lint
+from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, Skipped, has_inputs, lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 
 FILE = Path("/robots/robot.urdf")
 
@@ -137,11 +139,11 @@ def test_rules_need_their_input(needs, reason):
     asked = rule([violation()], needs=needs)
     made = lint(facts(), [asked], simulate=False)
     assert made.skipped == (Skipped(code="INR099", kind="no-input", reason=reason),)
-    assert not is_applicable(asked, facts(), simulate=False)
+    assert not has_inputs(asked, facts(), simulate=False)
 
 
 def test_rules_of_legged_robots_are_applicable_without_legs():
-    assert is_applicable(rule([], needs=("legs",)), facts(), simulate=False)
+    assert has_inputs(rule([], needs=("legs",)), facts(), simulate=False)
 
 
 @pytest.mark.parametrize("family", ["LEG", "SYM", "DYN"])
@@ -191,17 +193,15 @@ def test_findings_of_a_rule_are_limited():
     assert exactly.skipped == ()
 
 
-def test_all_rules_run_by_default():
-    codes = {each.code for each in rules()}
-    made = lint(facts("<robot/>"))
-    assert {each.code for each in (*made.findings, *made.skipped)} <= codes
+def test_only_given_rules_run():
+    made = lint(facts("<robot/>"), rules())
     assert any(each.code == "XML003" for each in made.findings)
     assert lint(facts("<robot/>"), []).findings == ()
 
 
 def test_lint_is_deterministic():
     robot = bundled.urdf_path("quadruped")
-    first, second = (lint(Facts(load_robot(robot))) for _ in range(2))
+    first, second = (lint_selected(Facts(load_robot(robot)), Settings()) for _ in range(2))
     assert first.findings == second.findings
     assert first.skipped == second.skipped
 
@@ -209,6 +209,6 @@ def test_lint_is_deterministic():
 @pytest.mark.parametrize("name", bundled.robot_names())
 @pytest.mark.parametrize("suffix", [".urdf", ".xml"])
 def test_bundled_robots_pass_all_rules(name, suffix):
-    made = lint(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))))
+    made = lint_selected(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))), Settings())
     assert made.crashed == ()
     assert made.verdict == "pass"

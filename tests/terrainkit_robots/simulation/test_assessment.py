@@ -75,7 +75,9 @@ def quadruped():
 
 def stand(facts, sim):
     return assess(
-        stand_test(sim, suggest_gains(facts), positions=facts.positions, areas=contact_areas(facts))
+        stand_test(
+            sim, suggest_gains(facts), positions=facts.default_pose, areas=contact_areas(facts)
+        )
     )
 
 

@@ -8,7 +8,8 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot
-from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.simulation.pd_gains import suggest_gains, suggest_training_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
@@ -117,7 +118,8 @@ def facts_of(name, robot_file):
 @cache
 def repaired(path):
     def look(contents):
-        return lint(Facts(load_robot(path, contents=contents), Meshes(contents)), simulate=False)
+        facts = Facts(load_robot(path, contents=contents), Meshes(contents))
+        return lint_selected(facts, Settings(simulate=False), contents)
 
     return fix_robot(path, look, unsafe=True).report.facts
 

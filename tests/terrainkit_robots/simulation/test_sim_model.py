@@ -75,7 +75,7 @@ def test_sim_model_stands_on_the_floor(facts):
     assert min(heights) == pytest.approx(0, abs=1e-3)
     assert sim.standing_qpos[2] == pytest.approx(facts.stance.height)
     placed = dict(zip(sim.joints, sim.standing_qpos[7:], strict=True))
-    assert placed == pytest.approx({name: facts.positions[name] for name in sim.joints})
+    assert placed == pytest.approx({name: facts.default_pose[name] for name in sim.joints})
 
 
 def test_sim_model_has_effort_limits(facts):

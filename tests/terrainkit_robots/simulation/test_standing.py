@@ -8,7 +8,8 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.apply import fix_robot
-from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
@@ -28,7 +29,7 @@ def facts_of(name, robot_file):
 
 
 def stand(facts, **keys):
-    keys = {"positions": facts.positions, "areas": contact_areas(facts)} | keys
+    keys = {"positions": facts.default_pose, "areas": contact_areas(facts)} | keys
     return stand_test(make_sim_model(facts), suggest_gains(facts), **keys)
 
 
@@ -54,7 +55,8 @@ def test_stand_test_of_repaired_anymal_c(robot_file):
     path = robot_file("anymal_c/urdf/anymal_c.urdf")
 
     def look(contents):
-        return lint(Facts(load_robot(path, contents=contents), Meshes(contents)), simulate=False)
+        facts = Facts(load_robot(path, contents=contents), Meshes(contents))
+        return lint_selected(facts, Settings(simulate=False), contents)
 
     check(stand(fix_robot(path, look, unsafe=True).report.facts, seconds=5))
 
@@ -93,7 +95,7 @@ def test_stand_test_with_stiffer_gains_sinks_less():
         for name, gain in suggest_gains(facts).items()
     }
     standing = stand_test(
-        make_sim_model(facts), stiff, positions=facts.positions, areas=contact_areas(facts)
+        make_sim_model(facts), stiff, positions=facts.default_pose, areas=contact_areas(facts)
     )
     assert standing.height_loss < 0.5 * stand(facts).height_loss
     largest = max(abs(torque) for torque in facts.stance.torques.values())
@@ -109,7 +111,7 @@ def test_stand_test_reports_knee_contacts():
         for name, gain in suggest_gains(facts).items()
     }
     standing = stand_test(
-        make_sim_model(facts), limp, positions=facts.positions, areas=contact_areas(facts)
+        make_sim_model(facts), limp, positions=facts.default_pose, areas=contact_areas(facts)
     )
     assert standing.height_loss > 0.15
     assert {"FL_calf", "RR_calf"} & set(standing.other_contacts)

@@ -8,7 +8,8 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.views.viewer import show_map
-from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.viewer.show_policy import PolicyView
 from terrainkit_robots.viewer.show_robot import show_robot
@@ -44,7 +45,7 @@ def show_on(server, page):
 
 def test_pages_show_scenes_without_errors(make_server, bundled):
     robot, small_map, policy = (make_server() for _ in range(3))
-    scene = show_robot(robot, lint(bundled("quadruped.urdf"), simulate=False))
+    scene = show_robot(robot, lint_selected(bundled("quadruped.urdf"), Settings(simulate=False)))
     show_map(small_map, tk.generate(tk.MapConfig(rows=2, cols=3, border=1.0, preset="stairs")))
     view = PolicyView(policy, open_run("quadruped"))
     with open_page("about:blank") as page:

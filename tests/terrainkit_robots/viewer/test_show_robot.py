@@ -6,13 +6,15 @@ import pytest
 from terrainkit_robots.description.model import Joint, Limit, Source
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.viewer.show_robot import findings_html, show_robot, slider_range
 
 
 @pytest.fixture
 def show(server, shown):
     def run(facts):
-        return show_robot(server, lint(facts, simulate=False)), shown
+        return show_robot(server, lint_selected(facts, Settings(simulate=False))), shown
 
     return run
 
@@ -30,7 +32,7 @@ def test_show_robot_adds_meshes_and_sliders(show, bundled):
     assert not any(handle.visible for handle in scene.collisions)
     assert len(scene.visuals) > 13
     assert shown["FL_calf_joint [rad]"].min == pytest.approx(-2.7227)
-    assert shown["FL_calf_joint [rad]"].value == scene.facts.positions["FL_calf_joint"]
+    assert shown["FL_calf_joint [rad]"].value == scene.facts.default_pose["FL_calf_joint"]
     # The feet touch the ground in the default pose.
     assert scene.base.position[2] == pytest.approx(scene.facts.stance.height)
 
@@ -65,7 +67,7 @@ def test_mirrored_joints_move_together_if_checked(show, bundled):
 def test_default_pose_button_resets_sliders(show, bundled):
     scene, shown = show(bundled("biped.urdf"))
     name = "left_knee_joint"
-    slider, default = shown[f"{name} [rad]"], scene.facts.positions[name]
+    slider, default = shown[f"{name} [rad]"], scene.facts.default_pose[name]
     slider.value = slider.max
     shown["default pose"].value = True
     assert slider.value == default
@@ -91,7 +93,7 @@ def test_finding_is_listed_and_marked_at_its_link(show, bundled, tmp_path):
     facts = bundled(
         "quadruped.urdf", ('<mass value="6.921"/>', '<mass value="-6.921"/>'), tmp_path=tmp_path
     )
-    report = lint(facts, simulate=False)
+    report = lint_selected(facts, Settings(simulate=False))
     (finding, *_) = (each for each in report.findings if each.code == "INR002")
     body = facts.body_of[finding.subject]
     _, shown = show(facts)
@@ -106,7 +108,8 @@ def test_finding_is_listed_and_marked_at_its_link(show, bundled, tmp_path):
 
 
 def test_findings_escape_texts_of_the_file(robot):
-    report = lint(robot('<robot name="r"><link name="&lt;img src=x&gt;"/></robot>'), simulate=False)
+    facts = robot('<robot name="r"><link name="&lt;img src=x&gt;"/></robot>')
+    report = lint_selected(facts, Settings(simulate=False))
     assert any("<img" in finding.subject for finding in report.findings)
     assert "<img" not in findings_html(report.findings)
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from terrainkit_robots.description.model import Joint, Link, RobotModel
+from terrainkit_robots.description.model import WORLD, Joint, Link, RobotModel
 
 Reason = Literal["duplicate", "unknown-link", "second-parent", "cycle"]
 
@@ -75,7 +75,7 @@ def _parent_joints(
     rejected: list[tuple[Joint, Reason]] = []
     seen: set[str] = set()
     for joint in model.joints:
-        if joint.parent == "world" and "world" not in links and model.kind == "mjcf":
+        if joint.parent == WORLD and WORLD not in links and model.kind == "mjcf":
             continue  # connects a root to the world, not two links
         if joint.name in seen and joint.child in parent_joint:
             rejected.append((joint, "duplicate"))

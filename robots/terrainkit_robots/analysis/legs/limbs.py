@@ -15,7 +15,7 @@ from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import bounds, min_height
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.description.model import Joint
+from terrainkit_robots.description.model import WORLD, Joint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
@@ -117,7 +117,7 @@ def detect_limbs(
         ),
         default=np.inf,
     )
-    is_fixed_base = bool(tree.order) and tree.order[0] == bodies[0].top.name == "world"
+    is_fixed_base = bool(tree.order) and tree.order[0] == bodies[0].top.name == WORLD
 
     def height_score(foot: float) -> float:
         ratio, is_arm = (foot - ground) / height, foot - rest > _MIN_ARM_HEIGHT * height

@@ -17,3 +17,8 @@ def urdf_path(name: str) -> Path | None:
     The robot's MJCF is in the same folder.
     """
     return _FOLDER / name / f"{name}.urdf" if name in _NAMES else None
+
+
+def is_bundled(path: Path) -> bool:
+    """Return whether a file belongs to a bundled robot."""
+    return path.resolve().is_relative_to(_FOLDER.resolve())

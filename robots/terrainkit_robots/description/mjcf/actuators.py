@@ -39,7 +39,7 @@ class ActuatorData:
     commands: tuple[float, float] | None
     """Range of the commanded force; None if it is unlimited or commands something else."""
 
-    def actuator(self, factor: float, max_effort: float | None) -> Actuator:
+    def to_actuator(self, factor: float, max_effort: float | None) -> Actuator:
         """Return the actuator of the model.
 
         Args:
@@ -70,7 +70,7 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
         gear = float(each.gear[0])
         joint = each.target if each.trntype in joints else ""
         commanded = None if "plugin" in node.written else _max_commanded_force(each)
-        limit = _limit(each.forcelimited, each.forcerange, each.compiler.autolimits)
+        limit = _max_magnitude(each.forcelimited, each.forcerange, each.compiler.autolimits)
         force = min((f for f in (commanded, limit) if f is not None), default=None)
         yield ActuatorData(
             name=each.name or (f"{joint}_actuator" if joint else node.tag),
@@ -102,7 +102,7 @@ def _max_commanded_force(actuator: Any) -> float | None:
     free = actuator.biastype == mujoco.mjtBias.mjBIAS_NONE or not np.any(actuator.biasprm)
     if not (direct and constant and free):
         return None
-    command = _limit(actuator.ctrllimited, actuator.ctrlrange, actuator.compiler.autolimits)
+    command = _max_magnitude(actuator.ctrllimited, actuator.ctrlrange, actuator.compiler.autolimits)
     force = None if command is None else command * abs(float(actuator.gainprm[0]))
     return force if force is None or math.isfinite(force) else None
 
@@ -118,7 +118,7 @@ def _stiffness(actuator: Any, gear: float) -> float | None:
     return gain * gear**2 if is_position else None
 
 
-def _limit(limited: Any, bounds: Sequence[float], autolimits: bool) -> float | None:
+def _max_magnitude(limited: Any, bounds: Sequence[float], autolimits: bool) -> float | None:
     """Return the largest absolute value of a range; None if the range is not active."""
     import mujoco
 
@@ -140,7 +140,7 @@ def force_limit(joint: Any, actuators: Sequence[ActuatorData], factor: float) ->
         factor: Factor of the frames around the joint on forces.
     """
     limits = [
-        _limit(joint.actfrclimited, joint.actfrcrange, joint.compiler.autolimits),
+        _max_magnitude(joint.actfrclimited, joint.actfrcrange, joint.compiler.autolimits),
         sum(actuator.effort for actuator in actuators if actuator.effort is not None)
         if actuators and all(actuator.effort is not None for actuator in actuators)
         else None,

@@ -175,7 +175,7 @@ class CompiledBodies:
         kind, ends = shape_kind(shape), shape.fromto
         spans = kind in _SPANNING and not math.isnan(ends[0])
         if spans and np.linalg.norm(ends[:3] - ends[3:]) < _MIN_LENGTH:
-            self._reject(shape, "the two points of fromto are equal")
+            self._report_rejected(shape, "the two points of fromto are equal")
             spans = False
         count = 1 if spans else SIZES.get(kind, 0)
         has_mesh = bool(getattr(shape, "meshname", ""))
@@ -271,10 +271,10 @@ class CompiledBodies:
                 )
             )
         except ValueError as error:
-            self._reject(element, f"there is no orientation: {error}", child)
+            self._report_rejected(element, f"there is no orientation: {error}", child)
             return np.array([1.0, 0, 0, 0])
 
-    def _reject(self, element: Any, message: str, child: str = "") -> None:
+    def _report_rejected(self, element: Any, message: str, child: str = "") -> None:
         node = self._node_of(element)
         node = next((each for each in node.elements() if each.tag == child), node)
         self._report(node, f"<{node.tag}>: {message}; MuJoCo rejects the file")

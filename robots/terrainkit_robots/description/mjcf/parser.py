@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import closest, truncate
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
-from terrainkit_robots.description.model import Problem
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
@@ -103,15 +102,8 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
         if time.monotonic() - start > _MAX_SECONDS:
             break
     reason = f"MuJoCo still rejects the file without the reported elements ({message}); "
-    report(tree, tree.root, "XML011", reason + "the robot is not checked")
+    tree.add_problem(tree.root, "XML011", reason + "the robot is not checked")
     return None, []
-
-
-def report(tree: MjcfTree, node: Node, code: str, message: str, **details: str) -> None:
-    """Add a problem at a node."""
-    tree.problems.append(
-        Problem(code=code, message=message, source=node.source, subject=node.owner, details=details)
-    )
 
 
 # Numbers
@@ -136,8 +128,7 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
             continue
         repaired = next((r for n in counts if (r := replace_commas(text, n))), "")
         expected = "a number" if counts[0] == 1 else f"{counts[0]} numbers"
-        report(
-            tree,
+        tree.add_problem(
             node,
             "XML006",
             f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
@@ -160,7 +151,7 @@ def _repair(tree: MjcfTree, lines: list[Node], error: str) -> bool:
     location = re.search(r"Element '[^']*', line (\d+)", error)
     line = int(location[1]) if location else 0
     if not 1 <= line <= len(lines):
-        report(tree, tree.root, "XML011", f"MuJoCo rejects the file: {message}")
+        tree.add_problem(tree.root, "XML011", f"MuJoCo rejects the file: {message}")
         return False
     node = lines[line - 1]
     for pattern, repair in _REPAIRS:
@@ -188,7 +179,7 @@ def _remove(node: Node) -> bool:
 def _report_rejected(tree: MjcfTree, node: Node, message: str) -> None:
     if "unknown default" in message and any(p.code == "XML012" for p in tree.problems):
         return  # the class may be in the missing file
-    report(tree, node, "XML011", f"MuJoCo rejects <{node.tag}>: {message}")
+    tree.add_problem(node, "XML011", f"MuJoCo rejects <{node.tag}>: {message}")
 
 
 def _similar_nodes(
@@ -223,8 +214,7 @@ def _unknown_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
         name, _schema().get(node.tag, frozenset()) - node.attributes.keys(), _MIN_SIMILARITY
     )
     what = f"attribute {name} of <{node.tag}> is unknown to {_mujoco()}, which rejects the file"
-    report(
-        tree,
+    tree.add_problem(
         node,
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean {suggestion}?" if suggestion else ""),
@@ -249,8 +239,7 @@ def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         node.tag, _allowed_children().get(node.parent.tag, frozenset(_schema())), _MIN_SIMILARITY
     )
     what = f"<{node.tag}> in <{node.parent.tag}> is unknown to {_mujoco()}, which rejects the file"
-    report(
-        tree,
+    tree.add_problem(
         node,
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean <{suggestion}>?" if suggestion else ""),
@@ -289,7 +278,7 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     else:
         expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
     message = f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
-    report(tree, node, "XML006", message, attribute=name, repaired="")
+    tree.add_problem(node, "XML006", message, attribute=name, repaired="")
     return True
 
 
@@ -297,7 +286,7 @@ def _missing_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
     name = match[1]
     if name not in node.written and (node.tag, name) != ("inertial", "mass"):  # reported by INR001
         message = f"<{node.tag}> has no {name}; MuJoCo rejects the file"
-        report(tree, node, "XML013", message, attribute=name)
+        tree.add_problem(node, "XML013", message, attribute=name)
     if name in _DEFAULTS and name not in node.attributes:
         node.attributes[name] = _DEFAULTS[name]
         node.defaults.add(name)
@@ -319,7 +308,7 @@ def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         where = f"also on line {same[0].source.line}" if is_first_known else "the name is taken"
         more = f" and {len(duplicates) - 1} more times" if len(duplicates) > 1 else ""
         message = f"duplicate {kind} {name}: {where}{more}; MuJoCo rejects the file"
-        report(tree, duplicates[0], "TRE001", message)
+        tree.add_problem(duplicates[0], "TRE001", message)
     else:
         _report_rejected(tree, node, match[0])
     taken = {n.attributes.get("name") for n in tree.nodes()}

@@ -27,7 +27,7 @@ from terrainkit_robots.description.mjcf.inertia import (
     geom_inertial,
     scale_to_total_mass,
 )
-from terrainkit_robots.description.mjcf.parser import parse_mjcf, report
+from terrainkit_robots.description.mjcf.parser import parse_mjcf
 from terrainkit_robots.description.mjcf.references import dangling_references
 from terrainkit_robots.description.mjcf.shapes import (
     SIZES,
@@ -39,6 +39,7 @@ from terrainkit_robots.description.mjcf.shapes import (
 )
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, read_tree
 from terrainkit_robots.description.model import (
+    WORLD,
     Actuator,
     Dynamics,
     Geometry,
@@ -56,8 +57,6 @@ from terrainkit_robots.description.xml.numbers import is_in_degrees, parse_numbe
 if TYPE_CHECKING:
     import mujoco
 
-WORLD = "world"
-
 _PAIRED = 1 << 30
 """Contype bit of geoms that collide only through a <pair>; no other geom uses it."""
 
@@ -69,31 +68,22 @@ def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None)
         doc: The XML document.
         contents: File contents by path, which are used instead of included files on disk.
     """
-    file = doc.file
-    if doc.root is None:
-        return RobotModel(
-            name="",
-            kind="mjcf",
-            file=file,
-            source=Source(file=file, line=0),
-            problems=doc.problems,
-            sources=(file,),
-        )
+    assert doc.root is not None
     mjcf = read_tree(doc, contents or {})
     spec, lines = parse_mjcf(mjcf)
-    robot = RobotModel(
+    model = RobotModel(
         name=mjcf.root.written.get("model", "").strip(),
         kind="mjcf",
-        file=file,
+        file=doc.file,
         source=mjcf.root.source,
         sources=mjcf.sources,
     )
     if spec is not None:
-        robot = _Reader(mjcf, spec, lines).fill(robot)
-    return replace(robot, problems=tuple(mjcf.problems))
+        model = _SpecReader(mjcf, spec, lines).fill(model)
+    return replace(model, problems=tuple(mjcf.problems))
 
 
-class _Reader:
+class _SpecReader:
     """Convert a parsed MuJoCo spec to links and joints, and collect problems."""
 
     def __init__(self, mjcf: MjcfTree, spec: "mujoco.MjSpec", lines: Sequence[Node]) -> None:
@@ -110,12 +100,12 @@ class _Reader:
         for actuator in self._actuators:
             self._joint_actuators.setdefault(actuator.joint, []).append(actuator)
         self._mimics = read_mimics(spec, self._node)
-        self._forces: dict[str, float] = {}
+        self._force_scales: dict[str, float] = {}
         self._links = {spec.worldbody: WORLD}
         self._reported: set[str] = set()
 
-    def fill(self, robot: RobotModel) -> RobotModel:
-        """Return the robot with the contents of the spec; without links if MuJoCo rejects it."""
+    def fill(self, model: RobotModel) -> RobotModel:
+        """Return the model with the contents of the spec; without links if MuJoCo rejects it."""
         import mujoco
 
         imu = find_imu(self._spec)
@@ -125,7 +115,7 @@ class _Reader:
             reason, _, location = str(error).removeprefix("Error: ").partition("\n")
             message = f"MuJoCo rejects the file: {reason}; the robot is not checked"
             self._report(self._node_of_line(location), message)
-            return robot
+            return model
         links, joints = self._read_bodies()
         compiler = self._spec.compiler
         bounds = float(compiler.boundmass), float(compiler.boundinertia)
@@ -134,7 +124,7 @@ class _Reader:
         if not compiler.degree:
             self._check_euler_angles()
         return replace(
-            robot,
+            model,
             links=scale_to_total_mass(links, float(compiler.settotalmass)),
             joints=tuple(joints),
             actuators=self._scaled_actuators(joints),
@@ -154,7 +144,7 @@ class _Reader:
             angles = parse_numbers(text, 3) if text else None
             if angles is not None and is_in_degrees(angles.tolist()):
                 message = f"euler of <{node.tag}>: got {text} rad; expected radians"
-                report(self._mjcf, node, "XML018", message)
+                self._mjcf.add_problem(node, "XML018", message)
 
     def _options(self) -> PhysicsOptions:
         import mujoco
@@ -191,12 +181,14 @@ class _Reader:
         """Report what MuJoCo's compiler would reject, each message once."""
         if message not in self._reported:
             self._reported.add(message)
-            report(self._mjcf, node, "XML011", message)
+            self._mjcf.add_problem(node, "XML011", message)
 
     def _scaled_actuators(self, joints: Sequence[Joint]) -> tuple[Actuator, ...]:
-        most = {joint.name: joint.limit.effort for joint in joints if joint.limit is not None}
+        max_efforts = {joint.name: joint.effort for joint in joints}
         return tuple(
-            actuator.actuator(self._forces.get(actuator.joint, 1.0), most.get(actuator.joint))
+            actuator.to_actuator(
+                self._force_scales.get(actuator.joint, 1.0), max_efforts.get(actuator.joint)
+            )
             for actuator in self._actuators
         )
 
@@ -344,7 +336,7 @@ class _Reader:
             return replace(bare, anchor=frame[:3, 3])
         slides = joint.type == kinds.mjJNT_SLIDE
         unit = scale.position if slides else math.pi / 180 if joint.compiler.degree else 1.0
-        self._forces[joint.name] = scale.force
+        self._force_scales[joint.name] = scale.force
         actuators = self._joint_actuators.get(joint.name, []) if joint.name else []
         limits = self._range(joint, node)
         armature = float(joint.armature) + sum(actuator.armature for actuator in actuators)

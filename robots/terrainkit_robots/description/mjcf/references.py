@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 from terrainkit_robots.description.mjcf.shapes import mesh_name
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node
-from terrainkit_robots.description.model import Problem
 
 if TYPE_CHECKING:
     import mujoco
@@ -66,9 +65,7 @@ def dangling_references(tree: MjcfTree, spec: "mujoco.MjSpec") -> None:
                 f"{attribute} of <{node.tag}>: got {value!r}; expected the name of a {kind}; "
                 "MuJoCo rejects the file"
             )
-            tree.problems.append(
-                Problem(code="XML011", message=message, source=node.source, subject=value)
-            )
+            tree.add_problem(node, "XML011", message, subject=value)
 
 
 def _iter_references(tree: MjcfTree, has_ground: bool) -> Iterator[Node]:

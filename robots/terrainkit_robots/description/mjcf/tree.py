@@ -120,6 +120,20 @@ class MjcfTree:
     complete: bool = True
     """Whether the trees contain the whole file; False if elements were skipped."""
 
+    def add_problem(
+        self, node: Node, code: str, message: str, *, subject: str | None = None, **details: str
+    ) -> None:
+        """Add a problem at a node; its subject is the owner of the node unless it is given."""
+        self.problems.append(
+            Problem(
+                code=code,
+                message=message,
+                source=node.source,
+                subject=node.owner if subject is None else subject,
+                details=details,
+            )
+        )
+
     def roots(self) -> list[Node]:
         """Return the root of the model and those of the attached models."""
         return [self.root, *self.attached.values()]
@@ -151,7 +165,7 @@ def read_tree(doc: XmlDocument, contents: Mapping[Path, bytes]) -> MjcfTree:
         doc: The main file; it has a root element.
         contents: File contents by path, which are used instead of the files on disk.
     """
-    reader = _Reader(contents)
+    reader = _TreeReader(contents)
     reader.problems += doc.problems
     root = reader.tree(doc)
     if root.tag != "mujoco":
@@ -180,7 +194,7 @@ def _excluded_attributes(tag: str) -> set[str]:
     return _EXCLUDED_ATTRIBUTES["*"] | _EXCLUDED_ATTRIBUTES.get(tag, set())
 
 
-class _Reader:
+class _TreeReader:
     """Read the files of a model and collect their problems."""
 
     def __init__(self, contents: Mapping[Path, bytes]) -> None:
@@ -387,9 +401,7 @@ def _report_size(tree: MjcfTree, node: Node, what: str) -> None:
         f"number of elements: more than {MAX_ELEMENTS}, long attributes count as several; {what}, "
         "because MuJoCo's parser needs quadratic time"
     )
-    tree.problems.append(
-        Problem(code="XML011", message=message, source=node.source, subject=node.owner)
-    )
+    tree.add_problem(node, "XML011", message)
 
 
 def _total_size(tree: MjcfTree) -> int:

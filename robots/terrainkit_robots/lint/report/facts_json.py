@@ -16,7 +16,7 @@ _DIGITS = 6
 """Significant digits of each number."""
 
 
-def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
+def facts_json(facts: "Facts", *, may_simulate: bool = False) -> dict[str, Any]:
     """Return the facts as a JSON-compatible dictionary, in SI units and radians.
 
     All robots have the same keys. Unknown values are None. `observation_size` is that of a
@@ -27,7 +27,7 @@ def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
 
     Args:
         facts: The robot.
-        simulated: Whether to compute `suggested_gains`, which requires a MuJoCo model.
+        may_simulate: Whether to compute `suggested_gains`, which requires a MuJoCo model.
     """
     legs, actuated = facts.legs, len(facts.actuated)
     return {
@@ -48,7 +48,7 @@ def facts_json(facts: "Facts", *, simulated: bool = False) -> dict[str, Any]:
         },
         "mirrored_joints": _mirrored_joints(facts),
         **_standing(facts),
-        "suggested_gains": _gains(facts) if simulated and not facts.tree.rejected else None,
+        "suggested_gains": _gains(facts) if may_simulate and not facts.tree.rejected else None,
         "action_size": actuated,
         "observation_size": 12 + 3 * actuated,
     }

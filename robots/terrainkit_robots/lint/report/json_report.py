@@ -38,7 +38,7 @@ def report_json(report: Report) -> dict[str, Any]:
         "file": display_path(model.file),
         "kind": model.kind,
         "verdict": report.verdict,
-        "facts": facts_json(report.facts, simulated=report.simulated),
+        "facts": facts_json(report.facts, may_simulate=report.may_simulate),
         "findings": [finding_json(finding) for finding in report.findings],
         "fixed": [finding_json(finding) for finding in report.fixed],
         "unfixed": [{**finding_json(f), "reason": why} for f, why in report.unfixed],

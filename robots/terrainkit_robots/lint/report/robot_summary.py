@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
     """Yield the lines of the summary as pairs of label and text."""
     facts = report.facts
-    data = facts_json(facts, simulated=report.simulated)
+    data = facts_json(facts, may_simulate=report.may_simulate)
     kind = {"urdf": "URDF", "xacro": "xacro", "mjcf": "MJCF"}[facts.model.kind]
     yield "robot", f"{data['name'] or 'unnamed'} ({kind})"
     yield "size", ", ".join(_size(data))
@@ -25,7 +25,7 @@ def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
     if data["standing_pose"] is None:
         return
     yield "standing", ", ".join(_standing(data))
-    limits = {joint.name: facts.effort_limit(joint) for joint in facts.joints}
+    limits = {joint.name: joint.effort for joint in facts.joints}
     yield from _joints(data, {name: limit for name, limit in limits.items() if limit})
 
 

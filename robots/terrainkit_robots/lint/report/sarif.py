@@ -50,7 +50,7 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
         "results": results,
         "properties": {
             "facts": {
-                display_path(r.facts.model.file): facts_json(r.facts, simulated=r.simulated)
+                display_path(r.facts.model.file): facts_json(r.facts, may_simulate=r.may_simulate)
                 for r in reports
             }
         },

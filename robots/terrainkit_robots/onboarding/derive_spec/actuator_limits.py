@@ -42,69 +42,69 @@ _MAX_RANGE_FACTOR = 0.25
 
 
 def effort_column(
-    robot: Facts, gains: "Mapping[str, Gain]", mirror: Mapping[str, MirrorJoint]
+    facts: Facts, gains: "Mapping[str, Gain]", mirror: Mapping[str, MirrorJoint]
 ) -> Column:
     """Return the effort limit of each joint [N m] or [N].
 
     Args:
-        robot: The robot.
+        facts: The robot.
         gains: PD gains of each joint.
         mirror: The joint on the other side of each joint.
     """
-    limits = {joint.name: robot.effort_limit(joint) for joint in robot.actuated}
-    in_file = _limits_in_file(robot, limits, mirror)
+    limits = {joint.name: joint.effort for joint in facts.actuated}
+    in_file = _limits_in_file(facts, limits, mirror)
     return {
         joint.name: in_file.get(joint.name)
-        or _suggest_effort(robot, joint, gains[joint.name].stiffness)
-        for joint in robot.actuated
+        or _suggest_effort(facts, joint, gains[joint.name].stiffness)
+        for joint in facts.actuated
     }
 
 
-def _suggest_effort(robot: Facts, joint: Joint, stiffness: float) -> tuple[float, Provenance]:
+def _suggest_effort(facts: Facts, joint: Joint, stiffness: float) -> tuple[float, Provenance]:
     """Return an effort limit for a joint whose limit is unknown [N m] or [N]."""
-    leg_effort = _leg_effort(robot)
-    if joint in robot.leg_joints and joint.kind != "prismatic" and leg_effort > 0:
+    leg_effort = _leg_effort(facts)
+    if joint in facts.leg_joints and joint.kind != "prismatic" and leg_effort > 0:
         value, reason = leg_effort, f"{_LEG_FACTOR:g} x weight x leg length"
     else:
         error = _by_kind(_DEFAULT_ERROR, joint)
         value, reason = stiffness * error, f"the stiffness at an error of {error:g} {joint.unit}"
-    torques = robot.stance.torques if robot.stance is not None else {}
+    torques = facts.stance.torques if facts.stance is not None else {}
     holding = _HOLDING_FACTOR * abs(torques.get(joint.name, 0.0))
     if math.isfinite(holding) and holding > value:
         value, reason = holding, f"{_HOLDING_FACTOR:g} times the holding torque"
     return rounded(value, 2) or 1.0, _suggested(f"not in the file; {reason}")
 
 
-def _leg_effort(robot: Facts) -> float:
+def _leg_effort(facts: Facts) -> float:
     """Return an estimate of the effort of a leg joint [N m]; 0 if the mass or length is unknown."""
-    lengths = [leg.length for leg in robot.legs]
-    effort = _LEG_FACTOR * robot.total_mass * GRAVITY * sum(lengths) / max(len(lengths), 1)
+    lengths = [leg.length for leg in facts.legs]
+    effort = _LEG_FACTOR * facts.total_mass * GRAVITY * sum(lengths) / max(len(lengths), 1)
     return effort if 0 < effort < math.inf else 0.0
 
 
-def velocity_column(robot: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
+def velocity_column(facts: Facts, mirror: Mapping[str, MirrorJoint]) -> Column:
     """Return the velocity limit of each joint [rad/s] or [m/s].
 
     Args:
-        robot: The robot.
+        facts: The robot.
         mirror: The joint on the other side of each joint.
     """
-    limits = {joint.name: joint.limit.velocity if joint.limit else None for joint in robot.actuated}
-    in_file = _limits_in_file(robot, limits, mirror)
+    limits = {joint.name: joint.velocity for joint in facts.actuated}
+    in_file = _limits_in_file(facts, limits, mirror)
     typical = _suggested("not in the file; typical of motors of legged robots")
     return {
         joint.name: in_file.get(joint.name, (_by_kind(_DEFAULT_VELOCITY, joint), typical))
-        for joint in robot.actuated
+        for joint in facts.actuated
     }
 
 
-def armature_column(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
+def armature_column(facts: Facts, gains: "Mapping[str, Gain]") -> Column:
     """Return the armature of each joint [kg m2] or [kg]."""
     column: Column = {}
-    for joint in robot.actuated:
+    for joint in facts.actuated:
         in_file, required = joint.armature, gains[joint.name].armature
         if 0 < in_file < math.inf and required <= in_file:
-            column[joint.name] = rounded(in_file), _from_file(robot)
+            column[joint.name] = rounded(in_file), _from_file(facts)
             continue
         reason = f"{in_file:.3g} in the file" if in_file > 0 else "not in the file"
         reason += "; required by the gains" if required > 0 else ""
@@ -113,7 +113,7 @@ def armature_column(robot: Facts, gains: "Mapping[str, Gain]") -> Column:
 
 
 def action_scale_column(
-    robot: Facts, gains: "Mapping[str, Gain]", effort: Column, velocity: Column
+    facts: Facts, gains: "Mapping[str, Gain]", effort: Column, velocity: Column
 ) -> Column:
     """Return the change of each joint target for an action of 1 [rad] or [m].
 
@@ -123,14 +123,14 @@ def action_scale_column(
     balance only without noise on its arms and waist (docs/training.md).
 
     Args:
-        robot: The robot.
+        facts: The robot.
         gains: PD gains of each joint.
         effort: Effort limits.
         velocity: Velocity limits.
     """
     column: Column = {}
-    in_legs = {joint.name for leg in robot.legs for joint in leg.joints}
-    for joint in robot.actuated:
+    in_legs = {joint.name for leg in facts.legs for joint in leg.joints}
+    for joint in facts.actuated:
         stiffness = gains[joint.name].stiffness
         if stiffness > 0 and in_legs and joint.name not in in_legs:
             value, reason = 0.0, "not a joint of a leg: it holds the default pose"
@@ -159,7 +159,7 @@ def _by_kind(values: Mapping[str, float], joint: Joint) -> float:
 
 
 def _limits_in_file(
-    robot: Facts, limits: Mapping[str, float | None], mirror: Mapping[str, MirrorJoint]
+    facts: Facts, limits: Mapping[str, float | None], mirror: Mapping[str, MirrorJoint]
 ) -> Column:
     """Return the valid limits of the file; a joint without one has that of its mirror joint."""
     valid = {
@@ -172,12 +172,12 @@ def _limits_in_file(
         for name, other in mirror.items()
         if other.joint in valid
     }
-    return copied | {name: (limit, _from_file(robot)) for name, limit in valid.items()}
+    return copied | {name: (limit, _from_file(facts)) for name, limit in valid.items()}
 
 
 def _suggested(reason: str) -> Provenance:
     return Provenance(origin="suggested", reason=reason)
 
 
-def _from_file(robot: Facts) -> Provenance:
-    return Provenance(origin="declared", reason=f"in {robot.model.file.name}")
+def _from_file(facts: Facts) -> Provenance:
+    return Provenance(origin="declared", reason=f"in {facts.model.file.name}")

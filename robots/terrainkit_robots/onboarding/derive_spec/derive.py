@@ -64,7 +64,7 @@ def derive_spec(
     if missing:
         raise ConfigError(f"gains of {names(missing)} are missing; expected all actuated joints")
     mirror = facts.mirror_map
-    columns = _columns(facts, gains)
+    columns = _pose_and_gain_columns(facts, gains)
     columns["effort"] = effort_column(facts, gains, mirror)
     columns["velocity"] = velocity_column(facts, mirror)
     columns["armature"] = armature_column(facts, gains)
@@ -78,7 +78,7 @@ def derive_spec(
     values: dict[str, Any] = {
         name: {key: value for key, (value, _) in column.items()} for name, column in columns.items()
     }
-    heights: dict[str, Any] = {name: value for name, (value, _) in lengths.items()}
+    length_values: dict[str, Any] = {name: value for name, (value, _) in lengths.items()}
     return RobotSpec(
         name=facts.model.title,
         urdf=urdf,
@@ -94,39 +94,37 @@ def derive_spec(
         **values,
         soft_limits=by_pattern(_soft_limits(facts, pose), [j.name for j in facts.actuated]),
         reset_range=reset,
-        **heights,
+        **length_values,
         mirror=mirror,
         provenance={
             **collect_provenance(columns),
             "soft_limits": Provenance(
                 origin="suggested", reason=f"{_SOFT_LIMIT_FACTOR:g} of each joint range, centered"
             ),
-            "reset_range": _provenance("suggested", reset_reason),
+            "reset_range": Provenance(origin="suggested", reason=reset_reason),
             **{name: origin for name, (_, origin) in lengths.items()},
-            "mirror": _provenance("measured", "joint positions and axes at zero pose"),
+            "mirror": Provenance(origin="measured", reason="joint positions and axes at zero pose"),
         },
     )
 
 
-def _provenance(origin: Origin, reason: str) -> Provenance:
-    return Provenance(origin=origin, reason=reason)
-
-
-def _columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
+def _pose_and_gain_columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[str, Column]:
     pose: Column = {}
     stiffness: Column = {}
     damping: Column = {}
     origin = _pose_provenance(facts)
+    see_stiffness = Provenance(origin="suggested", reason="see stiffness")
     for joint in facts.actuated:
         name, gain = joint.name, gains[joint.name]
-        pose[name] = rounded(facts.positions[name]), origin
-        stiffness[name] = rounded(gain.stiffness, 2), _provenance("suggested", gain.reason)
-        damping[name] = rounded(gain.damping, 2), _provenance("suggested", "see stiffness")
+        suggested = Provenance(origin="suggested", reason=gain.reason)
+        pose[name] = rounded(facts.default_pose[name]), origin
+        stiffness[name] = rounded(gain.stiffness, 2), suggested
+        damping[name] = rounded(gain.damping, 2), see_stiffness
     return {"default_pose": pose, "stiffness": stiffness, "damping": damping}
 
 
 def _pose_provenance(facts: Facts) -> Provenance:
-    declared = _provenance("declared", f"first keyframe of {facts.model.file.name}")
+    declared = Provenance(origin="declared", reason=f"first keyframe of {facts.model.file.name}")
     if facts.legs:
         if is_standing_keyframe(facts.leg_model):
             return declared
@@ -136,7 +134,7 @@ def _pose_provenance(facts: Facts) -> Provenance:
     keyframe = facts.model.keyframe
     if keyframe and all(joint.name in keyframe for joint in facts.actuated):
         return declared
-    return _provenance("suggested", "closest to 0 within the limits")
+    return Provenance(origin="suggested", reason="closest to 0 within the limits")
 
 
 def _soft_limits(facts: Facts, pose: Mapping[str, float]) -> dict[str, tuple[float, float]]:
@@ -206,7 +204,7 @@ def _lengths(facts: Facts) -> dict[str, tuple[float, Provenance]]:
     if facts.bodies[0].virtual:  # the base is the world, which has no height
         del found["base_height_target"], found["spawn_height"]
     return {
-        name: (rounded_length(value), _provenance(origin, reason))
+        name: (rounded_length(value), Provenance(origin=origin, reason=reason))
         for name, (value, origin, reason) in found.items()
         if value is not None and math.isfinite(value)
     }

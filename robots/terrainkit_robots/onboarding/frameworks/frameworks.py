@@ -35,10 +35,14 @@ def config_file_name(name: str) -> str:
     Raises:
         ConfigError: if the framework is unknown.
     """
+    _check_name(name)
+    return f"{name}_config.py"  # a file with the name of the framework would shadow it
+
+
+def _check_name(name: str) -> None:
     if name not in framework_names():
         expected = expected_names(name, framework_names(), "expected")
         raise ConfigError(f"framework: got {name!r}; {expected}")
-    return f"{name}_config.py"  # a file with the name of the framework would shadow it
 
 
 def config_text(name: str, robot: ConfigRobot) -> str:
@@ -47,7 +51,7 @@ def config_text(name: str, robot: ConfigRobot) -> str:
     Raises:
         ConfigError: if the framework is unknown, or does not support the robot.
     """
-    config_file_name(name)
+    _check_name(name)
     module = _get_module(name)
     if module.LEGGED_ONLY:
         others = [other for other in framework_names() if not _get_module(other).LEGGED_ONLY]

@@ -269,4 +269,5 @@ def test_overlap_scene_rejects_too_many_shapes():
 def test_detect_finds_none_on_standing_robots(name, robot_file):
     facts = Facts(load_robot(robot_file(name)))
     assert facts.stance is not None
-    assert [o.depth for o in facts.overlap_scene.detect(facts.positions) if o.depth > 0.001] == []
+    overlaps = facts.overlap_scene.detect(facts.default_pose)
+    assert [overlap.depth for overlap in overlaps if overlap.depth > 0.001] == []

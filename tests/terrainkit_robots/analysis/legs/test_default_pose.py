@@ -24,7 +24,7 @@ def test_positions_of_spec_define_stance(bundled, gains):
     spec = derive_spec(plain, gains=gains(plain), floating=True)
     low = {".*_hip_joint": 0.1, ".*_thigh_joint": 1.2, ".*_calf_joint": -2.4}
     facts = bundled("quadruped.urdf", spec=changed(spec, default_pose=low))
-    assert facts.positions["FL_thigh_joint"] == facts.stance.positions["FL_thigh_joint"] == 1.2
+    assert facts.default_pose["FL_thigh_joint"] == facts.stance.positions["FL_thigh_joint"] == 1.2
     assert facts.stance.height < plain.stance.height - 0.1
 
 
@@ -32,20 +32,20 @@ def test_positions_missing_in_spec_are_solved(bundled, gains):
     plain = bundled("quadruped.urdf")
     spec = derive_spec(plain, gains=gains(plain), floating=True)
     facts = bundled("quadruped.urdf", spec=changed(spec, default_pose={"FL_hip_joint": 0.2}))
-    expected = dict(plain.positions) | {"FL_hip_joint": 0.2}
-    assert facts.positions == expected
+    expected = dict(plain.default_pose) | {"FL_hip_joint": 0.2}
+    assert facts.default_pose == expected
     nothing = bundled("quadruped.urdf", spec=changed(spec, default_pose={"(": 1.0, "x": 2.0}))
-    assert nothing.positions == plain.positions
+    assert nothing.default_pose == plain.default_pose
 
 
 def test_positions_of_mimic_joints_follow_spec(robot, spec):
     facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 1.0}))
-    assert facts.positions == {"a": 1.0, "b": -2.0}
+    assert facts.default_pose == {"a": 1.0, "b": -2.0}
 
 
 def test_positions_of_spec_may_exceed_limits(robot, spec):
     facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 3.0}))
-    assert facts.positions["a"] == 3.0
+    assert facts.default_pose["a"] == 3.0
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "biped.xml"])
@@ -53,8 +53,8 @@ def test_positions_of_derived_spec_equal_solved_pose(bundled, gains, name):
     plain = bundled(name)
     facts = bundled(name, spec=derive_spec(plain, gains=gains(plain), floating=True))
     np.testing.assert_allclose(
-        [facts.positions[name] for name in plain.positions],
-        list(plain.positions.values()),
+        [facts.default_pose[name] for name in plain.default_pose],
+        list(plain.default_pose.values()),
         atol=1e-5,
     )
 
@@ -72,6 +72,6 @@ CHAIN = """
 
 
 def test_positions_of_chained_mimic_joints(robot, spec):
-    assert robot(CHAIN).positions == {"jA": 1.0, "jB": 1.5, "jC": -3.0}
+    assert robot(CHAIN).default_pose == {"jA": 1.0, "jB": 1.5, "jC": -3.0}
     specified = robot(CHAIN, spec=spec(joint_order=("jA",), default_pose={"jA": 2.0}))
-    assert specified.positions == {"jA": 2.0, "jB": 2.5, "jC": -5.0}
+    assert specified.default_pose == {"jA": 2.0, "jB": 2.5, "jC": -5.0}

@@ -13,10 +13,9 @@ import pytest
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.tree import build_tree
-from terrainkit_robots.description.mjcf.reader import read_mjcf
+from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS
 from terrainkit_robots.description.model import Geometry, Joint, Link, Problem, RobotModel
-from terrainkit_robots.description.xml.document import parse_xml
 from terrainkit_robots.transforms import Matrix
 
 EXACT = 1e-9 if int(mujoco.__version__.split(".")[0]) > 3 else 1e-6
@@ -25,11 +24,7 @@ EXACT = 1e-9 if int(mujoco.__version__.split(".")[0]) > 3 else 1e-6
 
 def read(text: str | bytes, file: Path = Path("robot.xml")) -> RobotModel:
     data = text.encode() if isinstance(text, str) else text
-    return read_mjcf(parse_xml(file, data))
-
-
-def read_file(file: Path) -> RobotModel:
-    return read_mjcf(parse_xml(file, file.read_bytes()))
+    return load_robot(file, contents={file: data})
 
 
 def in_world(inside: str, rest: str = "") -> str:
@@ -166,7 +161,7 @@ def compiled_without_meshes(file: Path) -> mujoco.MjModel:
 @pytest.mark.parametrize("name", ["h1/h1.xml", "g1/g1_29dof.xml", "go2_mjcf/go2.xml"])
 def test_published_robots_match_mujoco(name: str, robot_file: Callable[[str], Path]) -> None:
     file = robot_file(name)
-    robot, model = read_file(file), compiled_without_meshes(file)
+    robot, model = load_robot(file), compiled_without_meshes(file)
     assert robot.problems == ()
     for each in robot.links:  # the model has no meshes
         assert {s.shape for s in each.visuals} <= {"mesh"}
@@ -196,7 +191,7 @@ def test_published_robots_match_mujoco(name: str, robot_file: Callable[[str], Pa
 
 
 def test_go2_home_and_torque_limits(robot_file: Callable[[str], Path]) -> None:
-    robot = read_file(robot_file("go2_mjcf/go2.xml"))
+    robot = load_robot(robot_file("go2_mjcf/go2.xml"))
     assert robot.keyframe["RR_calf_joint"] == -1.8
     assert robot.imu is not None
     name, place = robot.imu
@@ -476,7 +471,7 @@ def test_mesh_pose_matches_mujoco(asset: str, tmp_path: Path) -> None:
             f'<compiler meshdir="parts"/><asset><mesh file="box.stl" {asset}/></asset>',
         )
     )
-    (shape,) = link(read_file(file), "a").collisions
+    (shape,) = link(load_robot(file), "a").collisions
     assert shape.mesh is not None
     assert shape.mesh.path == tmp_path / "parts" / "box.stl"
     assert shape.mesh.attribute == "file"
@@ -512,7 +507,7 @@ def test_mesh_paths_follow_compiler_settings(
         )
     )
     box_stl(tmp_path / path)
-    (shape,) = link(read_file(file), "a").collisions
+    (shape,) = link(load_robot(file), "a").collisions
     assert shape.mesh is not None
     assert shape.mesh.path == tmp_path / path
     mujoco.MjModel.from_xml_path(str(file))  # MuJoCo finds it there
@@ -737,7 +732,7 @@ def test_included_elements_have_file_and_line(tmp_path: Path) -> None:
             "parts/foot.xml": '<x>\n\n<geom name="foot" size="1"/></x>',
         },
     )
-    robot = read_file(file)
+    robot = load_robot(file)
     assert robot.problems == ()
     assert link(robot, "a").source.line == 4
     assert link(robot, "leg").source.file == tmp_path / "parts" / "leg.xml"
@@ -763,9 +758,9 @@ def test_include_relative_to_including_file(tmp_path: Path) -> None:
             "sub/b.xml": '<x><worldbody><body name="beside"/></worldbody></x>',
         },
     )
-    assert link(read_file(file), "beside").source.file == tmp_path / "sub" / "b.xml"
+    assert link(load_robot(file), "beside").source.file == tmp_path / "sub" / "b.xml"
     (tmp_path / "b.xml").write_text('<x><worldbody><body name="top"/></worldbody></x>')
-    assert [each.name for each in read_file(file).links] == ["top"]
+    assert [each.name for each in load_robot(file).links] == ["top"]
     assert [each.name for each in mujoco.MjSpec.from_file(str(file)).bodies] == ["world", "top"]
 
 
@@ -792,7 +787,7 @@ def test_broken_includes_are_reported(include: str, says: str, tmp_path: Path) -
             "empty.xml": "<x/>",
         },
     )
-    robot = read_file(file)
+    robot = load_robot(file)
     problem = only(robot)
     assert problem.code == "XML012"
     assert says in problem.message
@@ -808,7 +803,7 @@ def test_errors_in_included_file_name_the_file(tmp_path: Path) -> None:
             "part.xml": '<x>\n<worldbody><body name="b" poss="1 2 3"/></worldbody></x>',
         },
     )
-    problem = only(read_file(file))
+    problem = only(load_robot(file))
     assert problem.code == "XML007"
     assert (problem.source.file.name, problem.source.line) == ("part.xml", 2)
 
@@ -817,7 +812,7 @@ def test_contents_replace_files(tmp_path: Path) -> None:
     file = tmp_path / "robot.xml"
     data = b'<mujoco><include file="part.xml"/></mujoco>'
     part = b'<x><worldbody><body name="b"/></worldbody></x>'
-    robot = read_mjcf(parse_xml(file, data), contents={tmp_path / "part.xml": part})
+    robot = load_robot(file, contents={file: data, tmp_path / "part.xml": part})
     assert [each.name for each in robot.links] == ["b"]
 
 
@@ -835,7 +830,7 @@ def test_attached_model_keeps_its_settings(tmp_path: Path) -> None:
         },
     )
     box_stl(tmp_path / "sub" / "m" / "b.stl")
-    robot = read_file(file)
+    robot = load_robot(file)
     assert robot.problems == ()
     hand = link(robot, "l_hand")
     assert (hand.source.file.name, hand.source.line) == ("hand.xml", 2)
@@ -860,7 +855,7 @@ def test_invalid_attachments_are_reported(model: str, tmp_path: Path) -> None:
             "robot.urdf": "<robot name='r'/>",
         },
     )
-    robot = read_file(file)
+    robot = load_robot(file)
     assert codes(robot)[0] == "XML012"
     assert link(robot, "arm")
 
@@ -1116,7 +1111,7 @@ def test_nested_attachments_are_bounded(tmp_path: Path) -> None:
         )
     files["m30.xml"] = in_world('<body name="b"/>')
     file = write_all(tmp_path, files)
-    robot = read_file(file)
+    robot = load_robot(file)
     assert codes(robot) == ["XML011"]
 
 
@@ -1133,7 +1128,7 @@ def test_deeply_nested_includes(tmp_path: Path) -> None:
     files = {"robot.xml": in_world('<include file="p0.xml"/>')}
     for k in range(100):
         files[f"p{k}.xml"] = inner.format("<body>" * 100, k + 1, "</body>" * 100)
-    robot = read_file(write_all(tmp_path, files))
+    robot = load_robot(write_all(tmp_path, files))
     assert codes(robot) == ["XML011"]
     assert "deep" in robot.problems[0].message
     assert len(robot.links) > 200

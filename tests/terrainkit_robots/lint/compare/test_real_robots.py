@@ -113,9 +113,11 @@ def test_no_comparison_does_not_import_yourdfpy(robot_of):
     file = robot_of("quadruped.urdf").model.file
     code = (
         "import sys; from pathlib import Path; from terrainkit_robots.analysis.facts import Facts; "
-        "from terrainkit_robots.lint.runner import lint; "
+        "from terrainkit_robots.lint.selection import lint_selected; "
+        "from terrainkit_robots.lint.settings import Settings; "
         "from terrainkit_robots.description.load import load_robot; "
-        f"report = lint(Facts(load_robot(Path({str(file)!r}))), simulate=False); "
+        f"facts = Facts(load_robot(Path({str(file)!r}))); "
+        "report = lint_selected(facts, Settings(simulate=False)); "
         "assert not any(f.code.startswith('XRF') for f in report.findings); "
         "assert 'yourdfpy' not in sys.modules"
     )

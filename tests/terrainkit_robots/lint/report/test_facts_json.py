@@ -77,7 +77,7 @@ def test_number_keeps_six_digits(value, kept):
 def test_suggested_gains_require_simulation(robot_file):
     robot = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
     assert facts_json(robot)["suggested_gains"] is None
-    gains = facts_json(robot, simulated=True)["suggested_gains"]
+    gains = facts_json(robot, may_simulate=True)["suggested_gains"]
     assert list(gains) == [joint.name for joint in robot.actuated]
     assert gains["FL_calf_joint"]["stiffness"] == 60
     assert gains["FL_calf_joint"]["reason"]
@@ -86,4 +86,4 @@ def test_suggested_gains_require_simulation(robot_file):
 def test_suggested_gains_none_if_not_simulatable(tmp_path):
     path = tmp_path / "robot.urdf"
     path.write_text('<robot name="r"/>')
-    assert facts_json(Facts(load_robot(path)), simulated=True)["suggested_gains"] is None
+    assert facts_json(Facts(load_robot(path)), may_simulate=True)["suggested_gains"] is None

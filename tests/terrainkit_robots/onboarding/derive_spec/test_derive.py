@@ -5,7 +5,8 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.runner import lint
+from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec, unit_of
 
@@ -84,7 +85,7 @@ def test_derive_spec_passes_lint_rules(bundled, gains, name):
     facts = bundled(name)
     spec = derived(facts, gains)
     assert RobotSpec.from_toml(spec.to_toml()) == spec
-    report = lint(bundled(name, spec=spec), simulate=False)
+    report = lint_selected(bundled(name, spec=spec), Settings(simulate=False))
     assert report.crashed == ()
     own = [f for f in report.findings if f.severity != "info"]
     assert [f.message for f in own] == []

@@ -63,7 +63,8 @@ def overlap(robot: Facts) -> Violations:
     """
     if not robot.bodies:
         raise CannotCheckError("there is no tree of links")
-    for pair, deepest in _group_by_pair(robot, robot.overlap_scene.detect(robot.positions)).items():
+    overlaps = robot.overlap_scene.detect(robot.default_pose)
+    for pair, deepest in _group_by_pair(robot, overlaps).items():
         if deepest.depth <= _MAX_OVERLAP:
             continue
         got, expected = contrast(1000 * deepest.depth, 1000 * _MAX_OVERLAP, ".1f")

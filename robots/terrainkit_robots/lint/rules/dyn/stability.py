@@ -141,7 +141,7 @@ def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> StandR
     return stand_test(
         make_sim_model(robot),
         suggest_gains(robot),
-        positions=robot.positions,
+        positions=robot.default_pose,
         areas=contact_areas(robot),
         self_collision=self_collision,
         joints_locked=locked,

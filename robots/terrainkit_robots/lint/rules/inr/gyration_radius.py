@@ -19,7 +19,7 @@ from terrainkit_robots.analysis.inertia.physical import (
 )
 from terrainkit_robots.analysis.inertia.placeholder import placeholder_inertias
 from terrainkit_robots.export.canonical import has_floating_base
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule, violations
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, findings_of, rule
 from terrainkit_robots.transforms import Matrix
 
 _MAX_GYRATION, _MAX_GYRATION_ERROR = 1.05, 3.0
@@ -134,8 +134,8 @@ def _report_radius(
 def _invalid_bodies(robot: Facts) -> set[str]:
     """Return the bodies whose mass or inertia is reported by another rule."""
     reported = {link.name for _, links in placeholder_inertias(robot.bodies) for link in links}
-    reported |= {v.subject for v in violations(robot, "INR003", "INR004") if v.severity == "error"}
-    return reported | {violation.subject for violation in violations(robot, "INR010", "INR008")}
+    reported |= {f.subject for f in findings_of(robot, "INR003", "INR004") if f.severity == "error"}
+    return reported | {finding.subject for finding in findings_of(robot, "INR010", "INR008")}
 
 
 def _body_radii(robot: Facts) -> Iterator[tuple[Body, float]]:

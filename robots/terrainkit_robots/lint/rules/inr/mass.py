@@ -6,7 +6,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.density import shape_volume
 from terrainkit_robots.analysis.inertia.inertial import has_valid_mass, mass_source, max_inertia
 from terrainkit_robots.analysis.inertia.physical import MIN_INERTIA
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule, violations
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, findings_of, rule
 from terrainkit_robots.text import contrast, names
 
 if TYPE_CHECKING:
@@ -154,7 +154,7 @@ def mass_ratio(robot: Facts) -> Violations:
         light, heavy = sorted((body, parent), key=lambda b: b.mass)
         if light.mass > MIN_INERTIA and heavy.mass > _MAX_MASS_RATIO * light.mass:
             candidates.append((light, heavy))
-    reported = {v.subject for v in violations(robot, "INR010")} if candidates else set()
+    reported = {f.subject for f in findings_of(robot, "INR010")} if candidates else set()
     for light, heavy in candidates:
         if reported & {light.name, heavy.name}:
             continue

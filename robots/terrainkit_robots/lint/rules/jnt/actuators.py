@@ -1,7 +1,6 @@
 """Rules on actuators and safety controllers."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.joint_roles import robot_joints
 from terrainkit_robots.lint.problems import problem_violations
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import count, names
@@ -39,7 +38,7 @@ def missing_actuator(robot: Facts) -> Violations:
     actuated = {actuator.joint for actuator in robot.model.actuators}
     if "" in actuated:
         return
-    for joint in robot_joints(robot.bodies):
+    for joint in robot.robot_joints:
         if joint.name not in actuated and joint.mimic is None:
             yield Violation(
                 element=joint,
@@ -90,7 +89,7 @@ def one_sided_motor(robot: Facts) -> Violations:
         MuJoCo's XML reference, actuator: ctrlrange. Joints that several actuators pull, such as
         muscles, are not checked.
     """
-    joints = {joint.name: joint for joint in robot_joints(robot.bodies)}
+    joints = {joint.name: joint for joint in robot.robot_joints}
     used = [actuator.joint for actuator in robot.model.actuators]
     for actuator in robot.model.actuators:
         if actuator.commands is None or used.count(actuator.joint) != 1:

@@ -61,7 +61,7 @@ def excessive_friction(robot: Facts) -> Violations:
     """
     legs = {joint.name for joint in robot.leg_joints}
     for joint in robot.actuated:
-        effort = robot.effort_limit(joint)
+        effort = joint.effort
         limit = _MAX_LEG_FRICTION if joint.name in legs else _MAX_FRICTION
         if effort is None or effort <= 0 or joint.friction <= limit * effort:
             continue
@@ -92,7 +92,7 @@ def excessive_damping(robot: Facts) -> Violations:
     """
     legs = {joint.name for joint in robot.leg_joints}
     for joint in robot.actuated_hinges:
-        effort = robot.effort_limit(joint)
+        effort = joint.effort
         if effort is None or effort <= 0 or joint.damping <= 0:
             continue
         speed = effort / joint.damping
@@ -125,7 +125,7 @@ def excessive_armature(robot: Facts) -> Violations:
         Acceleration = effort / armature. Published legged robots have 300 rad/s2 and more.
     """
     for joint in robot.actuated_hinges:
-        effort = robot.effort_limit(joint)
+        effort = joint.effort
         if effort is None or effort <= 0 or joint.armature <= 0:
             continue
         acceleration = effort / joint.armature

@@ -3,7 +3,6 @@
 import math
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.joint_roles import robot_joints
 from terrainkit_robots.description.model import Joint, Limit
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import contrast, names
@@ -212,7 +211,7 @@ def unlimited_joint(robot: Facts) -> Violations:
     if robot.model.kind != "mjcf":
         return
     bodies = robot.body_of_joint
-    for joint in robot_joints(robot.bodies):
+    for joint in robot.robot_joints:
         if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
             yield Violation(
                 element=joint,
@@ -227,23 +226,24 @@ def narrow_range(robot: Facts) -> Violations:
     """The range of a driven hinge is only a few degrees.
 
     The limits were converted to radians twice, or those of an MJCF file are in radians although its
-    angles are in degrees, which is the default of <compiler>. The joint hardly moves.
+    angles are in degrees, which is the default of <compiler>. The joint hardly moves. A joint
+    outside the legs is a note, unless half of all joints are concerned: a rodent's shoulder blade
+    moves by 4 degrees.
 
     Fix:
         Give the limits in radians, and set <compiler angle="radian"/> in MJCF.
 
     Source:
-        The legs of published robots have ranges of 0.3 rad and more. Other joints are a note,
-        unless half of all joints are concerned: a rodent's shoulder blade moves by 4 degrees.
+        The legs of published robots have ranges of 0.3 rad and more.
     """
     options = robot.model.options
     hinges = {joint: joint.range for joint in robot.actuated_hinges if joint.range is not None}
     narrow = {
         joint: limits for joint, limits in hinges.items() if limits[1] - limits[0] < _MIN_RANGE
     }
-    certain = {joint.name for joint in robot.leg_joints}
+    warned = {joint.name for joint in robot.leg_joints}
     if robot.legs and 2 * len(narrow) >= len(hinges):
-        certain |= {joint.name for joint in narrow}
+        warned |= {joint.name for joint in narrow}
     for joint, limits in narrow.items():
         size = limits[1] - limits[0]
         factor = 180 / math.pi
@@ -255,7 +255,7 @@ def narrow_range(robot: Facts) -> Violations:
         yield Violation(
             subject=joint.name,
             source=(joint.limit or joint).source,
-            severity=None if joint.name in certain else "info",
+            severity=None if joint.name in warned else "info",
             message=f"range of joint {joint.name}: got {size:.3g} rad ({limits[0]:.3g} to "
             f"{limits[1]:.3g}), which is {factor * size:.3g} after a second conversion; expected "
             f"at least {_MIN_RANGE:g} rad{unit}",

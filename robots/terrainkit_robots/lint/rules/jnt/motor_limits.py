@@ -172,7 +172,7 @@ def oversized_effort(robot: Facts) -> Violations:
     weight = robot.total_mass * GRAVITY
     length = max(leg.length for leg in robot.legs)
     for joint in robot.leg_joints:
-        effort = robot.effort_limit(joint)
+        effort = joint.effort
         geared = _geared_torque(robot, joint)
         share = _MAX_GEARED_EFFORT if geared else _MAX_LEG_EFFORT
         limit = share * weight * length

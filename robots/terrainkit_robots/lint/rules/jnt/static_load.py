@@ -4,7 +4,7 @@ import math
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import Violation, Violations, rule, violations
+from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
 from terrainkit_robots.text import contrast
 
 _MAX_LOAD, _MAX_LOAD_ERROR = 0.5, 0.9
@@ -36,7 +36,7 @@ def insufficient_torque(robot: Facts) -> Violations:
         raise CannotCheckError("no statically stable standing pose was found")
     overloaded = []
     for joint in robot.leg_joints:
-        effort, torque = robot.effort_limit(joint), abs(stance.torques.get(joint.name, 0.0))
+        effort, torque = joint.effort, abs(stance.torques.get(joint.name, 0.0))
         if effort is None or effort <= 0 or not math.isfinite(torque):
             continue
         if torque > _MAX_LOAD * effort:
@@ -44,8 +44,8 @@ def insufficient_torque(robot: Facts) -> Violations:
     if not overloaded:
         return
     explaining_rules = ("INR002", "INR010", "INR008", "JNT001", "JNT002", "JNT004")
-    for violation in violations(robot, *explaining_rules):
-        raise CannotCheckError(f"the mass or joint of {violation.subject} is probably wrong")
+    if finding := next(findings_of(robot, *explaining_rules), None):
+        raise CannotCheckError(f"the mass or joint of {finding.subject} is probably wrong")
     named = any(leg.limb.has_leg_names for leg in robot.legs)
     for joint, torque, effort in overloaded:
         share, unit = torque / effort, joint.effort_unit

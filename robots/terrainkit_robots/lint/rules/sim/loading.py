@@ -9,7 +9,7 @@ from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Source
-from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule, violations
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, findings_of, rule
 from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
     codes = next((each for pattern, each in _EXPLAINED_BY if re.search(pattern, message)), "")
     for each in codes.split():
         try:
-            found = [violation.severity for violation in violations(robot, each)]
+            found = [finding.severity for finding in findings_of(robot, each)]
         except CannotCheckError:
             continue
         if found:

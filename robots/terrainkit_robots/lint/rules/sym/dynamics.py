@@ -39,7 +39,7 @@ def loss_asymmetry(robot: Facts) -> Violations:
             least, most = sorted((a, b))
             if least < 0 or most <= _MAX_RATIO * least or least == 0:
                 continue
-            efforts = [robot.effort_limit(side.joint) for side in (pair.left, pair.right)]
+            efforts = [side.joint.effort for side in (pair.left, pair.right)]
             known = [effort for effort in efforts if effort is not None]
             if known and (most - least) * _TYPICAL[name] < _MIN_EFFORT_SHARE * max(known):
                 continue

@@ -17,7 +17,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
     limits_match,
 )
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorSide
-from terrainkit_robots.lint.rule import Measured, Violation, Violations, rule, violations
+from terrainkit_robots.lint.rule import Measured, Violation, Violations, findings_of, rule
 from terrainkit_robots.lint.rules.sym.other_rules import check_joint_types
 from terrainkit_robots.text import numbers
 from terrainkit_robots.transforms import Matrix
@@ -62,7 +62,7 @@ def joint_axis_asymmetry(robot: Facts) -> Violations:
     for error in errors:
         if error.is_axis:
             yield _report_pair(robot, error)
-    reported = {violation.subject for violation in violations(robot, "JNT004")}
+    reported = {finding.subject for finding in findings_of(robot, "JNT004")}
     for found in find_flipped_joints(robot.legs, robot.bodies):
         joint = found.joint
         if joint.name in reported:

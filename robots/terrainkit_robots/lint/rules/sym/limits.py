@@ -88,7 +88,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
         left, right = pair.left, pair.right
         differences: dict[str, tuple[float, float, float]] = {}
         for name in ("effort", "velocity"):
-            a, b = (_motor_limit(robot, side.joint, name) for side in (left, right))
+            a, b = (_motor_limit(side.joint, name) for side in (left, right))
             if a is None or b is None or min(a, b) <= 0:
                 continue
             difference = relative_difference(a, b)
@@ -98,7 +98,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
             continue
 
         def value(body: Body, name: str = next(iter(differences))) -> Matrix | None:
-            limit = _motor_limit(robot, body.joint, name) if body.joint else None
+            limit = _motor_limit(body.joint, name) if body.joint else None
             return None if limit is None else np.array([limit])
 
         odd, other = robot.outlier_first(pair, value)
@@ -119,8 +119,8 @@ def effort_asymmetry(robot: Facts) -> Violations:
         )
 
 
-def _motor_limit(robot: Facts, joint: Joint, name: str) -> float | None:
-    return robot.effort_limit(joint) if name == "effort" else joint.velocity
+def _motor_limit(joint: Joint, name: str) -> float | None:
+    return joint.effort if name == "effort" else joint.velocity
 
 
 def _percent(difference: float) -> str:

@@ -16,7 +16,7 @@ from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     max_com_error,
 )
 from terrainkit_robots.lint.compare.body_mass import relative_difference
-from terrainkit_robots.lint.rule import Violation, Violations, rule, violations
+from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
 from terrainkit_robots.lint.rules.sym.other_rules import OtherRules, check_joint_types
 from terrainkit_robots.text import contrast, numbers
 from terrainkit_robots.transforms import Matrix
@@ -115,7 +115,7 @@ def _trunk_offset(robot: Facts) -> Violations:
     starts = [abs(float(leg.limb.points[0] @ mirror.normal) - mirror.offset) for leg in robot.legs]
     limit = max(_MAX_TRUNK_OFFSET, _TRUNK_OFFSET_SHARE * max(starts))
     distance = abs(float(trunk.center @ mirror.normal) - mirror.offset)
-    reported = {violation.subject for violation in violations(robot, "INR008")}
+    reported = {finding.subject for finding in findings_of(robot, "INR008")}
     if trunk.mass > 0 and distance > limit and trunk.name not in reported:
         got, expected = contrast(1000 * distance, 1000 * limit, ".3g")
         yield Violation(

@@ -5,13 +5,13 @@ from functools import cached_property
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
-from terrainkit_robots.lint.rule import violations
+from terrainkit_robots.lint.rule import findings_of
 
 
 def check_joint_types(robot: Facts) -> None:
     """Raise CannotCheckError if a joint has an unknown type, so that its body may be merged."""
-    for violation in violations(robot, "JNT001"):
-        raise CannotCheckError(f"the type of joint {violation.subject} is unknown")
+    if finding := next(findings_of(robot, "JNT001"), None):
+        raise CannotCheckError(f"the type of joint {finding.subject} is unknown")
 
 
 class OtherRules:
@@ -23,8 +23,8 @@ class OtherRules:
 
     @cached_property
     def _names(self) -> set[str]:
-        found = violations(self._robot, *self._codes)
-        return {violation.subject for violation in found if violation.severity != "info"}
+        found = findings_of(self._robot, *self._codes)
+        return {finding.subject for finding in found if finding.severity != "info"}
 
     def report(self, pair: MirrorPair) -> bool:
         """Return whether a link or joint of one of two bodies is reported."""

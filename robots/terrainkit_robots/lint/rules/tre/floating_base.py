@@ -3,7 +3,7 @@
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import InsertChild, make_fix
-from terrainkit_robots.description.model import Link
+from terrainkit_robots.description.model import WORLD, Link
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
@@ -26,7 +26,7 @@ def no_free_joint(robot: Facts) -> Violations:
         return
     root = tree.links[tree.order[0]]
     if any(
-        joint.parent == "world" and joint.child == root.name and joint.kind != "fixed"
+        joint.parent == WORLD and joint.child == root.name and joint.kind != "fixed"
         for joint in model.joints
     ):
         return
@@ -69,7 +69,7 @@ def inner_floating_joint(robot: Facts) -> Violations:
 def _is_world(robot: Facts, name: str) -> bool:
     """Return whether a link is a root that represents the world."""
     return name not in robot.tree.parent_joint and (
-        name == "world" or _is_empty(robot.tree.links[name])
+        name == WORLD or _is_empty(robot.tree.links[name])
     )
 
 
@@ -103,7 +103,7 @@ def dummy_root(robot: Facts) -> Violations:
     joint = tree.parent_joint[trunk]
     while joint.parent != root.name:
         joint = tree.parent_joint[joint.parent]
-    is_welded = root.name == "world" and robot.model.kind != "mjcf" and bool(robot.legs)
+    is_welded = root.name == WORLD and robot.model.kind != "mjcf" and bool(robot.legs)
     yield Violation(
         element=root,
         message=f"root link {truncate(root.name)}: has no mass and no collision shape; the trunk "

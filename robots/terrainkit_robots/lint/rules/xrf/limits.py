@@ -123,7 +123,7 @@ def compare_effort(robot: Facts) -> Violations:
     """
     other, there = other_robot(robot), other_name(robot)
     pairs = matching_joints(robot)
-    efforts = {a.name: (robot.effort_limit(a), other.effort_limit(b)) for a, b in pairs}
+    efforts = {a.name: (a.effort, b.effort) for a, b in pairs}
 
     def missing(one: Joint, _: Joint) -> bool | None:
         a, b = map(bool, efforts[one.name])

@@ -264,7 +264,7 @@ def spec_motor_limits(robot: Facts) -> Violations:
     Source:
         Limits of the description, and the force ranges of an MJCF's actuators.
     """
-    yield from _check_limits(robot, "effort", robot.effort_limit, lambda j: j.effort_unit)
+    yield from _check_limits(robot, "effort", lambda j: j.effort, lambda j: j.effort_unit)
     yield from _check_limits(robot, "velocity", lambda j: j.velocity, lambda j: j.speed_unit)
 
 
