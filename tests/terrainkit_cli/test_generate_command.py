@@ -37,6 +37,12 @@ def test_generate_writes_map_and_prints_next_commands(terrainkit_process, tmp_pa
     assert tk.TerrainMap.load(tmp_path / "map.npz").config == tk.MapConfig(rows=3)
 
 
+def test_generate_prints_next_commands_for_maps_only(terrainkit):
+    run = terrainkit("generate", "--rows", 1, "--terrain", "flat", "--cols", 1, "-o", "map.stl")
+    assert run.returncode == 0
+    assert "next:" not in run.stdout
+
+
 def test_generate_options_set_the_config(terrainkit, tmp_path):
     terrainkit(
         *("generate", "-o", "a.npz", "--rows", 2, "--cols", 3, "--patch-size", 8, 4, "--cell", 0.2),

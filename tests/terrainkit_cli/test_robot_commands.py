@@ -382,3 +382,10 @@ def test_check_robot_flags_override_settings(here, folder):
         for words in ((), ("--simulation",))
     )
     assert static != simulated
+
+
+def test_check_robot_names_why_a_file_cannot_be_read(terrainkit):
+    run = terrainkit("check-robot", "a" * 300)
+    assert run.returncode == 2
+    assert run.stderr.startswith("terrainkit: ")
+    assert "File name too long" in run.stderr

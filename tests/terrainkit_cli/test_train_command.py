@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit_cli import render, signals
+from terrainkit_cli import render, signals, train_command
 from terrainkit_cli.main import main
 from terrainkit_cli.training_extra import require_training
 from terrainkit_robots.rl.run import checkpoints, open_run
@@ -296,3 +297,8 @@ def test_train_requires_the_package_of_the_logger(train, tmp_path, capsys, monke
     assert train("quadruped", "--runner.logger", "wandb", "--log-dir", str(folder)) == 2
     assert "runner.logger: wandb is not installed: pip install wandb" in capsys.readouterr().err
     assert not folder.exists()
+
+
+def test_only_the_first_process_prints_the_result(capsys):
+    train_command._print_result(SimpleNamespace(folder=None), None)
+    assert capsys.readouterr().out == ""

@@ -44,3 +44,9 @@ def test_isolated_failure_is_one_line(function, arguments, limits, reason):
 def test_isolated_result_is_read_without_pickle():
     with pytest.raises(IsolatedError, match=r"^the result cannot be read: .*allow_pickle=False"):
         run_isolated(dict, [("a", np.array([print], dtype=object))])
+
+
+@pytest.mark.usefixtures("import_in_process")
+def test_main_needs_memory():
+    with pytest.raises(IsolatedError, match=r"^needs more than 8 GB of memory$"):
+        run_isolated(np.zeros, 1 << 50)

@@ -1,5 +1,9 @@
+from pathlib import Path
+
 import pytest
 
+import terrainkit
+from terrainkit import importing
 from terrainkit.errors import HeightFileError
 from terrainkit.importing import source
 from terrainkit.importing.source import check_file
@@ -19,3 +23,14 @@ def test_check_file_rejects_empty_file(tmp_path):
     path.touch()
     with pytest.raises(HeightFileError, match=r"a\.glb: got an empty file$"):
         check_file(path)
+
+
+def test_check_file_names_the_reason_of_the_system():
+    with pytest.raises(HeightFileError, match=r"^cannot read a+: .*File name too long"):
+        check_file(Path("a" * 300))
+
+
+def test_importing_has_the_names_of_terrainkit_only():
+    assert importing.import_map is terrainkit.import_map
+    with pytest.raises(AttributeError, match="no attribute 'import_maps'"):
+        _ = importing.import_maps
