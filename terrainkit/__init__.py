@@ -58,36 +58,25 @@ __all__ = [
 ]
 __version__ = "0.1.0"
 
-_MODULES = {
-    "ImportOptions": "importing.options",
-    "ImportReport": "map.import_map",
-    "ImportedMap": "map.import_map",
-    "MapConfig": "map.config",
-    "Overlay": "terrain.overlay",
-    "Patch": "map.patch",
-    "Solids": "geometry.solids",
-    "SubTerrain": "terrain.sub_terrain",
-    "Suite": "suites",
-    "TerrainMap": "map.terrain_map",
-    "TerrainkitError": "errors",
-    "TerrainkitWarning": "errors",
-    "Waypoints": "curriculum.waypoints",
-    "generate": "map.generation",
-    "generate_suite": "suites",
-    "get_suite": "suites",
-    "import_map": "map.import_map",
-    "import_terrain_mesh": "map.terrain_mesh",
-    "make_boxes": "geometry.solids",
-    "make_cylinders": "geometry.solids",
-    "make_hulls": "geometry.solids",
-    "make_patch": "map.patch",
-    "parameter": "terrain",
-    "register_overlay": "terrain.registry",
-    "register_terrain": "terrain.registry",
-    "suite_hash": "suites",
-    "suite_names": "suites",
-    "update_levels": "curriculum",
+_NAMES = {
+    "curriculum": ("update_levels",),
+    "curriculum.waypoints": ("Waypoints",),
+    "errors": ("TerrainkitError", "TerrainkitWarning"),
+    "geometry.solids": ("Solids", "make_boxes", "make_cylinders", "make_hulls"),
+    "importing.options": ("ImportOptions",),
+    "map.config": ("MapConfig",),
+    "map.generation": ("generate",),
+    "map.import_map": ("ImportReport", "ImportedMap", "import_map"),
+    "map.patch": ("Patch", "make_patch"),
+    "map.terrain_map": ("TerrainMap",),
+    "map.terrain_mesh": ("import_terrain_mesh",),
+    "suites.suite": ("Suite", "generate_suite", "get_suite", "suite_hash", "suite_names"),
+    "terrain": ("parameter",),
+    "terrain.overlay": ("Overlay",),
+    "terrain.registry": ("register_overlay", "register_terrain"),
+    "terrain.sub_terrain": ("SubTerrain",),
 }
+_MODULES = {name: module for module, names in _NAMES.items() for name in names}
 """Module of each public name, so that only those in use are imported: a robot needs no terrain."""
 
 

@@ -49,5 +49,4 @@ class LearningProgressSampler(UniformSampler):
             return uniform
         padded = np.pad(change, ((1, 1), (0, 0)), mode="edge")
         change = change / 2 + (padded[:-2] + padded[2:]) / 4
-        probs: FloatArray = EXPLORATION * uniform + (1 - EXPLORATION) * change / change.sum()
-        return probs
+        return np.asarray(EXPLORATION * uniform + (1 - EXPLORATION) * change / change.sum())

@@ -5,10 +5,7 @@ Each module in this folder that defines `SUFFIXES` is an exporter. Its function
 options of the format. `BYTES_PER_SAMPLE` is its peak memory per sample.
 """
 
-import importlib
 import inspect
-import pkgutil
-from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -17,6 +14,7 @@ from terrainkit.errors import ExportError, listing
 from terrainkit.export.requirements import require_finite
 from terrainkit.files.atomic_write import atomic_write, check_target
 from terrainkit.files.memory import check_memory
+from terrainkit.files.suffixes import find_module, modules_by_suffix
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
@@ -63,11 +61,7 @@ def get_exporter(path: Path) -> ModuleType:
     Raises:
         ExportError: if there is none.
     """
-    exporters = exporters_by_suffix()
-    suffix = repr(path.suffix) if path.suffix else "a name without suffix"
-    if path.suffix.lower() not in exporters:
-        raise ExportError(f"no format for {suffix} ({path}); there are: {listing(exporters)}")
-    return exporters[path.suffix.lower()]
+    return find_module(path, __name__, "format", ExportError)
 
 
 def export_options(path: Path) -> tuple[str, ...]:
@@ -76,11 +70,6 @@ def export_options(path: Path) -> tuple[str, ...]:
     return tuple(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
 
 
-@cache
 def exporters_by_suffix() -> dict[str, ModuleType]:
     """Return the exporters by suffix."""
-    modules = (
-        importlib.import_module(f"{__name__}.{module.name}")
-        for module in pkgutil.iter_modules(__path__)
-    )
-    return {suffix: module for module in modules for suffix in getattr(module, "SUFFIXES", ())}
+    return modules_by_suffix(__name__)

@@ -25,5 +25,4 @@ def int16_heights(heights: NDArray[np.floating], vertical_scale: float) -> NDArr
             f"heights from {heights.min():g} to {heights.max():g} m do not fit in "
             f"int16 at vertical_scale {vertical_scale:g}; expected at least {minimum:.3g}"
         )
-    result: NDArray[np.int16] = units.astype(np.int16)
-    return result
+    return np.asarray(units.astype(np.int16))

@@ -15,6 +15,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.features.frame import frame_rectangles
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.box_decomposition import (
     BoxDecomposition,
@@ -343,18 +344,11 @@ def _border_boxes(
     margin = config.border - (_MARGIN - 0.5) * config.cell  # a heightfield ends at a sample
     if margin <= 0:
         return []
+    center, size = frame_rectangles(grid.center, np.subtract(grid.size, 2 * margin), grid.size)
     bottom = float(terrain_map.heights.min()) - THICKNESS
-    (x0, y0), (x1, y1) = grid.lower, grid.upper
-    boxes = []
-    for a, b, c, d in (
-        (x0, x0 + margin, y0, y1),
-        (x1 - margin, x1, y0, y1),
-        (x0 + margin, x1 - margin, y0, y0 + margin),
-        (x0 + margin, x1 - margin, y1 - margin, y1),
-    ):
-        lower, upper = np.array([a, c, bottom]), np.array([b, d, height])
-        boxes.append(((lower + upper) / 2, (upper - lower) / 2))
-    return boxes
+    z = np.full((len(center), 1), (bottom + height) / 2)
+    boxes = np.hstack([center, z]), np.hstack([size / 2, height - z])
+    return list(zip(*boxes, strict=True))
 
 
 def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> HeightfieldSurface:

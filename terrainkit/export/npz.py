@@ -3,10 +3,10 @@
 import dataclasses
 import json
 import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,7 +18,6 @@ from terrainkit.geometry.solids import MAX_HULL_VERTICES, MIN_SIZE, Solids, conv
 from terrainkit.map.config import MapConfig
 from terrainkit.map.patch import PatchParameters
 from terrainkit.settings.type_hint import MAX_VALUE
-from terrainkit.terrain.parameter import Value
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
@@ -51,6 +50,12 @@ _SOLIDS = {
 MAX_PATCH_RECORD_BYTES = 8192
 """Upper bound of the parameters of a patch as JSON [bytes]."""
 
+_LIMITS = msgspec.Meta(ge=-MAX_VALUE, le=MAX_VALUE)
+_Number = bool | Annotated[int, _LIMITS] | Annotated[float, _LIMITS]
+_Values = dict[str, _Number | str | tuple[_Number, ...]]
+_Record = dict[Literal["requested", "realized"], _Values]
+"""The requested and the realized parameters of a patch."""
+
 _Map = TypeVar("_Map", bound="TerrainMap")
 
 
@@ -65,6 +70,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         path: Target.
     """
     config, mesh = terrain_map.config, terrain_map.mesh()
+    records = [[dataclasses.asdict(patch) for patch in row] for row in terrain_map.parameters]
     arrays = {
         "format_version": np.int64(FORMAT_VERSION),
         "heights": terrain_map.heights,
@@ -83,7 +89,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         "goals": terrain_map.goals,
         "spawns": terrain_map.spawns,
         "config": np.array(config.to_toml()),
-        "parameters": np.array(_parameters_text(terrain_map)),
+        "parameters": np.array(json.dumps(records, separators=(",", ":"))),
         "friction": np.array([config.static_friction, config.dynamic_friction]),
         "restitution": np.float64(config.restitution),
     }
@@ -257,42 +263,19 @@ def _read_poses(
     return poses
 
 
-def _parameters_text(terrain_map: "TerrainMap") -> str:
-    rows = [[dataclasses.asdict(record) for record in row] for row in terrain_map.parameters]
-    return json.dumps(rows, separators=(",", ":"))
-
-
 def _read_parameters(
     archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
     names = [set(each.declarations) for each in config.sub_terrains]
+    text = archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
     try:
-        rows = json.loads(
-            archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
-        )
+        rows = msgspec.json.decode(text, type=list[list[_Record]])
         for row, col in np.ndindex(table.shape):
-            table[row, col] = _to_parameters(rows[row][col], names[terrain_types[row, col]])
-    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+            record, expected = rows[row][col], names[terrain_types[row, col]]
+            if not record["requested"].keys() == record["realized"].keys() == expected:
+                raise ValueError(f"expected {listing(sorted(expected))}, requested and realized")
+            table[row, col] = PatchParameters(**record)
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise MapFileError(f"{archive.path}: parameters cannot be read: {error}") from error
     return table
-
-
-def _to_parameters(record: Mapping[str, Mapping[str, Any]], names: set[str]) -> PatchParameters:
-    requested = {name: _to_value(value) for name, value in record["requested"].items()}
-    realized = {name: _to_value(value) for name, value in record["realized"].items()}
-    if not requested.keys() == realized.keys() == names:
-        raise ValueError(f"expected {listing(sorted(names))}, requested and realized")
-    return PatchParameters(requested=requested, realized=realized)
-
-
-def _to_value(value: Any) -> Value:
-    if isinstance(value, list):
-        return tuple(_to_number(each) for each in value)
-    return value if isinstance(value, str) else _to_number(value)
-
-
-def _to_number(value: Any) -> float:
-    if not isinstance(value, int | float) or not abs(value) <= MAX_VALUE:
-        raise ValueError("expected numbers in range")
-    return value

@@ -81,5 +81,4 @@ def occupied_cells(heights: NDArray[np.float32], max_step: float) -> NDArray[np.
     """Return the cells that are higher than a neighbor by more than `max_step` [m]."""
     from scipy.ndimage import minimum_filter
 
-    occupied: NDArray[np.bool_] = heights - minimum_filter(heights, 3, mode="nearest") > max_step
-    return occupied
+    return np.asarray(heights - minimum_filter(heights, 3, mode="nearest") > max_step)

@@ -179,11 +179,10 @@ def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, FloatArray, li
     Gaps are only searched between regions that no smaller demand joins than that of the narrowest
     gap, and only up to the demand of the path without them. Wider ones would not change the result.
     """
-    size, narrowest = graph.columns.floor.size, _narrowest_gap(graph)
-    steps = graph.steps
-    edges, demand = steps, graph.demand(steps)
-    searched = narrowest
-    regions = None
+    steps, size = graph.steps, graph.columns.floor.size
+    # A lower bound of the demand of all gaps: the demand of cells that touch at a corner.
+    searched = narrowest = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap
+    edges, demand, regions = steps, graph.demand(steps), None
     for reach in _REACHES:
         leg_demands = bottlenecks(edges, demand, legs, size)
         max_demand = max(leg_demands)
@@ -194,12 +193,6 @@ def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, FloatArray, li
         edges = Edges.concatenate([steps, gap_edges(graph, regions, min(max_demand, reach))])
         demand, searched = graph.demand(edges), reach
     return edges, demand, bottlenecks(edges, demand, legs, size)
-
-
-def _narrowest_gap(graph: FootholdGraph) -> float:
-    """Return a lower bound of the demand of all gaps: that of cells that touch at a corner."""
-    s = graph.columns.spacing
-    return (2**0.5 - 1) * s / graph.limits.gap
 
 
 class _Path:

@@ -104,8 +104,7 @@ def shortest_path(
         nodes.append(int(before[nodes[-1]]))
     path = np.array(nodes[::-1], dtype=np.int64)
     wanted = path[:-1] * num_nodes + path[1:]
-    place: IntArray = order[np.searchsorted(key[order], wanted)]
-    return place
+    return np.asarray(order[np.searchsorted(key[order], wanted)])
 
 
 def _reaches(

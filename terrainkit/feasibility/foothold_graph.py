@@ -80,11 +80,8 @@ class FootholdGraph:
     def demand(self, edges: Edges) -> FloatArray:
         """Return the demand of each edge, those of its nodes included, shape (n,)."""
         nodes = np.maximum(self.node_demand[edges.start], self.node_demand[edges.end])
-        return largest([nodes, *self.edge_ratios(edges).values()])
-
-    def edge_ratios(self, edges: Edges) -> dict[str, FloatArray]:
-        """Return the ratio of each quantity of the edges by the name of its limit."""
-        return {name: ratio(name, values, self.limits) for name, values in _quantities(edges)}
+        ratios = [ratio(name, values, self.limits) for name, values in _quantities(edges)]
+        return largest([nodes, *ratios])
 
     def blocking(self, edge: Edges) -> tuple[str, float]:
         """Return the limit and the quantity of the largest demand of a single edge."""
@@ -129,5 +126,4 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
 
 def largest(ratios: list[FloatArray]) -> FloatArray:
     """Return the largest of several ratios of each node or edge, rounded."""
-    demand: FloatArray = np.round(np.stack(ratios).max(axis=0), DIGITS)
-    return demand
+    return np.asarray(np.round(np.stack(ratios).max(axis=0), DIGITS))

@@ -110,8 +110,7 @@ def _framed(
     is_free: NDArray[np.uint8], columns: Columns, low: tuple[int, int], size: tuple[int, int]
 ) -> NDArray[np.uint8]:
     """Return the image with a frame of walls; at an edge of the patch, the ground continues."""
-    framed = np.zeros((is_free.shape[0] + 2, is_free.shape[1] + 2), dtype=np.uint8)
-    framed[1:-1, 1:-1] = is_free
+    framed = np.pad(is_free, 1)
     if low[0] == 0:
         framed[0] = framed[1]
     if low[0] + size[0] == columns.shape[0]:

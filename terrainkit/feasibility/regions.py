@@ -51,5 +51,4 @@ class Regions:
     def joined(self, first: IntArray, second: IntArray, demand: FloatArray) -> NDArray[np.bool_]:
         """Return whether steps join pairs of nodes at a demand that is not above `demand`."""
         level = np.maximum(np.searchsorted(self.levels, demand, side="right") - 1, 0)
-        same: NDArray[np.bool_] = self.labels[level, first] == self.labels[level, second]
-        return same
+        return np.asarray(self.labels[level, first] == self.labels[level, second])

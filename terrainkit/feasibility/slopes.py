@@ -89,5 +89,4 @@ def step(
         np.where(slope * rise > 0, np.abs(slope), 0.0),
         np.where(other * rise > 0, np.abs(other), 0.0),
     )
-    rest: FloatArray = np.copysign(np.maximum(np.abs(rise) - explained, 0.0), rise)
-    return rest
+    return np.asarray(np.copysign(np.maximum(np.abs(rise) - explained, 0.0), rise))

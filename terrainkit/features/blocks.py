@@ -71,13 +71,7 @@ def make_blocks(lower: ArrayLike, upper: ArrayLike) -> Solids:
 
 
 def make_walls(
-    axis: int,
-    position: ArrayLike,
-    start: ArrayLike,
-    end: ArrayLike,
-    *,
-    thickness: float,
-    height: float,
+    axis: int, position: ArrayLike, start: ArrayLike, end: ArrayLike, size: tuple[float, float]
 ) -> Solids:
     """Return walls across an axis that stand on the ground at height 0.
 
@@ -86,14 +80,13 @@ def make_walls(
         position: Position of the middle of each wall on this axis [m], shape (n,).
         start: Lower end of each wall along the other axis [m], shape (n,).
         end: Upper end of each wall along the other axis [m], shape (n,).
-        thickness: Thickness of the walls [m].
-        height: Height of the walls [m].
+        size: Thickness and height of the walls [m].
     """
     low, high = np.asarray(start, float), np.asarray(end, float)
     order = [axis, 1 - axis]
     xy = np.column_stack([np.asarray(position, float), (low + high) / 2])
-    size = np.column_stack([np.full(len(low), thickness), high - low])
-    return make_standing_boxes(xy[:, order], size[:, order], height)
+    extent = np.column_stack([np.full(len(low), size[0]), high - low])
+    return make_standing_boxes(xy[:, order], extent[:, order], size[1])
 
 
 def make_ramps(

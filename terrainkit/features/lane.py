@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import MAX_PER_AXIS, number_that_fits
+from terrainkit.features.blocks import MAX_PER_AXIS
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
 
@@ -22,69 +22,46 @@ class Lane(Terrain):
         """Return the center of the flat start."""
         return lane_spawn(grid, self.start)
 
+    def slots(
+        self,
+        grid: Grid,
+        spacing: tuple[float, float],
+        *,
+        element: str,
+        length: float,
+        end: float = 0.0,
+    ) -> NDArray[np.float64]:
+        """Return the edges of as many equal slots as fit behind the start [m], shape (n + 1,).
+
+        A slot is the place of one element. It is as long as the mean of `spacing`, so the slots do
+        not depend on the length of the elements.
+
+        Args:
+            grid: Grid of the patch.
+            spacing: Minimum and maximum distance between two elements, center to center [m].
+            element: Name of the elements, for the error message.
+            length: Length of the longest element along x [m].
+            end: Minimum length of the flat end [m].
+
+        Raises:
+            ConfigError: if elements could overlap, or none fits.
+        """
+        low, high = spacing
+        first = grid.length(grid.cells(self.start))
+        number = (grid.size[0] - first - end + 1e-9) / ((low + high) / 2)
+        if not (length < low <= high and 1 <= number <= MAX_PER_AXIS):
+            raise ConfigError(
+                f"{self.kind()}: got {element} {length:g} m long with a spacing of {low:g} m to "
+                f"{high:g} m between a start of {self.start:g} m and an end of {end:g} m; expected "
+                f"{element} shorter than the spacing, and 1 to {MAX_PER_AXIS} of them in a patch "
+                f"{grid.size[0]:g} m long"
+            )
+        return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * ((low + high) / 2)
+
 
 def lane_spawn(grid: Grid, start: float) -> tuple[float, float]:
     """Return the center of a flat start of length `start` [m] at low x, x and y [m]."""
     return grid.lower[0] + grid.length(grid.cells(start)) / 2, grid.center[1]
-
-
-def lane_positions(
-    name: str, grid: Grid, start: float, length: float, gap: float
-) -> NDArray[np.float64]:
-    """Return the x of the first edge of as many elements as fit behind the start [m], shape (n,).
-
-    Args:
-        name: Name of the terrain, for the error message.
-        grid: Grid of the patch.
-        start: Length of the flat start [m].
-        length: Length of an element along x [m].
-        gap: Distance between two elements, and at least behind the last one [m].
-
-    Raises:
-        ConfigError: if there are more than `MAX_PER_AXIS`.
-    """
-    first = grid.length(grid.cells(start))
-    number = number_that_fits(name, length + gap, grid.size[0] - first)
-    return np.float64(grid.lower[0] + first) + np.arange(number) * (length + gap)
-
-
-def lane_slots(
-    name: str,
-    grid: Grid,
-    start: float,
-    spacing: tuple[float, float],
-    *,
-    element: str,
-    length: float,
-    end: float = 0.0,
-) -> NDArray[np.float64]:
-    """Return the edges of as many equal slots as fit behind the start [m], shape (n + 1,).
-
-    A slot is the place of one element. It is as long as the mean of `spacing`, so the slots do not
-    depend on the length of the elements.
-
-    Args:
-        name: Name of the terrain, for the error message.
-        grid: Grid of the patch.
-        start: Length of the flat start [m].
-        spacing: Minimum and maximum distance between two elements, center to center [m].
-        element: Name of the elements, for the error message.
-        length: Length of the longest element along x [m].
-        end: Minimum length of the flat end [m].
-
-    Raises:
-        ConfigError: if elements could overlap, or none fits.
-    """
-    low, high = spacing
-    first = grid.length(grid.cells(start))
-    number = (grid.size[0] - first - end + 1e-9) / ((low + high) / 2)
-    if not (length < low <= high and 1 <= number <= MAX_PER_AXIS):
-        raise ConfigError(
-            f"{name}: got {element} {length:g} m long with a spacing of {low:g} m to {high:g} m "
-            f"between a start of {start:g} m and an end of {end:g} m; expected {element} shorter "
-            f"than the spacing, and 1 to {MAX_PER_AXIS} of them in a patch {grid.size[0]:g} m long"
-        )
-    return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * ((low + high) / 2)
 
 
 def slot_centers(
@@ -93,7 +70,7 @@ def slot_centers(
     """Return a random x near the middle of each slot [m], shape (n,).
 
     Args:
-        edges: Edges of the slots [m], shape (n + 1,); see :func:`lane_slots`.
+        edges: Edges of the slots [m], shape (n + 1,); see :meth:`Lane.slots`.
         spacing: Minimum and maximum distance between two neighbors of the result [m].
         rng: Generator of the random numbers.
     """

@@ -11,11 +11,11 @@ from terrainkit.features.blocks import make_ramps, number_that_fits
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class RampField(Lane):
+class RampField(FlatTerrain, Lane):
     """The parent class of lanes with equal ramps as solids on flat ground, and a goal behind."""
 
     grade: float = parameter.scalar(0.09, 0.268)
@@ -23,10 +23,6 @@ class RampField(Lane):
 
     end: float = parameter.length(1.0)
     """Minimum length of the flat strip behind the ramps along x [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the ramps, in as many whole rows as fit."""
@@ -57,37 +53,25 @@ class RampField(Lane):
     def _cells(
         self, grid: Grid
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-        return ramp_cells(self.kind(), grid, self.start, self.end, self.ramp_size())
+        """Return as many ramps as fit along x between two strips, and along y.
 
+        Returns:
+            Corners with the smallest x and y [m], shape (n, 2), and the numbers of the ramps along
+            x and y, shapes (n,). The field is centered along y.
 
-def ramp_cells(
-    name: str, grid: Grid, start: float, end: float, size: tuple[float, float]
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return as many rectangles as fit along x between two strips, and along y.
-
-    Args:
-        name: Name of the terrain, for the error message.
-        grid: Grid of the patch.
-        start: Length of the flat start along x [m].
-        end: Minimum length of the flat strip behind the rectangles [m].
-        size: Sides of a rectangle along x and y [m].
-
-    Returns:
-        Corners with the smallest x and y [m], shape (n, 2), and the numbers of the rectangles along
-        x and y, shapes (n,). The field is centered along y.
-
-    Raises:
-        ConfigError: if no rectangle fits.
-    """
-    first = grid.length(grid.cells(start))
-    extent = grid.size[0] - first - grid.length(grid.cells(end)), grid.size[1]
-    nx, ny = (number_that_fits(name, side, n) for side, n in zip(size, extent, strict=True))
-    if min(nx, ny) < 1:
-        raise ConfigError(
-            f"{name}: got elements of {size[0]:g} m x {size[1]:g} m between strips of {start:g} m "
-            f"and {end:g} m; expected elements that fit in a patch of {grid.size[0]:g} m x "
-            f"{grid.size[1]:g} m"
-        )
-    i, j = (index.ravel() for index in np.indices((nx, ny)))
-    x = grid.lower[0] + first + i * size[0]
-    return np.column_stack([x, grid.center[1] + (j - ny / 2) * size[1]]), i, j
+        Raises:
+            ConfigError: if no ramp fits.
+        """
+        name, size = self.kind(), self.ramp_size()
+        first = grid.length(grid.cells(self.start))
+        extent = grid.size[0] - first - grid.length(grid.cells(self.end)), grid.size[1]
+        nx, ny = (number_that_fits(name, side, n) for side, n in zip(size, extent, strict=True))
+        if min(nx, ny) < 1:
+            raise ConfigError(
+                f"{name}: got elements of {size[0]:g} m x {size[1]:g} m between strips of "
+                f"{self.start:g} m and {self.end:g} m; expected elements that fit in a patch of "
+                f"{grid.size[0]:g} m x {grid.size[1]:g} m"
+            )
+        i, j = (index.ravel() for index in np.indices((nx, ny)))
+        x = grid.lower[0] + first + i * size[0]
+        return np.column_stack([x, grid.center[1] + (j - ny / 2) * size[1]]), i, j

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.geometry.segments import segment_indices
 from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
 
 _MAX_PAIRS = 2_000_000
@@ -51,7 +52,7 @@ class SolidIndex:
         first = ((self._lower - self._corner) / self._bin).astype(np.int64)
         last = ((self._upper - self._corner) / self._bin).astype(np.int64)
         sides = last - first + 1
-        solid, place = _expand(sides.prod(axis=1))
+        solid, place = segment_indices(sides.prod(axis=1))
         column = first[solid, 0] + place // sides[solid, 1]
         bins = column * self._shape[1] + first[solid, 1] + place % sides[solid, 1]
         order = np.argsort(bins, kind="stable")
@@ -102,7 +103,7 @@ class SolidIndex:
         block: NDArray[np.int64],
     ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
         """Return line, bottom and top of each solid on the lines `block`."""
-        row, place = _expand(counts[block])
+        row, place = segment_indices(counts[block])
         line = block[row]
         solid = self._solids[starts[line] + place]
         near = ((xy[line] >= self._lower[solid]) & (xy[line] <= self._upper[solid])).all(axis=1)
@@ -122,7 +123,7 @@ class SolidIndex:
         """Return the interval of z between the faces of each solid; empty if top < bottom."""
         if not len(solid):
             return np.empty(0), np.empty(0)
-        pair, place = _expand(self._num_planes[solid])
+        pair, place = segment_indices(self._num_planes[solid])
         normal, distance = np.split(self._planes[self._first_plane[solid][pair] + place], [3], 1)
         left = distance[:, 0] + self._radius * np.hypot(normal[:, 0], normal[:, 1])
         left -= (normal[:, :2] * xy[pair]).sum(axis=1)
@@ -154,12 +155,6 @@ class SolidIndex:
         low = np.where(upright, -np.inf, center[:, 2] - (b + root) / scale)
         high = np.where(upright, np.inf, center[:, 2] - (b - root) / scale)
         return np.where(miss, np.inf, low), np.where(miss, -np.inf, high)
-
-
-def _expand(counts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return index i `counts[i]` times for each i, and the position within each run."""
-    index = np.repeat(np.arange(len(counts)), counts)
-    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

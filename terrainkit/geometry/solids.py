@@ -20,6 +20,9 @@ MIN_SIZE = 1e-4
 MAX_HULL_VERTICES = 1000
 """Largest number of vertices of a convex hull."""
 
+_PER_SOLID = ("friction", "collides", "visible", "patch")
+"""The arrays of :class:`Solids` with one item for each solid."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solids:
@@ -79,13 +82,10 @@ class Solids:
             return cls.empty()
         kind = np.concatenate([part.kinds for part in parts])
         order = np.argsort(kind, kind="stable")
-        shapes = ("boxes", "cylinders", "hull_vertices", "hull_counts")
-        flags = ("friction", "collides", "visible", "patch")
         joined: dict[str, Any] = {
-            name: np.concatenate([getattr(part, name) for part in parts])
-            for name in (*shapes, *flags)
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])
         }
-        return cls(**joined | {name: joined[name][order] for name in flags})
+        return cls(**joined | {name: joined[name][order] for name in _PER_SOLID})
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Return the solids where `mask` is True, shape (n,)."""
@@ -99,11 +99,17 @@ class Solids:
             cylinders=self.cylinders[cylinders],
             hull_vertices=self.hull_vertices[np.repeat(hulls, self.hull_counts)],
             hull_counts=self.hull_counts[hulls],
-            friction=self.friction[mask],
-            collides=self.collides[mask],
-            visible=self.visible[mask],
-            patch=self.patch[mask],
+            **{name: getattr(self, name)[mask] for name in _PER_SOLID},
         )
+
+    def differing(self, other: "Solids", tolerance: float) -> list[str]:
+        """Return the names of the arrays that differ in shape, or by more than `tolerance`."""
+        pairs = [(name, array, getattr(other, name)) for name, array in vars(self).items()]
+        return [
+            name
+            for name, a, b in pairs
+            if a.shape != b.shape or not np.allclose(a, b, rtol=0, atol=tolerance, equal_nan=True)
+        ]
 
     def transformed(self, rotation: ArrayLike, translation: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
         """Return the solids moved by p -> rotation @ p + translation.
@@ -137,27 +143,20 @@ class Solids:
 
     def hulls(self) -> list[NDArray[np.float32]]:
         """Return the vertices of each hull [m], shapes (k, 3)."""
-        return np.split(self.hull_vertices, np.cumsum(self.hull_counts)[:-1])[
-            : len(self.hull_counts)
-        ]
+        return np.split(self.hull_vertices, np.cumsum(self.hull_counts))[:-1]
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the lower and upper corners of the axis-aligned bounding boxes [m], (n, 3)."""
-        centers: list[NDArray[Any]] = [np.empty((0, 3))]
-        half: list[NDArray[Any]] = [np.empty((0, 3))]
-        if len(self.boxes):
-            axes = np.abs(rotation_matrices(self.boxes[:, 6:]))
-            centers.append(self.boxes[:, :3])
-            half.append(np.einsum("nij,nj->ni", axes, self.boxes[:, 3:6]))
+        shapes = np.concatenate([self.boxes, self.cylinders]).astype(float)
+        axes = rotation_matrices(shapes[:, 6:])
+        half = np.einsum("nij,nj->ni", np.abs(axes), shapes[:, 3:6])
         if len(self.cylinders):
-            axis = rotation_matrices(self.cylinders[:, 6:])[..., 2]
-            radius, length = self.cylinders[:, 3:4], self.cylinders[:, 5:6]
-            centers.append(self.cylinders[:, :3])
+            axis = axes[len(self.boxes) :, :, 2]
+            radius, _, length = np.split(shapes[len(self.boxes) :, 3:6], 3, axis=1)
             # The extent of a disk with unit normal a along x is radius sqrt(a_y^2 + a_z^2).
             across = np.hypot(np.roll(axis, 1, axis=1), np.roll(axis, 2, axis=1))
-            half.append(radius * across + length * np.abs(axis))
-        center, size = np.concatenate(centers).astype(float), np.concatenate(half)
-        lower, upper = center - size, center + size
+            half[len(self.boxes) :] = radius * across + length * np.abs(axis)
+        lower, upper = shapes[:, :3] - half, shapes[:, :3] + half
         if len(self.hull_counts):
             starts = np.concatenate([[0], np.cumsum(self.hull_counts)[:-1]])
             vertices = self.hull_vertices.astype(float)
@@ -284,11 +283,11 @@ def rotation_matrices(quaternion: ArrayLike) -> NDArray[np.float64]:
 
 def quaternions(rotation: ArrayLike) -> NDArray[np.float64]:
     """Return the unit quaternions (w, x, y, z), shape (n, 4), of rotation matrices (n, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
     matrices = np.asarray(rotation, float)
     if not len(matrices):
         return np.empty((0, 4))
+    from scipy.spatial.transform import Rotation
+
     xyzw = np.atleast_2d(Rotation.from_matrix(matrices).as_quat())
     return xyzw[:, [3, 0, 1, 2]]
 
@@ -361,5 +360,4 @@ def _hull_vertices(points: NDArray[np.float32]) -> NDArray[np.float32]:
     used = convex_hull(points).vertices
     if len(used) > MAX_HULL_VERTICES:
         raise ConfigError(f"hull: got {len(used)} vertices; expected at most {MAX_HULL_VERTICES}")
-    hull: NDArray[np.float32] = points[np.sort(used)]
-    return hull
+    return np.asarray(points[np.sort(used)])

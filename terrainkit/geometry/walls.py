@@ -57,8 +57,7 @@ def flat_corners(edges: NDArray[np.uint8]) -> NDArray[np.bool_]:
         edges: Each edge of each quad: 0 level, 1 sloped, 2 a wall, shape (4, n).
     """
     a, b, c, d = edges
-    flat: NDArray[np.bool_] = np.take(_flat_cases(), a | b << 2 | c << 4 | d << 6, axis=1)
-    return flat
+    return np.asarray(np.take(_flat_cases(), a | b << 2 | c << 4 | d << 6, axis=1))
 
 
 def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -73,8 +72,7 @@ def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
     """
     # einsum is several times as slow for mixed types or another order in memory.
     corners = np.ascontiguousarray(corners, dtype=np.float64)
-    centers: NDArray[np.float64] = np.einsum("nij,nj->ni", _center_cases()[walls @ _CASE], corners)
-    return centers
+    return np.asarray(np.einsum("nij,nj->ni", _center_cases()[walls @ _CASE], corners))
 
 
 def _connected(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
+from terrainkit.geometry.segments import segment_indices
 
 Array = NDArray[np.float64]
 
@@ -100,9 +101,8 @@ def _crossings(
         within = np.flatnonzero(count)
         block = np.cumsum(count[within]) // _PAIRS_PER_BLOCK
         for each in np.split(within, np.flatnonzero(np.diff(block)) + 1):
-            triangle = np.repeat(each, count[each])
-            local = np.arange(len(triangle)) - np.repeat(np.cumsum(count[each]), count[each])
-            local += count[triangle]
+            k, local = segment_indices(count[each])
+            triangle = each[k]
             width = (j1 - j0)[triangle]
             i, j = first[triangle] + local // width, j0[triangle] + local % width
             inside, z = _intersect(corners[triangle], sign[triangle], x[i], y[j])

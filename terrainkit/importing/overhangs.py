@@ -12,6 +12,7 @@ from terrainkit.files.isolated import IsolatedError
 from terrainkit.geometry.convex_decomposition import convex_decomposition
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh import closed_mesh, merged_mesh
+from terrainkit.geometry.mesh.solid_mesh import manifold
 from terrainkit.geometry.solids import MAX_HULL_VERTICES, Solids, make_hulls
 from terrainkit.importing.columns import MIN_GAP, Columns
 
@@ -94,16 +95,13 @@ def _closed_bodies(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> I
     for body in mesh.split(only_watertight=True):
         if body.volume < 0:
             body.invert()
-        solid = manifold3d.Manifold(
-            manifold3d.Mesh64(np.asarray(body.vertices, float), np.asarray(body.faces, np.uint64))
-        )
+        solid = manifold(np.asarray(body.vertices), np.asarray(body.faces))
         if solid.status() == manifold3d.Error.NoError:
             yield solid
 
 
 def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float) -> Any:
     """Return the space above the cut as a manifold; elsewhere the cut is above the mesh."""
-    import manifold3d
     from scipy.ndimage import (
         binary_dilation,
         binary_fill_holes,
@@ -130,11 +128,7 @@ def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float)
     surface = np.where(np.isnan(cut), highest + 1.0, cut).astype(np.float32)
     # A closed mesh extends downward, so the space is built upside down.
     mesh = closed_mesh(merged_mesh(-surface, grid, threshold))
-    return manifold3d.Manifold(
-        manifold3d.Mesh64(
-            mesh.vertices * np.array([1.0, 1.0, -1.0]), mesh.triangles[:, ::-1].astype(np.uint64)
-        )
-    )
+    return manifold(mesh.vertices * np.array([1.0, 1.0, -1.0]), mesh.triangles[:, ::-1])
 
 
 def _decompose(path: Path, part: Any) -> list[NDArray[np.float64]]:
@@ -147,5 +141,5 @@ def _decompose(path: Path, part: Any) -> list[NDArray[np.float64]]:
     return [vertices for vertices, _ in found]
 
 
-def _points(manifold: Any) -> NDArray[np.float64]:
-    return np.asarray(manifold.to_mesh64().vert_properties[:, :3], float)
+def _points(solid: Any) -> NDArray[np.float64]:
+    return np.asarray(solid.to_mesh64().vert_properties[:, :3], float)

@@ -52,8 +52,7 @@ class Raster:
             i, j = (each.astype(int) for each in nearest)
             return np.asarray(self.values[np.ix_(i, j)], dtype=float)
         grid = np.meshgrid(*index, indexing="ij")
-        between: Array = map_coordinates(self.values.astype(float), grid, order=1, mode="nearest")
-        return between
+        return np.asarray(map_coordinates(self.values.astype(float), grid, order=1, mode="nearest"))
 
 
 def read_raster(path: Path, options: ReadOptions, missing: Missing, cell: float) -> Raster:

@@ -4,18 +4,15 @@ Positions are those of the file: x to the right and y up for images, east and no
 """
 
 from collections.abc import Callable, Mapping
-from functools import cache
-from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
-from types import ModuleType
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import HeightFileError, listing
+from terrainkit.errors import HeightFileError
 from terrainkit.files.isolated import IsolatedError, run_isolated
+from terrainkit.files.suffixes import find_module
 from terrainkit.importing.options import Missing, ReadOptions
 
 Array = NDArray[np.float64]
@@ -53,22 +50,10 @@ def open_source(path: Path, options: ReadOptions) -> Source:
         HeightFileError: if there is no reader for its suffix, or it cannot be read.
         ConfigError: if an option is missing or does not apply to the file.
     """
-    readers = readers_by_suffix()
-    suffix = repr(path.suffix) if path.suffix else "a name without suffix"
-    if path.suffix.lower() not in readers:
-        raise HeightFileError(f"no reader for {suffix} ({path}); there are: {listing(readers)}")
+    reader = find_module(path, "terrainkit.importing", "reader", HeightFileError)
     check_file(path)
-    source: Source = readers[path.suffix.lower()].read(path, options)
+    source: Source = reader.read(path, options)
     return source
-
-
-@cache
-def readers_by_suffix() -> dict[str, ModuleType]:
-    """Return the modules of this folder that define `SUFFIXES` and `read`, by suffix."""
-    package = __name__.rpartition(".")[0]
-    folder = [str(Path(__file__).parent)]
-    modules = (import_module(f"{package}.{module.name}") for module in iter_modules(folder))
-    return {suffix: module for module in modules for suffix in getattr(module, "SUFFIXES", ())}
 
 
 def check_file(path: Path) -> None:
@@ -128,5 +113,4 @@ def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Arra
     from scipy.ndimage import distance_transform_edt
 
     nearest = distance_transform_edt(is_missing, return_distances=False, return_indices=True)
-    filled: Array = heights[tuple(nearest)]
-    return filled
+    return np.asarray(heights[tuple(nearest)])

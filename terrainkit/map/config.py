@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from msgspec import Meta
@@ -16,9 +16,6 @@ from terrainkit.settings.schema import Config
 from terrainkit.settings.type_hint import SORTED, Count, Fraction, NonNegative, Size
 from terrainkit.terrain import presets
 from terrainkit.terrain.sub_terrain import SubTerrain
-
-if TYPE_CHECKING:
-    from terrainkit.map.spawn import SpawnDisk
 
 MAX_CELLS = 10**6
 """Largest number of cells along a side of a map; memory would not hold more."""
@@ -177,17 +174,6 @@ class MapConfig(Config):
             lower = (-self.border, -self.border)
         return Grid(shape=shape, cell=self.cell, lower=lower)
 
-    @cached_property
-    def spawn_disk(self) -> "SpawnDisk":
-        """The free place that a robot needs."""
-        from terrainkit.map.spawn import SpawnDisk
-
-        return SpawnDisk(
-            radius=self.spawn_radius,
-            tolerance=self.spawn_tolerance,
-            headroom=self.spawn_headroom,
-        )
-
     def check_patch(self, row: int, col: int) -> None:
         """Raise IndexError if the map has no patch (row, col)."""
         if not (0 <= row < self.rows and 0 <= col < self.cols):
@@ -205,6 +191,11 @@ class MapConfig(Config):
         """Return the first cell of patch (row, col) in the grid of the map."""
         x, y = self.patch_shape
         return self.border_cells + row * x, self.border_cells + col * y
+
+    def patch_cells(self, row: int, col: int) -> tuple[slice, slice]:
+        """Return the cells of patch (row, col), an index into the heights of the map."""
+        (i, j), (nx, ny) = self.patch_start(row, col), self.patch_shape
+        return slice(i, i + nx), slice(j, j + ny)
 
     def patch_grid(self, row: int, col: int) -> Grid:
         """Return the grid of patch (row, col), in the frame of the map."""

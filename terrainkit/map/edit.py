@@ -12,6 +12,7 @@ from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.generation import pad_poses
 from terrainkit.map.patch import place_spawns, with_headings
+from terrainkit.map.spawn import find_spawn
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import MAX_VALUE
 
@@ -80,19 +81,12 @@ def place_patch_spawns(
     Raises:
         ConfigError: if the patch has no place to spawn.
     """
-    from terrainkit.map.spawn import find_spawn
-
     grid = config.patch_grid(row, col)
-    (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
-    block = heights[i : i + nx, j : j + ny]
+    block = heights[config.patch_cells(row, col)]
     lower, upper = (corner[:, :2] for corner in solids.bounds())
     reaches = np.all((upper >= grid.lower) & (lower <= grid.upper), axis=1)
     near = solids.select(np.asarray(reaches))
-    disk, threshold = config.spawn_disk, config.wall_threshold
-    kept = [
-        find_spawn(block, grid, (x, y), disk, solids=near, threshold=threshold)
-        for x, y in spawns[:, :2].tolist()
-    ]
+    kept = [find_spawn(config, grid, block, near, (x, y)) for x, y in spawns[:, :2].tolist()]
     if None not in kept and np.allclose(np.array(kept)[:, :2], spawns[:, :2], atol=1e-4):
         positions = np.array(kept)
     else:

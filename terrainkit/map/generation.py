@@ -20,7 +20,6 @@ from terrainkit.map.patch import Patch, build_patch
 from terrainkit.map.seams import Seams, cliffs_text
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain.patch_geometry import uniform_friction
-from terrainkit.terrain.sub_terrain import SubTerrain
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -71,9 +70,9 @@ def generate(
     with closing(_build_patches(config, column_types(config), executor)) as patches:
         for (row, col), (terrain_type, patch) in zip(places, patches, strict=True):
             builder.add(row, col, terrain_type, patch)
-    _warn_about_patches(config, builder.deviations, builder.moved_spawns)
     terrain_map = builder.build()
-    _warn_about_map(terrain_map)
+    for text in _problems(builder, terrain_map):
+        warnings.warn(text, TerrainkitWarning, stacklevel=2)
     return terrain_map
 
 
@@ -103,8 +102,7 @@ class _MapBuilder:
     def add(self, row: int, col: int, terrain_type: int, patch: Patch) -> None:
         """Add a patch."""
         config, sub_terrain = self._config, self._config.sub_terrains[terrain_type]
-        i, j = config.patch_start(row, col)
-        block = (slice(i, i + patch.grid.shape[0]), slice(j, j + patch.grid.shape[1]))
+        block = config.patch_cells(row, col)
         self._heights[block] = patch.heights
         uniform = self._patch_friction
         if patch.friction is not uniform and (patch.friction != uniform).any():
@@ -116,7 +114,8 @@ class _MapBuilder:
         self._parameters[row, col] = patch.parameters
         self._spawns[row, col], self._goals[row, col] = patch.spawns, patch.goals
         self._solids.append(patch.solids)
-        self.deviations.update(_deviations(patch, sub_terrain, config.cell))
+        deviating = patch.parameters.deviating(sub_terrain.declarations, config.cell)
+        self.deviations.update(f"{patch.terrain}.{name}" for name in deviating)
         if patch.spawn_offset > config.cell:
             self.moved_spawns[sub_terrain.name] += 1
 
@@ -177,53 +176,33 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     return padded
 
 
-def _deviations(patch: Patch, sub_terrain: SubTerrain, cell: float) -> list[str]:
-    """Return the parameters that differ from the request by more than the grid requires."""
-    declared, realized = sub_terrain.declarations, patch.parameters.realized
-    return [
-        f"{patch.terrain}.{name}"
-        for name, requested in patch.parameters.requested.items()
-        if requested != realized[name] and declared[name].deviates(requested, realized[name], cell)
-    ]
-
-
-def _warn_about_patches(
-    config: MapConfig, deviations: Counter[str], moved_spawns: Counter[str]
-) -> None:
-    if deviations:
-        names = listing(f"{name} on {count} patches" for name, count in deviations.items())
-        warnings.warn(
-            f"cells of {config.cell:g} m, height steps or patches are too coarse or too small for "
-            f"the requested parameters: {names}; the map records the realized values",
-            TerrainkitWarning,
-            stacklevel=3,
-        )
-    if moved_spawns:
-        names = listing(f"{name} on {count} patches" for name, count in moved_spawns.items())
-        warnings.warn(
-            f"no flat disk of radius {config.spawn_radius:g} m at the preferred spawn position: "
-            f"{names}; the nearest flat disk is used; increase the platform or reduce spawn_radius",
-            TerrainkitWarning,
-            stacklevel=3,
-        )
-
-
-def _warn_about_map(terrain_map: TerrainMap) -> None:
+def _problems(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
+    """Yield what the user of a map should know about it."""
     config = terrain_map.config
+    if builder.deviations:
+        yield (
+            f"cells of {config.cell:g} m, height steps or patches are too coarse or too small for "
+            f"the requested parameters: {_counts_text(builder.deviations)}; the map records the "
+            "realized values"
+        )
+    if builder.moved_spawns:
+        yield (
+            f"no flat disk of radius {config.spawn_radius:g} m at the preferred spawn position: "
+            f"{_counts_text(builder.moved_spawns)}; the nearest flat disk is used; increase the "
+            "platform or reduce spawn_radius"
+        )
     if collapsed := list(_collapsed_ranges(terrain_map)):
-        warnings.warn(
+        yield (
             f"cells of {config.cell:g} m or height steps are too coarse for a range: "
-            f"{listing(collapsed)} on every patch",
-            TerrainkitWarning,
-            stacklevel=3,
+            f"{listing(collapsed)} on every patch"
         )
     if cliffs := Seams(terrain_map=terrain_map).cliffs():
         text = cliffs_text(cliffs, terrain_map.patch_names)
-        warnings.warn(
-            f"cliffs between patches: {text}; a robot cannot climb them",
-            TerrainkitWarning,
-            stacklevel=3,
-        )
+        yield f"cliffs between patches: {text}; a robot cannot climb them"
+
+
+def _counts_text(counts: Counter[str]) -> str:
+    return listing(f"{name} on {count} patches" for name, count in counts.items())
 
 
 def _collapsed_ranges(terrain_map: TerrainMap) -> Iterator[str]:

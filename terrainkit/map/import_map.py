@@ -90,7 +90,10 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     path, options = Path(path), options or ImportOptions()
     source = open_source(path, options)
     config, origin = _make_config(path, source, options)
-    return make_map(path, source, config, origin, options)
+    size = config.rows, config.cols
+    centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
+    types = np.zeros(size, dtype=np.int32)
+    return make_map(path, source, config, origin, options, centers.reshape(*size, 2), types)
 
 
 def make_map(
@@ -99,9 +102,8 @@ def make_map(
     config: MapConfig,
     origin: NDArray[np.float64],
     options: ImportOptions,
-    *,
-    spawn_xy: NDArray[np.float64] | None = None,
-    terrain_types: NDArray[np.int32] | None = None,
+    spawn_xy: NDArray[np.float64],
+    terrain_types: NDArray[np.int32],
 ) -> ImportedMap:
     """Return the map of a source.
 
@@ -111,9 +113,8 @@ def make_map(
         config: Configuration of the map.
         origin: Point of the source that becomes (0, 0, 0), shape (3,) [m].
         options: `missing` and `solids` are used.
-        spawn_xy: Preferred spawn position of each patch in the map, shape (rows, cols, 2) [m]; by
-            default the center of the patch.
-        terrain_types: Sub-terrain of each patch, shape (rows, cols); by default the first.
+        spawn_xy: Preferred spawn position of each patch in the map, shape (rows, cols, 2) [m].
+        terrain_types: Sub-terrain of each patch, shape (rows, cols).
 
     Raises:
         HeightFileError: if heights are missing.
@@ -126,36 +127,22 @@ def make_map(
     x, y = (grid.axis(k) + origin[k] for k in (0, 1))
     solids, columns = Solids.empty(), None
     if isinstance(source, MeshSource):
-        columns = source.columns(x, y)
+        given, z = source.columns(x, y), origin[2]
+        columns = Columns(top=given.top - z, floor=given.floor - z, ceiling=given.ceiling - z)
         found = columns.floor if options.solids else columns.top
         if options.solids:
-            solids = overhang_solids(
-                path,
-                source.vertices - origin,
-                source.faces,
-                _moved(columns, origin[2]),
-                grid,
-                config.wall_threshold,
-            )
+            vertices, threshold = source.vertices - origin, config.wall_threshold
+            solids = overhang_solids(path, vertices, source.faces, columns, grid, threshold)
             solids = assign_solids(config, solids)
     else:
         if options.solids:
             raise ConfigError(f"solids: got {path}; expected a mesh")
-        found = source.heights(x, y)
-    heights = (fill_missing(path, found, options.missing, x, y) - origin[2]).astype(np.float32)
+        found = source.heights(x, y) - origin[2]
+    heights = fill_missing(path, found, options.missing, x, y).astype(np.float32)
     if not (np.abs(heights) <= MAX_VALUE).all():
         raise HeightFileError(f"{path}: got heights beyond {MAX_VALUE:g} m")
-    if spawn_xy is None:
-        centers = [config.patch_grid(*k).center for k in np.ndindex(config.rows, config.cols)]
-        spawn_xy = np.array(centers).reshape(config.rows, config.cols, 2)
-    if terrain_types is None:
-        terrain_types = np.zeros((config.rows, config.cols), dtype=np.int32)
     terrain_map = _make_map(config, heights + np.float32(0), solids, spawn_xy, terrain_types)
-    num_missing = int(np.isnan(found).sum())
-    if columns is None:
-        report = ImportReport(num_missing=num_missing)
-    else:
-        report = _report(terrain_map, _moved(columns, origin[2]), num_missing)
+    report = _report(terrain_map, columns, int(np.isnan(found).sum()))
     return ImportedMap(terrain_map=terrain_map, report=report)
 
 
@@ -230,10 +217,6 @@ def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
     )
 
 
-def _moved(columns: Columns, z: float) -> Columns:
-    return Columns(top=columns.top - z, floor=columns.floor - z, ceiling=columns.ceiling - z)
-
-
 def _make_map(
     config: MapConfig,
     heights: NDArray[np.float32],
@@ -250,11 +233,8 @@ def _make_map(
         spawns[row, col] = place_patch_spawns(config, heights, solids, row, col, center, _NO_GOALS)
         record = records[terrain_types[row, col]]
         parameters[row, col] = PatchParameters(requested=record, realized=record)
-        (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
-        start = float(spawns[row, col][0, 2])
-        measured[row, col] = measured_difficulty(
-            heights[i : i + nx, j : j + ny], config.cell, start
-        )
+        block, start = heights[config.patch_cells(row, col)], float(spawns[row, col][0, 2])
+        measured[row, col] = measured_difficulty(block, config.cell, start)
     rank = np.unique(measured.round(6), return_inverse=True)[1].reshape(size)
     return TerrainMap(
         config=config,
@@ -271,12 +251,12 @@ def _make_map(
     )
 
 
-def _report(terrain_map: TerrainMap, columns: Columns, num_missing: int) -> ImportReport:
+def _report(terrain_map: TerrainMap, columns: Columns | None, num_missing: int) -> ImportReport:
     """Compare the map with the mesh at the samples where something hangs over the ground."""
-    i, j = np.nonzero(~np.isnan(columns.ceiling))
-    if not len(i):
+    if columns is None or np.isnan(columns.ceiling).all():
         return ImportReport(num_missing=num_missing)
     grid = terrain_map.grid
+    i, j = np.nonzero(~np.isnan(columns.ceiling))
     xy = np.column_stack([grid.axis(0)[i], grid.axis(1)[j]])
     top, ground, ceiling = columns.top[i, j], columns.floor[i, j], columns.ceiling[i, j]
     map_ground = terrain_map.height(xy)

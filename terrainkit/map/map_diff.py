@@ -1,6 +1,5 @@
 """Compare two maps patch by patch."""
 
-import dataclasses
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import listing
-from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.patch import Patch
 from terrainkit.map.terrain_map import TerrainMap
@@ -94,10 +92,7 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
     if _difference(a.difficulty, b.difficulty).any():
         yield f"difficulty {a.difficulty:g} -> {b.difficulty:g}"
     if a.parameters != b.parameters:
-        records = [(p.parameters.requested, p.parameters.realized) for p in (a, b)]
-        names = dict.fromkeys(name for record in records for name in record[0])
-        changed = [n for n in names if len({tuple(r.get(n) for r in rs) for rs in records}) > 1]
-        yield f"parameters differ: {listing(changed)}"
+        yield f"parameters differ: {listing(a.parameters.differing(b.parameters))}"
     difference = _difference(a.heights, b.heights)
     if difference.any():
         number = int((difference != 0).sum())
@@ -106,7 +101,11 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
     if not np.array_equal(a.friction, b.friction):
         number = int((a.friction != b.friction).sum())
         yield f"friction differs in {number:,} of {a.friction.size:,} cells"
-    yield from _diff_solids(_in_patch_frame(a), _in_patch_frame(b))
+    solids = [p.solids.transformed(np.eye(3), np.negative([*p.grid.lower, 0])) for p in (a, b)]
+    if len(a.solids) != len(b.solids):
+        yield f"{len(a.solids)} -> {len(b.solids)} solids"
+    elif changed := solids[0].differing(solids[1], TOLERANCE):
+        yield f"solids differ: {listing(changed)}"
     shift = np.array([*a.grid.lower, 0, 0]) - [*b.grid.lower, 0, 0]
     moved = float(np.linalg.norm(_difference(a.origin, b.origin + shift[:3])))
     if not moved <= TOLERANCE:
@@ -128,36 +127,3 @@ def _difference(a: ArrayLike, b: ArrayLike) -> NDArray[np.float64]:
     with np.errstate(invalid="ignore"):
         difference = np.abs(a - b)
     return np.where((a == b) | (np.isnan(a) & np.isnan(b)), 0.0, difference)
-
-
-def _diff_solids(a: Solids, b: Solids) -> Iterator[str]:
-    if len(a) != len(b):
-        yield f"{len(a)} -> {len(b)} solids"
-        return
-    pairs = {
-        field.name: (getattr(a, field.name), getattr(b, field.name))
-        for field in dataclasses.fields(Solids)
-    }
-    changed = [
-        name
-        for name, (one, other) in pairs.items()
-        if one.shape != other.shape
-        or not np.allclose(one, other, rtol=0, atol=TOLERANCE, equal_nan=True)
-    ]
-    if changed:
-        yield f"solids differ: {listing(changed)}"
-
-
-def _in_patch_frame(patch: Patch) -> Solids:
-    """Return the solids, relative to the lower corner of the patch."""
-    offset = np.array([*patch.grid.lower, 0], dtype=np.float32)
-
-    def moved(array: NDArray[np.float32]) -> NDArray[np.float32]:
-        return np.hstack([array[:, :3] - offset, array[:, 3:]])
-
-    return dataclasses.replace(
-        patch.solids,
-        boxes=moved(patch.solids.boxes),
-        cylinders=moved(patch.solids.cylinders),
-        hull_vertices=moved(patch.solids.hull_vertices),
-    )

@@ -24,7 +24,7 @@ from terrainkit.map.layout import (
 from terrainkit.map.spawn import find_spawn, sample_spawns
 from terrainkit.terrain import Terrain
 from terrainkit.terrain.overlay import Overlay
-from terrainkit.terrain.parameter import Value
+from terrainkit.terrain.parameter import Parameter, Value
 from terrainkit.terrain.patch_geometry import PatchGeometry, checked_heights, uniform_friction
 from terrainkit.terrain.sub_terrain import SubTerrain, overlay_path
 
@@ -41,6 +41,21 @@ class PatchParameters:
 
     realized: Mapping[str, Value]
     """Values after snapping to the cells, by name; (x, y) where the two axes differ."""
+
+    def differing(self, other: "PatchParameters") -> list[str]:
+        """Return the names of the parameters that differ from those of `other`."""
+        pairs = (self.requested, other.requested), (self.realized, other.realized)
+        names = dict.fromkeys([*self.requested, *other.requested])
+        return [name for name in names if any(a.get(name) != b.get(name) for a, b in pairs)]
+
+    def deviating(self, declared: Mapping[str, Parameter], cell: float) -> list[str]:
+        """Return the parameters that differ from the request by more than the grid requires."""
+        return [
+            name
+            for name, requested in self.requested.items()
+            if requested != self.realized[name]
+            and declared[name].deviates(requested, self.realized[name], cell)
+        ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -244,10 +259,7 @@ def place_spawns(
         ConfigError: if the patch has no place to spawn.
     """
     origin = _find_origin(config, name, grid, heights, solids, position)
-    if config.spawns_per_patch == 1:
-        return np.array([origin])
-    disk, number = config.spawn_disk, config.spawns_per_patch
-    return sample_spawns(heights, grid, origin, disk, number, solids=solids, rng=rng())
+    return sample_spawns(config, grid, heights, solids, origin, rng)
 
 
 def _find_origin(
@@ -259,10 +271,7 @@ def _find_origin(
     position: tuple[float, float],
 ) -> tuple[float, float, float]:
     """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
-    disk = config.spawn_disk
-    origin = find_spawn(
-        heights, grid, position, disk, solids=solids, threshold=config.wall_threshold
-    )
+    origin = find_spawn(config, grid, heights, solids, position)
     if origin is None:
         raise ConfigError(
             f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "

@@ -68,14 +68,12 @@ class Seams:
         Where the map ends at a patch, there is no seam, and the height is -inf.
         """
         config, heights = self.terrain_map.config, self.terrain_map.heights
-        nx, ny = config.patch_shape
-        border, (rows, cols) = config.border_cells, (config.rows, config.cols)
-        inner = slice(border, border + rows * nx), slice(border, border + cols * ny)
-        along_x = _line_heights(heights[:, inner[1]], border, nx, rows)
-        along_y = _line_heights(heights[inner[0]].T, border, ny, cols)
+        (nx, ny), (x, y) = config.patch_shape, config.patch_edges
+        along_x = _line_heights(heights[:, y[0] : y[-1]], x)
+        along_y = _line_heights(heights[x[0] : x[-1]].T, y)
         return (
-            along_x.reshape(rows + 1, cols, ny).max(axis=2),
-            along_y.reshape(cols + 1, rows, nx).max(axis=2).T,
+            along_x.reshape(len(x), -1, ny).max(axis=2),
+            along_y.reshape(len(y), -1, nx).max(axis=2).T,
         )
 
     def _patch(self, row: int, col: int) -> Index | None:
@@ -86,9 +84,7 @@ class Seams:
     def _max_step(self, patch: Index | None) -> float:
         if patch is None:
             return 0.0
-        config = self.terrain_map.config
-        (i, j), (nx, ny) = config.patch_start(*patch), config.patch_shape
-        heights = self.terrain_map.heights[i : i + nx, j : j + ny]
+        heights = self.terrain_map.heights[self.terrain_map.config.patch_cells(*patch)]
         steps = heights[1:] - heights[:-1], heights[:, 1:] - heights[:, :-1]
         return float(max(max(s.max(initial=0.0), -s.min(initial=0.0)) for s in steps))
 
@@ -106,14 +102,11 @@ class Seams:
         return not self.terrain_map.clearance(xy).any()
 
 
-def _line_heights(
-    heights: NDArray[np.float32], border: int, cells: int, count: int
-) -> NDArray[np.float32]:
-    """Return the height differences across each line between patches, shape (count + 1, n)."""
-    lines = border + cells * np.arange(count + 1)
-    lines = lines[(lines > 0) & (lines < len(heights))]
-    found = np.full((count + 1, heights.shape[1]), -np.inf, dtype=np.float32)
-    found[(lines - border) // cells] = np.abs(heights[lines] - heights[lines - 1])
+def _line_heights(heights: NDArray[np.float32], lines: NDArray[np.int64]) -> NDArray[np.float32]:
+    """Return the height difference across each line between two rows, -inf at the map's edge."""
+    inside = (lines > 0) & (lines < len(heights))
+    found = np.full((len(lines), heights.shape[1]), -np.inf, dtype=np.float32)
+    found[inside] = np.abs(heights[lines[inside]] - heights[lines[inside] - 1])
     return found
 
 

@@ -1,7 +1,7 @@
 """Find spawn positions on flat ground."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,62 +11,47 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import Solids
 from terrainkit.geometry.surface import surface_at
-
-
-@dataclass(frozen=True, kw_only=True)
-class SpawnDisk:
-    """The free place that a robot needs to be spawned."""
-
-    radius: float
-    """Radius [m]."""
-
-    tolerance: float
-    """Largest difference in height within the disk [m]."""
-
-    headroom: float
-    """Height above the disk that is free of solids [m]."""
+from terrainkit.map.config import MapConfig
 
 
 def find_spawn(
-    heights: NDArray[np.float32],
+    config: MapConfig,
     grid: Grid,
-    position: tuple[float, float],
-    disk: SpawnDisk,
-    *,
+    heights: NDArray[np.float32],
     solids: Solids,
-    threshold: float,
+    position: tuple[float, float],
 ) -> tuple[float, float, float] | None:
     """Return the spawn origin nearest to `position`.
 
     It is exactly at `position` if the ground there is flat and free, and else at the center of a
     cell.
 
-    All samples that influence the surface within the disk around the origin differ by at most its
-    tolerance, and no solid is above the disk within its headroom. The disk is therefore flat, and
-    no wall, step or obstacle reaches into it.
+    All samples that influence the surface within the disk of `spawn_radius` around the origin
+    differ by at most `spawn_tolerance`, and no solid is above the disk within `spawn_headroom`. The
+    disk is therefore flat, and no wall, step or obstacle reaches into it.
 
     Args:
-        heights: Heights on `grid` [m], shape `grid.shape`.
+        config: Configuration of the map.
         grid: Grid of the patch; the disk stays inside it.
-        position: Preferred spawn position, x and y [m].
-        disk: The disk.
+        heights: Heights on `grid` [m], shape `grid.shape`.
         solids: Solids of the patch.
-        threshold: Difference between neighboring samples above which there is a wall [m].
+        position: Preferred spawn position, x and y [m].
 
     Returns:
         Origin (x, y, z) [m]; None if there is no such disk in the patch.
     """
     (x, y), (x0, y0) = position, grid.lower
     index = (x - x0) / grid.cell - 0.5, (y - y0) / grid.cell - 0.5
-    if _is_inside(position, grid, disk.radius):
-        low, z = _height_range(heights, index, disk.radius / grid.cell)
-        if z - low <= disk.tolerance:
+    if _is_inside(position, grid, config.spawn_radius):
+        low, z = _height_range(heights, index, config.spawn_radius / grid.cell)
+        if z - low <= config.spawn_tolerance:
             if low != z:
                 # The disk is flat within the tolerance only: evaluate the surface at its center.
-                z = float(surface_at(heights, np.array([index]), threshold=threshold).height[0])
-            if not len(solids) or _is_free(np.array([[x, y, z]]), solids, disk)[0]:
+                surface = surface_at(heights, np.array([index]), threshold=config.wall_threshold)
+                z = float(surface.height[0])
+            if not len(solids) or _is_free(config, np.array([[x, y, z]]), solids)[0]:
                 return x, y, z
-    cells, origins = _free_disks(heights, grid, disk, solids)
+    cells, origins = _free_disks(config, grid, heights, solids)
     if not len(cells):
         return None
     x, y, z = origins[np.argmin(((cells - index) ** 2).sum(axis=1))].tolist()
@@ -74,49 +59,46 @@ def find_spawn(
 
 
 def sample_spawns(
-    heights: NDArray[np.float32],
+    config: MapConfig,
     grid: Grid,
-    origin: tuple[float, float, float],
-    disk: SpawnDisk,
-    number: int,
-    *,
+    heights: NDArray[np.float32],
     solids: Solids,
-    rng: np.random.Generator,
+    origin: tuple[float, float, float],
+    rng: Callable[[], np.random.Generator],
 ) -> NDArray[np.float64]:
-    """Return up to `number` spawn positions on the level ground around the origin.
+    """Return up to `spawns_per_patch` spawn positions on the level ground around the origin.
 
     The positions are a Poisson-disk sample: random, and at least two disk radii apart, so that the
     disks do not overlap. Each is the center of a flat and free disk, and a path over the centers
     of such disks leads to it from the origin. No position is therefore beyond an obstacle.
 
     Args:
-        heights: See :func:`find_spawn`.
-        grid: See :func:`find_spawn`.
+        config: Configuration of the map.
+        grid: Grid of the patch.
+        heights: Heights on `grid` [m], shape `grid.shape`.
+        solids: Solids of the patch.
         origin: Spawn origin of the patch [m], the first position.
-        disk: See :func:`find_spawn`.
-        number: Largest number of positions.
-        solids: See :func:`find_spawn`.
-        rng: Random number generator.
+        rng: Returns the random number generator; slow, so called only if needed.
 
     Returns:
-        Positions (x, y, z) [m], shape (n, 3) with 1 <= n <= `number`.
+        Positions (x, y, z) [m], shape (n, 3) with 1 <= n <= `spawns_per_patch`.
     """
-    if number == 1:
+    if config.spawns_per_patch == 1:
         return np.array([origin])
     from scipy.ndimage import label
 
     chosen = [np.array(origin)]
-    cells, places = _free_disks(heights, grid, disk, solids)
+    cells, places = _free_disks(config, grid, heights, solids)
     is_free = np.zeros(grid.shape, dtype=bool)
     is_free[tuple(cells.T)] = True
     regions, _ = label(is_free)
     region = regions[tuple(cells.T)]
     # The ground is level between the origin and the center of a flat disk that contains it.
-    contains_origin = np.hypot(*(places[:, :2] - chosen[0][:2]).T) <= disk.radius
-    places = rng.permutation(places[np.isin(region, region[contains_origin])])
-    while len(chosen) < number:
+    contains_origin = np.hypot(*(places[:, :2] - chosen[0][:2]).T) <= config.spawn_radius
+    places = rng().permutation(places[np.isin(region, region[contains_origin])])
+    while len(chosen) < config.spawns_per_patch:
         distance = np.hypot(*(places[:, :2] - chosen[-1][:2]).T)
-        places = places[distance >= 2 * disk.radius]
+        places = places[distance >= 2 * config.spawn_radius]
         if not len(places):
             break
         chosen.append(places[0])
@@ -124,30 +106,30 @@ def sample_spawns(
 
 
 def _free_disks(
-    heights: NDArray[np.float32], grid: Grid, disk: SpawnDisk, solids: Solids
+    config: MapConfig, grid: Grid, heights: NDArray[np.float32], solids: Solids
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """Return the cells with a flat and free disk, shape (n, 2), and their centers, (n, 3)."""
-    cells = _flat_cells(heights, disk.radius / grid.cell, disk.tolerance)
+    cells = _flat_cells(heights, config.spawn_radius / grid.cell, config.spawn_tolerance)
     i, j = cells.T
     places = np.column_stack([grid.axis(0)[i], grid.axis(1)[j], heights[i, j]])
-    is_free = _is_free(places, solids, disk)
+    is_free = _is_free(config, places, solids)
     return cells[is_free], places[is_free]
 
 
-def _is_free(origins: NDArray[np.float64], solids: Solids, disk: SpawnDisk) -> NDArray[np.bool_]:
+def _is_free(config: MapConfig, origins: NDArray[np.float64], solids: Solids) -> NDArray[np.bool_]:
     """Return whether no solid is above each disk within the headroom, shape (n,)."""
-    if not len(origins):
-        return np.ones(0, dtype=bool)
+    if not len(origins) or not len(solids):
+        return np.ones(len(origins), dtype=bool)
     # Most solids are far from the preferred position; the index of a few is made much faster.
     lower, upper = (corner[:, :2] for corner in solids.bounds())
     low, high = (f(origins[:, :2], axis=0) for f in (np.min, np.max))
-    margin = disk.radius + 1e-3
+    margin = config.spawn_radius + 1e-3
     solids = solids.select(((lower <= high + margin) & (upper >= low - margin)).all(axis=1))
-    spans = SolidIndex(solids, radius=disk.radius).spans(origins[:, :2])
+    spans = SolidIndex(solids, radius=config.spawn_radius).spans(origins[:, :2])
     bottom, top = np.moveaxis(spans, -1, 0)
     z = origins[:, 2:]
-    is_blocked: NDArray[np.bool_] = ((top > z + CONTACT) & (bottom < z + disk.headroom)).any(axis=1)
-    return ~is_blocked
+    is_blocked = (top > z + CONTACT) & (bottom < z + config.spawn_headroom)
+    return np.asarray(~is_blocked.any(axis=1))
 
 
 def _is_inside(point: tuple[float, float], grid: Grid, radius: float) -> bool:

@@ -226,16 +226,15 @@ class TerrainMap:
             IndexError: if there is no such patch.
         """
         self.config.check_patch(row, col)
-        grid = self.config.patch_grid(row, col)
-        i, j = self.config.patch_start(row, col)
+        cells = self.config.patch_cells(row, col)
         goals, spawns = self.goals[row, col], self.spawns[row, col]
         return Patch(
             terrain=self.terrain_names[self.terrain_types[row, col]],
             difficulty=float(self.difficulty[row, col]),
             parameters=self.parameters[row, col],
-            grid=grid,
-            heights=self.heights[i : i + grid.shape[0], j : j + grid.shape[1]],
-            friction=self.friction[i : i + grid.shape[0], j : j + grid.shape[1]],
+            grid=self.config.patch_grid(row, col),
+            heights=self.heights[cells],
+            friction=self.friction[cells],
             solids=self.solids.select((self.solids.patch == (row, col)).all(axis=1)),
             goals=goals[~np.isnan(goals[:, 0])],
             spawns=spawns[~np.isnan(spawns).all(axis=1)],

@@ -93,6 +93,6 @@ def import_terrain_mesh(
         config,
         np.zeros(3),
         options,
-        spawn_xy=starts[..., :2],
-        terrain_types=types.astype(np.int32),
+        starts[..., :2],
+        types.astype(np.int32),
     )

@@ -5,7 +5,6 @@ checked edge by edge and face by face, and each patch is compared with a second 
 Imported and edited maps (mode custom) are not compared with their config.
 """
 
-import dataclasses
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,9 +15,8 @@ from numpy.typing import NDArray
 from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
 from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
-from terrainkit.geometry.solids import Solids
 from terrainkit.map.layout import column_types, terrain_and_difficulty
-from terrainkit.map.patch import Patch, PatchParameters, build_patch
+from terrainkit.map.patch import Patch, build_patch
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain.parameter import format_value
 
@@ -44,35 +42,24 @@ def validate(terrain_map: TerrainMap, mesh: TriMesh | None = None) -> list[Issue
         terrain_map: The map.
         mesh: The trimesh stored with the map. By default the mesh of the map is built and checked.
     """
-    issues = _issues("finite", _check_finite(terrain_map, mesh))
+    issues = _issues(finite=_check_finite(terrain_map, mesh))
     if issues:
         return issues  # the other checks need finite values
-    return [
-        *(_custom_issues if terrain_map.config.mode == "custom" else _config_issues)(terrain_map),
-        *_issues("spawn", _check_spawn(terrain_map)),
-        *_issues("mesh", _check_mesh(terrain_map, mesh or terrain_map.mesh())),
-    ]
+    if terrain_map.config.mode == "custom":
+        issues = _issues(solids=_check_solids(terrain_map), goals=_check_goals(terrain_map))
+    else:
+        issues = _issues(
+            difficulty=_check_difficulty(terrain_map),
+            patches=_check_patches(terrain_map),
+            realized=_check_realized(terrain_map),
+        )
+    built = mesh or terrain_map.mesh()
+    return issues + _issues(spawn=_check_spawn(terrain_map), mesh=_check_mesh(terrain_map, built))
 
 
-def _config_issues(terrain_map: TerrainMap) -> list[Issue]:
-    """Return the differences between a map and its config."""
-    return [
-        *_issues("difficulty", _check_difficulty(terrain_map)),
-        *_issues("patches", _check_patches(terrain_map)),
-        *_issues("realized", _check_realized(terrain_map)),
-    ]
-
-
-def _custom_issues(terrain_map: TerrainMap) -> list[Issue]:
-    """Return the issues of a map that was not generated."""
-    return [
-        *_issues("solids", _check_solids(terrain_map)),
-        *_issues("goals", _check_goals(terrain_map)),
-    ]
-
-
-def _issues(check: str, messages: Iterator[str]) -> list[Issue]:
-    return [Issue(check=check, message=message) for message in messages]
+def _issues(**messages: Iterator[str]) -> list[Issue]:
+    """Return the messages of checks as issues."""
+    return [Issue(check=check, message=text) for check, texts in messages.items() for text in texts]
 
 
 def _check_finite(terrain_map: TerrainMap, mesh: TriMesh | None) -> Iterator[str]:
@@ -109,8 +96,7 @@ def _check_patches(terrain_map: TerrainMap) -> Iterator[str]:
         warnings.simplefilter("ignore", TerrainkitWarning)
         columns = column_types(config)
     for row, col in np.ndindex(terrain_map.difficulty.shape):
-        (i, j), (nx, ny) = config.patch_start(row, col), config.patch_shape
-        border[i : i + nx, j : j + ny] = False
+        border[config.patch_cells(row, col)] = False
         terrain_type, difficulty = terrain_and_difficulty(config, columns, row, col)
         try:
             expected = build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
@@ -133,11 +119,11 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
     if patch.parameters != expected.parameters:
         yield (
             f"{location}: the recorded parameters differ from those of its config: "
-            f"{_different(patch.parameters, expected.parameters)}"
+            f"{listing(patch.parameters.differing(expected.parameters))}"
         )
     is_same = {
         "friction coefficients": np.allclose(patch.friction, expected.friction, atol=1e-6),
-        "solids": _same_solids(patch.solids, expected.solids),
+        "solids": not patch.solids.differing(expected.solids, TOLERANCE),
         "goals": _same_poses(patch.goals, expected.goals),
         "spawn positions": _same_poses(patch.spawns[1:], expected.spawns[1:]),
     }
@@ -160,44 +146,20 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         )
 
 
-def _different(parameters: PatchParameters, expected: PatchParameters) -> str:
-    """Return the names of the parameters that differ."""
-    pairs = (
-        (parameters.requested, expected.requested),
-        (parameters.realized, expected.realized),
-    )
-    names = {n: None for a, b in pairs for n in {**a, **b} if a.get(n) != b.get(n)}
-    return listing(names)
-
-
 def _same_poses(poses: NDArray[np.float32], expected: NDArray[np.float32]) -> bool:
     return poses.shape == expected.shape and np.allclose(poses, expected, atol=TOLERANCE)
 
 
-def _same_solids(solids: Solids, expected: Solids) -> bool:
-    return all(
-        values.shape == wanted.shape and np.allclose(values, wanted, atol=TOLERANCE, equal_nan=True)
-        for values, wanted in (
-            (getattr(solids, field.name), getattr(expected, field.name))
-            for field in dataclasses.fields(Solids)
-        )
-    )
-
-
 def _check_realized(terrain_map: TerrainMap) -> Iterator[str]:
     """Compare the requested parameters with the realized ones."""
-    cell, sub_terrains = terrain_map.config.cell, terrain_map.config.sub_terrains
-    for row, col in np.ndindex(terrain_map.difficulty.shape):
-        patch = terrain_map.patch(row, col)
-        sub_terrain = sub_terrains[terrain_map.terrain_types[row, col]]
-        parameters = sub_terrain.declarations
-        for name, requested in patch.parameters.requested.items():
-            realized = patch.parameters.realized[name]
-            if parameters[name].deviates(requested, realized, cell):
-                yield (
-                    f"patch ({row}, {col}), {patch.terrain}: {name} is {realized}; "
-                    f"requested {format_value(requested)}"
-                )
+    config, types = terrain_map.config, terrain_map.terrain_types
+    for (row, col), parameters in np.ndenumerate(terrain_map.parameters):
+        declared = config.sub_terrains[types[row, col]].declarations
+        for name in parameters.deviating(declared, config.cell):
+            yield (
+                f"patch ({row}, {col}), {terrain_map.patch_names[row, col]}: {name} is "
+                f"{parameters.realized[name]}; requested {format_value(parameters.requested[name])}"
+            )
 
 
 def _check_solids(terrain_map: TerrainMap) -> Iterator[str]:

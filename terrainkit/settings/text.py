@@ -1,7 +1,6 @@
 """Text of numbers in XML, and of names in messages, such as the nearest to a misspelled one."""
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 from terrainkit.errors import listing
 
@@ -44,21 +43,11 @@ def closest(word: str, names: Iterable[str], min_ratio: float = MIN_RATIO) -> st
         for name in same_length:
             if sorted(name.lower()) == sorted(lower):
                 return name
-    return _similar(lower, names, min_ratio)
+    from difflib import get_close_matches
 
-
-def _similar(lower: str, names: Sequence[str], min_ratio: float) -> str:
-    from difflib import SequenceMatcher
-
-    matcher, best = SequenceMatcher(b=lower, autojunk=False), ""
-    ratio = math.nextafter(min_ratio, 0.0)
-    for name in names:
-        matcher.set_seq1(name.lower())
-        if matcher.real_quick_ratio() <= ratio or matcher.quick_ratio() <= ratio:
-            continue
-        if matcher.ratio() > ratio:
-            best, ratio = name, matcher.ratio()
-    return best
+    by_lower = {name.lower(): name for name in reversed(names)}
+    similar = get_close_matches(lower, by_lower, 1, min_ratio)
+    return by_lower[similar[0]] if similar else ""
 
 
 def closest_names(word: str, names: Iterable[str], number: int = 3) -> list[str]:

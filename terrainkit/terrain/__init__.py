@@ -1,5 +1,5 @@
 """Terrain types: the class `Terrain`, its parameters, overlays, the registry and presets."""
 
-from terrainkit.terrain.terrain import Terrain
+from terrainkit.terrain.terrain import FlatTerrain, Terrain
 
-__all__ = ["Terrain"]
+__all__ = ["FlatTerrain", "Terrain"]

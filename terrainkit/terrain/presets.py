@@ -102,15 +102,7 @@ _EQUAL_PARTS = {
     "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),
     "stairs": ("stairs", "pyramid_stairs", "pyramid_stairs_inverted"),
     "hard": ("gap", "stepping_stones", "pit", "boxes", "rails"),
-    "parkour": (
-        "boxes",
-        "hurdles",
-        "gap_track",
-        "side_ramps",
-        "stepping_beams",
-        "crawl",
-        "slit",
-    ),
+    "parkour": ("boxes", "hurdles", "gap_track", "side_ramps", "stepping_beams", "crawl", "slit"),
     "sparse": (
         "stepping_stones",
         "stone_rows",

@@ -51,18 +51,17 @@ _registered: dict[tuple[str, str], type[Any]] = {}
 """The classes that this process has registered, by noun and name."""
 
 
-@cache
 def terrain_names() -> tuple[str, ...]:
     """Return the names of the built-in terrains in alphabetical order, without importing them."""
     return _module_names(_TERRAINS)
 
 
-@cache
 def overlay_names() -> tuple[str, ...]:
     """Return the names of the built-in overlays in alphabetical order, without importing them."""
     return _module_names(_OVERLAYS)
 
 
+@cache
 def _module_names(group: _Group) -> tuple[str, ...]:
     package = importlib.import_module(group.package)
     return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__)))

@@ -1,4 +1,4 @@
-"""Terrain: the abstract class of all terrains."""
+"""Terrain: the abstract class of all terrains, and FlatTerrain."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -150,3 +150,14 @@ class Terrain(Parameterized, ABC):
         are those of :meth:`solids`.
         """
         return np.empty((0, 4))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatTerrain(Terrain):
+    """The parent class of terrains on flat ground at height 0."""
+
+    has_random_heights: ClassVar[bool] = False
+
+    def heights(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.floating]:
+        """Return zeros."""
+        return np.zeros(grid.shape)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane, lane_slots
+from terrainkit.features.lane import Lane
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -77,8 +77,5 @@ class Beams(Lane):
         return edges[:-1] + self.gap, edges[1:]
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
-        spacing = self.min_spacing, self.max_spacing
-        end = max(self.end, self.gap + grid.cell)
-        return lane_slots(
-            "beams", grid, self.start, spacing, element="gaps", length=self.gap, end=end
-        )
+        spacing, end = (self.min_spacing, self.max_spacing), max(self.end, self.gap + grid.cell)
+        return self.slots(grid, spacing, element="gaps", length=self.gap, end=end)

@@ -11,11 +11,11 @@ from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Boxes(Terrain):
+class Boxes(FlatTerrain):
     """Boxes and pyramids of boxes to climb, at random positions around a flat platform.
 
     The boxes are solids with random sides and directions; the ground is flat. There is a goal on
@@ -41,10 +41,6 @@ class Boxes(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the square at the center without boxes [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the boxes; those of a pyramid are inside each other."""

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from terrainkit.features.frame import frame_rectangles
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ceiling(Terrain):
+class Ceiling(FlatTerrain):
     """A low ceiling on all sides of a platform, under which the robot crawls.
 
     The ground is flat, and there is no ceiling over the platform.
@@ -29,10 +29,6 @@ class Ceiling(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the square at the center without a ceiling [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return four boxes, or two if the platform is as wide as the patch."""

@@ -6,14 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.lane import Lane, lane_goals, lane_positions
+from terrainkit.features.blocks import number_that_fits
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
-from terrainkit.terrain import parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Crawl(Lane):
+class Crawl(FlatTerrain, Lane):
     """Bars across a lane along x, under which the robot crawls.
 
     The ground is flat, and the robot is spawned at low x. There is a goal behind each bar.
@@ -33,10 +34,6 @@ class Crawl(Lane):
 
     spacing: float = parameter.size(1.0)
     """Distance between two bars [m]; more behind a bar shorter than `max_depth`."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the bars, which span the whole width of the patch."""
@@ -59,11 +56,13 @@ class Crawl(Lane):
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the first edge and the depth of each bar along x [m]."""
-        x = lane_positions("crawl", grid, self.start, self.max_depth, self.spacing)
-        if self.min_depth > self.max_depth or not len(x):
+        start, pitch = grid.length(grid.cells(self.start)), self.max_depth + self.spacing
+        number = number_that_fits("crawl", pitch, grid.size[0] - start)
+        if self.min_depth > self.max_depth or not number:
             raise ConfigError(
                 f"crawl: got min_depth {self.min_depth:g} m, max_depth {self.max_depth:g} m and "
                 f"spacing {self.spacing:g} m; expected min_depth <= max_depth, and a bar that fits "
                 f"behind a start of {self.start:g} m in a patch {grid.size[0]:g} m long"
             )
-        return x, self.min_depth + (self.max_depth - self.min_depth) * rng.random(len(x))
+        x = np.float64(grid.lower[0] + start) + np.arange(number) * pitch
+        return x, self.min_depth + (self.max_depth - self.min_depth) * rng.random(number)

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.lane import Lane, lane_goals, lane_slots, slot_centers
+from terrainkit.features.lane import Lane, lane_goals, slot_centers
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import parameter
 
@@ -50,4 +50,4 @@ class GapTrack(Lane):
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing = self.min_spacing, self.max_spacing
         length = grid.length(grid.cells(self.length))
-        return lane_slots("gap_track", grid, self.start, spacing, element="gaps", length=length)
+        return self.slots(grid, spacing, element="gaps", length=length)

@@ -10,11 +10,11 @@ from terrainkit.features.blocks import make_ramps
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gutter(Lane):
+class Gutter(FlatTerrain, Lane):
     """A gutter along x between two slopes, in the manner of NIST.
 
     The robot walks with its feet on both slopes. It is spawned at low x, and there is a goal behind
@@ -32,10 +32,6 @@ class Gutter(Lane):
 
     end: float = parameter.size(1.0)
     """Length of the flat end along x [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a wedge for each slope."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.lane import Lane, lane_goals, lane_slots, slot_centers
+from terrainkit.features.lane import Lane, lane_goals, slot_centers
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders
 from terrainkit.terrain import parameter
@@ -80,4 +80,4 @@ class Hurdles(Lane):
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing = self.min_spacing, self.max_spacing
         length = max(self.min_thickness, self.max_thickness)
-        return lane_slots("hurdles", grid, self.start, spacing, element="hurdles", length=length)
+        return self.slots(grid, spacing, element="hurdles", length=length)

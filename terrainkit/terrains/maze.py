@@ -11,11 +11,11 @@ from terrainkit.features.blocks import make_walls, number_that_fits
 from terrainkit.features.maze_layout import MazeLayout, sample_maze
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Maze(Terrain):
+class Maze(FlatTerrain):
     """A maze with a clearing at its center and an exit on each side.
 
     The robot is spawned in the clearing. The goals lead along the shortest path to the exit at high
@@ -42,31 +42,18 @@ class Maze(Terrain):
     clearing: float = parameter.size(1.5)
     """Side of the square at the center [m] from which walls are removed."""
 
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
-
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the walls, one box for each straight run."""
         maze = self._layout(grid, rng)
         pitch, half = self.corridor + self.thickness, self.thickness / 2
-        parts = []
+        parts, size = [], (self.thickness, self.height)
         for axis, walls in ((0, maze.walls_x), (1, maze.walls_y.T)):
             edges = np.diff(np.pad(walls.astype(np.int8), ((0, 0), (1, 1))), axis=1)
             (line, first), (_, last) = np.nonzero(edges == 1), np.nonzero(edges == -1)
             middle, other = grid.center[axis], grid.center[1 - axis]
             position = middle + (line - (len(walls) - 1) / 2) * pitch
             start, end = (other + (k - walls.shape[1] / 2) * pitch for k in (first, last))
-            parts.append(
-                make_walls(
-                    axis,
-                    position,
-                    start - half,
-                    end + half,
-                    thickness=self.thickness,
-                    height=self.height,
-                )
-            )
+            parts.append(make_walls(axis, position, start - half, end + half, size))
         return Solids.concatenate(parts)
 
     def goals(

@@ -10,11 +10,11 @@ from terrainkit.features.blocks import make_blocks, number_that_fits
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenStairs(Lane):
+class OpenStairs(FlatTerrain, Lane):
     """Stairs of separate treads up and down along x, between flat strips at both ends.
 
     There are no risers: a foot can slip between two treads. The robot is spawned at low x. The
@@ -33,10 +33,6 @@ class OpenStairs(Lane):
 
     start: float = parameter.length(2.0)
     """Length of the flat strip at each end along x [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the treads."""

@@ -11,7 +11,7 @@ from terrainkit.features.blocks import SINK
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 FULL, HALF = (1.2, 0.8, 0.144), (0.6, 0.4, 0.116)
 """Sides and height of a EUR pallet and of a half pallet [m]."""
@@ -21,7 +21,7 @@ RUNNER_WIDTH, RUNNER_HEIGHT = 1 / 8, 0.7
 
 
 @dataclass(frozen=True, kw_only=True)
-class Pallets(Terrain):
+class Pallets(FlatTerrain):
     """Stacks of EUR pallets at random positions around a flat platform.
 
     A pallet is a deck on three runners, with openings in which a foot can get caught. The pallets
@@ -42,10 +42,6 @@ class Pallets(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the square at the center without pallets [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return four boxes for each pallet: the deck and three runners."""

@@ -11,11 +11,11 @@ from terrainkit.features.blocks import SINK
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Poles(Terrain):
+class Poles(FlatTerrain):
     """Round poles at random positions around a flat platform.
 
     A robot that is narrower than `gap` can pass between any two poles, also of neighboring patches.
@@ -45,10 +45,6 @@ class Poles(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the square at the center without poles [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return upright cylinders."""

@@ -10,11 +10,11 @@ from terrainkit.features.blocks import make_standing_boxes
 from terrainkit.features.frame import frame_rectangles
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rails(Terrain):
+class Rails(FlatTerrain):
     """Nested rectangular rails around a flat platform, at equal distances.
 
     The rails are solids, so that their width is exact; the ground is flat.
@@ -31,10 +31,6 @@ class Rails(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the square at the center without rails [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return four boxes for each rail."""

@@ -10,11 +10,11 @@ from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_walls, number_that_fits
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rooms(Terrain):
+class Rooms(FlatTerrain):
     """Square rooms with a door at a random place in each wall.
 
     As many rooms as fit are centered in the patch. The robot is spawned in a room near the center,
@@ -42,27 +42,14 @@ class Rooms(Terrain):
         x, y = (c + (n % 2 - 1) * pitch / 2 for c, n in zip(grid.center, counts, strict=True))
         return x, y
 
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
-
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the walls, two boxes beside each door."""
-        parts = []
+        parts, size = [], (self.thickness, self.height)
         for axis, (line, first, door) in enumerate(self._lines(grid, rng)):
             last = first + self.side + 2 * self.thickness
             middle = (line + self.thickness / 2).ravel()
             for start, end in ((first, door), (door + self.door, last)):
-                parts.append(
-                    make_walls(
-                        axis,
-                        middle,
-                        start.ravel(),
-                        end.ravel(),
-                        thickness=self.thickness,
-                        height=self.height,
-                    )
-                )
+                parts.append(make_walls(axis, middle, start.ravel(), end.ravel(), size))
         return Solids.concatenate(parts)
 
     def goals(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_ramps
-from terrainkit.features.lane import Lane, lane_slots
+from terrainkit.features.lane import Lane
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -86,6 +86,4 @@ class SideRamps(Lane):
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing, end = (self.spacing, self.spacing), max(self.end, self.gap + grid.cell)
-        return lane_slots(
-            "side_ramps", grid, self.start, spacing, element="gaps", length=self.gap, end=end
-        )
+        return self.slots(grid, spacing, element="gaps", length=self.gap, end=end)

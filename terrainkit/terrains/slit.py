@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane, lane_goals, lane_slots
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Slit(Lane):
+class Slit(FlatTerrain, Lane):
     """Walls across a lane along x, each with a narrow opening at a random position.
 
     The robot is spawned at low x, and there is a goal behind each opening. The walls are solids, so
@@ -42,10 +42,6 @@ class Slit(Lane):
     spacing: float = parameter.size(1.5)
     """Distance between two walls, center to center [m]."""
 
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
-
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return two boxes for each wall, on both sides of the opening."""
         edges, y = self._slots(grid, rng)
@@ -71,7 +67,7 @@ class Slit(Lane):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the edges of the slots along x, and the y of each opening [m]."""
         spacing = self.spacing, self.spacing
-        edges = lane_slots("slit", grid, self.start, spacing, element="walls", length=self.depth)
+        edges = self.slots(grid, spacing, element="walls", length=self.depth)
         if not 2 * self.offset + self.opening * self.body_width < grid.size[1]:
             raise ConfigError(
                 f"slit: got an opening of {self.opening * self.body_width:g} m with an offset of "

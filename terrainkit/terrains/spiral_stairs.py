@@ -10,14 +10,14 @@ from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import MAX_PER_AXIS, SINK
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders, make_hulls
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 _ARC_POINTS = 5
 """Points on the outer edge of a tread."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpiralStairs(Terrain):
+class SpiralStairs(FlatTerrain):
     """Treads without risers that climb counterclockwise around a column.
 
     The robot is spawned at low x in front of the first tread. There is a goal on every fourth tread
@@ -49,10 +49,6 @@ class SpiralStairs(Terrain):
         """Return the middle of the flat start in front of the first tread."""
         x = grid.lower[0] + grid.length(grid.cells(self.start)) / 2
         return x, grid.center[1] - (self.column + self.radius) / 2
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the treads and the column."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane, lane_slots
+from terrainkit.features.lane import Lane
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -83,12 +83,4 @@ class SteppingBeams(Lane):
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         pitch, end = self.width + self.gap, max(self.end, self.gap + grid.cell)
-        return lane_slots(
-            "stepping_beams",
-            grid,
-            self.start,
-            (pitch, pitch),
-            element="beams",
-            length=self.width,
-            end=end,
-        )
+        return self.slots(grid, (pitch, pitch), element="beams", length=self.width, end=end)

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane, lane_goals, lane_slots
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
-from terrainkit.terrain import parameter
+from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tunnel(Lane):
+class Tunnel(FlatTerrain, Lane):
     """Tunnels along a lane along x, with walls up to the sides of the patch.
 
     The robot is spawned at low x, and there is a goal behind each tunnel. The tunnels are solids;
@@ -35,10 +35,6 @@ class Tunnel(Lane):
 
     spacing: float = parameter.size(3.0)
     """Distance between two tunnels, center to center [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return flat ground."""
-        return np.zeros(grid.shape)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return two walls and a roof for each tunnel."""
@@ -67,4 +63,4 @@ class Tunnel(Lane):
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         spacing = self.spacing, self.spacing
-        return lane_slots("tunnel", grid, self.start, spacing, element="tunnels", length=self.depth)
+        return self.slots(grid, spacing, element="tunnels", length=self.depth)

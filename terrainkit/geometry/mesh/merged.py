@@ -68,7 +68,7 @@ def _merge_quads(node_grid: NodeGrid) -> tuple[Mask, list[Rectangles], list[Wall
     walls_y &= node_grid.walls_y[1:]
     # Each of these clears the mask where there is nothing to merge.
     rectangles = [Rectangles.flat(flat), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
-    runs = [WallRuns.normal_x(node_grid, walls_x), WallRuns.normal_y(node_grid, walls_y)]
+    runs = [WallRuns.from_mask(node_grid, each, k) for k, each in enumerate((walls_x, walls_y))]
     merged = flat
     for mask in (rows_x, rows_y, walls_x, walls_y):
         merged |= mask

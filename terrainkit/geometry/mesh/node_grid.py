@@ -62,15 +62,13 @@ class NodeGrid:
     def flat_x(self) -> NDArray[np.bool_]:
         """Whether both edges of each quad along x are flat."""
         same = self.z[:-1] == self.z[1:]
-        flat: NDArray[np.bool_] = same[:, :-1] & same[:, 1:]
-        return flat
+        return np.asarray(same[:, :-1] & same[:, 1:])
 
     @property
     def flat_y(self) -> NDArray[np.bool_]:
         """Whether both edges of each quad along y are flat."""
         same = self.z[:, :-1] == self.z[:, 1:]
-        flat: NDArray[np.bool_] = same[:-1] & same[1:]
-        return flat
+        return np.asarray(same[:-1] & same[1:])
 
     def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the numbers of the four corners of each quad (i, j), counterclockwise, (4, n)."""
@@ -110,27 +108,22 @@ class NodeGrid:
         The vertex on the other side has the next number. Without a wall, the result is undefined.
         """
         index = np.searchsorted(self.edges_x, i * self.walls_x.shape[1] + j)
-        vertex: NDArray[np.int64] = self.z.size + 2 * index
-        return vertex
+        return np.asarray(self.z.size + 2 * index)
 
     def midpoint_y(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the vertex at the midpoint of each wall (i, j)-(i, j + 1), like `midpoint_x`."""
         index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
-        vertex: NDArray[np.int64] = self.z.size + 2 * index
-        return vertex
+        return np.asarray(self.z.size + 2 * index)
 
     def midpoints(self) -> NDArray[np.float32]:
         """Return the positions of all midpoints of walls [m], in the order of their numbers."""
-        num_x = 2 * self.edges_x.size
-        result = np.empty((num_x + 2 * self.edges_y.size, 3), dtype=np.float32)
-        i, j = np.divmod(self.edges_x, self.walls_x.shape[1])
-        for side in (0, 1):
-            part = result[side:num_x:2]
-            part[:, 0], part[:, 1] = (self.x[i] + self.x[i + 1]) / 2, self.y[j]
-            part[:, 2] = self.z[i + side, j]
-        i, j = np.divmod(self.edges_y, self.walls_y.shape[1])
-        for side in (0, 1):
-            part = result[num_x + side :: 2]
-            part[:, 0], part[:, 1] = self.x[i], (self.y[j] + self.y[j + 1]) / 2
-            part[:, 2] = self.z[i, j + side]
-        return result
+        edges = self.edges_x, self.edges_y
+        result = np.empty((edges[0].size + edges[1].size, 2, 3), dtype=np.float32)
+        parts = result[: edges[0].size], result[edges[0].size :]
+        for axis, (part, walls) in enumerate(zip(parts, (self.walls_x, self.walls_y), strict=True)):
+            i, j = np.divmod(edges[axis], walls.shape[1])
+            end_i, end_j = (i, j + 1) if axis else (i + 1, j)
+            part[:, :, 0] = ((self.x[i] + self.x[end_i]) / 2)[:, None]
+            part[:, :, 1] = ((self.y[j] + self.y[end_j]) / 2)[:, None]
+            part[:, 0, 2], part[:, 1, 2] = self.z[i, j], self.z[end_i, end_j]
+        return result.reshape(-1, 3)

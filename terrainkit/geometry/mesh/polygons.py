@@ -52,12 +52,6 @@ class Polygons:
         return triangles[:, ::-1] if self.clockwise else triangles, self.centers[~bare]
 
 
-def segment_indices(lengths: Ids) -> tuple[Ids, Ids]:
-    """Return segment and index within the segment of the items of consecutive segments."""
-    owner = np.repeat(np.arange(len(lengths)), lengths)
-    return owner, np.arange(len(owner)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
-
-
 def runs(mask: Mask) -> tuple[Ids, Ids, Ids]:
     """Return row, start and end of each run of True along the second axis, in order."""
     padded = np.zeros((mask.shape[0], mask.shape[1] + 2), dtype=bool)

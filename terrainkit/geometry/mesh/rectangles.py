@@ -7,7 +7,8 @@ from typing import Self
 import numpy as np
 
 from terrainkit.geometry.mesh.node_grid import NodeGrid
-from terrainkit.geometry.mesh.polygons import Ids, Mask, Polygons, runs, segment_indices
+from terrainkit.geometry.mesh.polygons import Ids, Mask, Polygons, runs
+from terrainkit.geometry.segments import segment_indices
 
 _BLOCK = 1 << 10
 

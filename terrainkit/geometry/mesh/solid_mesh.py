@@ -1,6 +1,7 @@
 """The triangle mesh of solids."""
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,12 +56,7 @@ def united(meshes: list[TriMesh]) -> TriMesh:
         return meshes[0]
     import manifold3d
 
-    parts = [
-        manifold3d.Manifold(
-            manifold3d.Mesh64(mesh.vertices.astype(float), mesh.triangles.astype(np.uint64))
-        )
-        for mesh in meshes
-    ]
+    parts = [manifold(mesh.vertices, mesh.triangles) for mesh in meshes]
     whole = manifold3d.Manifold.batch_boolean(parts, manifold3d.OpType.Add)
     if whole.status() != manifold3d.Error.NoError:
         raise ExportError(f"union of ground and solids: manifold3d reports {whole.status().name}")
@@ -68,11 +64,17 @@ def united(meshes: list[TriMesh]) -> TriMesh:
     return _mesh(result.vert_properties[:, :3], result.tri_verts)
 
 
+def manifold(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> Any:
+    """Return a closed mesh as a `manifold3d.Manifold`."""
+    import manifold3d
+
+    return manifold3d.Manifold(manifold3d.Mesh64(vertices.astype(float), faces.astype(np.uint64)))
+
+
 def _transform(vertices: NDArray[np.float64], shapes: NDArray[np.float32]) -> NDArray[np.float64]:
     """Return `vertices`, shape (n, k, 3), in the frames of `shapes`, in the frame of the map."""
     turned = np.einsum("nij,nkj->nki", rotation_matrices(shapes[:, 6:]), vertices)
-    moved: NDArray[np.float64] = turned + shapes[:, None, :3]
-    return moved
+    return np.asarray(turned + shapes[:, None, :3])
 
 
 def _mesh(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> TriMesh:

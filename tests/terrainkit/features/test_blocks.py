@@ -42,7 +42,7 @@ def test_make_blocks_span_both_corners():
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_make_walls_stand_across_the_axis(axis):
-    walls = make_walls(axis, [2.0, 5.0], [0.0, 1.0], [3.0, 1.5], thickness=0.2, height=0.8)
+    walls = make_walls(axis, [2.0, 5.0], [0.0, 1.0], [3.0, 1.5], (0.2, 0.8))
     lower, upper = walls.bounds()
     order = [axis, 1 - axis, 2]
     assert lower[:, order] == pytest.approx(np.array([[1.9, 0.0, -SINK], [4.9, 1.0, -SINK]]))

@@ -2,16 +2,22 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.lane import lane_goals, lane_slots, slot_centers
+from terrainkit.features.lane import Lane, lane_goals, slot_centers
 from terrainkit.geometry.grid import Grid
+
+
+class Walls(Lane):
+    def heights(self, grid, rng):  # noqa: ARG002
+        return np.zeros(grid.shape)
+
 
 GRID = Grid(shape=(80, 40), cell=0.1, lower=(10.0, -2.0))
 
 
-def test_lane_slots_by_hand():
-    edges = lane_slots("x", GRID, 2.0, (1.0, 2.0), element="walls", length=0.5)
+def test_slots_by_hand():
+    edges = Walls(start=2.0).slots(GRID, (1.0, 2.0), element="walls", length=0.5)
     assert edges == pytest.approx([12.0, 13.5, 15.0, 16.5, 18.0])
-    edges = lane_slots("x", GRID, 2.04, (1.5, 1.5), element="walls", length=0.5, end=0.1)
+    edges = Walls(start=2.04).slots(GRID, (1.5, 1.5), element="walls", length=0.5, end=0.1)
     assert edges == pytest.approx([12.0, 13.5, 15.0, 16.5])
 
 
@@ -20,14 +26,14 @@ def test_lane_slots_by_hand():
     [((1.0, 2.0), 1.0, 0.0), ((2.0, 1.0), 0.5, 0.0), ((3.0, 3.0), 0.5, 3.1), ((1e-3, 1e-3), 0, 0)],
     ids=["overlap", "unsorted", "none", "many"],
 )
-def test_lane_slots_rejects_elements_that_do_not_fit(spacing, length, end):
-    with pytest.raises(ConfigError, match=r"x: got walls .* expected walls shorter than"):
-        lane_slots("x", GRID, 2.0, spacing, element="walls", length=length, end=end)
+def test_slots_rejects_elements_that_do_not_fit(spacing, length, end):
+    with pytest.raises(ConfigError, match=r"walls: got walls .* expected walls shorter than"):
+        Walls(start=2.0).slots(GRID, spacing, element="walls", length=length, end=end)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_slot_centers_keep_the_spacing(seed):
-    edges = lane_slots("x", GRID, 2.0, (0.3, 0.7), element="walls", length=0.2)
+    edges = Walls(start=2.0).slots(GRID, (0.3, 0.7), element="walls", length=0.2)
     x = slot_centers(edges, (0.3, 0.7), np.random.default_rng(seed))
     assert len(x) == 12
     assert (np.diff(x) >= 0.3).all()

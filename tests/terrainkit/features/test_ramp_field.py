@@ -1,13 +1,13 @@
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.ramp_field import ramp_cells
 from terrainkit.geometry.grid import Grid
+from terrainkit.terrains.continuous_ramps import ContinuousRamps
 
 
 def test_ramp_cells_are_centered_across_the_lane():
     grid = Grid(shape=(80, 40), cell=0.1, lower=(10.0, -2.0))
-    lower, i, j = ramp_cells("ramps", grid, 2.0, 1.0, (2.0, 1.5))
+    lower, i, j = ContinuousRamps(start=2.0, end=1.0, length=2.0, width=1.5)._cells(grid)
     # 5 m along x hold two of 2 m, and 4 m along y two of 1.5 m with 0.5 m to either side.
     assert lower.ravel() == pytest.approx([12.0, -1.5, 12.0, 0.0, 14.0, -1.5, 14.0, 0.0])
     assert i.tolist() == [0, 0, 1, 1]
@@ -16,5 +16,8 @@ def test_ramp_cells_are_centered_across_the_lane():
 
 @pytest.mark.parametrize("size", [(5.1, 1.0), (1.0, 4.1)])
 def test_ramp_cells_rejects_elements_that_do_not_fit(size):
-    with pytest.raises(ConfigError, match=r"ramps: got elements of .* expected elements that fit"):
-        ramp_cells("ramps", Grid(shape=(80, 40), cell=0.1), 2.0, 1.0, size)
+    ramps = ContinuousRamps(start=2.0, end=1.0, length=size[0], width=size[1])
+    with pytest.raises(
+        ConfigError, match=r"continuous_ramps: got elements of .* expected elements that fit"
+    ):
+        ramps._cells(Grid(shape=(80, 40), cell=0.1))

@@ -31,9 +31,9 @@ def moon(tmp_path, monkeypatch):
     (tmp_path / "moon.py").write_text(MOON)
     monkeypatch.setattr(terrains, "__path__", [*terrains.__path__, str(tmp_path)])
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    registry.terrain_names.cache_clear()
+    registry._module_names.cache_clear()
     yield
-    registry.terrain_names.cache_clear()
+    registry._module_names.cache_clear()
     registry._get.cache_clear()
     sys.modules.pop("terrainkit.terrains.moon", None)
 

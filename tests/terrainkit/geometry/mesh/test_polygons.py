@@ -1,10 +1,9 @@
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from terrainkit.geometry.mesh.polygons import Polygons, runs, segment_indices
+from terrainkit.geometry.mesh.polygons import Polygons, runs
 
 
 def polygons(*rings, clockwise=False):
@@ -40,19 +39,6 @@ def test_polygons_only_fans_use_a_center():
 def test_polygons_clockwise_order_is_reversed():
     triangles, _ = polygons([3, 4, 6, 5], clockwise=True).triangles(first=10)
     assert triangles.tolist() == [[6, 4, 3], [5, 6, 3]]
-
-
-@pytest.mark.parametrize(
-    ("lengths", "owner", "place"),
-    [
-        ([2, 0, 3], [0, 0, 2, 2, 2], [0, 1, 0, 1, 2]),
-        ([1], [0], [0]),
-        ([], [], []),
-    ],
-)
-def test_segment_indices_of_consecutive_segments(lengths, owner, place):
-    found = segment_indices(np.array(lengths, dtype=np.int64))
-    assert [each.tolist() for each in found] == [owner, place]
 
 
 def test_runs_are_separate_at_row_ends():

@@ -21,8 +21,7 @@ def lattice_and_runs(heights, straight, *, normal_y):
     heights = heights.T if normal_y else heights
     straight = straight.T if normal_y else straight
     node_grid = NodeGrid.from_heights(heights, Grid(shape=heights.shape, cell=1.0), 0.5)
-    find = WallRuns.normal_y if normal_y else WallRuns.normal_x
-    return node_grid, find(node_grid, straight), straight
+    return node_grid, WallRuns.from_mask(node_grid, straight, int(normal_y)), straight
 
 
 def straight_quads():

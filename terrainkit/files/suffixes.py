@@ -1,0 +1,30 @@
+"""The modules of a package that read or write files, by suffix."""
+
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
+
+from terrainkit.errors import TerrainkitError, listing
+
+
+@cache
+def modules_by_suffix(package: str) -> dict[str, ModuleType]:
+    """Return the modules of a package that define `SUFFIXES`, by suffix."""
+    names = [module.name for module in iter_modules(import_module(package).__path__)]
+    modules = [import_module(f"{package}.{name}") for name in names]
+    return {suffix: module for module in modules for suffix in getattr(module, "SUFFIXES", ())}
+
+
+def find_module(path: Path, package: str, noun: str, error: type[TerrainkitError]) -> ModuleType:
+    """Return the module of a package for the suffix of `path`.
+
+    Raises:
+        TerrainkitError: of class `error`, with `noun` for what is missing, if there is none.
+    """
+    modules = modules_by_suffix(package)
+    suffix = repr(path.suffix) if path.suffix else "a name without suffix"
+    if path.suffix.lower() not in modules:
+        raise error(f"no {noun} for {suffix} ({path}); there are: {listing(modules)}")
+    return modules[path.suffix.lower()]
