@@ -6,7 +6,8 @@ runs in a child process, one for each backend that is tried.
 
 import os
 import sys
-from pathlib import Path
+
+from terrainkit.files.isolated import import_path
 
 
 def backends() -> tuple[str, ...]:
@@ -33,9 +34,7 @@ def child_environment(backend: str) -> dict[str, str]:
     # Rendering must not leave files in the user's home folder.
     variables.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
     variables.setdefault("__GL_SHADER_DISK_CACHE", "0")
-    variables["PYTHONPATH"] = os.pathsep.join(
-        str(Path(entry).absolute()) for entry in sys.path if entry
-    )
+    variables["PYTHONPATH"] = import_path()
     return variables
 
 

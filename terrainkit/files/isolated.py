@@ -60,14 +60,13 @@ def run_isolated(
         # -P: no module is imported from the current folder, which may be a stranger's.
         start = f"import sys; from {__name__} import main; main(*sys.argv[1:])"
         command = [sys.executable, "-P", "-c", start, str(request), str(result)]
-        paths = os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path if entry)
         try:
             subprocess.run(
                 command,
                 check=True,
                 capture_output=True,
                 timeout=limits.seconds,
-                env={**os.environ, "PYTHONPATH": paths},
+                env={**os.environ, "PYTHONPATH": import_path()},
             )
             with np.load(result, allow_pickle=False) as arrays:
                 return dict(arrays)
@@ -79,6 +78,14 @@ def run_isolated(
             raise IsolatedError(textwrap.shorten(reason, 200, placeholder="...")) from None
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise IsolatedError(f"the result cannot be read: {error}") from None
+
+
+def import_path() -> str:
+    """Return the PYTHONPATH with which a child process imports from the folders of this process.
+
+    The current folder, which may contain files of strangers, is not among them.
+    """
+    return os.pathsep.join(str(Path(entry).absolute()) for entry in sys.path if entry)
 
 
 def main(request: str, result: str) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import TerrainkitError
+from terrainkit.files.isolated import import_path
 from terrainkit_robots.description.xacro.process import ORIGIN
 
 MAX_SECONDS = 8.0
@@ -95,9 +96,7 @@ def _run(request: bytes, timeout: float) -> bytes:
     folder, which may contain the robot.
     """
     environment = {k: value for k, value in os.environ.items() if not _SECRET_NAME.search(k)}
-    environment["PYTHONPATH"] = os.pathsep.join(
-        str(Path(entry).absolute()) for entry in sys.path if entry
-    )
+    environment["PYTHONPATH"] = import_path()
     with subprocess.Popen(
         [sys.executable, "-P", "-m", "terrainkit_robots.description.xacro.process"],
         stdin=subprocess.PIPE,
