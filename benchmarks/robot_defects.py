@@ -52,7 +52,7 @@ _MAX_SECONDS = 60
 _MAX_MESH_BYTES = 14_000_000
 """Robots with more mesh data get half as many mutants, since each check is slow."""
 
-_LEVELS = {"info": 0, "warning": 1, "error": 2}
+_LEVELS = {"note": 0, "warning": 1, "error": 2}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +147,7 @@ def _load_source(path: Path) -> tuple[SourceRobot, tuple[Finding, ...], SourceRe
     counts = Counter(finding.severity for finding in report.findings)
     result = SourceResult(
         robot=path.name,
-        findings=tuple(_format(f) for f in report.findings if f.severity != "info"),
+        findings=tuple(_format(f) for f in report.findings if f.severity != "note"),
         errors=counts["error"],
         warnings=counts["warning"],
         seconds=median(times),
@@ -231,7 +231,7 @@ def _check(
         or any(_is_expected(f, defect) and _has_name(f, names) for f in changed),
         findings=tuple(_format(f) for f in new),
         names=names,
-        extra=sum(f.severity != "info" and f.code not in defect.codes for f in new),
+        extra=sum(f.severity != "note" and f.code not in defect.codes for f in new),
     )
 
 

@@ -140,7 +140,7 @@ def rules_page() -> str:
         for rule in rules():
             if rule.family == family:
                 link = f"[{rule.code} {rule.name}](#{rule.code.lower()}-{rule.name})"
-                severity, fix = SEVERITY[rule.severity], FIXED[rule.fixes]
+                severity, fix = rule.severity, FIXED[rule.fixes]
                 parts.append(f"| {link} | {markup(rule.title)} | {severity} | {fix} |")
         parts += ["", *(rule_section(rule) for rule in rules() if rule.family == family)]
     return "\n".join(parts)
@@ -156,14 +156,13 @@ CONFIGS = {
 """Config class of each TOML file."""
 
 FIXED = {"safe": "`--fix`", "unsafe": "`--unsafe-fixes`", "no": ""}
-SEVERITY = {"error": "error", "warning": "warning", "info": "note"}
 
 
 def rule_section(rule: Rule) -> str:
     fixed = f"; fixed by {FIXED[rule.fixes]}" if FIXED[rule.fixes] else ""
     return (
         f"### {rule.code} {rule.name}\n\n"
-        f"**{markup(rule.title)}** Severity: {SEVERITY[rule.severity]}{fixed}.\n\n"
+        f"**{markup(rule.title)}** Severity: {rule.severity}{fixed}.\n\n"
         f"{markup(rule.why)}\n\n"
         f"*How to fix:* {markup(rule.how_to_fix)}\n\n"
         f"*Source:* {markup(rule.reference)}\n"

@@ -3,7 +3,9 @@
 Each message is one line: what was received, what was expected, what exists.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
 
 
 class TerrainkitError(Exception):
@@ -12,6 +14,13 @@ class TerrainkitError(Exception):
 
 class ConfigError(TerrainkitError, ValueError):
     """A value, name or combination of values is invalid."""
+
+
+class PluginError(ConfigError):
+    """A terrain, overlay, task or reward that is not built in failed.
+
+    `__cause__` is the exception of its code, with the traceback.
+    """
 
 
 class MapFileError(TerrainkitError):
@@ -32,6 +41,35 @@ class MemoryLimitError(TerrainkitError, MemoryError):
 
 class TerrainkitWarning(UserWarning):
     """Something was omitted or changed; the result is still valid."""
+
+
+def is_built_in(item: Any) -> bool:
+    """Return whether a class or function belongs to terrainkit."""
+    packages = "terrainkit", "terrainkit_robots", "terrainkit_cli"
+    return item.__module__.partition(".")[0] in packages
+
+
+@contextmanager
+def plugin_errors(plugin: str | None, *passed: type[BaseException]) -> Iterator[None]:
+    """Replace the exceptions of a plugin by a PluginError in one line.
+
+    `SystemExit` is replaced, too. Signals, such as Ctrl-C, are not.
+
+    Args:
+        plugin: What the error names; None if the code is built in: its exceptions are not replaced.
+        passed: Classes of exceptions that are not replaced.
+    """
+    try:
+        yield
+    except BaseException as error:
+        is_signal = not isinstance(error, Exception) and is_built_in(type(error))
+        if plugin is None or is_signal or isinstance(error, (KeyboardInterrupt, *passed)):
+            raise
+        import traceback
+
+        is_own = isinstance(error, TerrainkitError)
+        cause = str(error) if is_own else "".join(traceback.format_exception_only(error))
+        raise PluginError(f"{plugin}: {' '.join(cause.split())}") from error
 
 
 MAX_LISTED = 80

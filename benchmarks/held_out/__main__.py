@@ -107,7 +107,7 @@ def measure(defect: Defect, seed: int) -> Iterator[dict[str, Any]]:
         known = {identity(f) for f in ORIGINALS[key] if is_about(f, names, about)}
         new = [f for f in found if is_about(f, names, about) and identity(f) not in known]
         severities = {f["severity"] for f in new}
-        level = next((s for s in (*SEVERITIES, "info") if s in severities), "")
+        level = next((s for s in (*SEVERITIES, "note") if s in severities), "")
         rules = sorted({f"{f['code']} {f['severity']}" for f in new})
         yield result | {"found": level, "rules": rules}
 
@@ -122,7 +122,7 @@ def table(results: list[dict[str, Any]]) -> str:
         found = count["error"] + count["warning"] + count["refused"]
         kinds = len({r["kind"] for r in rows})
         lines.append(
-            f"{family:<12} {kinds:5} {len(rows):7} {found:5} {count['info']:5} "
+            f"{family:<12} {kinds:5} {len(rows):7} {found:5} {count['note']:5} "
             f"{found / len(rows):6.0%}"
         )
     return "\n".join(lines)
@@ -146,7 +146,7 @@ def main() -> None:
         everything[name] = results
         print(f"set {name.upper()}\n{table(results)}\nmissed:")
         for r in results:
-            if r["found"] in ("", "info"):
+            if r["found"] in ("", "note"):
                 print(f"  {r['family']:<12} {r['kind']} {r['robot']} {r['found']}")
     if options.output:
         options.output.write_text(json.dumps(everything, indent=1))

@@ -63,8 +63,8 @@ class Generate(ConfigCommand):
     """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
     jobs: Annotated[int, Meta(ge=1, le=MAX_JOBS), option("N")] = 1
-    """Number of processes that build patches; the map does not depend on it. More than one is
-    faster for maps that take several seconds."""
+    """Number of processes that build patches; the map does not depend on it. Starting them and
+    sending the patches back takes time, so more than one can be slower."""
 
     overwrite: bool = False
     """Replace an existing file."""

@@ -7,7 +7,6 @@ import shutil
 import sys
 import textwrap
 import time
-import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -106,17 +105,16 @@ def show_warning(
     category: type[Warning],
     filename: str,
     lineno: int,
-    file: TextIO | None = None,
-    line: str | None = None,
+    file: TextIO | None = None,  # noqa: ARG001 - an argument of `warnings.showwarning`
+    line: str | None = None,  # noqa: ARG001
 ) -> None:
     """Print a warning as one line; replaces `warnings.showwarning`."""
     from terrainkit.errors import TerrainkitWarning
 
-    if issubclass(category, TerrainkitWarning):
-        _print_message(f"warning: {message}")
-    else:
-        text = warnings.formatwarning(message, category, filename, lineno, line)
-        print(text, end="", file=file or sys.stderr)
+    text = " ".join(str(message).split())
+    if not issubclass(category, TerrainkitWarning):
+        text = f"{filename}:{lineno}: {category.__name__}: {text}"
+    _print_message(f"warning: {text}")
 
 
 def progress(items: Iterable[_T], total: int, *, of: str = "patches") -> Iterator[_T]:

@@ -78,7 +78,10 @@ class Info(Command):
 
     def run(self) -> int:
         """Print the size of the map and its columns, one patch, or the budget."""
+        from terrainkit.export.requirements import require_finite
+
         terrain_map = TerrainMap.load(self.map)
+        require_finite(terrain_map)
         if self.patch and self.budget:
             raise ConfigError("--budget, --patch: got both; expected one of them")
         if self.budget:
@@ -250,11 +253,12 @@ class CheckMap(Command):
         issues = validate(terrain_map, read_mesh(self.map))
         for issue in issues:
             render.result(f"{issue.check}: {issue.message}")
-        seams = Seams(terrain_map=terrain_map)
-        if largest := seams.largest():
-            render.result(f"largest seam: {seam_text(largest, terrain_map.patch_names)}")
-        if cliffs := seams.cliffs():
-            render.result(f"cliffs: {cliffs_text(cliffs, terrain_map.patch_names)}")
+        if not any(issue.check == "finite" for issue in issues):
+            seams = Seams(terrain_map=terrain_map)
+            if largest := seams.largest():
+                render.result(f"largest seam: {seam_text(largest, terrain_map.patch_names)}")
+            if cliffs := seams.cliffs():
+                render.result(f"cliffs: {cliffs_text(cliffs, terrain_map.patch_names)}")
         # The path over a map with issues would be of no use.
         blocked = 0
         if derived and not issues:

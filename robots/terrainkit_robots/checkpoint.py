@@ -4,6 +4,7 @@ They hold only tensors and plain values, so that they can be read without execut
 """
 
 import io
+import warnings
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -54,7 +55,9 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
             if any(part.compress_type != zipfile.ZIP_STORED for part in parts):
                 raise ConfigError(f"{path}: got a compressed file, which could expand to any size")
             file.seek(0)
-            state: dict[str, Any] = torch.load(file, map_location="cpu", weights_only=True)
+            with warnings.catch_warnings():  # of content that no checkpoint of terrainkit has
+                warnings.simplefilter("error")
+                state: dict[str, Any] = torch.load(file, map_location="cpu", weights_only=True)
         policy_state(state)
     except msgspec.ValidationError as error:
         raise ConfigError(f"{path} is not a checkpoint of terrainkit: {error}") from error

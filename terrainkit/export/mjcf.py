@@ -320,9 +320,9 @@ def _write_hfield(
     file.write('"/>\n')
 
 
-def _elevation_units(heights: Any, low: float) -> NDArray[np.int32]:
+def _elevation_units(heights: Any, low: float) -> NDArray[np.int64]:
     """Return the heights above `low` in units of `_ELEVATION_UNIT`."""
-    return np.asarray(np.rint((heights - low) / _ELEVATION_UNIT), dtype=np.int32)
+    return np.asarray(np.rint((heights - low) / _ELEVATION_UNIT), dtype=np.int64)
 
 
 def _border_height(terrain_map: "TerrainMap") -> float | None:

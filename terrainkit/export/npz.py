@@ -4,7 +4,7 @@ import dataclasses
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -14,10 +14,11 @@ from terrainkit.errors import ConfigError, MapFileError, listing
 from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
-from terrainkit.geometry.solids import MAX_HULL_VERTICES, MIN_SIZE, Solids, convex_hull
+from terrainkit.geometry.solids import Solids, check_solids
 from terrainkit.map.config import MapConfig
-from terrainkit.map.patch import PatchParameters
+from terrainkit.map.patch import PatchParameters, Values
 from terrainkit.settings.type_hint import MAX_VALUE
+from terrainkit.terrain.patch_geometry import MAX_GOALS
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
@@ -31,9 +32,6 @@ MAX_FACES_PER_SAMPLE = 20
 
 MAX_SOLID_BYTES = 1 << 30
 """Upper bound of an array of solids [bytes]."""
-
-MAX_GOALS = 1000
-"""Largest number of goals of a patch."""
 
 _SOLIDS = {
     "boxes": "boxes",
@@ -50,10 +48,7 @@ _SOLIDS = {
 MAX_PATCH_RECORD_BYTES = 8192
 """Upper bound of the parameters of a patch as JSON [bytes]."""
 
-_LIMITS = msgspec.Meta(ge=-MAX_VALUE, le=MAX_VALUE)
-_Number = bool | Annotated[int, _LIMITS] | Annotated[float, _LIMITS]
-_Values = dict[str, _Number | str | tuple[_Number, ...]]
-_Record = dict[Literal["requested", "realized"], _Values]
+_Record = dict[Literal["requested", "realized"], Values]
 """The requested and the realized parameters of a patch."""
 
 _Map = TypeVar("_Map", bound="TerrainMap")
@@ -212,23 +207,10 @@ def _read_solids(archive: Archive, size: tuple[int, int]) -> Solids:
         visible=read("solid_visible", "b1", number),
         patch=read("solid_patch", "i4", number, 2),
     )
-    shapes = np.concatenate([boxes, cylinders])
-    is_valid = {
-        "boxes and cylinders": (np.abs(shapes) <= MAX_VALUE).all()
-        and (shapes[:, 3:6] >= np.float32(MIN_SIZE / 2)).all()
-        and (np.abs(np.linalg.norm(shapes[:, 6:], axis=1) - 1) < 1e-3).all(),
-        "hulls": (np.abs(vertices) <= MAX_VALUE).all()
-        and ((counts >= 4) & (counts <= MAX_HULL_VERTICES)).all()
-        and counts.sum(dtype=np.int64) == len(vertices),
-        "solid_friction": not (solids.friction < 0).any() and not np.isinf(solids.friction).any(),
-        "solid_patch": ((solids.patch >= 0) & (solids.patch < size)).all(),
-    }
-    for key, valid in is_valid.items():
-        if not valid:
-            raise MapFileError(f"{archive.path}: {key}: got invalid values or sizes")
     try:
-        for hull in solids.hulls():
-            convex_hull(hull)
+        check_solids(solids)
+        if not ((solids.patch >= 0) & (solids.patch < size)).all():
+            raise ConfigError("solid_patch: got invalid values or sizes")
     except ConfigError as error:
         raise MapFileError(f"{archive.path}: {error}") from error
     return solids

@@ -165,6 +165,42 @@ class Solids:
         return lower, upper
 
 
+def check_solids(solids: object) -> None:
+    """Check the types, shapes and values of solids that other code made.
+
+    Raises:
+        ConfigError: if they are not `Solids`, or an array is invalid.
+    """
+    if not isinstance(solids, Solids):
+        raise ConfigError(f"solids: got {type(solids).__name__}; expected Solids")
+    for name, like in vars(Solids.empty()).items():
+        array = np.asarray(getattr(solids, name))
+        if (
+            array.dtype != like.dtype
+            or array.ndim != like.ndim
+            or array.shape[1:] != like.shape[1:]
+        ):
+            got, expected = (f"{each.dtype} {each.shape}" for each in (array, like))
+            raise ConfigError(f"solids.{name}: got {got}; expected {expected} with any first size")
+    shapes, counts = np.concatenate([solids.boxes, solids.cylinders]), solids.hull_counts
+    lengths = {len(getattr(solids, name)) for name in _PER_SOLID}
+    is_valid = {
+        "solids": lengths == {len(shapes) + len(counts)},
+        "boxes and cylinders": (np.abs(shapes) <= MAX_VALUE).all()
+        and (shapes[:, 3:6] >= np.float32(MIN_SIZE / 2)).all()
+        and (np.abs(np.linalg.norm(shapes[:, 6:], axis=1) - 1) < 1e-3).all(),
+        "hulls": (np.abs(solids.hull_vertices) <= MAX_VALUE).all()
+        and ((counts >= 4) & (counts <= MAX_HULL_VERTICES)).all()
+        and counts.sum(dtype=np.int64) == len(solids.hull_vertices),
+        "solid_friction": not ((solids.friction < 0) | np.isinf(solids.friction)).any(),
+    }
+    for key, valid in is_valid.items():
+        if not valid:
+            raise ConfigError(f"{key}: got invalid values or sizes")
+    for hull in solids.hulls():
+        convex_hull(hull)
+
+
 def make_boxes(
     center: ArrayLike,
     size: ArrayLike,

@@ -12,6 +12,7 @@ from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.files.memory import check_memory
 from terrainkit.importing.options import Missing, ReadOptions
 from terrainkit.importing.source import Array, fill_missing, open_source
+from terrainkit.settings.type_hint import MAX_VALUE
 
 _BYTES_PER_VALUE = 24
 _BYTES_PER_SAMPLE = 100
@@ -126,9 +127,12 @@ def make_raster(
     for missing in (nodata, options.nodata):
         if missing is not None:
             heights[values == np.float64(missing)] = np.nan
-    invalid = np.isinf(heights)
+    invalid = np.abs(heights) > MAX_VALUE
     if invalid.any():
-        raise HeightFileError(f"{path}: {int(invalid.sum())} heights are infinite")
+        raise HeightFileError(
+            f"{path}: got {int(invalid.sum())} heights beyond {MAX_VALUE:,} m; expected another "
+            "scale, or nodata for missing heights"
+        )
     return Raster(values=heights.astype(np.float32), cell=cell, lower=lower)
 
 

@@ -159,7 +159,7 @@ def _make_config(
     counts, sizes = [], []
     for k, count in enumerate((options.rows, options.cols)):
         axis, extent = "xy"[k], source.upper[k] - float(origin[k])
-        if origin[k] < source.lower[k] - cell / 2 or extent < cell / 2:
+        if origin[k] < source.lower[k] - cell / 2 or not cell / 2 <= extent < math.inf:
             raise ConfigError(
                 f"origin: got {axis} = {origin[k]:g} m; the file extends from "
                 f"{source.lower[k]:g} m to {source.upper[k]:g} m"

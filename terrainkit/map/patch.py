@@ -1,15 +1,17 @@
 """Patch: one terrain, built on the grid of its place in a map."""
 
 import dataclasses
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
@@ -22,14 +24,25 @@ from terrainkit.map.layout import (
     terrain_and_difficulty,
 )
 from terrainkit.map.spawn import find_spawn, sample_spawns
-from terrainkit.terrain import Terrain
+from terrainkit.settings.type_hint import MAX_VALUE
+from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, Value
-from terrainkit.terrain.patch_geometry import PatchGeometry, checked_heights, uniform_friction
+from terrainkit.terrain.patch_geometry import (
+    PatchGeometry,
+    checked_heights,
+    real_array,
+    uniform_friction,
+)
 from terrainkit.terrain.sub_terrain import SubTerrain, overlay_path
 
 EDGE_TOLERANCE = 1e-3
 """Distance by which a solid may extend beyond its patch [m]."""
+
+_LIMITS = msgspec.Meta(ge=-MAX_VALUE, le=MAX_VALUE)
+_Number = bool | Annotated[int, _LIMITS] | Annotated[float, _LIMITS]
+Values = dict[str, _Number | str | tuple[_Number, ...]]
+"""The requested or the realized parameters of a patch, by name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,15 +144,29 @@ def build_patch(
 
     Raises:
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
+        PluginError: if a terrain or overlay that is not built in fails.
     """
+    try:
+        return _build_patch(config, sub_terrain, difficulty, row, col)
+    except ConfigError as error:
+        raise type(error)(f"patch ({row}, {col}): {error}") from error.__cause__ or error
+
+
+def _build_patch(
+    config: MapConfig, sub_terrain: SubTerrain, difficulty: float, row: int, col: int
+) -> Patch:
+    grid, name, plugin = config.patch_grid(row, col), sub_terrain.name, sub_terrain.plugin
     terrain = sub_terrain.at(difficulty)
-    overlays = [overlay.at(difficulty) for overlay in sub_terrain.overlays]
-    _check_slopes(terrain, config)
-    grid, name = config.patch_grid(row, col), sub_terrain.name
+    overlays = [_overlay_at(overlay, difficulty) for overlay in sub_terrain.overlays]
     child_rng = partial(_child_rng, config, terrain, row, col)
-    rng: Any = patch_rng(config, terrain, row, col) if terrain.has_random_heights else None
-    heights = terrain.build(grid, rng)
-    geometry = _terrain_geometry(config, sub_terrain, terrain, difficulty, heights, grid, child_rng)
+    with plugin_errors(plugin):
+        _check_slopes(terrain, config)
+        rng: Any = patch_rng(config, terrain, row, col) if terrain.has_random_heights else None
+        heights = terrain.build(grid, rng)
+        geometry = _terrain_geometry(
+            config, sub_terrain, terrain, difficulty, heights, grid, child_rng
+        )
+        geometry = geometry.checked(grid) if plugin else geometry
     spawn_offset = 0.0
     if overlays:
         geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
@@ -149,10 +176,11 @@ def build_patch(
     spawns_rng = partial(child_rng, SPAWNS_STREAM)
     spawns = place_spawns(config, name, grid, heights, solids, position, spawns_rng)
     x, y, _ = spawns[0].tolist()
-    requested, realized = terrain.requested(), terrain.realized(grid)
+    requested, realized = _parameters(terrain, grid)
     for k, overlay in enumerate(overlays):
-        requested |= {overlay_path(k, n): v for n, v in overlay.requested().items()}
-        realized |= {overlay_path(k, n): v for n, v in overlay.realized(grid).items()}
+        values = zip((requested, realized), _parameters(overlay, grid), strict=True)
+        for of_patch, own in values:
+            of_patch |= {overlay_path(k, n): v for n, v in own.items()}
     return Patch(
         terrain=name,
         difficulty=difficulty,
@@ -165,6 +193,24 @@ def build_patch(
         spawns=with_headings(spawns, goals, geometry.heading),
         spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
     )
+
+
+def _overlay_at(overlay: Overlay, difficulty: float) -> Overlay:
+    with plugin_errors(registry.plugin_name(type(overlay))):
+        return overlay.at(difficulty)
+
+
+def _parameters(owner: Terrain | Overlay, grid: Grid) -> tuple[dict[str, Value], dict[str, Value]]:
+    """Return the requested and the realized parameters of a terrain or overlay."""
+    with plugin_errors(plugin := registry.plugin_name(type(owner))):
+        requested, realized = owner.requested(), owner.realized(grid)
+        if plugin:
+            msgspec.json.decode(json.dumps([requested, realized]), type=list[Values])  # as files
+            if not requested.keys() == realized.keys() == owner.declarations().keys():
+                raise ConfigError(
+                    "got different names from requested(), realized(), declarations()"
+                )
+    return requested, realized
 
 
 def _child_rng(
@@ -194,7 +240,7 @@ def _terrain_geometry(
         solids = terrain.solids(grid, heights, child_rng(SOLIDS_STREAM))
     if type(terrain).goals is not Terrain.goals:
         raw = terrain.goals(grid, heights, child_rng(SOLIDS_STREAM))
-        goals = np.array(raw, dtype=float).reshape(-1, 4)
+        goals = real_array(raw).reshape(-1, 4)
     friction = sub_terrain.friction_at(difficulty)
     if friction is not None:
         own = np.where(np.isnan(solids.friction), friction, solids.friction).astype(np.float32)
@@ -227,7 +273,10 @@ def _apply_overlays(
     x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, position)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
     for k, overlay in enumerate(overlays):
-        geometry = overlay.apply(geometry, child_rng(OVERLAYS_STREAM + k))
+        with plugin_errors(plugin := registry.plugin_name(type(overlay))):
+            geometry = overlay.apply(geometry, child_rng(OVERLAYS_STREAM + k))
+            if plugin:
+                geometry = PatchGeometry.checked(geometry, grid)
         heights = checked_heights(
             geometry.heights, grid, f"{overlay.kind()}: apply(): got heights of"
         )

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
+from terrainkit.errors import PluginError, TerrainkitError, TerrainkitWarning, listing
 from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.map.layout import column_types, terrain_and_difficulty
@@ -100,8 +100,10 @@ def _check_patches(terrain_map: TerrainMap) -> Iterator[str]:
         terrain_type, difficulty = terrain_and_difficulty(config, columns, row, col)
         try:
             expected = build_patch(config, config.sub_terrains[terrain_type], difficulty, row, col)
+        except PluginError:
+            raise
         except TerrainkitError as error:
-            yield f"patch ({row}, {col}) cannot be generated from its config: {error}"
+            yield f"cannot be generated from the config: {error}"
             continue
         yield from _compare(terrain_map.patch(row, col), expected, f"patch ({row}, {col})")
     if (np.abs(terrain_map.heights[border]) > TOLERANCE).any():

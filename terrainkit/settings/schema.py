@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Self
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, TerrainkitError, is_built_in, plugin_errors
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit.settings.toml_text import key_text, line_text, parse_toml, read_text
@@ -74,8 +74,11 @@ class Config:
             if field.name not in values and is_required(field):
                 expected = describe(hints[field.name])
                 raise ConfigError(f"{path}{field.name}: missing; expected {expected}")
+        made: Any = cls if default is None else type(default)
+        plugin = None if is_built_in(made) else f"{made.__module__}:{made.__qualname__}"
         try:
-            return cls(**values) if default is None else dataclasses.replace(default, **values)
+            with plugin_errors(plugin, TerrainkitError):
+                return cls(**values) if default is None else dataclasses.replace(default, **values)
         except ConfigError as error:
             raise ConfigError(f"{path}{error}") from error
 

@@ -2,14 +2,21 @@
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
-from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.solids import Solids, check_solids
+from terrainkit.settings.type_hint import MAX_VALUE
+
+MAX_GOALS = 1000
+"""Largest number of goals of a patch."""
+
+_MAY_BE_NAN = np.array([False, False, True, False])
+"""Which numbers of a goal may be NaN: z."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,6 +47,31 @@ class PatchGeometry:
 
     heading: float = 0.0
     """Heading of a robot on a patch without goals [rad]."""
+
+    def checked(self, grid: Grid) -> Self:
+        """Return the patch that a plugin made on `grid`, with arrays of the documented types.
+
+        Raises:
+            ConfigError: if a value has another shape or is out of range.
+            TypeError: if values are not real numbers.
+        """
+        if not isinstance(self, PatchGeometry):
+            raise ConfigError(f"got {type(self).__name__}; expected a PatchGeometry")
+        friction, goals = real_array(self.friction), real_array(self.goals)
+        pose = real_array([*self.spawn, self.heading, self.spawn_radius])
+        goal_values = np.where(np.isnan(goals) & _MAY_BE_NAN, 0, goals)
+        numbers = {
+            "friction": (np.where(friction < 0, np.nan, friction), grid.shape),
+            "goals": (goal_values, (min(len(goals), MAX_GOALS), 4)),
+            "spawn, heading and spawn_radius": (pose, (4,)),
+        }
+        for name, (values, shape) in numbers.items():
+            if values.shape != shape or not (np.abs(values) <= MAX_VALUE).all():
+                raise ConfigError(f"{name}: got shape {values.shape}; expected {shape}, finite")
+        check_solids(self.solids)
+        heights = checked_heights(self.heights, grid, "got heights of")
+        friction = friction.astype(np.float32)
+        return replace(self, grid=grid, heights=heights, friction=friction, goals=goals)
 
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return the patch rotated or reflected about its center.
@@ -77,13 +109,22 @@ def checked_heights(heights: ArrayLike, grid: Grid, got: str) -> NDArray[np.floa
         got: Start of the error message, which the shape follows.
 
     Raises:
-        ConfigError: if the shape is not `grid.shape`, or a height is not finite.
+        ConfigError: if the shape is not `grid.shape`, or a height is out of range.
+        TypeError: if the heights are not real numbers.
     """
-    # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
-    result = np.asarray(heights, dtype=np.float32) + np.float32(0)
-    if result.shape != grid.shape or not np.isfinite(result).all():
-        raise ConfigError(f"{got} shape {result.shape}; expected {grid.shape} with finite values")
+    with np.errstate(over="ignore"):  # infinite values are rejected below
+        # Adding 0 turns -0.0 into 0.0: equal heights must be equal bytes.
+        result = real_array(heights, np.float32) + np.float32(0)
+    if result.shape != grid.shape or not (np.abs(result) <= MAX_VALUE).all():
+        raise ConfigError(
+            f"{got} shape {result.shape}; expected {grid.shape} with values up to {MAX_VALUE} m"
+        )
     return result
+
+
+def real_array(values: Any, dtype: type[Any] = np.float64) -> NDArray[Any]:
+    """Return real numbers as an array of `dtype`; others are a TypeError."""
+    return np.asarray(values).astype(dtype, casting="same_kind", copy=False)
 
 
 @lru_cache(maxsize=16)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, TerrainkitError, is_built_in, plugin_errors
 from terrainkit.settings.text import closest_names
 from terrainkit.terrain import Terrain
 from terrainkit.terrain.overlay import Overlay
@@ -128,17 +128,7 @@ def register_overlay(overlay: _Overlay) -> _Overlay:
 
 
 def _register(group: _Group, item: Any) -> None:
-    if not _is_subclass(item, group):
-        raise ConfigError(
-            f"{group.noun}: got {item!r}; expected a subclass of {group.parent.__name__}"
-        )
-    name = item.kind()
-    if inspect.isabstract(item):
-        missing = ", ".join(sorted(item.__abstractmethods__))
-        raise ConfigError(f"{item.__name__}: got no method {missing}; expected one")
-    if "__dataclass_fields__" not in vars(item):
-        raise ConfigError(f"{item.__name__} lacks @dataclass(frozen=True, kw_only=True)")
-    parameters_of(item)
+    name = _checked_name(group, item)
     existing: Any = _registered.get((group.noun, name))
     if existing is None and (name in _module_names(group) or name in _plugins(group)):
         existing = _get(group, name)
@@ -153,8 +143,28 @@ def _register(group: _Group, item: Any) -> None:
         )
 
 
-def _is_subclass(item: object, group: _Group) -> bool:
-    return isinstance(item, type) and issubclass(item, group.parent)
+def _checked_name(group: _Group, item: Any) -> str:
+    """Return the name of a class, after checking how it is declared."""
+    is_subclass = isinstance(item, type) and issubclass(item, group.parent)
+    if not is_subclass:
+        raise ConfigError(
+            f"{group.noun}: got {item!r}; expected a subclass of {group.parent.__name__}"
+        )
+    if inspect.isabstract(item):
+        missing = ", ".join(sorted(item.__abstractmethods__))
+        raise ConfigError(f"{item.__name__}: got no method {missing}; expected one")
+    if "__dataclass_fields__" not in vars(item):
+        raise ConfigError(f"{item.__name__} lacks @dataclass(frozen=True, kw_only=True)")
+    parameters_of(item)
+    return item.kind()  # type: ignore[no-any-return]
+
+
+def plugin_name(item: type[Any]) -> str | None:
+    """Return the name of a terrain or overlay class in errors; None if it is built in."""
+    if is_built_in(item):
+        return None
+    noun = (_OVERLAYS if issubclass(item, Overlay) else _TERRAINS).noun
+    return f"{noun} {item.kind()} ({item.__module__}:{item.__qualname__})"
 
 
 def _path(item: type[Any]) -> str:
@@ -188,15 +198,9 @@ def _get(group: _Group, name: str) -> Any:
     plugins = _plugins(group)
     if name not in plugins:
         raise _unknown_name(group, name, plugins)
-    try:
+    with plugin_errors(f"{group.noun} {name} ({plugins[name].value}) cannot be loaded"):
         found = plugins[name].load()
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{name} ({plugins[name].value}) cannot be loaded: {error}") from error
-    if not _is_subclass(found, group):
-        raise ConfigError(
-            f"{name} ({plugins[name].value}): got {found!r}; expected a subclass of "
-            f"{group.parent.__name__}"
-        )
+        _checked_name(group, found)
     return found
 
 
@@ -224,7 +228,8 @@ def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
     """
     overlay = get_overlay(name)
     check_names(name, parameters, parameters_of(overlay))
-    return overlay(**parameters)
+    with plugin_errors(plugin_name(overlay), TerrainkitError):
+        return overlay(**parameters)
 
 
 def _load_class(group: _Group, name: str) -> type[Any]:

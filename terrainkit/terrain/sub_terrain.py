@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors
 from terrainkit.settings.schema import Config, field_keys
 from terrainkit.settings.text import closest
 from terrainkit.settings.type_hint import MAX_VALUE, convert, show
@@ -116,9 +116,15 @@ class SubTerrain(Config):
         """The class of the terrain. It is looked up once, and pickled with the instance."""
         return registry.get_terrain(self.terrain)
 
+    @property
+    def plugin(self) -> str | None:
+        """Name of the terrain in errors; None if it is built in."""
+        return registry.plugin_name(self.terrain_class)
+
     def at(self, difficulty: float) -> Terrain:
         """Return the terrain at `difficulty`, 0 to 1."""
-        return self.terrain_class.at(difficulty, self.parameters)
+        with plugin_errors(self.plugin, TerrainkitError):
+            return self.terrain_class.at(difficulty, self.parameters)
 
     def friction_at(self, difficulty: float) -> float | None:
         """Return the friction of the patches at `difficulty`, 0 to 1; None for the map's."""
@@ -130,7 +136,8 @@ class SubTerrain(Config):
     @cached_property
     def declarations(self) -> dict[str, Parameter]:
         """The parameters of the terrain by name, and those of its overlays by path."""
-        declared = self.at(1.0).declarations()
+        with plugin_errors(self.plugin):
+            declared = dict(self.at(1.0).declarations())
         for k, overlay in enumerate(self.overlays):
             for name, parameter in parameters_of(type(overlay)).items():
                 declared[overlay_path(k, name)] = parameter

@@ -4,6 +4,7 @@ import inspect
 from dataclasses import dataclass
 from typing import Any
 
+from terrainkit.errors import plugin_errors
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.terrain import registry
 from terrainkit.terrain.parameter import Parameter, format_value, parameters_of
@@ -73,10 +74,11 @@ def _summary(kind: Any) -> str:
 
 
 def _class_doc(name: str, kind: Any) -> TerrainDoc:
-    texts = field_docs(kind)
+    with plugin_errors(registry.plugin_name(kind)):
+        text, texts = inspect.getdoc(kind) or "", field_docs(kind)
     return TerrainDoc(
         name=name,
-        text=inspect.getdoc(kind) or "",
+        text=text,
         parameters=tuple(
             ParameterDoc(
                 name=name,

@@ -10,13 +10,13 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors
 from terrainkit.features.blocks import number_that_fits
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
-from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.solids import Solids, check_solids
 from terrainkit.settings.type_hint import MAX_VALUE
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import Terrain, parameter, registry
 from terrainkit.terrain.parameter import Parameter, Range, Value, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
 
@@ -61,7 +61,8 @@ class Element(SubTerrain):
     def at(self, difficulty: float) -> Terrain:
         """Return the terrain at `difficulty`, 0 to 1."""
         start = {"start": ELEMENT_START} if issubclass(self.terrain_class, Lane) else {}
-        return self.terrain_class.at(difficulty, start | dict(self.parameters))
+        with plugin_errors(self.plugin, TerrainkitError):
+            return self.terrain_class.at(difficulty, start | dict(self.parameters))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +115,11 @@ class Course(Lane):
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
         """Return the course at `difficulty`, with its elements; see :meth:`Terrain.at`."""
         course = super().at(difficulty, values)
-        elements = [replace(e, parameters=e.at(difficulty).requested()) for e in course.elements]
+        elements = []
+        for k, element in enumerate(course.elements):
+            with _element_errors(k, terrain := element.at(difficulty)):
+                parameters = terrain.requested()
+            elements.append(replace(element, parameters=parameters))
         return replace(course, elements=tuple(elements))
 
     def requested(self) -> dict[str, Value]:
@@ -132,7 +137,8 @@ class Course(Lane):
         for k, (element, terrain) in enumerate(zip(self.elements, self._terrains, strict=True)):
             if element.element_length is not None:
                 declared[_path(k, "element_length")] = _ELEMENT_LENGTH
-            declared |= {_path(k, name): each for name, each in terrain.declarations().items()}
+            with _element_errors(k, terrain):
+                declared |= {_path(k, name): each for name, each in terrain.declarations().items()}
         return declared
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
@@ -145,7 +151,7 @@ class Course(Lane):
         ground = np.zeros(grid.shape, np.float32)
         # Solids and goals get the first child of this generator. It decides on the order.
         for k, span in self._layout(grid, rng.spawn(1)[0]):
-            with _element_errors(k):
+            with _element_errors(k, self._terrains[k]):
                 ground[span] = self._terrains[k].build(_block(grid, span), _child(rng))
         return ground
 
@@ -153,9 +159,10 @@ class Course(Lane):
         """Return the solids of the elements."""
         solids = []
         for k, span in self._layout(grid, rng):
-            with _element_errors(k):
-                block = _block(grid, span)
-                solids.append(self._terrains[k].solids(block, heights[span], _child(rng)))
+            with _element_errors(k, terrain := self._terrains[k]):
+                solids.append(terrain.solids(_block(grid, span), heights[span], _child(rng)))
+                if registry.plugin_name(type(terrain)):
+                    check_solids(solids[-1])
         return Solids.concatenate(solids)
 
     def goals(
@@ -226,11 +233,12 @@ class Course(Lane):
         """Yield the parameters of the elements by path, requested or realized on `grid`."""
         cells = None if grid is None else self._element_cells(grid)
         for k, (element, terrain) in enumerate(zip(self.elements, self._terrains, strict=True)):
-            values = terrain.requested()
             length = element.element_length
-            if grid is not None and cells is not None:
-                values = terrain.realized(_block(grid, slice(0, cells[k])))
-                length = length and grid.length(cells[k])
+            with _element_errors(k, terrain):
+                values = terrain.requested()
+                if grid is not None and cells is not None:
+                    values = terrain.realized(_block(grid, slice(0, cells[k])))
+                    length = length and grid.length(cells[k])
             own = {} if length is None else {"element_length": length}
             yield from ((_path(k, name), value) for name, value in (own | values).items())
 
@@ -241,12 +249,13 @@ def _block(grid: Grid, span: slice) -> Grid:
 
 
 @contextmanager
-def _element_errors(number: int) -> Iterator[None]:
+def _element_errors(number: int, terrain: Terrain) -> Iterator[None]:
     """Name an element in errors."""
     try:
-        yield
+        with plugin_errors(registry.plugin_name(type(terrain))):
+            yield
     except ConfigError as error:
-        raise ConfigError(f"course.{_path(number)}: {error}") from error
+        raise type(error)(f"course.{_path(number)}: {error}") from error.__cause__ or error
 
 
 def _child(rng: np.random.Generator) -> np.random.Generator:

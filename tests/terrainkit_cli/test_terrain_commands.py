@@ -105,6 +105,19 @@ def test_check_map_reports_issues(terrainkit, tmp_path, small_map):
     assert run.stdout.endswith("broken.npz: 1 issue\n")
 
 
+@pytest.mark.parametrize("height", [np.nan, np.inf, 3e38])
+def test_heights_out_of_range_are_one_line(terrainkit, tmp_path, small_map, height):
+    arrays = dict(np.load(tmp_path / small_map))
+    arrays["heights"][...] = height
+    np.savez(tmp_path / "broken.npz", **arrays)
+    for words in (("info", "broken.npz"), ("info", "broken.npz", "--budget")):
+        run = terrainkit(*words)
+        assert (run.returncode, run.stdout) == (2, "")
+        assert run.stderr.startswith("terrainkit: error: heights has values that are not finite or")
+    run = terrainkit("check-map", "broken.npz")
+    assert (run.returncode, run.stderr) == (1, "")
+
+
 def test_diff_exit_codes(terrainkit, tmp_path):
     small = ("--rows", 1, "--cols", 2, "--border", 0, "--terrain", "rough")
     for name, seed in (("a.npz", 0), ("b.npz", 0), ("c.npz", 1)):

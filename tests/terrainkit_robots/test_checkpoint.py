@@ -1,5 +1,6 @@
 import pickle
 import resource
+import warnings
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -134,6 +135,22 @@ def test_read_checkpoint_rejects_foreign_files(tmp_path, state, change, said):
     torch.save(state | whole | change, tmp_path / "model.pt")
     with pytest.raises(ConfigError, match=said):
         read_checkpoint(tmp_path / "model.pt")
+
+
+@pytest.mark.parametrize("kind", ["sparse", "torchscript"])
+def test_read_checkpoint_rejects_content_that_torch_warns_about(tmp_path, state, kind):
+    path = tmp_path / "model.pt"
+    if kind == "sparse":
+        torch.save(state | {"actor_state_dict": {"w": torch.eye(2).to_sparse()}}, path)
+    else:
+        torch.save({}, path)
+        with zipfile.ZipFile(path, "a") as archive:
+            archive.writestr("archive/constants.pkl", b"")
+    with warnings.catch_warnings(record=True) as printed:
+        warnings.simplefilter("always")
+        with pytest.raises(ConfigError, match=r"is not a checkpoint of terrainkit, or is damaged$"):
+            read_checkpoint(path)
+    assert not printed
 
 
 def test_read_checkpoint_rejects_nonfiles(tmp_path):

@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import closest, expected_names
@@ -36,7 +36,10 @@ from terrainkit_robots.description.model import Source
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
 
-Severity = Literal["error", "warning", "info"]
+Severity = Literal["error", "warning", "note"]
+SEVERITIES: tuple[Severity, ...] = get_args(Severity)
+"""Every severity, the most severe first."""
+
 Certainty = Literal["proven", "likely"]
 Measured = Mapping[str, float | int | str]
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import IMPORTANCE, Finding, Need, Rule
+from terrainkit_robots.lint.rule import IMPORTANCE, SEVERITIES, Finding, Need, Rule
 
 Verdict = Literal["pass", "warn", "fail"]
 
@@ -141,7 +141,7 @@ def _require_complete(rule: Rule, facts: Facts) -> None:
 
 def _importance(finding: Finding) -> tuple[int, int, str, str, int]:
     """Return the sort key of a finding."""
-    severity = ("error", "warning", "info").index(finding.severity)
+    severity = SEVERITIES.index(finding.severity)
     family = IMPORTANCE.index(finding.code[:3])
     return severity, family, finding.code, str(finding.file), finding.line
 

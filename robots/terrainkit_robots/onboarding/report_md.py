@@ -11,7 +11,8 @@ from terrainkit_robots.analysis.simulator_conventions.order_table import order_t
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_list
-from terrainkit_robots.lint.report.summary import SEVERITY_LABELS, group_skipped, summarize_findings
+from terrainkit_robots.lint.report.summary import group_skipped, summarize_findings
+from terrainkit_robots.lint.rule import SEVERITIES
 from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
 from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.simulation.assessment import assess
@@ -229,10 +230,10 @@ def _simulators(robot: "RobotFiles") -> Iterator[str]:
 
 
 def _findings(result: "OnboardResult") -> Iterator[str]:
-    report, severities = result.report, list(SEVERITY_LABELS)
+    report = result.report
     yield "## Findings\n"
     yield f"**{summarize_findings([report])}** in the source file, after the fixes.\n"
-    findings = sorted(report.findings, key=lambda f: (severities.index(f.severity), f.code))
+    findings = sorted(report.findings, key=lambda f: (SEVERITIES.index(f.severity), f.code))
     yield from findings_table(group_findings(report.facts.model, findings))
     skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
     yield from titled_list("Not checked or ignored", skipped)

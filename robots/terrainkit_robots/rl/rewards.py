@@ -7,10 +7,12 @@ Reward Composition, 2021: each foot has a phase, in which it should be in the ai
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.errors import ConfigError, is_built_in, plugin_errors
 from terrainkit_robots.rl.config import Rewards
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.spec.robot import Robot
@@ -54,11 +56,30 @@ def reward(function: Reward) -> Reward:
 
 
 def active_rewards(cfg: Rewards, mass: float, leg_length: float) -> dict[str, tuple[Reward, float]]:
-    """Return each term with a scale other than 0, and that scale in SI units."""
+    """Return each term with a scale other than 0, and that scale in SI units.
+
+    Raises:
+        PluginError: if the scale of a term of another package is not a number.
+    """
     time = np.sqrt(leg_length / 9.81)
-    scales = {name: float(getattr(cfg, name, 0.0)) for name in REWARDS}
     units = {k: mass**a * leg_length**b * time**c for k, (a, b, c) in UNITS.items()}
-    return {k: (REWARDS[k], scale / units.get(k, 1.0)) for k, scale in scales.items() if scale}
+    terms = {}
+    for name, function in REWARDS.items():
+        plugin = None if is_built_in(function) else f"reward {name} ({function.__module__})"
+        with plugin_errors(plugin):
+            scale = float(getattr(cfg, name, 0.0)) / units.get(name, 1.0)
+        if scale:
+            terms[name] = partial(_checked, plugin, function) if plugin else function, scale
+    return terms
+
+
+def _checked(plugin: str, function: Reward, state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+    """Return the values of a term of another package, after checking them."""
+    with plugin_errors(plugin):
+        values = np.asarray(function(state, robot, cfg)).astype(np.float32, casting="same_kind")
+        if values.shape != (shape := (len(state.commands),)) or not np.isfinite(values).all():
+            raise ConfigError(f"got shape {values.shape}; expected {shape} with finite values")
+        return values
 
 
 def _sum_squares(values: FloatArray) -> FloatArray:
@@ -84,7 +105,8 @@ def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     log_standing = np.float32(np.log(STANDING_TRACKING))
     width_at_rest = np.float32(cfg.tracking_sigma)
     widths = (np.where(s > 0, -s / log_standing, width_at_rest) for s in squares)
-    lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
+    with np.errstate(over="ignore"):  # of a tiny width: exp(-inf) is 0
+        lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
     moving = is_moving(commands)
     only_yaw, only_lin = moving & (squares[0] == 0), moving & (squares[1] < MIN_YAW_RATE**2)
     return lin * np.where(only_yaw, yaw, 1), yaw * np.where(only_lin, lin, 1)

@@ -14,7 +14,7 @@ from importlib import metadata
 from os.path import isdir
 from pathlib import Path
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Task
@@ -80,14 +80,10 @@ def get_task(name_or_folder: str | Path) -> RegisteredTask:
     if name in _registered:
         return _registered[name]
     for plugin in metadata.entry_points(group=ENTRY_POINTS, name=name):
-        what = f"task {name} ({plugin.value})"
-        try:
+        with plugin_errors(f"task {name} ({plugin.value}) cannot be loaded"):
             plugin.load()  # it calls `register_task`
-        except Exception as error:  # a module of another package may raise anything
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            raise ConfigError(f"{what} cannot be loaded: {reason}") from error
-        if name not in _registered:
-            raise ConfigError(f"{what}: expected a call of register_task({name!r}, ...)")
+            if name not in _registered:
+                raise ConfigError(f"expected a call of register_task({name!r}, ...)")
         return _registered[name]
     if not isdir(name):  # noqa: PTH112 - Path.is_dir raises OSError for long names
         expected = expected_names(name, task_names(), "tasks are")

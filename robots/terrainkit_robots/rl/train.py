@@ -64,6 +64,11 @@ def train(
     parts = run.parts_to_load(resume, robot, terrain, task) if resume else None
     continued = resume if parts is None else None
     process_task = process_share(task)
+    if process_task.env.num_envs * process_task.runner.num_steps_per_env < 2:
+        # PPO divides by the standard deviation of the advantages.
+        raise ConfigError(
+            "runner.num_steps_per_env: got 1 with one environment; expected 2 or more"
+        )
     device = resolve_device(device)
     loaded_robot = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
     torch.set_num_threads(process_task.env.num_threads)

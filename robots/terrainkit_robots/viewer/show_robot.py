@@ -18,7 +18,7 @@ from terrainkit_robots.viewer.robot_scene import RobotScene, body_node
 if TYPE_CHECKING:
     import viser
 
-_SEVERITY_COLORS = {"error": (200, 40, 40), "warning": (215, 130, 0), "info": (60, 110, 190)}
+_SEVERITY_COLORS = {"error": (200, 40, 40), "warning": (215, 130, 0), "note": (60, 110, 190)}
 
 _MAX_RANGE = 100.0
 """Largest range of a slider [rad] or [m]; wider limits are placeholders."""

@@ -172,6 +172,15 @@ def test_mjcf_divides_long_heightfields_beside_boxes(tmp_path):
     np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
 
 
+def test_mjcf_hfield_of_the_largest_heights(level_map, tmp_path):
+    heights = np.full(level_map.heights.shape, -1e6, np.float32)
+    heights[level_map.config.patch_cells(0, 0)] = 1e6
+    path = level_map.edited(heights=heights).save(tmp_path / "map.xml", collision="hfield")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert model.hfield_size[0, 2] == pytest.approx(2e6)
+    assert sorted({*model.hfield_data.tolist()}) == [0, 1]
+
+
 def test_mjcf_flat_map_is_one_box(tmp_path):
     flat = generate(MapConfig(rows=2, cols=1, terrains=(SubTerrain(terrain="flat"),)))
     model = loaded(flat, tmp_path)

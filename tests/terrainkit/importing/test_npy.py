@@ -25,8 +25,10 @@ def test_npy_first_index_is_x(tmp_path):
         np.zeros((2, 2), complex),
         np.array([["a"]]),
         np.full((2, 2), np.inf),
+        np.full((2, 2), 1e300),
+        np.full((2, 2), 1.1e6, np.float32),
     ],
-    ids=["one axis", "three axes", "empty", "complex", "text", "infinite"],
+    ids=["one axis", "three axes", "empty", "complex", "text", "infinite", "huge", "too high"],
 )
 def test_npy_without_heights_is_rejected(tmp_path, array):
     np.save(tmp_path / "a.npy", array)

@@ -155,7 +155,7 @@ def test_import_without_flat_disc_is_an_error(tmp_path):
         ({"origin": (-1.0, 0.0, 0.0)}, "origin: got x = -1 m; the file extends from 0 m to 6 m"),
         ({"patch_size": (1.05, 1.0)}, r"patch_size: got 1\.05 m; expected a whole number of cells"),
         ({"solids": True}, r"solids: got .*a\.npy; expected a mesh"),
-        ({"scale": 1e5}, r"got heights beyond 1e\+06 m"),
+        ({"scale": 1e5}, r"got 1 heights beyond 1,000,000 m"),
     ],
 )
 def test_import_rejects_options(tmp_path, options, message):
@@ -305,3 +305,11 @@ def table(tmp_path):
     body = trimesh.boolean.union(parts, engine="manifold")
     trimesh.util.concatenate([box((4, 3, 1), (2, 1.5, -0.5)), body]).export(tmp_path / "table.ply")
     return tmp_path / "table.ply"
+
+
+def test_import_map_rejects_infinite_extent(tmp_path):
+    path = tmp_path / "a.asc"
+    header = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1e308\n"
+    path.write_text(header + "1 2 3\n1 2 3\n")
+    with pytest.raises(ConfigError, match="the file extends from 0 m to inf m"):
+        import_map(path)

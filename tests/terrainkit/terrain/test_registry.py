@@ -146,7 +146,7 @@ def test_get_overlay_loads_entry_point(plugin):
 def test_get_terrain_rejects_other_entry_point(plugin):
     plugin("math:pi")
     with pytest.raises(
-        ConfigError, match=r"dunes \(math:pi\): got 3\.14.*; expected a subclass of Terr"
+        ConfigError, match=r"dunes \(math:pi\) cannot be loaded: .* got 3\.14.*; expected a subc"
     ):
         registry.get_terrain("dunes")
 

@@ -73,8 +73,8 @@ def test_violation_hint_overrides_rule():
 
 
 def test_violation_severity_overrides_rule():
-    found = report(rule([violation(severity="info")])).findings
-    assert [each.severity for each in found] == ["info"]
+    found = report(rule([violation(severity="note")])).findings
+    assert [each.severity for each in found] == ["note"]
 
 
 def test_findings_that_prevent_loading_come_first():
@@ -88,7 +88,7 @@ def test_findings_are_sorted():
     found = report(
         rule([violation("a", 9), violation("b", 3)], "INR099", "warning"),
         rule([violation("c", 9), violation("d", 3)], "INR098", "error"),
-        rule([violation("e", 1)], "INR097", "info"),
+        rule([violation("e", 1)], "INR097", "note"),
         rule([violation("f", 3)], "INR096", "error"),
     ).findings
     assert [each.subject for each in found] == ["f", "d", "c", "b", "a", "e"]
@@ -98,9 +98,9 @@ def test_findings_are_sorted():
     ("severities", "verdict"),
     [
         ([], "pass"),
-        (["info"], "pass"),
-        (["warning", "info"], "warn"),
-        (["info", "error", "warning"], "fail"),
+        (["note"], "pass"),
+        (["warning", "note"], "warn"),
+        (["note", "error", "warning"], "fail"),
     ],
 )
 def test_verdict_is_the_worst_severity(severities, verdict):

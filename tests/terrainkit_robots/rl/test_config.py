@@ -72,6 +72,16 @@ def with_value(section, name, value):
         ("commands.lin_vel_x", (1, -1), "lin_vel_x: got .*, the lower one first"),
         ("commands.lin_vel_x", (math.nan, 1), "lin_vel_x: got .nan, 1.; expected 2 values"),
         ("commands.standing", 1.5, "standing: got 1.5; expected a number from 0 to 1"),
+        (
+            "noise.noise_level",
+            1e300,
+            "noise_level: got 1e.300; expected a number from 0 to 1000000",
+        ),
+        (
+            "normalization.obs_scales.lin_vel",
+            1e38,
+            "lin_vel: got .*; expected a number from 0 to 1",
+        ),
         ("commands.resampling_time", 0, "expected a number > 0"),
         ("domain_rand.friction", (-0.1, 1), "friction: got .*each a number >= 0"),
         ("domain_rand.com_shift", -1, "com_shift: got -1; expected a number >= 0"),

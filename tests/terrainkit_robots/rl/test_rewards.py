@@ -2,12 +2,15 @@
 
 import re
 from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
 from made_states import FLAGS, made_state, shapes
 
+from terrainkit.errors import PluginError
+from terrainkit_robots.rl import rewards
 from terrainkit_robots.rl.config import Env, Rewards
 from terrainkit_robots.rl.rewards import REWARDS, STANDING_TRACKING, active_rewards, reward
 from terrainkit_robots.rl.state import State
@@ -338,3 +341,37 @@ class TestUserReward:
     @pytest.mark.parametrize("rewards", [Rewards(), MyRewards()])
     def test_user_reward_without_scale_is_ignored(self, random_env, rewards):
         assert "headway" not in random_env(rewards=rewards).reward_terms
+
+
+@pytest.mark.parametrize(
+    ("result", "told"),
+    [
+        (ValueError("two\nlines"), "ValueError: two lines"),
+        (SystemExit(0), "SystemExit: 0"),
+        (None, "TypeError: Cannot cast .*"),
+        (1.0, r"got shape \(\); expected \(3,\) with finite values"),
+        (np.zeros((3, 1)), r"got shape \(3, 1\); expected \(3,\) with finite values"),
+        (np.full(3, np.nan), r"got shape \(3,\); expected \(3,\) with finite values"),
+        (np.zeros(3, complex), "TypeError: Cannot cast .*"),
+    ],
+)
+def test_failing_reward_of_another_package_is_named(monkeypatch, robot, result, told):
+    def bonus(*_):
+        if isinstance(result, BaseException):
+            raise result
+        return result
+
+    monkeypatch.setattr(rewards, "REWARDS", {"bonus": bonus})
+    bonus.__module__ = "rover_pack.rewards"
+    cfg = SimpleNamespace(bonus=2.0)
+    function, scale = active_rewards(cfg, 10.0, 0.5)["bonus"]
+    assert scale == 2.0
+    with pytest.raises(PluginError, match=rf"^reward bonus \(rover_pack\.rewards\): {told}$"):
+        function(state(3), robot, cfg)
+    with pytest.raises(PluginError, match=r"^reward bonus .*: ValueError: could not convert str"):
+        active_rewards(SimpleNamespace(bonus="high"), 10.0, 0.5)
+
+
+def test_tiny_tracking_sigma_pays_nothing(robot):
+    given = state(2, mean_vel=[[1.0, 0, 0], [0, 0, 0]])
+    assert paid("tracking_lin_vel", robot, given, tracking_sigma=1e-45) == [0, 1]

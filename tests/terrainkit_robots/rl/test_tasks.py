@@ -129,12 +129,14 @@ def test_entry_point_is_imported_on_use(tmp_path, monkeypatch, plugin):
     [
         ("no_such_package", r"task rover \(no_such_package\) cannot be loaded: ModuleNotFoundErr"),
         ("math:no_such_name", r"rover \(math:no_such_name\) cannot be loaded: AttributeError"),
-        ("math", r"task rover \(math\): expected a call of register_task"),
+        ("math", r"task rover \(math\) cannot be loaded: expected a call of register_task"),
         ("broken_tasks", r"cannot be loaded: RuntimeError: two lines$"),
+        ("ended_tasks", r"task rover \(ended_tasks\) cannot be loaded: SystemExit: 0$"),
     ],
 )
 def test_invalid_entry_point_fails_on_use(tmp_path, monkeypatch, plugin, value, told):
     (tmp_path / "broken_tasks.py").write_text("raise RuntimeError('two\\nlines')\n")
+    (tmp_path / "ended_tasks.py").write_text("raise SystemExit(0)\n")
     monkeypatch.syspath_prepend(tmp_path)
     plugin(value)
     assert "rover" in task_names()

@@ -13,7 +13,7 @@ import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import tasks
-from terrainkit_robots.rl.config import Commands, Env, Terrain
+from terrainkit_robots.rl.config import Algorithm, Commands, Env, Runner, Task, Terrain
 from terrainkit_robots.rl.run import checkpoints, open_run
 from terrainkit_robots.rl.train import train
 
@@ -73,6 +73,14 @@ def test_train_writes_a_run(task, tmp_path):
     run = open_run(tmp_path / "run")
     assert run.task == task
     assert run.checkpoint == tmp_path / "run" / "model_4.pt"
+
+
+def test_one_sample_is_rejected(tmp_path):
+    algorithm = Algorithm(num_mini_batches=1)
+    one = Task(env=Env(num_envs=1), runner=Runner(num_steps_per_env=1), algorithm=algorithm)
+    with pytest.raises(ConfigError, match=r"num_steps_per_env: got 1 with one env.*; expected 2"):
+        train("quadruped", "plane", one, folder=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_train_names_the_default_folder(task, tmp_path, monkeypatch):

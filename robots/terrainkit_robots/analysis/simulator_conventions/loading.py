@@ -109,7 +109,7 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
     try:
         with quiet_mujoco():
             if with_meshes:
-                mujoco.MjModel.from_xml_path(str(model.file))
+                mujoco.MjModel.from_xml_path(str(model.file), _replaced_file(model))
             else:
                 mujoco.MjModel.from_xml_string(*_without_meshes(model))
     except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
@@ -127,14 +127,36 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
     return None
 
 
-def _without_meshes(model: RobotModel) -> tuple[str, Mapping[str, bytes]]:
-    """Return the text of a URDF in which a tetrahedron replaces each mesh, and its assets."""
+def _replaced_file(model: RobotModel) -> dict[str, bytes]:
+    """Return the content of a URDF by its name, if it differs from the file: without shape names.
+
+    MuJoCo prints a warning for each name that repeats, and ignores it.
+    """
     from lxml import etree
 
+    shapes = [each for link in model.links for each in (*link.collisions, *link.visuals)]
+    names = [shape.name for shape in shapes if shape.name]
+    if model.kind != "urdf" or len(set(names)) == len(names):
+        return {}
+    return {model.file.name: etree.tostring(_without_names(model))}
+
+
+def _without_names(model: RobotModel) -> "etree._Element":
+    """Return the root of a URDF whose collisions and visuals have no names."""
     root = parse_xml(model.file, _read(model.file)).root
     if root is None:
         raise NotAttemptedError("a file without elements is not passed to MuJoCo")
     root = copy.deepcopy(root)
+    for shape in root.iter("collision", "visual"):
+        shape.attrib.pop("name", None)
+    return root
+
+
+def _without_meshes(model: RobotModel) -> tuple[str, Mapping[str, bytes]]:
+    """Return the text of a URDF in which a tetrahedron replaces each mesh, and its assets."""
+    from lxml import etree
+
+    root = _without_names(model)
     files: dict[tuple[str, str], str] = {}
     for mesh in root.iter("mesh"):
         if "filename" in mesh.attrib:

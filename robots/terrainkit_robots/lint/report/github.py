@@ -7,7 +7,7 @@ from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.text import display_path
 
-_LEVELS = {"error": "error", "warning": "warning", "info": "notice"}
+_LEVELS = {"error": "error", "warning": "warning", "note": "notice"}
 
 
 def to_text(reports: Sequence[Report]) -> str:

@@ -8,7 +8,6 @@ from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.report.summary import (
     LIKELY,
-    SEVERITY_LABELS,
     format_location,
     group_skipped,
     summarize_findings,
@@ -64,7 +63,7 @@ def findings_table(groups: Sequence[FindingGroup]) -> Iterator[str]:
 def _finding_row(group: FindingGroup) -> str:
     finding = group.first
     cells = (
-        SEVERITY_LABELS[finding.severity],
+        finding.severity,
         f"{finding.code} {finding.name}",
         format_location(finding),
         _text(group) + (" (likely)" if finding.certainty == "likely" else ""),

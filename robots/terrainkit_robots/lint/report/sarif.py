@@ -8,7 +8,6 @@ from urllib.parse import quote_from_bytes
 
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import to_json
-from terrainkit_robots.lint.report.summary import SEVERITY_LABELS
 from terrainkit_robots.lint.rule import FAMILIES, Finding, Rule, rules
 from terrainkit_robots.lint.runner import Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed
@@ -65,7 +64,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "shortDescription": {"text": rule.title},
         "fullDescription": {"text": rule.why},
         "help": {"text": "\n\n".join(paragraphs)},
-        "defaultConfiguration": {"level": SEVERITY_LABELS[rule.severity]},
+        "defaultConfiguration": {"level": rule.severity},
         "properties": {"tags": ["robot", FAMILIES[rule.family]], "fixes": rule.fixes},
     }
 
@@ -74,7 +73,7 @@ def _result(finding: Finding, index: dict[str, int]) -> dict[str, Any]:
     return {
         "ruleId": finding.code,
         "ruleIndex": index[finding.code],
-        "level": SEVERITY_LABELS[finding.severity],
+        "level": finding.severity,
         "message": _message(f"{finding.message}\n{finding.hint}".strip()),
         "locations": [_location(finding.file, finding.line, finding.subject)],
         "properties": dict(_properties(finding)),

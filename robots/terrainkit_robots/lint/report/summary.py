@@ -4,13 +4,10 @@ from collections import Counter
 from collections.abc import Sequence
 
 from terrainkit_robots.lint.report.grouping import group_findings
-from terrainkit_robots.lint.rule import Finding, Severity
+from terrainkit_robots.lint.rule import SEVERITIES, Finding
 from terrainkit_robots.lint.runner import Report, SkipKind, Skipped
 from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import count, display_path, names
-
-SEVERITY_LABELS: dict[Severity, str] = {"error": "error", "warning": "warning", "info": "note"}
-"""Label of each severity, in the order of reports; the level of SARIF has the same names."""
 
 _MAX_CODES = 6
 """Maximum number of rules that are listed for one reason."""
@@ -25,7 +22,7 @@ def summarize_findings(reports: Sequence[Report]) -> str:
     A finding that repeats over joints or links counts once.
     """
     counts = Counter(finding.severity for finding in _unique_findings(reports))
-    parts = [count(counts[s], label) for s, label in SEVERITY_LABELS.items() if counts[s]]
+    parts = [count(counts[severity], severity) for severity in SEVERITIES if counts[severity]]
     if not counts["error"] + counts["warning"]:
         parts.insert(0, "no problems found")
     return ", ".join(parts)

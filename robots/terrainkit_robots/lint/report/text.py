@@ -12,7 +12,6 @@ from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.report.summary import (
     LIKELY,
-    SEVERITY_LABELS,
     format_location,
     group_skipped,
     summarize_findings,
@@ -31,7 +30,7 @@ _MAX_ENTRIES = 10
 _MAX_LENGTH = 2000
 """Maximum length of a message [characters]; names in a file can have any length."""
 
-_STYLES: dict[Severity, str] = {"error": "bold red", "warning": "bold yellow", "info": "bold blue"}
+_STYLES: dict[Severity, str] = {"error": "bold red", "warning": "bold yellow", "note": "bold blue"}
 
 
 @dataclass(frozen=True)
@@ -85,13 +84,13 @@ def _robot(report: Report, width: int, *, verbose: bool) -> Iterator[Line]:
             yield from _entry(group, f"{group.first.code}, {group.text}", model.file, width)
         yield ()
     groups = group_findings(model, report.findings)
-    short = [] if verbose else [group for group in groups if group.first.severity == "info"]
+    short = [] if verbose else [group for group in groups if group.first.severity == "note"]
     by_rule = groupby(
         (group for group in groups if group not in short),
         lambda group: (group.first.severity, group.first.code, group.first.name),
     )
     for (severity, code, name), members in by_rule:
-        yield Span(SEVERITY_LABELS[severity], _STYLES[severity]), Span(f" {code} {name}")
+        yield Span(severity, _STYLES[severity]), Span(f" {code} {name}")
         yield from _rule(list(members), model.file, width)
         yield ()
     for group in short:
@@ -108,7 +107,7 @@ def _robot(report: Report, width: int, *, verbose: bool) -> Iterator[Line]:
 def _note(group: FindingGroup, width: int) -> Line:
     """Return a note on one line, cut at `width` characters."""
     first = group.first
-    label, code = Span(SEVERITY_LABELS["info"], _STYLES["info"]), f" {first.code}"
+    label, code = Span("note", _STYLES["note"]), f" {first.code}"
     more = f" (+{len(group.others)})" if group.others else ""
     text = " ".join(escape_control(group.text[:_MAX_LENGTH]).split())
     room = max(width - len(f"{label.text}{code} {more}"), 20)
@@ -122,7 +121,7 @@ def _rule(groups: Sequence[FindingGroup], robot_file: Path, width: int) -> Itera
         likely = " (likely)" if group.first.certainty == "likely" else ""
         yield from _entry(group, group.text + likely, robot_file, width)
         # The help of notes is left to `terrainkit rule`.
-        is_note = group.first.severity == "info"
+        is_note = group.first.severity == "note"
         if not is_note and hints[i] and hints[i + 1 : i + 2] != [hints[i]]:
             yield from _wrap(Span("      help: ", "green"), hints[i], width, indent=12)
     if len(groups) > _MAX_ENTRIES:
@@ -152,11 +151,11 @@ def _fix_description(finding: Finding) -> str:
 
 def _help(findings: Sequence[Finding], *, verbose: bool) -> Iterator[Line]:
     """Yield what `(likely)` means, and how to get help on notes, which are listed without help."""
-    shown = [finding for finding in findings if verbose or finding.severity != "info"]
+    shown = [finding for finding in findings if verbose or finding.severity != "note"]
     if any(finding.certainty == "likely" for finding in shown):
         label, text = LIKELY.split(" ", 1)
         yield Span(f"{label} ", "dim"), Span(text)
-    codes = [finding.code for finding in findings if finding.severity == "info"]
+    codes = [finding.code for finding in findings if finding.severity == "note"]
     if codes and not verbose:
         yield Span("notes in full: ", "dim"), Span("--notes")
     if codes:

@@ -182,3 +182,12 @@ def test_mujoco_load_error_writes_no_files(tmp_path, monkeypatch):
     facts = facts_of(tmp_path, mesh_of("missing.stl"), "robot.urdf")
     assert "Error opening file" in mujoco_load_error(facts.model).message
     assert [path.name for path in tmp_path.iterdir()] == ["robot.urdf"]
+
+
+@pytest.mark.parametrize("with_meshes", [True, False])
+def test_repeated_shape_names_print_nothing(tmp_path, capfd, with_meshes):
+    text = bundled.urdf_path("quadruped").read_text().replace("<collision>", '<collision name="c">')
+    assert text.count('name="c"') > 1
+    model = facts_of(tmp_path, text, "robot.urdf").model
+    assert mujoco_load_error(model, with_meshes=with_meshes) is None
+    assert capfd.readouterr() == ("", "")

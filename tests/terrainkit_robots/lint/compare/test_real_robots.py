@@ -22,7 +22,7 @@ def compared(one, other):
 
 
 def told(report, *, info=False):
-    return sorted((f.code, f.subject) for f in report.findings if (f.severity == "info") == info)
+    return sorted((f.code, f.subject) for f in report.findings if (f.severity == "note") == info)
 
 
 def test_go2(robot_file):
@@ -33,7 +33,7 @@ def test_go2(robot_file):
         ("XRF007", "go2_description"),
     ]
     order, effort, mass = sorted(
-        (f for f in report.findings if f.severity != "info"), key=lambda f: f.code
+        (f for f in report.findings if f.severity != "note"), key=lambda f: f.code
     )
     assert f"ctrl = joints[{GO2}]" in order.message
     assert "4 joints" in effort.message
@@ -58,7 +58,7 @@ def test_h1(robot_file):
     report = compared(robot_file("h1/urdf/h1.urdf"), robot_file("h1/h1.xml"))
     assert told(report) == [("XRF009", "left_ankle_link"), ("XRF009", "right_ankle_link")]
     assert told(report, info=True) == [("XRF007", "pelvis")]
-    (dropped,) = [f for f in report.findings if f.severity == "info"]
+    (dropped,) = [f for f in report.findings if f.severity == "note"]
     assert dropped.measured["dropped"] == pytest.approx(29.847)
     assert dropped.measured["declared"] == pytest.approx(51.649896)
 

@@ -22,7 +22,7 @@ def test_rules_are_headings_sorted_by_severity(report):
 
 def test_notes_are_one_line_by_default(report, finding):
     message = "position of " + ", ".join(f"joint_{k}" for k in range(40))
-    note = finding("LEG001", "legs", "info", message=message)
+    note = finding("LEG001", "legs", "note", message=message)
     both = dataclasses.replace(report, findings=(finding(), note))
     (line,) = [each for each in to_text([both]).splitlines() if each.startswith("note ")]
     assert line.startswith("note LEG001 position of joint_0, joint_1")
@@ -62,7 +62,7 @@ def test_shared_hint_is_printed_once(report, finding):
 
 
 def test_notes_have_no_help(report, finding):
-    note = finding("LEG001", "legs", "info", hint="Look at the legs.")
+    note = finding("LEG001", "legs", "note", hint="Look at the legs.")
     both = dataclasses.replace(report, findings=(finding(), note))
     text = to_text([both])
     assert "Look at the legs." not in text
@@ -73,7 +73,7 @@ def test_notes_have_no_help(report, finding):
 
 def test_no_notes_no_note_help(report, finding):
     assert "details of a note" not in to_text([dataclasses.replace(report, findings=(finding(),))])
-    unhelpful = finding("LEG001", "legs", "info", hint="")
+    unhelpful = finding("LEG001", "legs", "note", hint="")
     assert "details of a note" in to_text([dataclasses.replace(report, findings=(unhelpful,))])
 
 

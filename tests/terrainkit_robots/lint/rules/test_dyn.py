@@ -68,7 +68,7 @@ def test_unstable_drop_units_of_sliding_joint(robot):
 
 @pytest.mark.parametrize(
     ("tilt", "lifted", "severity"),
-    [(2, (), None), (5, (), "info"), (12, (), "warning"), (5, ("toe",), "warning")],
+    [(2, (), None), (5, (), "note"), (12, (), "warning"), (5, ("toe",), "warning")],
 )
 def test_does_not_stand_severity(monkeypatch, stood, tilt, lifted, severity):
     standing_with = replace(stood, tilt=math.radians(tilt), lifted_feet=lifted)

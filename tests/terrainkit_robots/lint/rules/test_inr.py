@@ -56,7 +56,7 @@ def check(path, meshes=None):
         for rule in rules()
         if rule.family == "INR"
         for violation in rule.findings(facts)
-        if violation.severity != "info"
+        if violation.severity != "note"
     ]
 
 

@@ -25,7 +25,7 @@ def check(path):
         for rule in rules()
         if rule.family == "JNT" and (facts.legs or "legs" not in rule.needs)
         for violation in rule.findings(facts)
-        if violation.severity != "info"
+        if violation.severity != "note"
     ]
 
 

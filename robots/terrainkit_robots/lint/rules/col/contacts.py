@@ -90,7 +90,7 @@ def no_trunk_collision(robot: Facts) -> Violations:
         trunk = robot.bodies[0]
         yield Violation(
             element=robot.tree.links[trunk.name],
-            severity="info" if colliding <= {leg.limb.chain[-1] for leg in robot.legs} else None,
+            severity="note" if colliding <= {leg.limb.chain[-1] for leg in robot.legs} else None,
             message=f"collision shapes of trunk {trunk.name} and all other bodies outside of the "
             "legs: got 0; expected 1 or more",
         )
@@ -113,7 +113,7 @@ def no_collision(robot: Facts) -> Violations:
     if robot.bodies and not any(body.has_contacts for body in robot.bodies):
         severity: Severity | None = None if has_floating_base(robot) else "warning"
         if robot.model.kind == "mjcf":
-            severity = "info"
+            severity = "note"
         yield Violation(
             severity=None if robot.legs else severity,
             message=f"collision shapes of {count(len(robot.links), 'link')}: got 0; expected 1 or "

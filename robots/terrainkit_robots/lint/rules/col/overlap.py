@@ -69,7 +69,7 @@ def overlap(robot: Facts) -> Violations:
             continue
         got, expected = contrast(1000 * deepest.depth, 1000 * _MAX_OVERLAP, ".1f")
         # Fixed-base arms often disable contacts of pairs that always touch, so no error for them.
-        levels: tuple[Severity, ...] = ("info", "warning", "error" if robot.legs else "warning")
+        levels: tuple[Severity, ...] = ("note", "warning", "error" if robot.legs else "warning")
         level = 1 + (deepest.depth > _MAX_OVERLAP_ERROR) - deepest.has_mesh
         if _is_arbitrary_pose(robot, pair, deepest):
             level = 0
@@ -109,7 +109,7 @@ def _group_by_pair(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, 
     return by_pair
 
 
-@rule("COL006", "overlap-in-range", "info", certainty="likely")
+@rule("COL006", "overlap-in-range", "note", certainty="likely")
 def overlap_in_range(robot: Facts) -> Violations:
     """Two bodies overlap in a large part of the joint range.
 

@@ -15,7 +15,7 @@ _FULL_RANGE_SHARE = 0.99
 """Usable share of the joint range from which a joint reaches its limits."""
 
 
-@rule("DYN003", "unreachable-limits", "info", needs=("simulation",), certainty="likely")
+@rule("DYN003", "unreachable-limits", "note", needs=("simulation",), certainty="likely")
 def unreachable_limits(robot: Facts) -> Violations:
     """A joint does not reach its limits while the others stay at the standing pose.
 

@@ -21,7 +21,7 @@ _MAX_SINGLE_LEGS = 6
 """With more legs, two branches usually form one leg through a closed loop. URDF has no loops, so
 the real robot may stand."""
 
-_LEVELS: tuple[Severity, ...] = ("info", "warning", "error")
+_LEVELS: tuple[Severity, ...] = ("note", "warning", "error")
 
 _MIN_MARGIN = 0.005
 """Distance of the center of mass from the edge of the support that a biped needs to stand with

@@ -19,7 +19,7 @@ _MIN_STIFFNESS_SHARE = 0.003
 ankle of a humanoid has 0.04 without the inertia of its rotor."""
 
 
-@rule("DYN004", "low-joint-inertia", "info", needs=("simulation",), certainty="likely")
+@rule("DYN004", "low-joint-inertia", "note", needs=("simulation",), certainty="likely")
 def low_joint_inertia(robot: Facts) -> Violations:
     """The inertia of a joint is too low for its gains at the training time step.
 
@@ -57,7 +57,7 @@ def low_joint_inertia(robot: Facts) -> Violations:
     yield Violation(
         subject=lightest,
         source=next((j.source for j in robot.joints if j.name == lightest), robot.model.source),
-        severity="warning" if is_wrong else "info",
+        severity="warning" if is_wrong else "note",
         message=f"largest stable time step of explicit PD on joint {lightest} (kp "
         f"{gain.stiffness:g}, kd {gain.damping:g}, {'mass' if units == PRISMATIC else 'inertia'} "
         f"{inertia:.2g} {units.inertia}): got {1000 * step:.2g} ms; expected at least twice the "

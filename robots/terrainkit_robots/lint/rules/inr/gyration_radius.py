@@ -73,7 +73,7 @@ def inertia_too_large(robot: Facts) -> Violations:
         if body.name not in reported:
             is_error = radius > _MAX_GYRATION_ERROR * half_diagonal(box)
             is_fixed = body.index == 0 and not has_floating_base(robot)
-            severity: Severity = "info" if is_fixed else "error" if is_error else "warning"
+            severity: Severity = "note" if is_fixed else "error" if is_error else "warning"
             limit = f"at most {_MAX_GYRATION:g}"
             yield _report_radius(body, radius, box, limit, severity)
 

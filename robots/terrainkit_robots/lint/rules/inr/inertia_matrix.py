@@ -132,7 +132,7 @@ def triangle_inequality(robot: Facts) -> Violations:
         if moments[0] <= MIN_INERTIA or triangle_ratio(moments) >= _MIN_EXACT_RATIO:
             continue
         ratio = triangle_ratio(moments)
-        severity: Severity = "warning" if ratio < _MIN_ROUNDED_RATIO else "info"
+        severity: Severity = "warning" if ratio < _MIN_ROUNDED_RATIO else "note"
         text = f"1 - {1 - ratio:.1g}" if ratio > 0.9999 else f"{ratio:.4g}"
         yield Violation(
             subject=link.name,

@@ -94,7 +94,7 @@ def _links_without_mass(robot: Facts) -> Violations:
     # A frame has no mass on purpose; the mass of a link with shapes was probably forgotten.
     parts = [link for link in links if link.visuals or link.collisions]
     frames = [link for link in links if link not in parts]
-    groups: tuple[tuple[list[Link], Severity], ...] = ((parts, "warning"), (frames, "info"))
+    groups: tuple[tuple[list[Link], Severity], ...] = ((parts, "warning"), (frames, "note"))
     for group, severity in groups:
         if group:
             yield Violation(

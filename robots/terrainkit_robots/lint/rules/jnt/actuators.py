@@ -29,7 +29,7 @@ def missing_actuator(robot: Facts) -> Violations:
     if not robot.model.actuators:
         if robot.joints:
             yield Violation(
-                severity="info",
+                severity="note",
                 message=f"actuators of the file: got 0 for {count(len(robot.joints), 'joint')}; "
                 "expected one for each joint, unless the framework adds them",
                 measured={"joints": len(robot.joints)},
@@ -42,7 +42,7 @@ def missing_actuator(robot: Facts) -> Violations:
         if joint.name not in actuated and joint.mimic is None:
             yield Violation(
                 element=joint,
-                severity="warning" if robot.legs else "info",
+                severity="warning" if robot.legs else "note",
                 message=f"actuators of joint {joint.name}: got 0; expected 1",
             )
 
@@ -103,14 +103,14 @@ def one_sided_motor(robot: Facts) -> Violations:
             yield Violation(
                 subject=actuator.joint,
                 source=actuator.source,
-                severity=None if robot.legs else "info",
+                severity=None if robot.legs else "note",
                 message=f"control range of the motor of joint {actuator.joint}: got {lower:g} to "
                 f"{upper:g}; expected both signs with similar values",
                 measured={"lower": lower, "upper": upper},
             )
 
 
-@rule("JNT014", "safety-controller", "info")
+@rule("JNT014", "safety-controller", "note")
 def safety_controller(robot: Facts) -> Violations:
     """A joint has a safety_controller, which Genesis treats as a position controller.
 

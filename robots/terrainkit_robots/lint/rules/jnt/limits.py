@@ -156,7 +156,7 @@ def wide_range(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT012", "zero-outside-limits", "info")
+@rule("JNT012", "zero-outside-limits", "note")
 def zero_outside_limits(robot: Facts) -> Violations:
     """Position zero is outside the limits of a joint.
 
@@ -215,7 +215,7 @@ def unlimited_joint(robot: Facts) -> Violations:
         if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
             yield Violation(
                 element=joint,
-                severity="warning" if robot.legs else "info",
+                severity="warning" if robot.legs else "note",
                 message=f"range of hinge {joint.name}: got none; expected one, unless the hinge "
                 "turns without end",
             )
@@ -255,7 +255,7 @@ def narrow_range(robot: Facts) -> Violations:
         yield Violation(
             subject=joint.name,
             source=(joint.limit or joint).source,
-            severity=None if joint.name in warned else "info",
+            severity=None if joint.name in warned else "note",
             message=f"range of joint {joint.name}: got {size:.3g} rad ({limits[0]:.3g} to "
             f"{limits[1]:.3g}), which is {factor * size:.3g} after a second conversion; expected "
             f"at least {_MIN_RANGE:g} rad{unit}",

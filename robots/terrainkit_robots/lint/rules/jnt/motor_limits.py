@@ -183,7 +183,7 @@ def oversized_effort(robot: Facts) -> Violations:
         yield Violation(
             subject=joint.name,
             source=geared.source if geared else (joint.limit or joint).source,
-            severity="info" if robot.model.kind == "mjcf" and not geared else None,
+            severity="note" if robot.model.kind == "mjcf" and not geared else None,
             message=f"effort limit of joint {joint.name}: got {effort:g} N m, "
             f"{effort / (weight * length):.3g} times the weight times the leg length; expected at "
             f"most {share:g} times ({limit:.4g} N m)"

@@ -39,7 +39,7 @@ def _joint_types(limb: Limb) -> tuple[str, ...]:
     return tuple(joint.kind for joint in limb.joints)
 
 
-@rule("LEG001", "detected-legs", "info", needs=("legs",), certainty="likely")
+@rule("LEG001", "detected-legs", "note", needs=("legs",), certainty="likely")
 def detected_legs(robot: Facts) -> Violations:
     """Lists the legs that were detected and the roles of their joints.
 

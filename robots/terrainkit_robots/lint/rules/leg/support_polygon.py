@@ -51,6 +51,6 @@ def com_outside_support(robot: Facts) -> Violations:
         message="distance of the center of mass from the edge of the support polygon at the "
         f"standing pose: got {got} mm {'outside' if outside else 'inside'}; expected at least "
         f"{expected} mm inside",
-        severity="error" if outside else "warning" if is_statically_stable(robot.legs) else "info",
+        severity="error" if outside else "warning" if is_statically_stable(robot.legs) else "note",
         measured={"margin": round(stance.margin, 5)},
     )

@@ -39,7 +39,7 @@ def flat_mesh(robot: Facts) -> Violations:
             break
 
 
-@rule("MSH014", "nonconvex-collision", "info")
+@rule("MSH014", "nonconvex-collision", "note")
 def nonconvex_collision(robot: Facts) -> Violations:
     """The convex hull of a collision mesh is far larger than the mesh.
 

@@ -72,7 +72,7 @@ def malformed_mesh(robot: Facts) -> Violations:
 def _file_problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
     """Return what is wrong with a file and the severity, unless another rule reports it."""
     if used.header.state in ("lfs", "missing"):
-        return "", "info"
+        return "", "note"
     if used.header.problem:
         # All readers except MuJoCo read the faces and ignore the rest.
         is_harmless = not used.strict and used.header.faces is not None
@@ -82,10 +82,10 @@ def _file_problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
             try:
                 meshes.vertices(use.mesh)
             except TooLargeError as error:
-                return f"was not checked: it {error}", "info"
+                return f"was not checked: it {error}", "note"
             except MeshError as error:
                 return str(error), "error"
-    return "", "info"
+    return "", "note"
 
 
 @rule("MSH007", "ascii-stl", "error", fixes="safe")
@@ -109,7 +109,7 @@ def ascii_stl(robot: Facts) -> Violations:
                 element=used,
                 message=f"format of {used.label}: got ASCII STL of {used.header.size:,} "
                 "bytes; expected binary STL for MuJoCo",
-                severity="error" if used.strict else "info",
+                severity="error" if used.strict else "note",
                 fix=make_fix("safe", "Convert it to binary STL.", edits),
             )
 

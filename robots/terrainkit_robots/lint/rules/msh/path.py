@@ -124,7 +124,7 @@ def _read_or_empty(path: Path) -> bytes:
         return b""
 
 
-@rule("MSH003", "package-uri", "info", fixes="safe")
+@rule("MSH003", "package-uri", "note", fixes="safe")
 def package_uri(robot: Facts) -> Violations:
     """A mesh path refers to a ROS package.
 

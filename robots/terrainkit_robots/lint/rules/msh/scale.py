@@ -92,5 +92,5 @@ def negative_scale(robot: Facts) -> Violations:
             subject=used.name,
             source=first.mesh.scale_source or first.mesh.source,
             message=f"scale of {used.label}: got {scale}; expected values > 0",
-            severity="warning" if is_harmful else "info",
+            severity="warning" if is_harmful else "note",
         )

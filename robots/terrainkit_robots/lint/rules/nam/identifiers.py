@@ -32,7 +32,7 @@ def invalid_name(robot: Facts) -> Violations:
     if robot.model.kind != "mjcf":
         joints = [joint for joint in robot.model.joints if joint.name]
     fixed = {id(joint) for joint in joints if joint.kind == "fixed"}
-    renamed: dict[Severity, dict[str, Link | Joint]] = {"warning": {}, "info": {}}
+    renamed: dict[Severity, dict[str, Link | Joint]] = {"warning": {}, "note": {}}
     kinds: tuple[tuple[str, Sequence[Link | Joint]], ...] = (("links", links), ("joints", joints))
     for kind, items in kinds:
         conflicts = _conflicts(items)
@@ -42,7 +42,7 @@ def invalid_name(robot: Facts) -> Violations:
         for item in items:
             if item.name not in reported and not _IDENTIFIER.fullmatch(item.name):
                 is_note = robot.model.kind == "mjcf" or id(item) in fixed
-                renamed["info" if is_note else "warning"].setdefault(item.name, item)
+                renamed["note" if is_note else "warning"].setdefault(item.name, item)
     for severity, found in renamed.items():
         if not found:
             continue

@@ -12,7 +12,7 @@ _LEG_WORDS = ("thigh", "calf", "shank", "knee", "hip")
 """Words by which configurations select the links whose contacts they penalize."""
 
 
-@rule("NAM003", "ambiguous-substring", "info", needs=("legs",), certainty="likely")
+@rule("NAM003", "ambiguous-substring", "note", needs=("legs",), certainty="likely")
 def ambiguous_substring(robot: Facts) -> Violations:
     """A substring that configurations use matches unexpected links.
 

@@ -22,7 +22,7 @@ _MAX_JOINTS = 40
 """Maximum number of joints for which the message contains the permutation."""
 
 
-@rule("SIM001", "joint-order", "info")
+@rule("SIM001", "joint-order", "note")
 def joint_order(robot: Facts) -> Violations:
     """A simulator orders the joints differently from the file.
 
@@ -64,7 +64,7 @@ def _format_order(order: SimulatorOrder, file: Sequence[str]) -> str:
     return f"{order.simulator}{unverified}: {indices}"
 
 
-@rule("SIM002", "merged-feet", "info", needs=("legs",))
+@rule("SIM002", "merged-feet", "note", needs=("legs",))
 def merged_feet(robot: Facts) -> Violations:
     """A simulator merges the feet into the shanks by default.
 
@@ -99,7 +99,7 @@ def merged_feet(robot: Facts) -> Violations:
     )
 
 
-@rule("SIM003", "genesis-armature", "info")
+@rule("SIM003", "genesis-armature", "note")
 def genesis_armature(robot: Facts) -> Violations:
     """The default armature of Genesis exceeds the inertia that a joint moves.
 

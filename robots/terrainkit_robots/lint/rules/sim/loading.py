@@ -95,7 +95,7 @@ def mujoco_load_failure(robot: Facts) -> Violations:
             if "not found in" in refusal.message and _is_included(robot.model.file):
                 is_explained = True
             yield _load_failure(
-                robot, "MuJoCo", refusal, code, severity="info" if is_explained else "error"
+                robot, "MuJoCo", refusal, code, severity="note" if is_explained else "error"
             )
 
 
@@ -107,7 +107,7 @@ def _is_included(file: Path) -> bool:
     return any(include.search(path.read_bytes()) for path in small)
 
 
-@rule("SIM005", "yourdfpy-load-failure", "info", needs=("simulation",))
+@rule("SIM005", "yourdfpy-load-failure", "note", needs=("simulation",))
 def yourdfpy_load_failure(robot: Facts) -> Violations:
     """The library yourdfpy cannot load the unmodified file.
 
@@ -133,7 +133,7 @@ def yourdfpy_load_failure(robot: Facts) -> Violations:
     except NotAttemptedError as reason:
         raise CannotCheckError(str(reason)) from None
     if refusal is not None:
-        yield _load_failure(robot, "yourdfpy", refusal, "", severity="info")
+        yield _load_failure(robot, "yourdfpy", refusal, "", severity="note")
 
 
 def _require_saved(robot: Facts) -> None:
@@ -151,8 +151,8 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
     for problem in robot.model.problems:
         if message in problem.message:
             return problem.code, "error"
-    order: tuple[Severity, ...] = ("info", "warning", "error")
-    best: tuple[str, Severity] = "", "info"
+    order: tuple[Severity, ...] = ("note", "warning", "error")
+    best: tuple[str, Severity] = "", "note"
     codes = next((each for pattern, each in _EXPLAINED_BY if re.search(pattern, message)), "")
     for each in codes.split():
         try:

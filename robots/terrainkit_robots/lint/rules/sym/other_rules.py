@@ -24,7 +24,7 @@ class OtherRules:
     @cached_property
     def _names(self) -> set[str]:
         found = findings_of(self._robot, *self._codes)
-        return {finding.subject for finding in found if finding.severity != "info"}
+        return {finding.subject for finding in found if finding.severity != "note"}
 
     def report(self, pair: MirrorPair) -> bool:
         """Return whether a link or joint of one of two bodies is reported."""

@@ -78,7 +78,7 @@ def _is_empty(link: Link) -> bool:
     return link.inertial is None and not link.collisions
 
 
-@rule("TRE009", "dummy-root", "info")
+@rule("TRE009", "dummy-root", "note")
 def dummy_root(robot: Facts) -> Violations:
     """The root link is empty and has the trunk as its fixed child.
 

@@ -73,7 +73,7 @@ def compare_joint_sets(robot: Facts) -> Violations:
         yield Violation(
             subject=renamed[0][0],
             source=next(j.source for j in robot.joints if j.name == renamed[0][0]),
-            severity="info",
+            severity="note",
             certainty="likely",
             message=f"{count(len(renamed), 'joint')} of {there} matched by a similar name: "
             f"{names([f'{a} is {b}' for a, b in renamed])}",

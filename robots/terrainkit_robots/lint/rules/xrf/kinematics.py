@@ -34,7 +34,7 @@ def compare_kinematics(robot: Facts) -> Violations:
         return
     severity: Severity | None = "warning" if gap.is_rotation_only else None
     if gap.is_base_offset and gap.base[0] != gap.base[1]:
-        severity = "info"
+        severity = "note"
     links = {link.name: link for link in robot.links}
     subject = gap.base[0] if gap.is_base_offset else gap.first
     yield Violation(

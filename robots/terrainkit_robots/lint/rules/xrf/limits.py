@@ -147,5 +147,5 @@ def compare_effort(robot: Facts) -> Violations:
             "effort limit",
             f"none in {without}{'' if has_actuators else note}; expected the limit of "
             f"{'this file' if limited else there}",
-            severity=None if has_actuators else "info",
+            severity=None if has_actuators else "note",
         )

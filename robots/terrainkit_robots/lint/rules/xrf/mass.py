@@ -82,7 +82,7 @@ def _missing_mass(robot: Facts, other: Facts) -> Violations:
             yield Violation(
                 subject=root,
                 source=robot.model.source,
-                severity="info",
+                severity="note",
                 message=f"mass that MuJoCo drops when it loads {file}: got {dropped:.5g} of "
                 f"{urdf.total_mass:.5g} kg; expected 0 kg, as for {truncate(mjcf.model.file.name)} "
                 f"with {mjcf.total_mass:.5g} kg; the URDF has no floating joint, so that {root} is "

@@ -92,7 +92,7 @@ def compare_actuator_order(robot: Facts) -> Violations:
         )
         yield _report_actuators(robot, "; ".join([between, *within]))
     elif within:
-        yield _report_actuators(robot, "; ".join(["both files agree", *within]), "info")
+        yield _report_actuators(robot, "; ".join(["both files agree", *within]), "note")
 
 
 def _actuator_difference(robot: Facts) -> str:

@@ -1,0 +1,85 @@
+"""Installed packages whose terrains, overlays or tasks fail."""
+
+import pytest
+
+MODULE = """
+import os, sys
+from dataclasses import dataclass
+import numpy as np
+from terrainkit.terrain import Terrain, parameter
+
+if os.environ.get("FAIL") == "import":
+    sys.exit(0)
+
+@dataclass(frozen=True, kw_only=True)
+class Dunes(Terrain):
+    height: float = parameter.height(0.0, 0.1)
+
+    def heights(self, grid, rng):
+        if os.environ.get("FAIL") == "heights":
+            sys.exit(0)
+        return np.full(grid.shape, self.height)
+"""
+
+ENTRY_POINTS = """
+[terrainkit.terrains]
+dunes = dune_pack:Dunes
+[terrainkit.overlays]
+ripples = dune_pack:Dunes
+[terrainkit.tasks]
+rover = dune_pack
+"""
+
+
+@pytest.fixture
+def dune_pack(tmp_path, monkeypatch):
+    """Install a package for child processes; the environment variable FAIL says where it fails."""
+    site = tmp_path / "site"
+    info = site / "dune_pack-1.0.dist-info"
+    info.mkdir(parents=True)
+    (site / "dune_pack.py").write_text(MODULE)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: dune_pack\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    monkeypatch.setenv("PYTHONPATH", str(site), prepend=":")
+
+
+SMALL = ("--rows", 2, "--cols", 2, "--border", 0, "--terrain", "dunes", "-o", "map.npz")
+IMPORT = "terrain dunes (dune_pack:Dunes) cannot be loaded: SystemExit: 0"
+BUILD = "patch (0, 0): terrain dunes (dune_pack:Dunes): SystemExit: 0"
+
+
+@pytest.mark.usefixtures("dune_pack")
+@pytest.mark.parametrize(
+    ("fails", "words", "told"),
+    [
+        ("import", ("generate", *SMALL), IMPORT),
+        ("import", ("list", "dunes"), IMPORT),
+        ("import", ("train", "rover"), "task rover (dune_pack) cannot be loaded: SystemExit: 0"),
+        (
+            "",
+            ("generate", "--overlay", "ripples", "-o", "map.npz"),
+            "overlay ripples (dune_pack:Dunes) cannot be loaded: overlay: got <class "
+            "'dune_pack.Dunes'>; expected a subclass of Overlay",
+        ),
+        ("heights", ("generate", *SMALL), BUILD),
+        ("heights", ("generate", *SMALL, "--jobs", 2), BUILD),
+    ],
+)
+def test_failing_plugin_is_one_line(terrainkit_process, monkeypatch, tmp_path, fails, words, told):
+    monkeypatch.setenv("FAIL", fails)
+    run = terrainkit_process(*words)
+    expected = (2, "", f"terrainkit: error: {told}\n")
+    assert (run.returncode, run.stdout, run.stderr) == expected
+    assert not (tmp_path / "map.npz").exists()
+
+
+@pytest.mark.usefixtures("dune_pack")
+def test_plugin_that_fails_later_is_one_line(terrainkit_process, monkeypatch):
+    assert terrainkit_process("generate", *SMALL).returncode == 0
+    monkeypatch.setenv("FAIL", "heights")
+    run = terrainkit_process("check-map", "map.npz")
+    assert (run.returncode, run.stderr) == (2, f"terrainkit: error: {BUILD}\n")
+    monkeypatch.setenv("FAIL", "import")
+    run = terrainkit_process("check-map", "map.npz")
+    assert run.returncode == 2
+    assert run.stderr == f"terrainkit: error: map.npz: config: terrains[0]: {IMPORT}\n"
