@@ -1,6 +1,8 @@
+import contextlib
 import dataclasses
 import os
 import resource
+import socket
 import subprocess
 from types import SimpleNamespace
 
@@ -18,6 +20,22 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 settings.register_profile("untimed", deadline=None)
 settings.load_profile("untimed")
+
+
+@pytest.fixture
+def make_viewer_server():
+    """Return a function that starts a server of the viewer on a free port."""
+    from terrainkit.views.viewer_server import viewer_server
+
+    with contextlib.ExitStack() as servers:
+
+        def make(host="localhost"):
+            with socket.socket() as free:
+                free.bind(("localhost", 0))
+                port = free.getsockname()[1]
+            return servers.enter_context(viewer_server(host, port))
+
+        yield make
 
 
 @pytest.fixture(scope="session")

@@ -3,9 +3,8 @@
 import socket
 import time
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import suppress
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -24,6 +23,7 @@ from terrainkit_cli.argument_types import (
     parse_settings,
 )
 from terrainkit_cli.parse import Command, positional
+from terrainkit_cli.signals import Terminated
 
 if TYPE_CHECKING:
     import viser
@@ -48,6 +48,7 @@ class View(Command):
 
     The command prints the address and runs until Ctrl+C. It needs no display: with the default
     host, forward the port of a remote machine (ssh -L 8080:localhost:8080) and open the address.
+    Web pages of other sites cannot connect to it.
     """
 
     source: Annotated[str, positional("MAP.npz|ROBOT|RUN")] = ""
@@ -71,7 +72,8 @@ class View(Command):
     """For a robot: value of a xacro argument of the file."""
 
     host: str = "localhost"
-    """Address that the server listens on; 0.0.0.0 is reachable from other machines."""
+    """Name or address that the server listens on; 0.0.0.0 is reachable from other machines, at the
+    name and the addresses of this one."""
 
     port: Annotated[int, Meta(ge=1, le=65535)] = 8080
     """Port that the server listens on; the next free one if it is in use."""
@@ -81,7 +83,7 @@ class View(Command):
         if not self.source:
             raise ConfigError("MAP.npz, ROBOT or RUN: missing; expected a map, a robot or a run")
         try:
-            import viser
+            from terrainkit.views.viewer_server import viewer_server
         except ModuleNotFoundError:
             raise ConfigError(
                 "view requires viser; install it with: pip install terrainkit[view]"
@@ -95,21 +97,20 @@ class View(Command):
                     f"--{option}: got the {kind} {self.source}; expected a {expected}"
                 )
         show = {"map": self._load_map, "robot": self._check_robot, "run": self._open_run}[kind]()
-        with redirect_stdout(StringIO()):  # viser prints a banner
-            server = viser.ViserServer(host=self.host, port=self.port, verbose=False)
-        try:
+        with viewer_server(self.host, self.port) as server:
             run = show(server)
-            address = f"http://{self.host}:{server.get_port()}"
+            host = f"[{self.host}]" if ":" in self.host else self.host
+            address = f"http://{host}:{server.get_port()}"
             render.result(f"{address} shows {self.source}; Ctrl+C ends it")
-            run()
-        finally:
-            server.stop()
+            with suppress(KeyboardInterrupt, Terminated):
+                run()
         return 0
 
     def _check_address(self) -> None:
         try:  # viser would wait forever for a server that cannot listen
-            with socket.socket() as trial:
-                trial.bind((self.host, 0))
+            family, kind, *_, address = socket.getaddrinfo(self.host, 0, type=socket.SOCK_STREAM)[0]
+            with socket.socket(family, kind) as trial:
+                trial.bind(address)
         except OSError as error:
             raise ConfigError(
                 f"--host: got {self.host}, which is not an address of this machine "
@@ -166,11 +167,11 @@ class View(Command):
 
 
 Show = Callable[["viser.ViserServer"], Callable[[], None]]
-"""A function that fills the scene, and returns a function that runs until it is interrupted."""
+"""A function that fills the scene, and returns a function that runs until a signal ends it."""
 
 
 def wait() -> None:
-    """Wait until the command is interrupted."""
+    """Wait until a signal ends the command."""
     while True:
         time.sleep(1.0)
 

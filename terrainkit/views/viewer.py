@@ -1,5 +1,6 @@
 """An interactive 3D view of a map in the browser, drawn by viser."""
 
+import html
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,7 +45,7 @@ def show_map(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
         ],
         "labels": _add_labels(server, terrain_map),
     }
-    server.gui.add_markdown(f"`{terrain_map!r}`")
+    server.gui.add_html(f'<code style="margin: 0.5em">{html.escape(repr(terrain_map))}</code>')
     for name, handles in parts.items():
         if handles:
             add_checkbox(server, name, handles)

@@ -1,22 +1,16 @@
-import socket
+import dataclasses
 from urllib.request import urlopen
 
 import numpy as np
 import pytest
-import viser
 
 import terrainkit as tk
 from terrainkit.views.viewer import show_map
 
 
 @pytest.fixture
-def server():
-    with socket.socket() as free:
-        free.bind(("localhost", 0))
-        port = free.getsockname()[1]
-    made = viser.ViserServer(host="localhost", port=port, verbose=False)
-    yield made
-    made.stop()
+def server(make_viewer_server):
+    return make_viewer_server()
 
 
 def make_map(preset):
@@ -65,3 +59,14 @@ def test_server_answers_in_browser(server):
     show_map(server, make_map("stairs"))
     with urlopen(f"http://localhost:{server.get_port()}", timeout=10) as response:
         assert response.status == 200
+
+
+def test_names_of_a_map_are_text(server, monkeypatch):
+    terrain_map, pages = make_map("stairs"), []
+    names = ("`</code><iframe srcdoc='<script>alert(1)</script>'>",) * len(
+        terrain_map.terrain_names
+    )
+    monkeypatch.setattr(server.gui, "add_html", pages.append)
+    show_map(server, dataclasses.replace(terrain_map, terrain_names=names))
+    assert "&lt;iframe" in pages[0]
+    assert "<iframe" not in pages[0]

@@ -1,29 +1,9 @@
-import socket
-
 import pytest
-import viser
 
 
 @pytest.fixture
-def make_server():
-    """Return a function that starts a server on a free port."""
-    servers = []
-
-    def make():
-        with socket.socket() as free:
-            free.bind(("localhost", 0))
-            port = free.getsockname()[1]
-        servers.append(viser.ViserServer(host="localhost", port=port, verbose=False))
-        return servers[-1]
-
-    yield make
-    for server in servers:
-        server.stop()
-
-
-@pytest.fixture
-def server(make_server):
-    return make_server()
+def server(make_viewer_server):
+    return make_viewer_server()
 
 
 @pytest.fixture

@@ -1,3 +1,5 @@
+import math
+
 import mujoco
 import numpy as np
 import pytest
@@ -5,6 +7,7 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.viewer.show_policy import PolicyView
+from tests.viewer_client import CAMERA, connect_to, send, update, wait_for
 
 
 @pytest.fixture
@@ -69,3 +72,25 @@ def test_map_policy_is_reset_to_the_selected_patch(server, shown):
 def test_policy_view_rejects_unknown_terrain(server):
     with pytest.raises(ConfigError, match="expected plane"):
         PolicyView(server, open_run("quadruped"), "hills")
+
+
+def test_invalid_messages_of_a_browser_do_not_end_the_view(server, view):
+    forward, *_ = view.commands
+    with connect_to(server) as client:
+        for value in (math.nan, math.inf, 1e9, "fast"):
+            send(client, update(forward, value))
+        send(client, update(view.falls, "many"))
+        send(client, update(view.column, "west"))
+        send(client, CAMERA | {"look_at": CAMERA["position"]})
+        send(client, CAMERA)
+        wait_for(server.get_clients)
+        send(client, update(forward, forward.max))
+        wait_for(lambda: forward.value == forward.max)
+        for _ in range(5):
+            view.step()
+            view.update_robot()
+        (browser,) = server.get_clients().values()
+        moved = view.robot.base.position[0]
+        assert browser.camera.position[0] == pytest.approx(CAMERA["position"][0] + moved, abs=0.1)
+    assert view.falls.value == "0"
+    assert np.isfinite(view.env.sim.qpos).all()
