@@ -27,7 +27,7 @@ BAR_DELAY = 0.5
 
 def result(text: str) -> None:
     """Print a result."""
-    print(_relative_paths(text))
+    _print(_relative_paths(text))
 
 
 def table(rows: Sequence[Sequence[str]]) -> None:
@@ -35,19 +35,30 @@ def table(rows: Sequence[Sequence[str]]) -> None:
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     for row in rows:
         cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        print("  ".join(cells).rstrip())
+        _print("  ".join(cells).rstrip())
 
 
 def help_page(text: str) -> None:
     """Print a help page; argparse does not wrap long names of options."""
     for line in text.splitlines():
-        print(textwrap.fill(line, width(), subsequent_indent="    ") if line else "")
+        _print(textwrap.fill(line, width(), subsequent_indent="    ") if line else "")
 
 
 def report(text: str) -> None:
     """Print a text that ends with a newline; characters unknown to the terminal are escaped."""
     _escape_unknown()
-    print(text, end="")
+    _print(text, end="")
+
+
+def _print(text: str, end: str = "\n") -> None:
+    """Print on stdout; once the reader is gone, as in `| head -1`, the command still does the rest.
+
+    What is left may be writing its files.
+    """
+    try:
+        print(text, end=end)
+    except BrokenPipeError:
+        drop_stdout()
 
 
 def styled(lines: "Iterator[tuple[Span, ...]]") -> None:

@@ -4,18 +4,30 @@ They hold only tensors and plain values, so that they can be read without execut
 """
 
 import io
+import math
+import os
 import warnings
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, TypedDict
+from typing import Annotated, Any, BinaryIO, Literal, TypedDict
 
 import msgspec
+from msgspec import Meta
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.files import open_regular
+
+TRAINING_KEYS = {"optimizer_state_dict", "processes", "logger"}
+"""Keys of the state of the training."""
+
+_MAYBE_NAN = {"heading", "speed", "goals", "success", "returns", "score"}
+"""Names of the numbers that may be NaN: none, or unknown."""
+
+_NON_NEGATIVE = {"_var", "_std", "step", "exp_avg_sq"}
+"""Names of the numbers of networks and of Adam that are not negative; integers never are."""
 
 
 class Checkpoint(TypedDict):
@@ -23,7 +35,7 @@ class Checkpoint(TypedDict):
 
     format: Literal["terrainkit checkpoint"]
     version: Literal[1]
-    iteration: int
+    iteration: Annotated[int, Meta(ge=0, lt=10**12)]
     robot: str
     joints: list[str]
     observed: dict[str, int]  # width of each observation group
@@ -51,9 +63,7 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
 
     try:
         with open_regular(path) as file:
-            parts = zipfile.ZipFile(file).infolist()
-            if any(part.compress_type != zipfile.ZIP_STORED for part in parts):
-                raise ConfigError(f"{path}: got a compressed file, which could expand to any size")
+            _check_archive(path, file)
             file.seek(0)
             with warnings.catch_warnings():  # of content that no checkpoint of terrainkit has
                 warnings.simplefilter("error")
@@ -70,9 +80,73 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
     return state
 
 
+def _check_archive(path: Path, file: BinaryIO) -> None:
+    """Raise ConfigError if a checksum differs; torch does not compare them."""
+    archive = zipfile.ZipFile(file)
+    parts = archive.infolist()
+    if any(part.compress_type != zipfile.ZIP_STORED for part in parts):
+        raise ConfigError(f"{path}: got a compressed file, which could expand to any size")
+    if sum(part.file_size for part in parts) > os.fstat(file.fileno()).st_size:
+        raise ConfigError(f"{path} is damaged: its parts overlap")
+    if damaged := archive.testzip():
+        raise ConfigError(f"{path} is damaged: the checksum of {damaged} differs")
+
+
 def policy_state(state: Mapping[str, Any]) -> Checkpoint:
     """Return the part of a checkpoint without which there is no policy or critic."""
     return msgspec.convert(state, Checkpoint)
+
+
+def check_state(name: str, got: Any, expected: Any) -> None:
+    """Raise ConfigError unless a part of a checkpoint has the form of another, and is finite.
+
+    Args:
+        name: Path of the part, for the error.
+        got: The part: tensors and numbers, text and None, in dicts, lists and tuples.
+        expected: A part with the required keys, types, and dtypes and shapes of tensors. A list has
+            one element, the form of all, and `...` is for anything.
+    """
+    if expected is ...:
+        return
+    if isinstance(expected, Mapping) and isinstance(got, Mapping):
+        for key, value in expected.items():
+            if key not in got:
+                raise ConfigError(f"{name}.{key}: got nothing; expected {_form(value)}")
+            check_state(f"{name}.{key}", got[key], value)
+    elif isinstance(expected, list) and isinstance(got, list):
+        for index, value in enumerate(got):
+            check_state(f"{name}.{index}", value, expected[0])
+    elif (form := _form(got)) != _form(expected):
+        raise ConfigError(f"{name}: got {form}; expected {_form(expected)}")
+    else:
+        _check_numbers(name, got)
+
+
+def _check_numbers(name: str, got: Any) -> None:
+    """Raise ConfigError if a number or a tensor is not finite, or negative where it cannot be."""
+    import torch
+
+    if not isinstance(got, torch.Tensor | float | int):
+        return
+    values = got if isinstance(got, torch.Tensor) else torch.tensor(float(got), dtype=torch.float64)
+    key = name.rpartition(".")[2]
+    is_signed = "float" in _form(got) and key not in _NON_NEGATIVE
+    valid = values.isfinite() & (values >= (-math.inf if is_signed else 0))
+    if key in _MAYBE_NAN:
+        valid |= values.isnan()
+    if not valid.all():
+        wrong = values[~valid].flatten()[0].item()
+        expected = "finite numbers" if is_signed else "finite numbers >= 0"
+        raise ConfigError(f"{name}: got {wrong:g}; expected {expected}")
+
+
+def _form(value: Any) -> str:
+    """Return the type of a value, and the dtype and shape of a tensor."""
+    if value is ...:
+        return "a value"
+    if not hasattr(value, "dtype"):
+        return type(value).__name__
+    return f"{str(value.dtype).removeprefix('torch.')} {tuple(value.shape)}"
 
 
 @contextmanager
@@ -81,7 +155,7 @@ def open_checkpoint(
 ) -> Iterator[dict[str, Any]]:
     """Yield the content of a checkpoint after checking that it fits a robot and its observations.
 
-    Errors in the block, such as torch's about weights that do not fit, become ConfigErrors.
+    Errors in the block, such as those of `check_state`, become ConfigErrors that name the file.
 
     Args:
         path: The checkpoint.
@@ -106,8 +180,6 @@ def open_checkpoint(
             )
     try:
         yield state
-    except ConfigError:
-        raise
-    except (RuntimeError, ValueError, LookupError, TypeError, AttributeError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise ConfigError(f"{path} does not fit the networks of its task: {reason}") from error
+    except (ConfigError, RuntimeError, LookupError, ValueError, TypeError, OverflowError) as error:
+        reason = " ".join(str(error).split())[:300]
+        raise ConfigError(f"{path} does not fit its robot, task and map: {reason}") from error

@@ -3,6 +3,7 @@
 The ground is a mesh without simplification, and each solid a cube, a cylinder or a convex mesh.
 """
 
+import errno
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,16 +36,17 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
 
     Raises:
         ExportError: if usd-core is not installed, or the ground has several friction coefficients.
+        OSError: if the file cannot be written.
     """
     try:
-        from pxr import Kind, Usd, UsdGeom
+        from pxr import Kind, Tf, Usd, UsdGeom
     except ModuleNotFoundError:
         raise ExportError(
             f"{path.suffix} requires usd-core; install it with: pip install terrainkit[usd]"
         ) from None
     require_one_ground_friction(terrain_map, "a USD mesh")
     config = terrain_map.config
-    usd_stage = Usd.Stage.CreateNew(str(path))
+    usd_stage = Usd.Stage.CreateInMemory()
     UsdGeom.SetStageUpAxis(usd_stage, UsdGeom.Tokens.z)
     UsdGeom.SetStageMetersPerUnit(usd_stage, 1.0)
     root = UsdGeom.Xform.Define(usd_stage, "/terrain")
@@ -55,7 +57,10 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     _add_solids(usd_stage, terrain_map.solids, config.contact)
     _add_points(usd_stage, "/terrain/spawns", terrain_map.spawns)
     _add_points(usd_stage, "/terrain/goals", terrain_map.goals)
-    usd_stage.GetRootLayer().Save()
+    try:
+        usd_stage.GetRootLayer().Export(str(path))
+    except Tf.ErrorException as error:  # its text has the path of the temporary file
+        raise OSError(errno.EIO, "usd-core failed; the disk may be full") from error
 
 
 def _add_mesh(usd_stage: Any, path: str, mesh: TriMesh) -> Any:

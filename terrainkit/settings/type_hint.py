@@ -39,6 +39,7 @@ Interval = Annotated[tuple[float, float], SORTED]
 NonNegativeInterval = Annotated[tuple[NonNegativeFloat, NonNegativeFloat], SORTED]
 
 _MAX_INT = 2**63
+_MIN_FLOAT, _MAX_FLOAT = 1e-12, 1e9  # beyond them, squares and ratios overflow single precision
 _NAMES = {int: "an integer", float: "a number", str: "a string", bool: "true or false"}
 _LIMITS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
@@ -130,19 +131,25 @@ def _to_python(value: Any) -> Any:
 
 
 def _is_valid(value: Any, constraints: Mapping[str, Any]) -> bool:
-    """Return whether numbers are finite, and the constraints that msgspec does not know hold."""
+    """Return whether numbers are in range, and the constraints that msgspec does not know hold."""
     items = value if isinstance(value, tuple) else (value,)
     numbers = [item for item in items if isinstance(item, int | float)]
     return (
         all(-_MAX_INT < item < _MAX_INT for item in numbers if isinstance(item, int))
-        and all(math.isfinite(item) for item in numbers if isinstance(item, float))
+        and all(_is_in_range(item) for item in numbers if isinstance(item, float))
         and ("sorted" not in constraints or numbers == sorted(numbers))
         and ("unique" not in constraints or len({*map(repr, items)}) == len(items))
     )
 
 
+def _is_in_range(value: float) -> bool:
+    return value == 0 or _MIN_FLOAT <= abs(value) <= _MAX_FLOAT
+
+
 def show(value: object) -> str:
     """Return `value` as an error message quotes it."""
+    if isinstance(value, float) and math.isfinite(value) and not _is_in_range(value):
+        return f"{value!r}, whose size is not from {_MIN_FLOAT:g} to {_MAX_FLOAT:g}"
     if isinstance(value, int) and abs(value) >= _MAX_INT:  # Python does not print 5000 digits
         return "an integer beyond 64 bits"
     if isinstance(value, tuple):

@@ -182,6 +182,20 @@ def test_pipe_without_reader_is_not_an_error(command):
     assert (run.returncode, run.stderr) == (0, "")
 
 
+@pytest.mark.parametrize(
+    ("command", "files"),
+    [
+        ("feasibility small.npz --robot quadruped -o report", ["report.json", "report.png"]),
+        ("evaluate quadruped --seconds 0.04 --num-envs 2 -o result.json", ["result.json"]),
+    ],
+)
+def test_files_are_written_without_a_reader_of_stdout(small_map, command, files, tmp_path):
+    assert small_map == "small.npz"
+    run = bash(f"cd {tmp_path}; export PYTHONUNBUFFERED=1; terrainkit {command} | true")
+    assert run.stderr == ""
+    assert [name for name in files if not (tmp_path / name).is_file()] == []
+
+
 @pytest.mark.parametrize("command", ["list", "check-robot --help", "check-robot quadruped"])
 def test_closed_stdout_is_not_an_error(command):
     run = bash(f"terrainkit {command} >&-")

@@ -1,4 +1,5 @@
 import pickle
+import re
 import resource
 import warnings
 import zipfile
@@ -11,6 +12,7 @@ import pytest
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.checkpoint import (
     Checkpoint,
+    check_state,
     policy_state,
     read_checkpoint,
     save_checkpoint,
@@ -76,19 +78,84 @@ def test_read_checkpoint_rejects_truncated_files(tmp_path, state):
             read_checkpoint(path)
 
 
-def test_damaged_checkpoint_raises_one_line(tmp_path, state):
+def test_damaged_checkpoint_raises_one_line_or_has_the_same_content(tmp_path, state):
     save_checkpoint(tmp_path / "whole.pt", state)
     data = bytearray((tmp_path / "whole.pt").read_bytes())
-    path, draw = tmp_path / "model.pt", np.random.default_rng(0)
-    for _ in range(100):
+    path, draw, rejected = tmp_path / "model.pt", np.random.default_rng(0), 0
+    for flips in (1, 5) * 100:
         damaged = bytearray(data)
-        for at in draw.integers(0, len(data), 5):
+        for at in draw.integers(0, len(data), flips):
             damaged[at] ^= int(draw.integers(1, 256))
         path.write_bytes(damaged)
         try:
-            read_checkpoint(path)
+            read = read_checkpoint(path)
         except ConfigError as error:
-            assert "\n" not in str(error)  # noqa: PT017 (damage may go unnoticed in a weight)
+            assert "\n" not in str(error)  # noqa: PT017
+            rejected += 1
+        else:  # the padding of the archive
+            assert torch.equal(read["actor_state_dict"]["weight"], torch.arange(6.0).reshape(2, 3))
+            assert read["processes"][0]["levels"].tolist() == [0, 1, 2, 3]
+    assert rejected > 50
+
+
+def test_flipped_bit_in_a_weight_is_a_wrong_checksum(tmp_path, state):
+    path, weight = tmp_path / "model.pt", state["actor_state_dict"]["weight"].numpy().tobytes()
+    save_checkpoint(path, state)
+    data = bytearray(path.read_bytes())
+    data[data.index(weight)] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ConfigError, match=r"model\.pt is damaged: the checksum of archive/data/0"):
+        read_checkpoint(path)
+
+
+def test_archive_whose_parts_overlap_is_rejected(tmp_path, state):
+    path = tmp_path / "model.pt"
+    save_checkpoint(path, state)
+    with zipfile.ZipFile(path, "a") as archive:
+        part = archive.getinfo("archive/data.pkl")
+        archive.filelist += [part] * 100
+        archive.writestr("archive/more", b"")  # writes the table of contents again
+    with pytest.raises(ConfigError, match="is damaged: its parts overlap"):
+        read_checkpoint(path)
+
+
+FORM = {
+    "weight": torch.zeros(2, 3),
+    "heading": torch.zeros(2),
+    "count": torch.tensor(1),
+    "rate": 0.5,
+    "means": [0.5],
+    "levels": ...,
+}
+
+
+def test_state_of_the_same_form_is_accepted():
+    state = FORM | {"heading": torch.tensor([1.0, torch.nan]), "levels": 3, "more": 1}
+    check_state("part", state | {"means": [1.0, 2.0, -3.0]}, FORM)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"weight": torch.zeros(3, 2)}, "weight: got float32 (3, 2); expected float32 (2, 3)"),
+        ({"weight": torch.zeros(2, 3).double()}, "weight: got float64 (2, 3); expected float32 (2"),
+        ({"weight": torch.full((2, 3), torch.nan)}, "weight: got nan; expected finite numbers"),
+        ({"heading": torch.full((2,), torch.inf)}, "heading: got inf; expected finite numbers"),
+        ({"count": torch.tensor(-2)}, "count: got -2; expected finite numbers >= 0"),
+        ({"rate": "0.5"}, "rate: got str; expected float"),
+        ({"rate": True}, "rate: got bool; expected float"),
+        ({"means": [0.5, None]}, "means.1: got NoneType; expected float"),
+        ({"means": 3}, "means: got int; expected list"),
+    ],
+)
+def test_state_of_another_form_is_named(change, message):
+    with pytest.raises(ConfigError, match=f"^part.{re.escape(message)}"):
+        check_state("part", FORM | change, FORM)
+
+
+def test_missing_part_of_a_state_is_named():
+    with pytest.raises(ConfigError, match=r"^part.rate: got nothing; expected float$"):
+        check_state("part", {k: v for k, v in FORM.items() if k != "rate"}, FORM)
 
 
 class _Harm:

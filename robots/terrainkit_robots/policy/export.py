@@ -3,6 +3,7 @@
 import io
 import json
 import warnings
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import torch
 from tensordict import TensorDict
 
 from terrainkit.errors import ExportError
-from terrainkit.files.atomic_write import atomic_write, check_target
+from terrainkit.files.atomic_write import atomic_folder, atomic_write, check_target
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
@@ -106,18 +107,21 @@ def export_policy(
     onnx_actions = np.asarray(session.run(["actions"], {"obs": obs.numpy()})[0])
     onnx_error = verify_actions(onnx_actions, actions, ONNX_FILE)
     errors = onnx_error, verify_actions(script_actions, actions, TORCHSCRIPT_FILE)
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise ExportError(f"cannot write {folder}: {error.strerror or error}") from error
-    with atomic_write(folder / JSON_FILE, overwrite=overwrite) as path:
-        path.write_text(text, encoding="utf-8")
-        path.with_name(ONNX_FILE).write_bytes(onnx_data)
-        path.with_name(TORCHSCRIPT_FILE).write_bytes(script_file.getvalue())
-        for name, data in other_files.items():
-            path.with_name(name).write_bytes(data)
+    contents = {JSON_FILE: text.encode(), ONNX_FILE: onnx_data, **other_files}
+    contents[TORCHSCRIPT_FILE] = script_file.getvalue()
+    if folder.is_dir():  # it may have other files
+        with atomic_write(folder / JSON_FILE, overwrite=overwrite) as path:
+            _write_files(path.parent, contents)
+    else:
+        with atomic_folder(folder) as new:
+            _write_files(new, contents)
     sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
     return ExportResult(files=files, errors=errors, **sizes)
+
+
+def _write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    for name, data in contents.items():
+        (folder / name).write_bytes(data)
 
 
 def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> bytes:

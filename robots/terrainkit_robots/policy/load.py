@@ -9,7 +9,7 @@ from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
-from terrainkit_robots.checkpoint import open_checkpoint
+from terrainkit_robots.checkpoint import check_state, open_checkpoint
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec, Run, changed_robot_files, last_checkpoint
 from terrainkit_robots.rl.runner import OBS_GROUPS, runner_config
@@ -45,6 +45,7 @@ def load_actor(run: Run, env: LeggedEnv) -> MLPModel:
         config = runner_config(run.task)["actor"]
         config.pop("class_name")
         actor = MLPModel(env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **config)
+        check_state("actor_state_dict", state["actor_state_dict"], actor.state_dict())
         actor.load_state_dict(state["actor_state_dict"])
     return actor.to(env.device).eval()
 

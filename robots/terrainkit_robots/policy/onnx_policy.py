@@ -1,20 +1,25 @@
 """Open a policy from outside: an ONNX file, and the JSON that describes it as in an export."""
 
 from collections.abc import Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from math import isclose
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any
+from weakref import finalize
 
 import msgspec
-import numpy as np
 import onnxruntime
 import torch
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit.files.isolated import IsolatedError, run_isolated
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.export import JSON_FILE, METADATA_KEY, describe_policy
+from terrainkit_robots.policy.onnx_model import LIMITS, call_model, load_model, make_session
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
@@ -40,7 +45,7 @@ _OF_THE_ROBOT = ("joints.frictionloss", "joints.passive_damping")
 
 
 class _Description(msgspec.Struct):
-    joints: dict[str, list[Any]]
+    joints: dict[str, list[str | float | bool | None]]
     task: dict[str, Any] = {}
 
 
@@ -48,29 +53,48 @@ class OnnxPolicy:
     """A policy without memory in an ONNX file, from observations (n, k) to actions (n, a)."""
 
     def __init__(self, path: Path) -> None:
-        """Load the file and run it once; raise ConfigError if it is not such a policy."""
-        options, self.__name__ = onnxruntime.SessionOptions(), path.name
-        options.intra_op_num_threads, options.log_severity_level = 1, 4
-        data = _read(path)
+        """Load the file and call it once; raise ConfigError if it is not such a policy."""
+        self.__name__ = path.name
         try:
-            self.session = onnxruntime.InferenceSession(data, options)
-        except Exception as error:  # onnxruntime's errors have no common class
-            raise ConfigError(f"{path} is not an ONNX file: {_one_line(error)}") from error
-        inputs = [(each.name, *each.shape) for each in self.session.get_inputs()]
-        try:
-            ((self._input, batch, self.num_obs),) = inputs
-            self._is_single = batch == 1
-            self.num_actions: int = self(torch.zeros(2, self.num_obs)).reshape(2, -1).shape[1]
-        except Exception as error:
-            got = f"{path} is not a policy: got the inputs {listing(map(str, inputs))}"
-            expected = "expected one of shape (n, k) or (1, k), and actions of shape (n, a)"
-            raise ConfigError(f"{got}; {expected}: {_one_line(error)}") from error
+            loaded = run_isolated(load_model, _read(path), path.parent, METADATA_KEY, limits=LIMITS)
+        except IsolatedError as error:
+            raise ConfigError(f"{path} is not a policy: {error}") from error
+        self.num_obs, self.num_actions = loaded["sizes"].tolist()
+        self.description = loaded["text"].tobytes()
+        self._calls: SimpleQueue[Any] = SimpleQueue()
+        session = make_session(loaded["model"].tobytes())
+        # A signal interrupts waiting for a thread, but not a call. The process does not wait for
+        # this thread when it ends.
+        Thread(target=_serve, args=(session, self._calls), daemon=True).start()
+        finalize(self, self._calls.put, None)
 
     def __call__(self, obs: torch.Tensor) -> FloatArray:
-        """Return actions (n, a) for observations (n, k)."""
-        rows = obs.numpy(force=True)
-        parts = np.split(rows, len(rows)) if self._is_single else [rows]
-        return np.concatenate([self.session.run(None, {self._input: part})[0] for part in parts])
+        """Return actions (n, a) for observations (n, k).
+
+        Raises:
+            ConfigError: If the model fails, or exceeds the limits of :mod:`.onnx_model`.
+        """
+        result: Future[FloatArray] = Future()
+        options = onnxruntime.RunOptions()
+        options.log_severity_level = 4
+        self._calls.put((obs.numpy(force=True), options, result))
+        try:
+            return result.result(LIMITS.seconds)
+        except TimeoutError:
+            raise ConfigError(f"{self.__name__} takes more than {LIMITS.seconds:g} s") from None
+        except ConfigError as error:
+            raise ConfigError(f"{self.__name__} {_one_line(error)}") from error
+        finally:
+            options.terminate = True  # ends the call if it is still running
+
+
+def _serve(session: onnxruntime.InferenceSession, calls: "SimpleQueue[Any]") -> None:
+    """Answer calls until one is None."""
+    for obs, options, result in iter(calls.get, None):
+        try:
+            result.set_result(call_model(session, obs, options))
+        except Exception as error:
+            result.set_exception(error)
 
 
 def open_onnx(path: Path, robot: str | Path) -> PolicySpec:
@@ -86,11 +110,10 @@ def open_onnx(path: Path, robot: str | Path) -> PolicySpec:
             describe the environment that terrainkit builds from it.
     """
     policy, found, beside = OnnxPolicy(path), get_task(robot), path.with_name(JSON_FILE)
-    metadata = policy.session.get_modelmeta().custom_metadata_map
-    if not beside.is_file() and METADATA_KEY not in metadata:
+    if not beside.is_file() and not policy.description:
         got = f"got no {JSON_FILE} beside it, nor in its metadata (key {METADATA_KEY})"
         raise ConfigError(f"{path}: {got}; terrainkit export writes both")
-    text = _read(beside) if beside.is_file() else metadata[METADATA_KEY]
+    text = _read(beside) if beside.is_file() else policy.description
     source = str(beside) if beside.is_file() else f"{JSON_FILE} in {path}"
     try:
         document = msgspec.json.decode(text, type=dict[str, Any])
@@ -109,7 +132,7 @@ def open_onnx(path: Path, robot: str | Path) -> PolicySpec:
                     if at in expected:
                         other = f"expected {expected[at]}, as in task and joints"
                     raise ConfigError(f"{at}: got {str(got)[:80]}; {other}")
-    except (msgspec.DecodeError, RecursionError, ConfigError) as error:
+    except (msgspec.DecodeError, UnicodeError, RecursionError, ConfigError) as error:
         raise ConfigError(f"{source}: {_one_line(error)}") from error
     sizes = built["observation"]["size"], env.num_actions
     if (policy.num_obs, policy.num_actions) != sizes:
@@ -150,7 +173,10 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:
 
 def _is_close(got: Any, built: Any) -> bool:
     numbers = isinstance(got, int | float) and isinstance(built, int | float)
-    return isclose(got, built, rel_tol=1e-5, abs_tol=1e-6) if numbers else bool(got == built)
+    try:
+        return isclose(got, built, rel_tol=1e-5, abs_tol=1e-6) if numbers else bool(got == built)
+    except OverflowError:  # an integer beyond the range of float
+        return False
 
 
 def _read(path: Path) -> bytes:

@@ -106,5 +106,5 @@ class Gait:
         walks = moving[:, None] & (self.period > 0)
         swings = walks & (foot_phase < self._swing_fraction)
         gait_phase = np.hstack([np.sin(angle), np.cos(angle)]) * walks
-        swing_phase = np.where(swings, foot_phase / self._swing_fraction, 0)
+        swing_phase = np.where(swings, foot_phase / (self._swing_fraction or 1.0), 0)
         return gait_phase.astype(np.float32), swing_phase.astype(np.float32)

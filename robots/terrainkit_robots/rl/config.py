@@ -14,7 +14,6 @@ from terrainkit.curriculum import SamplerName
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import Config
 from terrainkit.settings.type_hint import (
-    MAX_VALUE,
     Fraction,
     Interval,
     NonNegativeFloat,
@@ -24,7 +23,6 @@ from terrainkit.settings.type_hint import (
 )
 
 HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
-ObservationFactor = Annotated[float, Meta(ge=0, le=MAX_VALUE)]
 ScanPoints = Annotated[tuple[float, ...], Meta(min_length=1)]
 Activation = Literal[
     "elu", "selu", "relu", "crelu", "lrelu", "tanh", "sigmoid", "softplus", "gelu", "swish", "mish"
@@ -243,15 +241,15 @@ class Termination(Config):
 class ObsScales(Config):
     """Scales of the observations."""
 
-    lin_vel: ObservationFactor = 2.0
+    lin_vel: NonNegativeFloat = 2.0
     """Scale of linear velocities and their commands."""
-    ang_vel: ObservationFactor = 0.25
+    ang_vel: NonNegativeFloat = 0.25
     """Scale of angular velocities and their command."""
-    dof_pos: ObservationFactor = 1.0
+    dof_pos: NonNegativeFloat = 1.0
     """Scale of joint positions."""
-    dof_vel: ObservationFactor = 0.05
+    dof_vel: NonNegativeFloat = 0.05
     """Scale of joint velocities."""
-    height_measurements: ObservationFactor = 5.0
+    height_measurements: NonNegativeFloat = 5.0
     """Scale of the height scan."""
 
 
@@ -270,19 +268,19 @@ class Normalization(Config):
 class Noise(Config):
     """Uniform noise on the observations of the policy, to either side, before the scales."""
 
-    noise_level: ObservationFactor = 1.0
+    noise_level: NonNegativeFloat = 1.0
     """Factor on all noise; 0 for none."""
-    dof_pos: ObservationFactor = 0.01
+    dof_pos: NonNegativeFloat = 0.01
     """Noise of joint positions [rad]."""
-    dof_vel: ObservationFactor = 1.5
+    dof_vel: NonNegativeFloat = 1.5
     """Noise of joint velocities [rad/s]."""
-    ang_vel: ObservationFactor = 0.2
+    ang_vel: NonNegativeFloat = 0.2
     """Noise of the base angular velocity [rad/s]."""
-    lin_vel: ObservationFactor = 0.1
+    lin_vel: NonNegativeFloat = 0.1
     """Noise of the base linear velocity, if it is observed [m/s]."""
-    gravity: ObservationFactor = 0.05
+    gravity: NonNegativeFloat = 0.05
     """Noise of the gravity direction."""
-    height_measurements: ObservationFactor = 0.1
+    height_measurements: NonNegativeFloat = 0.1
     """Noise of the height scan [m]."""
 
 
@@ -290,7 +288,7 @@ class Noise(Config):
 class Sim(Config):
     """Physics simulation."""
 
-    dt: Annotated[float, Meta(gt=0, le=0.1)] = 0.005
+    dt: Annotated[float, Meta(ge=1e-6, le=0.1)] = 0.005
     """Time step [s]."""
     iterations: PositiveInt = 10
     """Largest number of solver iterations."""

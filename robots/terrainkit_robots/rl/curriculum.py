@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum import SAMPLERS, CommandProgress, assign_spawns
 from terrainkit.views.curriculum_picture import draw_statistics
+from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl.config import Terrain
 from terrainkit_robots.rl.terrain import Ground
 
@@ -56,4 +57,5 @@ class TerrainCurriculum:
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore a state; the number of robots may differ."""
+        check_state("curriculum", state, self.state_dict() | {"levels": ..., "columns": ...})
         self.sampler.load_state_dict(state)

@@ -12,6 +12,7 @@ from tensordict import TensorDict
 
 from terrainkit.curriculum.waypoints import Waypoints
 from terrainkit.errors import ConfigError
+from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl import observations
 from terrainkit_robots.rl.commands import Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
@@ -326,21 +327,28 @@ class LeggedEnv(VecEnv):
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore a state; if the number of environments differs, restore only the curriculum."""
+        parts = self.state_dict()
+        check_state("env", state, dict.fromkeys(parts, ...))
         self.curriculum.load_state_dict(state["curriculum"])
         arrays, saved = self._arrays(), state["arrays"]
-        if len(saved["episode_length"]) != self.num_envs:
+        num_envs = len(state["curriculum"]["levels"])
+        if num_envs != self.num_envs and num_envs == len(saved["episode_length"]):
             self.reset()
             return
-        if wrong := [k for k, a in arrays.items() if k not in saved or saved[k].shape != a.shape]:
-            raise ConfigError(
-                f"the checkpoint's {wrong[0]} belongs to another robot, task or version of "
-                "terrainkit; with another env.num_envs, its networks and curricula can be used"
-            )
+        try:
+            check_state("env", state, parts | {"curriculum": ...})
+        except ConfigError as error:
+            hint = "with another env.num_envs, the networks and the curriculum can be used"
+            raise ConfigError(f"{error}; {hint}") from error
         for name, array in arrays.items():
             array[...] = saved[name].numpy()
+        if self.waypoints and (self.waypoints.index > self.waypoints.numbers).any():
+            largest = self.waypoints.index.max()
+            raise ConfigError(f"next_goal: got {largest}; expected no more than the robot has")
         apply_params(self.sim, self.params)
         self.rng.bit_generator.state = state["rng"]
-        self._observations = TensorDict(state["observations"], [self.num_envs]).to(self.device)
+        groups = {name: state["observations"][name] for name in parts["observations"]}
+        self._observations = TensorDict(groups, [self.num_envs]).to(self.device)
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""

@@ -105,8 +105,7 @@ def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     log_standing = np.float32(np.log(STANDING_TRACKING))
     width_at_rest = np.float32(cfg.tracking_sigma)
     widths = (np.where(s > 0, -s / log_standing, width_at_rest) for s in squares)
-    with np.errstate(over="ignore"):  # of a tiny width: exp(-inf) is 0
-        lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
+    lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
     moving = is_moving(commands)
     only_yaw, only_lin = moving & (squares[0] == 0), moving & (squares[1] < MIN_YAW_RATE**2)
     return lin * np.where(only_yaw, yaw, 1), yaw * np.where(only_lin, lin, 1)

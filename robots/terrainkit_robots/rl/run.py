@@ -21,7 +21,7 @@ from terrainkit.files.atomic_write import atomic_folder, atomic_write
 from terrainkit.settings.schema import Config
 from terrainkit.settings.text import expected_names
 from terrainkit.settings.toml_text import read_text
-from terrainkit_robots.checkpoint import read_checkpoint
+from terrainkit_robots.checkpoint import TRAINING_KEYS, read_checkpoint
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE, Robot
@@ -229,7 +229,7 @@ def parts_to_load(
                 f"{' and '.join(changed)} changed since {run.folder} was trained; with a copy of "
                 "the robot or another --terrain, a new run starts with its networks"
             )
-        if "processes" in read_checkpoint(last_checkpoint(run)):
+        if TRAINING_KEYS & read_checkpoint(last_checkpoint(run)).keys():
             return None
     rates = [(each.learning_rate, each.schedule) for each in (task.algorithm, run.task.algorithm)]
     is_plane, was_plane = (each.terrain.collision == "plane" for each in (task, run.task))

@@ -19,7 +19,12 @@ from rsl_rl.runners import OnPolicyRunner
 from rsl_rl.utils.logger import Logger
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.checkpoint import open_checkpoint, save_checkpoint
+from terrainkit_robots.checkpoint import (
+    TRAINING_KEYS,
+    check_state,
+    open_checkpoint,
+    save_checkpoint,
+)
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.symmetry import has_symmetry
@@ -105,16 +110,24 @@ class MetricsLogger(Logger):
 
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        names = ("tot_timesteps", "tot_time", "cur_reward_sum", "cur_episode_length")
+        names = ("tot_timesteps", "cur_reward_sum", "cur_episode_length")
         means = {"rewbuffer": list(self.rewbuffer), "lenbuffer": list(self.lenbuffer)}
-        return {name: getattr(self, name) for name in names} | means
+        own = {name: getattr(self, name) for name in names}
+        return own | means | {"tot_time": float(self.tot_time)}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; those per environment only if their number is the same."""
+        expected = self.state_dict() | {"rewbuffer": [0.0], "lenbuffer": [0.0]}
+        sums = ("cur_reward_sum", "cur_episode_length")
+        is_same = any(np.shape(state.get(name, 0)) == (self.num_envs,) for name in sums)
+        check_state("logger", state, expected | ({} if is_same else dict.fromkeys(sums, ...)))
+        rewards, lengths = (len(state[name]) for name in ("rewbuffer", "lenbuffer"))
+        if rewards != lengths:
+            raise ConfigError(f"logger.rewbuffer: got {rewards} numbers; expected {lengths}")
         self.rewbuffer.extend(state["rewbuffer"])
         self.lenbuffer.extend(state["lenbuffer"])
         self.tot_timesteps, self.tot_time = state["tot_timesteps"], state["tot_time"]
-        if len(state["cur_reward_sum"]) == self.num_envs:
+        if is_same:
             self.cur_reward_sum.copy_(state["cur_reward_sum"])
             self.cur_episode_length.copy_(state["cur_episode_length"])
 
@@ -214,10 +227,20 @@ class LeggedRunner(OnPolicyRunner):
         parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
         joints = self.env.robot.spec.joint_order
         with open_checkpoint(Path(path), joints, self.env.obs_sizes) as state:
-            if "processes" not in state:
+            networks = self.alg.save()
+            for name in (f"{part}_state_dict" for part in ("actor", "critic") if parts.get(part)):
+                check_state(name, state[name], networks[name])
+            if not TRAINING_KEYS & state.keys():
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
-            self.alg.load(state, parts, strict)
+            process = {"env": ..., "random": {"cpu": torch.get_rng_state()}}
+            adam = {"state": ..., "param_groups": [{"lr": 0.0}]}
+            training = {"optimizer_state_dict": adam, "logger": {}, "processes": [process]}
+            check_state("state", state, training)
+            if not state["processes"]:
+                raise ConfigError("state.processes: got none; expected one or more")
+            optimizer = self._optimizer_state(state) if parts.get("optimizer") else {}
+            self.alg.load(state | {"optimizer_state_dict": optimizer}, parts, strict)
             processes = state["processes"]  # additional processes use the last state
             process = processes[min(self.gpu_global_rank, len(processes) - 1)]
             if load_cfg is not None:
@@ -256,6 +279,22 @@ class LeggedRunner(OnPolicyRunner):
             "processes": processes,
             "logger": self.logger.state_dict(),
         }
+
+    def _optimizer_state(self, state: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what the optimizer loads from a checkpoint: the moments and the learning rate.
+
+        The other settings are those of the task.
+        """
+        saved, optimizer = state["optimizer_state_dict"], self.alg.optimizer
+        groups = optimizer.state_dict()["param_groups"]
+        parameters = enumerate(each for group in optimizer.param_groups for each in group["params"])
+        step = torch.tensor(0.0)
+        moments = {k: {"step": step, "exp_avg": each, "exp_avg_sq": each} for k, each in parameters}
+        is_new = not state["iteration"] and saved["state"] == {}  # before the first update
+        check_state("optimizer_state_dict.state", saved["state"], {} if is_new else moments)
+        rates = [{"lr": group["lr"]} for group in saved["param_groups"]]
+        new = [group | rate for group, rate in zip(groups, rates, strict=True)]
+        return {"state": saved["state"], "param_groups": new}
 
     def _stop_requested(self) -> bool:
         requested = torch.tensor(float(bool(self._should_stop())), device=self.device)

@@ -1,3 +1,4 @@
+import resource
 import sys
 
 import numpy as np
@@ -71,4 +72,16 @@ def test_usd_without_usd_core_is_one_line(parkour, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
     with pytest.raises(ExportError, match=r"pip install terrainkit\[usd\]"):
         parkour.save(tmp_path / "map.usda")
+    assert not list(tmp_path.iterdir())
+
+
+def test_full_disk_is_one_line_without_the_temporary_path(parkour, tmp_path):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.prlimit(0, resource.RLIMIT_FSIZE, (2000, limits[1]))  # fixtures replace setrlimit
+    try:
+        message = r"cannot write .*/map\.usdc: usd-core failed; the disk may be full$"
+        with pytest.raises(ExportError, match=message):
+            parkour.save(tmp_path / "map.usdc")
+    finally:
+        resource.prlimit(0, resource.RLIMIT_FSIZE, limits)
     assert not list(tmp_path.iterdir())

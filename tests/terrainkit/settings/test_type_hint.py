@@ -78,6 +78,16 @@ def test_convert_makes_floats_of_integers_in_lists():
         (None, float, "key: got None; expected a number"),
         (math.nan, float, "key: got nan; expected a number"),
         (-math.inf, float | None, "key: got -inf; expected a number, or none"),
+        (
+            -1e39,
+            float,
+            "key: got -1e\\+39, whose size is not from 1e-12 to 1e\\+09; expected a number",
+        ),
+        (
+            1e-39,
+            float,
+            "key: got 1e-39, whose size is not from 1e-12 to 1e\\+09; expected a number",
+        ),
         (datetime.date(2000, 1, 1), float, r"key: got datetime\.date.*; expected a number"),
         (np.float64(3), int, r"key: got 3\.0; expected an integer"),
         (np.True_, float, "key: got True; expected a number"),

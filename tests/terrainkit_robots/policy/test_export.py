@@ -1,4 +1,5 @@
 import json
+import resource
 import runpy
 import shutil
 import sys
@@ -406,3 +407,17 @@ def test_export_policy_rejects_invalid_folders(trained, tmp_path):
     for folder, message in ((tmp_path / "file", "exists"), (tmp_path / "a" / "b", "not exist")):
         with pytest.raises(ExportError, match=message):
             export_policy(trained, folder)
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_full_disk_leaves_no_file_and_names_the_folder(trained, tmp_path, exists):
+    folder, limits = tmp_path / "policy", resource.getrlimit(resource.RLIMIT_FSIZE)
+    if exists:
+        folder.mkdir()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, limits[1]))
+    try:
+        with pytest.raises(ExportError, match=rf"cannot write {folder}\S*: File too large"):
+            export_policy(trained, folder)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [path.name for path in tmp_path.rglob("*")] == ["policy"] * exists

@@ -1,9 +1,11 @@
 import shutil
+from dataclasses import replace
 
 import pytest
 import torch
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.rl.config import Env, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -52,6 +54,23 @@ def test_load_policy_warns_about_a_changed_model(trained, env, tmp_path, name, w
             load_policy(open_run(folder), env)
     else:
         load_policy(open_run(folder), env)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (torch.Tensor.double, r"got float64 \(16, 47\); expected float32 \(16, 47\)"),
+        (torch.Tensor.t, r"got float32 \(47, 16\); expected float32 \(16, 47\)"),
+        (lambda weight: weight / 0, "got .*(nan|inf); expected finite numbers"),
+    ],
+)
+def test_load_policy_rejects_changed_weights(trained, env, tmp_path, change, told):
+    state = read_checkpoint(trained.checkpoint)
+    actor = state["actor_state_dict"]
+    actor["mlp.0.weight"] = change(actor["mlp.0.weight"])
+    save_checkpoint(tmp_path / "model.pt", state)
+    with pytest.raises(ConfigError, match=rf"actor_state_dict\.mlp\.0\.weight: {told}"):
+        load_policy(replace(trained, checkpoint=tmp_path / "model.pt"), env)
 
 
 def test_load_policy_rejects_another_robot(trained, biped):

@@ -1,14 +1,20 @@
 import json
 import shutil
+import signal
+import threading
+import time
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import onnx
 import pytest
 import torch
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 
 from terrainkit.errors import ConfigError
+from terrainkit.files.isolated import ProcessLimits
+from terrainkit_robots.policy import onnx_policy
 from terrainkit_robots.policy.evaluate import EvaluationConfig, evaluate
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.onnx_policy import OnnxPolicy, open_onnx
@@ -134,6 +140,10 @@ def test_json_replaces_gains_and_joint_order(mine):
         ),
         ({"observation__parts": 3}, "observation.parts: got 3; the environment"),
         ({"format_version": 2}, "format_version: got 2; expected 1"),
+        ({"joints__name": [{}] * 12}, "Expected .*, got `object`"),
+        ({"timing__physics_dt": 10**400}, "timing.physics_dt: got 1000000.*; expected 0.005"),
+        ({"task__sim": {"dt": 1e-300}}, "sim.dt: got 1e-300, whose size is not from 1e-12"),
+        ({"task__commands": {"resampling_time": 1e39}}, r"got 1e\+39, whose size is not"),
     ],
 )
 def test_json_that_does_not_describe_the_environment_is_rejected(mine, keys, message):
@@ -144,9 +154,10 @@ def test_json_that_does_not_describe_the_environment_is_rejected(mine, keys, mes
     assert "\n" not in str(info.value)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 100_000, "\ud800"])
+@pytest.mark.parametrize("text", ["", "[]", "{", "[" * 100_000, "\ud800", "\xff"])
 def test_json_that_is_not_an_object_is_rejected(mine, text):
-    mine.with_name("policy.json").write_bytes(text.encode("utf-8", "surrogatepass"))
+    encoding = "latin-1" if text == "\xff" else "utf-8"
+    mine.with_name("policy.json").write_bytes(text.encode(encoding, "surrogatepass"))
     with pytest.raises(ConfigError, match=r"policy\.json: "):
         open_onnx(mine, "quadruped")
 
@@ -164,20 +175,172 @@ def test_policy_of_another_robot_is_rejected(mine):
         open_onnx(mine, "biped")
 
 
-def make_onnx(path, shape=("n", 47), size=12, op="MatMul", kind=TensorProto.FLOAT):
-    """Write a linear policy, or a network of one other operation."""
+def make_onnx(
+    path, shape=("n", 47), size=12, op="MatMul", kind=TensorProto.FLOAT, nodes=(), save=onnx.save
+):
+    """Write a linear policy with some nodes before it, or a network of one other operation."""
     names = ["obs", "weight"] if op == "MatMul" else ["obs"]
-    weight = helper.make_tensor("weight", TensorProto.FLOAT, (47, size), np.ones(47 * size))
+    weight = numpy_helper.from_array(np.ones((47, size), np.float32), "weight")
+    names[0] = "before" if nodes else "obs"
     graph = helper.make_graph(
-        [helper.make_node(op, names, ["out"])],
+        [*nodes, helper.make_node(op, names, ["out"])],
         "graph",
         [helper.make_tensor_value_info("obs", kind, shape)],
         [helper.make_tensor_value_info("out", kind, None)],
         [weight] if op == "MatMul" else [],
     )
     opset = [helper.make_opsetid("", 17)]
-    onnx.save(helper.make_model(graph, opset_imports=opset, ir_version=8), path)
+    save(helper.make_model(graph, opset_imports=opset, ir_version=8), path)
     return path
+
+
+def endless_loop():
+    """Nodes whose output `before` is `obs`, after a loop that ends only if all `obs` are 0."""
+    value = partial(helper.make_tensor_value_info, shape=[])
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["go_on"], ["again"]),
+            helper.make_node("Identity", ["old"], ["new"]),
+        ],
+        "body",
+        [
+            value("index", TensorProto.INT64),
+            value("go_on", TensorProto.BOOL),
+            value("old", TensorProto.FLOAT),
+        ],
+        [value("again", TensorProto.BOOL), value("new", TensorProto.FLOAT)],
+    )
+    return [
+        helper.make_node("ReduceSumSquare", ["obs"], ["sum"], keepdims=0),
+        helper.make_node("Cast", ["sum"], ["is_moving"], to=TensorProto.BOOL),
+        helper.make_node("Loop", ["", "is_moving", "sum"], ["same"], body=body),
+        helper.make_node("Sub", ["same", "sum"], ["zero"]),
+        helper.make_node("Add", ["obs", "zero"], ["before"]),
+    ]
+
+
+def memory_bomb():
+    """Nodes whose output `before` is `obs`, after 100 GB of numbers unless all `obs` are 0."""
+    count = helper.make_tensor("count", TensorProto.FLOAT, (1,), [25e9])
+    return [
+        helper.make_node("Constant", [], ["count"], value=count),
+        helper.make_node("ReduceMax", ["obs"], ["largest"], keepdims=0),
+        helper.make_node("Mul", ["count", "largest"], ["product"]),
+        helper.make_node("Cast", ["product"], ["size"], to=TensorProto.INT64),
+        helper.make_node("ConstantOfShape", ["size"], ["zeros"]),
+        helper.make_node("ReduceSum", ["zeros"], ["sum"], keepdims=0),
+        helper.make_node("Add", ["obs", "sum"], ["before"]),
+    ]
+
+
+def test_first_call_that_does_not_end_is_an_error(tmp_path, monkeypatch):
+    monkeypatch.setattr(onnx_policy, "LIMITS", ProcessLimits(seconds=5.0))
+    one = helper.make_tensor("one", TensorProto.FLOAT, (), [1.0])
+    always = [
+        helper.make_node("Constant", [], ["one"], value=one),
+        helper.make_node("Add", ["obs", "one"], ["shifted"]),
+        *endless_loop(),
+    ]
+    always[2].input[0] = "shifted"
+    path = make_onnx(tmp_path / "always.onnx", nodes=always)
+    with pytest.raises(ConfigError, match=r"always\.onnx is not a policy: takes more than 5 s"):
+        OnnxPolicy(path)
+
+
+def test_later_call_that_does_not_end_is_an_error(tmp_path, monkeypatch):
+    policy = OnnxPolicy(make_onnx(tmp_path / "later.onnx", nodes=endless_loop()))
+    monkeypatch.setattr(onnx_policy, "LIMITS", ProcessLimits(seconds=0.5))
+    with pytest.raises(ConfigError, match=r"later\.onnx takes more than 0\.5 s"):
+        policy(torch.ones(2, 47))
+    monkeypatch.undo()
+    assert policy(torch.zeros(2, 47)).shape == (2, 12)  # its thread is free again
+
+
+def test_signal_ends_a_call(tmp_path):
+    policy = OnnxPolicy(make_onnx(tmp_path / "later.onnx", nodes=endless_loop()))
+    main = threading.main_thread().ident
+    threading.Timer(0.5, lambda: signal.pthread_kill(main, signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        policy(torch.ones(2, 47))
+    assert policy(torch.zeros(2, 47)).shape == (2, 12)
+
+
+def test_memory_of_a_call_is_limited(tmp_path):
+    policy = OnnxPolicy(make_onnx(tmp_path / "bomb.onnx", nodes=memory_bomb()))
+    with pytest.raises(ConfigError, match=r"bomb\.onnx needs more than 1 GB of memory"):
+        policy(torch.ones(2, 47))
+    assert policy(torch.zeros(2, 47)).shape == (2, 12)
+
+
+def save_with_data(model, path, location="weights.bin"):
+    """Save a model whose weight is in another file, and change the location afterward."""
+    onnx.save(model, path, save_as_external_data=True, location="weights.bin", size_threshold=0)
+    saved = onnx.load(path, load_external_data=False)
+    (entry,) = (e for e in saved.graph.initializer[0].external_data if e.key == "location")
+    entry.value = location
+    path.write_bytes(saved.SerializeToString())
+
+
+def test_external_data_is_read_beside_the_model(tmp_path, monkeypatch):
+    (tmp_path / "model").mkdir()
+    path = make_onnx(tmp_path / "model" / "mine.onnx", save=save_with_data)
+    monkeypatch.chdir(tmp_path)
+    for given in (path, path.relative_to(tmp_path)):
+        np.testing.assert_allclose(OnnxPolicy(given)(torch.ones(1, 47)), np.full((1, 12), 47))
+
+
+@pytest.mark.parametrize("location", ["../weights.bin", "{}/weights.bin", "link.bin", "here.bin"])
+def test_external_data_elsewhere_is_rejected(tmp_path, monkeypatch, location):
+    folder = tmp_path / "model"
+    folder.mkdir()
+    save = partial(save_with_data, location=location.format(tmp_path))
+    path = make_onnx(folder / "mine.onnx", save=save)
+    (folder / "weights.bin").rename(tmp_path / "weights.bin")
+    (folder / "link.bin").symlink_to(tmp_path / "weights.bin")
+    (tmp_path / "here.bin").write_bytes((tmp_path / "weights.bin").read_bytes())
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="not an ONNX file that can be loaded") as info:
+        OnnxPolicy(path)
+    assert "\n" not in str(info.value)
+
+
+def test_external_data_of_sparse_tensors_is_rejected(tmp_path, monkeypatch):
+    def save(model, path):
+        values = helper.make_tensor("sparse", TensorProto.FLOAT, (3,), np.ones(3))
+        indices = helper.make_tensor("indices", TensorProto.INT64, (3,), [0, 1, 2])
+        sparse = helper.make_sparse_tensor(values, indices, [564])
+        sparse.values.ClearField("float_data")
+        sparse.values.data_location = TensorProto.EXTERNAL
+        sparse.values.external_data.add(key="location", value="here.bin")
+        model.graph.sparse_initializer.append(sparse)
+        onnx.save(model, path)
+
+    (tmp_path / "here.bin").write_bytes(bytes(12))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="not an ONNX file that can be loaded"):
+        OnnxPolicy(make_onnx(tmp_path / "mine.onnx", save=save))
+
+
+@pytest.mark.parametrize("part", ["key", "value", "input"])
+def test_text_that_is_not_utf8_is_rejected(tmp_path, part):
+    path = make_onnx(tmp_path / "mine.onnx")
+    model = onnx.load(path)
+    model.metadata_props.add(key="@@key@@", value="@@value@@")
+    model.graph.input[0].name = model.graph.node[0].input[0] = "@@input@@"
+    marker = f"@@{part}@@".encode()
+    path.write_bytes(model.SerializeToString().replace(marker, b"\xff" * len(marker)))
+    with pytest.raises(ConfigError, match=r"mine\.onnx is not a policy: .*utf-8"):
+        OnnxPolicy(path)
+
+
+def test_policy_is_freed_with_its_thread(tmp_path):
+    policy, before = OnnxPolicy(make_onnx(tmp_path / "mine.onnx")), threading.active_count()
+    del policy
+    for _ in range(100):
+        if threading.active_count() < before:
+            break
+        time.sleep(0.05)
+    assert threading.active_count() < before
 
 
 def test_policy_with_a_batch_of_one_runs_row_by_row(tmp_path):
@@ -190,10 +353,15 @@ def test_policy_with_a_batch_of_one_runs_row_by_row(tmp_path):
     ("options", "message"),
     [
         ({"shape": ("n", 3, 8, 8), "op": "Relu"}, "not a policy: got the inputs .*3, 8, 8"),
-        ({"shape": (), "op": "Relu"}, "is not a policy"),
-        ({"kind": TensorProto.INT64, "op": "Abs"}, "is not a policy"),
-        ({"shape": (5, 47)}, "is not a policy"),
-        ({"shape": ("n", "k")}, "is not a policy"),
+        ({"shape": (), "op": "Relu"}, r"got the inputs obs tensor\(float\) \[\]; expected one"),
+        (
+            {"kind": TensorProto.INT64, "op": "Abs"},
+            r"got the outputs tensor\(int64\); expected",
+        ),
+        ({"kind": TensorProto.STRING, "op": "Identity"}, r"got the outputs tensor\(string\)"),
+        ({"shape": (5, 47)}, r"got the inputs obs tensor\(float\) \[5, 47\]; expected one"),
+        ({"shape": ("n", "k")}, r"got the inputs obs tensor\(float\) \['n', 'k'\]; expected one"),
+        ({"op": "Size"}, "is not a policy"),
         ({"shape": ("n", 45), "op": "Relu"}, "got 45 observations and 45 actions; expected 47 and"),
         ({"size": 10}, "got 47 observations and 10 actions; expected 47 and 12"),
     ],
@@ -208,7 +376,7 @@ def test_files_that_cannot_be_read_are_rejected(mine, tmp_path):
     for path, message in (
         (tmp_path / "gone.onnx", "cannot read .*gone"),
         (tmp_path, "cannot read .*a folder"),
-        (mine.with_name("policy.json"), "is not an ONNX file"),
+        (mine.with_name("policy.json"), r"policy\.json is not a policy: not an ONNX file"),
     ):
         with pytest.raises(ConfigError, match=message):
             open_onnx(path, "quadruped")

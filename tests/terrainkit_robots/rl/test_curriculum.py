@@ -104,9 +104,12 @@ class TestCheckpoint:
         for name, value in other.sampler.state_dict().items():
             np.testing.assert_array_equal(value, before[name], err_msg=name, strict=True)
 
-    @pytest.mark.parametrize("other", [Patches(rows=9), Patches(names=("flat",))])
-    def test_load_rejects_another_map(self, other):
-        with pytest.raises(ConfigError, match="curriculum: got 10 x 2 patches; expected"):
+    @pytest.mark.parametrize(
+        ("other", "expected"), [(Patches(rows=9), "9, 2"), (Patches(names=("flat",)), "10, 1")]
+    )
+    def test_load_rejects_another_map(self, other, expected):
+        message = rf"curriculum\.visits: got float64 \(10, 2\); expected float64 \({expected}\)"
+        with pytest.raises(ConfigError, match=message):
             make(other).load_state_dict(make().state_dict())
 
 

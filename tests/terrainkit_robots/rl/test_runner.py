@@ -1,4 +1,5 @@
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -126,26 +127,96 @@ def test_load_rejects_another_task(make, task, tmp_path, map_ground):
     wide = replace(task, policy=replace(task.policy, actor_hidden_dims=(32,)))
     for runner, told in (
         (make(ground=map_ground), "belongs to another task: got 47 policy observations; exp"),
-        (make(wide), "does not fit the networks of its task: .*size mismatch"),
+        (
+            make(wide),
+            r"does not fit .*mlp\.0\.weight: got float32 \(16, 47\); exp",
+        ),
     ):
         with pytest.raises(ConfigError, match=told):
             runner.load(tmp_path / "model_0.pt")
 
 
-def test_load_rejects_malformed_parts(make, tmp_path):
+DELETED = object()
+
+OF_ENV = "processes 0 env"
+"""Path of the state of the environment in a checkpoint."""
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        ("actor_state_dict mlp.0.weight", DELETED, "mlp.0.weight: got nothing; expected float32"),
+        (
+            "critic_state_dict mlp.0.bias",
+            torch.zeros(16).double(),
+            "got float64 (16,); expected",
+        ),
+        ("actor_state_dict mlp.0.bias", torch.full((16,), torch.nan), "got nan; expected finite"),
+        ("optimizer_state_dict", {}, "optimizer_state_dict.state: got nothing"),
+        ("optimizer_state_dict state", {}, "state.0: got nothing; expected dict"),
+        ("optimizer_state_dict state 2 exp_avg", torch.zeros(3), "exp_avg: got float32 (3,); exp"),
+        (
+            "optimizer_state_dict state 2 exp_avg_sq",
+            -torch.ones(16),
+            "got -1; expected finite",
+        ),
+        (
+            "optimizer_state_dict param_groups 0 lr",
+            "fast",
+            "param_groups.0.lr: got str; exp",
+        ),
+        ("processes", [], "processes: got none; expected one or more"),
+        ("processes", DELETED, "state.processes: got nothing"),
+        (OF_ENV, 3, "env: got int; expected dict"),
+        (f"{OF_ENV} arrays commands", torch.zeros(3), "env.arrays.commands: got float32 (3,); exp"),
+        (
+            f"{OF_ENV} arrays episode_length",
+            torch.zeros(2).long(),
+            "episode_length: got int64 (2",
+        ),
+        (f"{OF_ENV} curriculum updates", "x", "curriculum.updates: got str; expected int"),
+        (
+            f"{OF_ENV} curriculum levels",
+            torch.full((3,), 99),
+            "levels: got 99 to 99; expected 0",
+        ),
+        (f"{OF_ENV} observations policy", torch.zeros(3), "env.observations.policy: got float32"),
+        (f"{OF_ENV} rng state state", 2**200, ""),
+        (f"{OF_ENV} rng bit_generator", "MT19937", "PCG64"),
+        ("processes 0 random cpu", torch.zeros(3).byte(), "random.cpu: got uint8 (3,); expected"),
+        ("logger", DELETED, "state.logger: got nothing"),
+        ("logger rewbuffer", ["much"], "logger.rewbuffer.0: got str; expected float"),
+        ("logger rewbuffer", [0.5] * 7, "logger.rewbuffer: got 7 numbers; expected"),
+        ("logger cur_reward_sum", torch.zeros(2), "logger.cur_reward_sum: got float32 (2,)"),
+    ],
+)
+def test_load_names_the_part_that_does_not_fit(make, tmp_path, path, value, told):
+    make().learn(1)
+    state = read_checkpoint(tmp_path / "model_1.pt")
+    *parents, last = (int(key) if key.isdecimal() else key for key in path.split())
+    part = state
+    for key in parents:
+        part = part[key]
+    if value is DELETED:
+        del part[last]
+    else:
+        part[last] = value
+    save_checkpoint(tmp_path / "changed.pt", state)
+    with pytest.raises(ConfigError, match=rf"changed\.pt does not fit .*{re.escape(told)}") as info:
+        make().load(tmp_path / "changed.pt")
+    assert "\n" not in str(info.value)
+
+
+def test_load_takes_the_settings_of_the_optimizer_from_the_task(make, tmp_path):
+    make().learn(1)
+    state = read_checkpoint(tmp_path / "model_1.pt")
+    (group,) = state["optimizer_state_dict"]["param_groups"]
+    group |= {"lr": 0.25, "betas": (0.5, 0.5), "maximize": True}
+    save_checkpoint(tmp_path / "changed.pt", state)
     runner = make()
-    runner.save()
-    path = tmp_path / "model_0.pt"
-    for change in (
-        {"actor_state_dict": {"weight": 1}},
-        {"optimizer_state_dict": {}},
-        {"processes": []},
-        {"processes": [{"env": 3}]},
-        {"logger": {}},
-    ):
-        save_checkpoint(tmp_path / "changed.pt", read_checkpoint(path) | change)
-        with pytest.raises(ConfigError, match=r"changed\.pt does not fit"):
-            make().load(tmp_path / "changed.pt")
+    runner.load(tmp_path / "changed.pt")
+    (loaded,) = runner.alg.optimizer.param_groups
+    assert (loaded["lr"], loaded["betas"], loaded["maximize"]) == (0.25, (0.9, 0.999), False)
 
 
 @pytest.mark.parametrize("symmetry", [None, True, False])

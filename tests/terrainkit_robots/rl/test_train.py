@@ -289,8 +289,9 @@ def test_failure_to_log_is_one_error(task, tmp_path, capfd, fill_disk, fails, to
 
 
 def test_divergence_names_the_last_checkpoint(task, tmp_path):
-    algorithm = replace(task.algorithm, learning_rate=1e30, schedule="fixed")
-    diverging = replace(task, algorithm=algorithm)
+    algorithm = replace(task.algorithm, learning_rate=1e9, schedule="fixed")
+    policy = replace(task.policy, critic_hidden_dims=(8, 8, 8, 8))
+    diverging = replace(task, algorithm=algorithm, policy=policy)
     told = r"iteration 1: the networks have diverged.*; there is no checkpoint"
     with pytest.raises(ConfigError, match=told):
         train("quadruped", "plane", diverging, folder=tmp_path / "run")
