@@ -63,8 +63,12 @@ class Generate(ConfigCommand):
     """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
     jobs: Annotated[int, Meta(ge=1, le=MAX_JOBS), option("N")] = 1
-    """Number of processes that build patches; the map does not depend on it. Starting them and
-    sending the patches back takes time, so more than one can be slower."""
+    """Number of processes that build patches; the map does not depend on it. One process builds
+    patches that take less time than sending them, such as those of the default map."""
+
+    mesh: bool = True
+    """For .npz: write the triangle mesh. It is most of a large file, and
+    terrainkit.TerrainMap.mesh() builds it when it is needed."""
 
     overwrite: bool = False
     """Replace an existing file."""
@@ -89,7 +93,10 @@ class Generate(ConfigCommand):
         from terrainkit_cli.feasibility_command import solve_demand
 
         config = self.changed_config()
-        samples = config.grid.shape[0] * config.grid.shape[1]
+        options = {} if self.mesh else {"mesh": False}
+        if options and not is_map(self.output):
+            raise ConfigError(f"--no-mesh: got {self.output}; expected a .npz file")
+        samples = config.grid.shape[0] * config.grid.shape[1] if self.mesh else 0
         # Fail before generating.
         export.check_export(self.output, samples, overwrite=self.overwrite)
         if bool(self.robot) != bool(self.demand) or (self.limit and not self.robot):
@@ -98,7 +105,7 @@ class Generate(ConfigCommand):
             if self.demand:
                 config = solve_demand(config, self.robot, self.limit, self.demand, executor)
             terrain_map = generate(config, progress=render.progress, executor=executor)
-        files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
+        files = export.export_files(terrain_map, self.output, overwrite=self.overwrite, **options)
         render.result(written(terrain_map, *files))
         if is_map(self.output):
             path = quote(str(self.output))

@@ -13,14 +13,13 @@ import numpy as np
 
 from terrainkit.errors import ExportError
 from terrainkit.export.requirements import warn_about_losses
-from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
-BYTES_PER_SAMPLE = BYTES_PER_NODE
+BYTES_PER_SAMPLE = 20
 
 _FACES_PER_BLOCK = 1 << 15
 """Faces or vertices that are written at a time."""

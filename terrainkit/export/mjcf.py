@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.frame import frame_rectangles
-from terrainkit.files.memory import check_memory
 from terrainkit.geometry.box_decomposition import (
     BoxDecomposition,
     changes,
@@ -44,8 +43,8 @@ _ELEVATION_UNIT = 1e-4
 """Height of one unit of the elevation data [m]; integers are short to write and to parse. MuJoCo
 rescales the data to [0, 1], and the third value of `size` is the range in meters."""
 
-BYTES_PER_SAMPLE = 100
-"""Peak memory per sample [bytes]: its elevation as a number and as text."""
+BYTES_PER_SAMPLE = 0
+"""Heightfields are written row by row; :func:`.decompose_boxes` checks the memory of boxes."""
 
 _ROWS_PER_BAND = 256
 """Samples along x that are searched for slopes at a time."""
@@ -91,8 +90,6 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
 def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -> None:
     """Write the map as MJCF to an open file; see :func:`export`."""
     collision = convert("collision", collision, Collision)
-    samples = terrain_map.heights.size
-    check_memory(samples * BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
     decomposition = collision_boxes(terrain_map, collision)
     root = ET.Element("mujoco")
     _add_contact_settings(root, terrain_map)
@@ -328,12 +325,15 @@ def _elevation_units(heights: Any, low: float) -> NDArray[np.int64]:
 def _border_height(terrain_map: "TerrainMap") -> float | None:
     """Return the height of the border [m]; None if it is not level, as in some edited maps."""
     (x, *_, x1), (y, *_, y1) = terrain_map.config.patch_edges
-    is_border = np.ones(terrain_map.heights.shape, dtype=bool)
-    is_border[x:x1, y:y1] = False
-    heights = terrain_map.heights[is_border]
-    if not heights.size:
+    heights = terrain_map.heights
+    sides = [
+        side for side in (heights[:x], heights[x1:], heights[:, :y], heights[:, y1:]) if side.size
+    ]
+    if not sides:
         return 0.0
-    return float(heights[0]) if (heights == heights[0]).all() else None
+    height = heights[0, 0]
+    is_level = all(side.min() == side.max() == height for side in sides)
+    return float(height) if is_level else None
 
 
 def _border_boxes(

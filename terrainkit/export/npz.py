@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, MapFileError, listing
 from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
-from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, check_solids
 from terrainkit.map.config import MapConfig
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".npz",)
-BYTES_PER_SAMPLE = BYTES_PER_NODE
+BYTES_PER_SAMPLE = 20
 FORMAT_VERSION = 1
 
 MAX_FACES_PER_SAMPLE = 20
@@ -54,7 +53,7 @@ _Record = dict[Literal["requested", "realized"], Values]
 _Map = TypeVar("_Map", bound="TerrainMap")
 
 
-def export(terrain_map: "TerrainMap", path: Path) -> None:
+def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
     """Write the map as arrays.
 
     They are heights, ground friction, trimesh, solids, goals, spawn origins and spawns, terrain
@@ -63,8 +62,9 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     Args:
         terrain_map: The map.
         path: Target.
+        mesh: Write the trimesh. `TerrainMap.mesh` builds it from the other arrays.
     """
-    config, mesh = terrain_map.config, terrain_map.mesh()
+    config, trimesh = terrain_map.config, terrain_map.mesh() if mesh else None
     records = [[dataclasses.asdict(patch) for patch in row] for row in terrain_map.parameters]
     arrays = {
         "format_version": np.int64(FORMAT_VERSION),
@@ -78,8 +78,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         "terrain_types": terrain_map.terrain_types,
         "terrain_names": np.array(terrain_map.terrain_names),
         "difficulty": terrain_map.difficulty,
-        "vertices": mesh.vertices,
-        "triangles": mesh.triangles,
+        **({"vertices": trimesh.vertices, "triangles": trimesh.triangles} if trimesh else {}),
         **{key: getattr(terrain_map.solids, name) for key, name in _SOLIDS.items()},
         "goals": terrain_map.goals,
         "spawns": terrain_map.spawns,
@@ -133,15 +132,17 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
         )
 
 
-def read_mesh(path: str | Path) -> TriMesh:
-    """Return the trimesh in the .npz file `path`.
+def read_mesh(path: str | Path) -> TriMesh | None:
+    """Return the trimesh in the .npz file `path`; None if it was written without one.
 
     Raises:
-        MapFileError: if there is none, or a vertex index is out of range.
+        MapFileError: if it has only one of the arrays, or a vertex index is out of range.
         MemoryLimitError: if its arrays would not fit in memory.
     """
     with open_archive(path) as archive:
         shape = _read_config(archive).grid.shape
+        if archive.names().isdisjoint(("vertices", "triangles")):
+            return None
         limit = MAX_FACES_PER_SAMPLE * 12 * math.prod(n + 2 for n in shape)
         vertices = archive.array("vertices", "f4", (None, 3), limit=limit)
         triangles = archive.array("triangles", "i4", (None, 3), limit=limit)

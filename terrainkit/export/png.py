@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".png",)
-BYTES_PER_SAMPLE = 20
+BYTES_PER_SAMPLE = 9
 
 MAX_HEIGHT_PER_LEVEL = 0.002
 """Largest height of a gray level at which heights are accurate to a millimeter [m]."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".yaml",)
-BYTES_PER_SAMPLE = png.BYTES_PER_SAMPLE
+BYTES_PER_SAMPLE = 13
 
 MAX_STEP = 0.2
 """Default height of the largest step that a robot takes [m]."""

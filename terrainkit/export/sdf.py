@@ -8,7 +8,6 @@ import numpy as np
 
 from terrainkit.export.mesh_file import write_stl
 from terrainkit.export.requirements import require_one_ground_friction
-from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.geometry.solids import Solids, rotation_matrices
 from terrainkit.settings.text import format_numbers
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".sdf",)
-BYTES_PER_SAMPLE = BYTES_PER_NODE
+BYTES_PER_SAMPLE = 20
 
 
 def export(terrain_map: "TerrainMap", path: Path) -> None:
@@ -108,7 +107,7 @@ def _add_shapes(link: ET.Element, solids: Solids, contact: dict[str, float]) -> 
 def _add_hulls(link: ET.Element, solids: Solids, contact: dict[str, float], path: Path) -> None:
     """Add the hulls: one mesh for those with the same friction and flags."""
     hulls = solids.select(solids.kinds == 2)
-    meshes = solid_meshes(hulls)
+    meshes = list(solid_meshes(hulls))
     friction = np.where(np.isnan(hulls.friction), contact["static_friction"], hulls.friction)
     keys = list(
         zip(friction.tolist(), hulls.collides.tolist(), hulls.visible.tolist(), strict=True)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ExportError
 from terrainkit.export.requirements import require_one_ground_friction
-from terrainkit.geometry.mesh.node_grid import BYTES_PER_NODE
 from terrainkit.geometry.mesh.solid_mesh import solid_meshes
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".usd", ".usda", ".usdc")
-BYTES_PER_SAMPLE = 3 * BYTES_PER_NODE
+BYTES_PER_SAMPLE = 46
 
 
 def export(terrain_map: "TerrainMap", path: Path) -> None:
@@ -118,7 +117,7 @@ def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> No
             prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
             prim.CreateHeightAttr(2.0)
         else:
-            prim = _add_mesh(usd_stage, path, hulls[k - len(shapes)])
+            prim = _add_mesh(usd_stage, path, next(hulls))
         if k < len(shapes):
             pose = shapes[k].tolist()
             prim.AddTranslateOp().Set(Gf.Vec3d(*pose[:3]))

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrainkit.files.memory import check_memory
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh.closed import THICKNESS
 from terrainkit.geometry.mesh.node_grid import NodeGrid
@@ -18,6 +19,9 @@ MAX_HEIGHTS_PER_BLOCK = 50
 """Number of heights in a block above which boxes are searched only around the cells of their
 height, since the time would grow with its square. Below it, a box may extend under higher ground to
 the edge of the block, where it can merge with one in the next block."""
+
+_BYTES_PER_CELL = 17
+"""Peak memory per cell without that of the boxes, which are few [bytes]; measured: 15 to 16."""
 
 MAX_LENGTHS = (16.0, 32.0)
 """Distances along x and y at which a row of merged boxes is divided [m]. Long boxes enlarge many
@@ -75,6 +79,7 @@ def decompose_boxes(
     """
     import cv2
 
+    check_memory(heights.size * _BYTES_PER_CELL, f"boxes of {heights.size} samples")
     friction = np.broadcast_to(np.asarray(friction, dtype=np.float32), heights.shape)
 
     node_grid = NodeGrid.from_heights(heights, grid, threshold)

@@ -7,6 +7,7 @@ import numpy as np
 
 from terrainkit.errors import ExportError
 from terrainkit.export.mjcf import Collision, write_model
+from terrainkit.files.memory import check_memory
 from terrainkit.integrations import load_map
 
 if TYPE_CHECKING:
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     import trimesh
 
     from terrainkit.map.terrain_map import TerrainMap
+
+_BYTES_PER_SAMPLE = 32
+"""Peak memory per sample of a heightfield as text and in MuJoCo [bytes]; measured: 26 to 31."""
 
 
 def make_spec(
@@ -29,8 +33,11 @@ def make_spec(
     """
     import mujoco
 
+    terrain_map = load_map(source)
+    samples = terrain_map.heights.size
+    check_memory(samples * _BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
     file = StringIO()
-    write_model(load_map(source), file, collision)
+    write_model(terrain_map, file, collision)
     return mujoco.MjSpec.from_string(file.getvalue())
 
 

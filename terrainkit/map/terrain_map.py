@@ -3,6 +3,7 @@
 import warnings
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -171,7 +172,7 @@ class TerrainMap:
         meshes = solid_meshes(self.solids.select(self.solids.collides))
         if closed:
             return united([closed_mesh(ground), *meshes])
-        return concatenate_meshes([ground, *meshes])
+        return concatenate_meshes(chain([ground], meshes)) if self.solids.collides.any() else ground
 
     def ground_mesh(self, *, merged: bool = True) -> "TriMesh":
         """Return the ground as a triangle mesh, without the solids; see :meth:`mesh`."""

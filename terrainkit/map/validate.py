@@ -23,6 +23,8 @@ from terrainkit.terrain.parameter import format_value
 TOLERANCE = 1e-3
 """Largest difference in position that is not an issue [m]."""
 
+_FACES_PER_BLOCK = 1 << 16
+
 
 @dataclass(frozen=True, kw_only=True)
 class Issue:
@@ -238,56 +240,55 @@ def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
     grid = terrain_map.grid
     solids = terrain_map.solids.select(terrain_map.solids.collides)
     if len(solids):
-        expected_mesh = concatenate_meshes(solid_meshes(solids))
-        mesh, solid_part = _split(mesh, len(expected_mesh.vertices), len(expected_mesh.triangles))
-        if solid_part.triangles.tolist() != expected_mesh.triangles.tolist() or not np.allclose(
-            solid_part.vertices, expected_mesh.vertices, atol=TOLERANCE
+        last = concatenate_meshes(solid_meshes(solids))
+        nv, nf = len(mesh.vertices) - len(last.vertices), len(mesh.triangles) - len(last.triangles)
+        if (
+            min(nv, nf) < 0
+            or not np.array_equal(mesh.triangles[nf:] - np.int32(nv), last.triangles)
+            or not np.allclose(mesh.vertices[nv:], last.vertices, atol=TOLERANCE)
         ):
             yield "the last faces of the mesh differ from the solids of the map"
             return
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]].astype(np.float64) for k in range(3))
-    normal = np.cross(b - a, c - a)
-    area = np.linalg.norm(normal, axis=1) / 2
-    if not len(area):
+        mesh = TriMesh(vertices=mesh.vertices[:nv], triangles=mesh.triangles[:nf])
+    if not len(mesh.triangles):
         yield "the mesh has no faces"
         return
-    if (area < 1e-12).any():
-        yield f"{int((area < 1e-12).sum())} faces have no area"
-    # Rounding can tilt a wall to either side.
-    vertical = np.abs(normal[:, 2]) < 1e-3 * 2 * area
-    if (normal[~vertical, 2] < 0).any():
-        yield f"{int((normal[~vertical, 2] < 0).sum())} faces point downward"
-    covered, expected = normal[~vertical, 2].sum() / 2, grid.size[0] * grid.size[1]
+    empty, downward, covered, largest, place = 0, 0, 0.0, 0.0, np.zeros(3)
+    for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
+        corners = mesh.vertices[mesh.triangles[start : start + _FACES_PER_BLOCK]].astype(np.float64)
+        a, b, c = corners.swapaxes(0, 1)
+        normal = np.cross(b - a, c - a)
+        area = np.linalg.norm(normal, axis=1) / 2
+        # Rounding can tilt a wall to either side.
+        vertical = np.abs(normal[:, 2]) < 1e-3 * 2 * area
+        empty += int(np.count_nonzero(area < 1e-12))
+        downward += int(np.count_nonzero(normal[~vertical, 2] < 0))
+        covered += normal[~vertical, 2].sum() / 2
+        centroid = ((a + b + c) / 3)[~vertical]
+        error = np.abs(centroid[:, 2] - terrain_map.height(centroid[:, :2]))
+        if error.max(initial=0.0) > largest:
+            largest, place = error.max(), centroid[np.argmax(error)]
+    if empty:
+        yield f"{empty} faces have no area"
+    if downward:
+        yield f"{downward} faces point downward"
+    expected = grid.size[0] * grid.size[1]
     if abs(covered - expected) > 1e-4 * expected:
         yield f"the mesh covers {covered:.1f} m2; expected the {expected:.1f} m2 of the map"
     yield from _check_edges(terrain_map, mesh)
-    centroid = ((a + b + c) / 3)[~vertical]
-    error = np.abs(centroid[:, 2] - terrain_map.height(centroid[:, :2]))
-    if (error > TOLERANCE).any():
-        x, y, _ = centroid[np.argmax(error)]
+    if largest > TOLERANCE:
         yield (
-            f"the mesh differs from the heights by up to {error.max():.3f} m, "
-            f"most at ({x:.2f}, {y:.2f})"
+            f"the mesh differs from the heights by up to {largest:.3f} m, "
+            f"most at ({place[0]:.2f}, {place[1]:.2f})"
         )
 
 
-def _split(mesh: TriMesh, num_vertices: int, num_triangles: int) -> tuple[TriMesh, TriMesh]:
-    """Return the first part of a mesh, and its last vertices and triangles as a mesh."""
-    nv, nf = len(mesh.vertices) - num_vertices, len(mesh.triangles) - num_triangles
-    first, last = mesh.triangles[: max(nf, 0)], mesh.triangles[max(nf, 0) :]
-    return (
-        TriMesh(vertices=mesh.vertices[: max(nv, 0)], triangles=first),
-        TriMesh(vertices=mesh.vertices[max(nv, 0) :], triangles=last - np.int32(max(nv, 0))),
-    )
-
-
 def _check_edges(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
-    edges = mesh.edges()
-    directed = np.sort(edges[:, 0] * len(mesh.vertices) + edges[:, 1])
-    repeated = int((np.diff(directed) == 0).sum())
+    numbers = mesh.edge_numbers()
+    repeated = np.count_nonzero(numbers[1:] == numbers[:-1])
     if repeated:
         yield f"{repeated} edges are shared by more than two faces or by faces of opposite winding"
-    boundary = mesh.vertices[mesh.boundary()].astype(np.float64)
+    boundary = mesh.vertices[mesh.boundary(numbers)].astype(np.float64)
     inside = ~_is_on_outline(boundary, terrain_map).any(axis=1)
     if inside.any():
         x, y = boundary[inside][0, 0, :2]

@@ -39,7 +39,9 @@ Interval = Annotated[tuple[float, float], SORTED]
 NonNegativeInterval = Annotated[tuple[NonNegativeFloat, NonNegativeFloat], SORTED]
 
 _MAX_INT = 2**63
-_MIN_FLOAT, _MAX_FLOAT = 1e-12, 1e9  # beyond them, squares and ratios overflow single precision
+# Ratios of numbers beyond these overflow single precision. Numbers that need not be positive can be
+# smaller: a computed angle of 0 has a rounding error.
+_MIN_FLOAT, _MAX_FLOAT = 1e-12, 1e9
 _NAMES = {int: "an integer", float: "a number", str: "a string", bool: "true or false"}
 _LIMITS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
@@ -136,20 +138,19 @@ def _is_valid(value: Any, constraints: Mapping[str, Any]) -> bool:
     numbers = [item for item in items if isinstance(item, int | float)]
     return (
         all(-_MAX_INT < item < _MAX_INT for item in numbers if isinstance(item, int))
-        and all(_is_in_range(item) for item in numbers if isinstance(item, float))
+        and all(abs(item) <= _MAX_FLOAT for item in numbers if isinstance(item, float))
+        and ("gt" not in constraints or all(abs(item) >= _MIN_FLOAT for item in numbers))
         and ("sorted" not in constraints or numbers == sorted(numbers))
         and ("unique" not in constraints or len({*map(repr, items)}) == len(items))
     )
 
 
-def _is_in_range(value: float) -> bool:
-    return value == 0 or _MIN_FLOAT <= abs(value) <= _MAX_FLOAT
-
-
 def show(value: object) -> str:
     """Return `value` as an error message quotes it."""
-    if isinstance(value, float) and math.isfinite(value) and not _is_in_range(value):
-        return f"{value!r}, whose size is not from {_MIN_FLOAT:g} to {_MAX_FLOAT:g}"
+    if isinstance(value, float) and _MAX_FLOAT < abs(value) < math.inf:
+        return f"{value!r}, which is beyond {_MAX_FLOAT:g}"
+    if isinstance(value, float) and 0 < value < _MIN_FLOAT:
+        return f"{value!r}, which is below {_MIN_FLOAT:g}"
     if isinstance(value, int) and abs(value) >= _MAX_INT:  # Python does not print 5000 digits
         return "an integer beyond 64 bits"
     if isinstance(value, tuple):

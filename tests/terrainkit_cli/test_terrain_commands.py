@@ -86,6 +86,14 @@ def test_check_map_accepts_generated_map(terrainkit, small_map):
     assert "no issues" in run.stdout
 
 
+def test_check_map_accepts_a_map_without_a_mesh(terrainkit, tmp_path, small_map):
+    run = terrainkit("generate", "-o", "a.npz", "--config", small_map, "--no-mesh")
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "a.npz").stat().st_size < (tmp_path / small_map).stat().st_size
+    run = terrainkit("check-map", "a.npz")
+    assert (run.returncode, "no issues" in run.stdout) == (0, True)
+
+
 def test_check_map_prints_the_largest_seam(terrainkit):
     options = ("--rows", 1, "--cols", 1, "--border", 1, "--difficulty-range", 1, 1)
     terrainkit("generate", "-o", "a.npz", "--terrain", "stairs", *options)

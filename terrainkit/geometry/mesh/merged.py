@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.geometry.grid import Grid
-from terrainkit.geometry.mesh.full import split_quads
+from terrainkit.geometry.mesh.full import quad_faces
 from terrainkit.geometry.mesh.node_grid import QUADS_PER_BLOCK, NodeGrid
 from terrainkit.geometry.mesh.polygons import Mask
 from terrainkit.geometry.mesh.rectangles import Rectangles
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
-from terrainkit.geometry.mesh.wall_quads import wall_quads
 from terrainkit.geometry.mesh.wall_runs import WallRuns
 
 
@@ -33,23 +32,21 @@ def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> T
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
-    parts, extra_parts = _faces(node_grid, *_merge_quads(node_grid))
-    x, y, z = node_grid.x, node_grid.y, node_grid.z
+    triangles, added = _faces(node_grid, *_merge_quads(node_grid))
+    blocks = [
+        triangles[start : start + QUADS_PER_BLOCK]
+        for start in range(0, len(triangles), QUADS_PER_BLOCK)
+    ]
+    used = np.zeros(node_grid.vertex_count + len(added), dtype=bool)
+    for block in blocks:
+        used[block] = True
+    vertices = node_grid.vertices(used, added)
     # Arrays that are no longer needed are freed, since they are larger than the mesh.
-    del node_grid
-    triangles, extra = np.concatenate(parts), np.concatenate(extra_parts)
-    del parts, extra_parts
-    used = np.zeros(z.size + len(extra), dtype=bool)
-    used[triangles.ravel()] = True
-    i, j = np.divmod(np.flatnonzero(used[: z.size]), z.shape[1])
-    nodes = np.empty((len(i), 3), dtype=np.float32)
-    nodes[:, 0], nodes[:, 1], nodes[:, 2] = x[i], y[j], z[i, j]
-    vertices = np.concatenate([nodes, extra[used[z.size :]]])
-    del i, j, z, nodes, extra
-    number = np.cumsum(used, dtype=np.int32)
-    for start in range(0, len(triangles), QUADS_PER_BLOCK):
-        part = triangles[start : start + QUADS_PER_BLOCK]
-        part[:] = number[part] - 1
+    del node_grid, added
+    number = used.astype(np.int32)
+    np.cumsum(number, out=number)
+    for block in blocks:
+        block[:] = number[block] - 1
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
@@ -77,32 +74,28 @@ def _merge_quads(node_grid: NodeGrid) -> tuple[Mask, list[Rectangles], list[Wall
 
 def _faces(
     node_grid: NodeGrid, single: Mask, rectangles: list[Rectangles], runs: list[WallRuns]
-) -> tuple[list[NDArray[np.int32]], list[NDArray[np.float32]]]:
-    """Return the triangles in several parts, and the positions of the vertices after the nodes."""
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Return the triangles, and the positions of the vertices after the nodes and midpoints."""
     kept = _corners(single)
     for rectangle in rectangles:
         rectangle.keep_corners(kept)
     for run in runs:
         run.keep_ends(kept)
+    # A rectangle adds its center; a wall the midpoints at its ends, and the centers of two strips.
+    num_vertices = sum(len(each.i0) for each in rectangles) + 6 * sum(len(run.i) for run in runs)
+    node_grid.check_memory(num_vertices + int(np.count_nonzero(kept)), single)
 
-    plain = node_grid.first_corners(single & ~node_grid.has_wall)
-    pairs = np.empty((2 * len(plain), 3), dtype=np.int32)
-    split_quads(node_grid, plain, out=pairs)
-    count = node_grid.vertex_count
-    faces, added = wall_quads(node_grid, np.flatnonzero(single & node_grid.has_wall), count)
-    triangles = [pairs, faces, *(run.panels().astype(np.int32) for run in runs)]
-    extra = [added]
-    count += len(added)
+    triangles, added = quad_faces(node_grid, single)
+    for run in runs:
+        triangles.append(run.panels())
     for polygons in itertools.chain(
         (part.polygons(node_grid, kept) for each in rectangles for part in each.blocks()),
         *(run.strips(kept) for run in runs),
     ):
-        parts, added = polygons.triangles(count)
-        triangles.append(parts.astype(np.int32))
-        extra.append(added)
-        count += len(added)
-    del kept  # as large as the midpoints
-    return triangles, [node_grid.midpoints(), *extra]
+        faces, centers = polygons.triangles(node_grid.vertex_count + len(added))
+        triangles.append(faces)
+        added.append(centers)
+    return triangles.array(), added.array()
 
 
 def _corners(quads: Mask) -> Mask:

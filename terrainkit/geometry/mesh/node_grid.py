@@ -5,6 +5,8 @@ that the mesh covers the whole map. Node (i, j) has the number `i * ny + j`. The
 midpoints of walls follow, two for each wall.
 """
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,10 +15,15 @@ from numpy.typing import NDArray
 
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.mesh.row_buffer import RowBuffer
 from terrainkit.geometry.walls import wall_edges
 
-BYTES_PER_NODE = 120
-"""Peak memory of building a mesh per node [bytes]."""
+_BYTES_PER_NODE = 11
+"""Peak memory of the nodes and of the masks of what is merged, per node [bytes]; measured."""
+
+_BYTES_PER_VERTEX = 48
+"""Peak memory of the faces and vertices per vertex of the mesh [bytes]; measured: 40 to 48. A
+vertex and its two triangles take 36."""
 
 QUADS_PER_BLOCK = 1 << 14
 """Quads whose faces are built at a time, so that intermediate arrays stay in the cache."""
@@ -44,7 +51,7 @@ class NodeGrid:
     @classmethod
     def from_heights(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "NodeGrid":
         """Return the nodes of a heightfield; a difference above `threshold` [m] is a wall."""
-        check_memory(heights.size * BYTES_PER_NODE, f"a mesh of {heights.size} samples")
+        check_memory(heights.size * _BYTES_PER_NODE, f"a mesh of {heights.size} samples")
         z = np.pad(heights, 1, mode="edge")
         walls_x, walls_y = wall_edges(z, threshold)
         x, y = (np.concatenate([[grid.lower[k]], grid.axis(k), [grid.upper[k]]]) for k in (0, 1))
@@ -57,6 +64,19 @@ class NodeGrid:
         either |= self.walls_y[:-1]
         either |= self.walls_y[1:]
         return either
+
+    def check_memory(self, num_vertices: int, quads: NDArray[np.bool_]) -> None:
+        """Raise MemoryLimitError if a mesh would not fit in memory.
+
+        Args:
+            num_vertices: Number of vertices without those of quads with walls.
+            quads: Mask of the quads that are not merged.
+        """
+        x, y = self.walls_x, self.walls_y
+        for walls in (x[:, :-1], x[:, 1:], y[:-1], y[1:]):
+            # Two quads share the two midpoints of a wall, and each has a center for one of them.
+            num_vertices += 2 * int(np.count_nonzero(walls & quads))
+        check_memory(num_vertices * _BYTES_PER_VERTEX, f"a mesh of about {num_vertices} vertices")
 
     @property
     def flat_x(self) -> NDArray[np.bool_]:
@@ -75,12 +95,6 @@ class NodeGrid:
         ny = self.z.shape[1]
         first = i * ny + j
         return np.stack([first, first + ny, first + ny + 1, first + 1])
-
-    def first_corners(self, quads: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Return the number of corner 0 of each quad in the mask `quads`, shape (n,)."""
-        nodes = np.zeros((quads.shape[0], self.z.shape[1]), dtype=bool)
-        nodes[:, :-1] = quads
-        return np.flatnonzero(nodes)
 
     def walls(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return whether each of the four edges of each quad (i, j) is a wall, (4, n)."""
@@ -115,15 +129,31 @@ class NodeGrid:
         index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
         return np.asarray(self.z.size + 2 * index)
 
-    def midpoints(self) -> NDArray[np.float32]:
-        """Return the positions of all midpoints of walls [m], in the order of their numbers."""
-        edges = self.edges_x, self.edges_y
-        result = np.empty((edges[0].size + edges[1].size, 2, 3), dtype=np.float32)
-        parts = result[: edges[0].size], result[edges[0].size :]
-        for axis, (part, walls) in enumerate(zip(parts, (self.walls_x, self.walls_y), strict=True)):
-            i, j = np.divmod(edges[axis], walls.shape[1])
-            end_i, end_j = (i, j + 1) if axis else (i + 1, j)
-            part[:, :, 0] = ((self.x[i] + self.x[end_i]) / 2)[:, None]
-            part[:, :, 1] = ((self.y[j] + self.y[end_j]) / 2)[:, None]
-            part[:, 0, 2], part[:, 1, 2] = self.z[i, j], self.z[end_i, end_j]
-        return result.reshape(-1, 3)
+    def vertices(self, used: NDArray[np.bool_], added: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return the positions of the vertices that are used [m], shape (n, 3).
+
+        Args:
+            used: Whether each node, midpoint and added vertex is used, in the order of the numbers.
+            added: Positions of the added vertices [m], shape (k, 3).
+        """
+        vertices, start = RowBuffer(np.float32), self.z.size
+        for i, used_row in enumerate(used[:start].reshape(self.z.shape)):
+            j = np.flatnonzero(used_row)
+            vertices.append(np.column_stack([np.full(len(j), self.x[i]), self.y[j], self.z[i, j]]))
+        for block in itertools.chain(self.midpoints(), [added]):
+            vertices.append(block[used[start : start + len(block)]])
+            start += len(block)
+        return vertices.array()
+
+    def midpoints(self) -> Iterator[NDArray[np.float32]]:
+        """Yield the positions of all midpoints of walls [m], in the order of their numbers."""
+        sides = (self.edges_x, self.walls_x), (self.edges_y, self.walls_y)
+        for axis, (edges, walls) in enumerate(sides):
+            for start in range(0, edges.size, QUADS_PER_BLOCK):
+                i, j = np.divmod(edges[start : start + QUADS_PER_BLOCK], walls.shape[1])
+                end_i, end_j = (i, j + 1) if axis else (i + 1, j)
+                block = np.empty((len(i), 2, 3), dtype=np.float32)
+                block[:, :, 0] = ((self.x[i] + self.x[end_i]) / 2)[:, None]
+                block[:, :, 1] = ((self.y[j] + self.y[end_j]) / 2)[:, None]
+                block[:, 0, 2], block[:, 1, 2] = self.z[i, j], self.z[end_i, end_j]
+                yield block.reshape(-1, 3)

@@ -1,5 +1,6 @@
 """The triangle mesh of solids."""
 
+from collections.abc import Iterable, Iterator
 from itertools import product
 from typing import Any
 
@@ -7,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ExportError
+from terrainkit.geometry.mesh.row_buffer import RowBuffer
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
 
 MAX_CHORD_ERROR = 5e-4
 """Largest distance between a cylinder and its mesh, half of it inside and half outside [m]."""
+
+_BOXES_PER_BLOCK = 1 << 14
 
 _BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
 _BOX_FACES = np.array(
@@ -23,27 +27,25 @@ _BOX_FACES = np.array(
 )  # fmt: skip
 
 
-def solid_meshes(solids: Solids) -> list[TriMesh]:
-    """Return the mesh of each solid, closed, in the order of the solids."""
-    boxes = _transform(_BOX * solids.boxes[:, None, 3:6], solids.boxes)
-    meshes = [_mesh(vertices, _BOX_FACES) for vertices in boxes]
+def solid_meshes(solids: Solids) -> Iterator[TriMesh]:
+    """Yield the mesh of each solid, closed, in the order of the solids."""
+    for start in range(0, len(solids.boxes), _BOXES_PER_BLOCK):
+        boxes = solids.boxes[start : start + _BOXES_PER_BLOCK]
+        for vertices in _transform(_BOX * boxes[:, None, 3:6], boxes):
+            yield _mesh(vertices, _BOX_FACES)
     for cylinder in solids.cylinders:
         vertices, faces = _cylinder(*cylinder[[3, 5]].tolist())
-        meshes.append(_mesh(_transform(vertices[None], cylinder[None])[0], faces))
-    return meshes + [_hull(vertices) for vertices in solids.hulls()]
+        yield _mesh(_transform(vertices[None], cylinder[None])[0], faces)
+    yield from map(_hull, solids.hulls())
 
 
-def concatenate_meshes(meshes: list[TriMesh]) -> TriMesh:
+def concatenate_meshes(meshes: Iterable[TriMesh]) -> TriMesh:
     """Return one mesh with the faces of all `meshes`."""
-    if len(meshes) == 1:
-        return meshes[0]
-    counts = [len(mesh.vertices) for mesh in meshes]
-    starts = np.cumsum([0, *counts])
-    triangles = [m.triangles + np.int32(start) for m, start in zip(meshes, starts, strict=False)]
-    return TriMesh(
-        vertices=np.concatenate([mesh.vertices for mesh in meshes]),
-        triangles=np.concatenate(triangles).astype(np.int32),
-    )
+    vertices, triangles = RowBuffer(np.float32), RowBuffer(np.int32)
+    for mesh in meshes:
+        triangles.append(mesh.triangles, offset=len(vertices))
+        vertices.append(mesh.vertices)
+    return TriMesh(vertices=vertices.array(), triangles=triangles.array())
 
 
 def united(meshes: list[TriMesh]) -> TriMesh:

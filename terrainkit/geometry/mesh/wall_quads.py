@@ -35,19 +35,17 @@ walls has an edge of its own.
 
 def wall_quads(
     node_grid: NodeGrid, numbers: Ids, first: int
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Return the triangles of the quads `numbers`, and their additional vertices.
+) -> Iterator[tuple[NDArray[np.int32], NDArray[np.float32]]]:
+    """Yield the triangles of blocks of the quads `numbers`, and their additional vertices.
 
     Args:
         node_grid: Nodes of the mesh.
         numbers: Flat index of each quad, shape (K,).
         first: Number of the first added vertex.
 
-    Returns:
+    Yields:
         Triangles, shape (T, 3), and positions of the added vertices [m], shape (V, 3).
     """
-    triangles = [np.empty((0, 3), dtype=np.int32)]
-    vertices = [np.empty((0, 3), dtype=np.float32)]
     for start in range(0, len(numbers), QUADS_PER_BLOCK):
         quads = _Quads.from_grid(node_grid, numbers[start : start + QUADS_PER_BLOCK])
         z0, z1, z2, z3 = quads.z
@@ -61,9 +59,8 @@ def wall_quads(
         ):
             faces, added = build(part, first)
             first += len(added)
-            triangles += faces
-            vertices.append(added)
-    return np.concatenate(triangles), np.concatenate(vertices)
+            if faces:
+                yield np.concatenate(faces), added
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -82,7 +82,8 @@ def test_export_unknown_suffix_lists_formats(level_map, tmp_path, name):
     [
         ("map.stl", "color", "full, closed, y_up"),
         ("map.xml", "merged", "collision"),
-        ("map.npz", "merged", "nothing"),
+        ("map.npz", "merged", "mesh"),
+        ("map.png", "merged", "nothing"),
     ],
 )
 def test_export_unknown_option_lists_options(level_map, tmp_path, name, option, known):

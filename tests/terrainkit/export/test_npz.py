@@ -156,6 +156,16 @@ def test_npz_mesh_round_trip(path, terrain_map):
     assert read.triangles.tobytes() == wanted.triangles.tobytes()
 
 
+def test_npz_without_a_mesh_has_all_other_arrays(path, terrain_map, arrays, tmp_path):
+    small = terrain_map.save(tmp_path / "small.npz", mesh=False)
+    with np.load(small, allow_pickle=False) as archive:
+        assert set(arrays) - set(archive) == {"vertices", "triangles"}
+        assert all(archive[key].tobytes() == arrays[key].tobytes() for key in archive)
+    assert read_mesh(small) is None
+    again = TerrainMap.load(small).save(tmp_path / "again.npz")
+    assert again.read_bytes() == path.read_bytes()
+
+
 # ---- what is no map ----------------------------------------------------------------------------
 
 

@@ -35,7 +35,7 @@ def test_usd_ground_is_the_mesh(stage, parkour):
 
 def test_usd_solids_have_the_same_bounds(stage, parkour):
     cache = UsdGeom.BBoxCache(Usd.TimeCode.Default(), [UsdGeom.Tokens.default_])
-    meshes = solid_meshes(parkour.solids)
+    meshes = list(solid_meshes(parkour.solids))
     assert len(meshes) > 10
     for k, mesh in enumerate(meshes):
         bounds = cache.ComputeWorldBound(stage.GetPrimAtPath(f"/terrain/solids/solid_{k}"))

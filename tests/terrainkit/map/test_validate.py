@@ -1,4 +1,5 @@
 import dataclasses
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -221,3 +222,14 @@ def test_validate_finds_mesh_of_another_map(sound):
 def test_validate_finds_mesh_without_faces(sound):
     empty = TriMesh(vertices=sound.mesh().vertices, triangles=np.empty((0, 3), dtype=np.int32))
     assert found(sound, empty) == [("mesh", "the mesh has no faces")]
+
+
+def test_validate_takes_at_most_twice_the_memory_of_the_mesh():
+    terrain_map = tk.generate(tk.MapConfig(rows=16, cols=16))
+    peaks = []
+    for work in (terrain_map.mesh, lambda: validate(terrain_map)):
+        tracemalloc.start()
+        work()
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 2 * peaks[0]

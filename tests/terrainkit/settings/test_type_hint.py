@@ -52,6 +52,7 @@ MOTOR = Motor(effort=2.0)
         (np.int8(8), float, 8.0),
         (np.float32(0.5), float, 0.5),
         (np.float64(0.5), float | None, 0.5),
+        (-1e-300, float, -1e-300),
         (np.True_, bool, True),
         (np.str_("b"), Mode, "b"),
     ],
@@ -81,12 +82,12 @@ def test_convert_makes_floats_of_integers_in_lists():
         (
             -1e39,
             float,
-            "key: got -1e\\+39, whose size is not from 1e-12 to 1e\\+09; expected a number",
+            "key: got -1e\\+39, which is beyond 1e\\+09; expected a number",
         ),
         (
             1e-39,
-            float,
-            "key: got 1e-39, whose size is not from 1e-12 to 1e\\+09; expected a number",
+            PositiveFloat,
+            "key: got 1e-39, which is below 1e-12; expected a number > 0",
         ),
         (datetime.date(2000, 1, 1), float, r"key: got datetime\.date.*; expected a number"),
         (np.float64(3), int, r"key: got 3\.0; expected an integer"),

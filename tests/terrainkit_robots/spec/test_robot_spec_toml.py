@@ -21,7 +21,7 @@ from terrainkit_robots.spec.robot_spec import (
 )
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=12)
-NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+NUMBERS = st.floats(-1e9, 1e9)
 POSITIVE = NUMBERS.map(abs)
 PAIRS = st.tuples(NUMBERS, NUMBERS).map(sorted).map(tuple)
 LISTS = st.lists(NAMES, unique=True, max_size=4).map(tuple)

@@ -34,7 +34,7 @@ def straight_quads():
 def test_wall_runs_panel_faces_the_low_side(normal_y, height):
     node_grid, found, _ = lattice_and_runs(cliff(height), straight_quads(), normal_y=normal_y)
     panels = found.panels()
-    corners = node_grid.midpoints()[panels - node_grid.z.size].astype(float)
+    corners = np.concatenate([*node_grid.midpoints()])[panels - node_grid.z.size].astype(float)
     doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     # 4 m long and 2 m high, in two triangles; downhill is against the axis where it rises.
     assert doubled[:, 1 if normal_y else 0].tolist() == [-4.0 * height] * 2

@@ -1,0 +1,43 @@
+"""RowBuffer: an array to which rows are appended."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+_MAX_GROWTH = 1 << 18
+"""Largest number of rows by which a buffer grows at once, which bounds its unused memory."""
+
+
+class RowBuffer:
+    """Rows of three values in an array that grows in place.
+
+    Concatenating a list of parts would take twice the memory.
+    """
+
+    def __init__(self, dtype: DTypeLike) -> None:
+        self._rows: NDArray[Any] = np.empty((0, 3), dtype=dtype)
+        self._length = 0
+
+    def __len__(self) -> int:
+        return self._length
+
+    def append(self, rows: NDArray[Any], offset: int = 0) -> None:
+        """Append rows of shape (n, 3), to whose values `offset` is added."""
+        start, self._length = self._length, self._length + len(rows)
+        if self._length > len(self._rows):
+            size = len(self._rows) + min(len(self._rows), _MAX_GROWTH)
+            self._resize(max(self._length, size))
+        self._rows[start : self._length] = rows
+        if offset:
+            self._rows[start : self._length] += offset
+
+    def array(self) -> NDArray[Any]:
+        """Return all rows, shape (n, 3); nothing may be appended afterward."""
+        self._resize(self._length)
+        return self._rows
+
+    def _resize(self, length: int) -> None:
+        # The system moves the pages of a large array without copying them. No other reference
+        # exists before `array` returns one.
+        self._rows.resize((length, 3), refcheck=False)
