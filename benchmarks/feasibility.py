@@ -27,7 +27,7 @@ def run() -> Iterator[tuple[str, float]]:
     config = terrainkit.MapConfig()
     terrain_map = terrainkit.generate(config)
     yield (
-        "time_over_heights (at most 200)",
+        "time_over_heights (at most 150)",
         ratio(
             partial(assess_map, terrain_map, LIMITS),
             partial(terrainkit.generate, config),

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from msgspec import Meta
+
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import expected_names
 from terrainkit_cli.parse import option, positional
@@ -14,6 +16,8 @@ if TYPE_CHECKING:
 MapFile = Annotated[Path, positional("MAP.npz")]
 InputPath = Annotated[Path, option("PATH")]
 OutputPath = Annotated[Path, option("PATH", "-o")]
+Jobs = Annotated[int, Meta(ge=1, le=61), option("N")]
+"""Number of processes, at most as many as a `ProcessPoolExecutor` may have on Windows."""
 
 RobotName = Annotated[str, option("ROBOT")]
 Limits = Annotated[tuple[str, ...], option("[NAME=VALUE ...]")]

@@ -12,8 +12,16 @@ from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import Limits, MapFile, OutputPath, RobotName, parse_pairs
+from terrainkit_cli.argument_types import (
+    Jobs,
+    Limits,
+    MapFile,
+    OutputPath,
+    RobotName,
+    parse_pairs,
+)
 from terrainkit_cli.parse import Command, value_of
+from terrainkit_cli.worker_pool import worker_pool
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -49,6 +57,9 @@ class Feasibility(Command):
     output: OutputPath | None = None
     """Write PATH.json with all paths, and PATH.png with the paths on the preview."""
 
+    jobs: Jobs = 1
+    """Number of processes that assess patches; the results do not depend on it."""
+
     overwrite: bool = False
     """Replace existing files."""
 
@@ -62,7 +73,10 @@ class Feasibility(Command):
         target = self.output.with_suffix("") if self.output else None
         if target:
             self._check_targets(target)
-        results = assess_map(terrain_map, derived.limits, render.progress)
+        with worker_pool(self.jobs) as executor:
+            results = assess_map(
+                terrain_map, derived.limits, progress=render.progress, executor=executor
+            )
         render.result(f"{derived.robot}:")
         rows = [(f"  {name}", f"{value:.3g}") for name, value in vars(derived.limits).items()]
         render.table([(*row, derived.reasons[row[0].strip()]) for row in rows])

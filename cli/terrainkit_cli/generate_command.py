@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from shlex import quote
 from typing import Annotated, Any
 
-from msgspec import Meta
-
 from terrainkit.errors import ConfigError
 from terrainkit.map.config import MapConfig
 from terrainkit.map.terrain_map import TerrainMap
@@ -16,11 +14,11 @@ from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import Limits, OutputPath, RobotName, is_map
+from terrainkit_cli.argument_types import Jobs, Limits, OutputPath, RobotName, is_map
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import option, value_of
-from terrainkit_cli.worker_pool import MAX_JOBS, worker_pool
+from terrainkit_cli.worker_pool import worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +60,7 @@ class Generate(ConfigCommand):
     limit: Limits = ()
     """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
 
-    jobs: Annotated[int, Meta(ge=1, le=MAX_JOBS), option("N")] = 1
+    jobs: Jobs = 1
     """Number of processes that build patches; the map does not depend on it. One process builds
     patches that take less time than sending them, such as those of the default map."""
 

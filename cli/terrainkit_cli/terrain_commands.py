@@ -262,7 +262,7 @@ class CheckMap(Command):
         # The path over a map with issues would be of no use.
         blocked = 0
         if derived and not issues:
-            results = assess_map(terrain_map, derived.limits, render.progress)
+            results = assess_map(terrain_map, derived.limits, progress=render.progress)
             blocked = print_impassable(results, derived, self.map)
         if issues:
             render.result(f"\n{self.map}: {count(len(issues), 'issue')}")

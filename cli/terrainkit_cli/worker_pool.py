@@ -10,9 +10,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from concurrent.futures import Executor
 
-MAX_JOBS = 61
-"""Largest number of processes of a `ProcessPoolExecutor` on Windows."""
-
 
 @contextmanager
 def worker_pool(jobs: int) -> "Iterator[Executor | None]":

@@ -4,8 +4,9 @@ The footholds of a patch are a graph. Each quantity of a node or an edge is divi
 the robot; the demand of a patch is the largest ratio on the path where it is smallest.
 """
 
-from terrainkit.feasibility.assess import MAX_DEMAND, PatchFeasibility, assess_map, assess_patch
+from terrainkit.feasibility.assess import PatchFeasibility, assess_map, assess_patch
 from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.feasibility.solve import SolvedTerrain, solve_ranges
 
 __all__ = [

@@ -1,7 +1,9 @@
 """Assess the patches of a map: the demand on a robot, its path, and the blocking place."""
 
 import itertools
+import math
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,13 +11,11 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.export.requirements import require_finite
-from terrainkit.feasibility.bottleneck import Leg, bottlenecks, shortest_path
-from terrainkit.feasibility.columns import Columns, FloatArray, IntArray, sample_columns
-from terrainkit.feasibility.edges import Edges
+from terrainkit.feasibility.bottleneck import Leg, shortest_path
+from terrainkit.feasibility.columns import Columns, IntArray, columns_per_cell, sample_columns
 from terrainkit.feasibility.foothold_graph import FootholdGraph
-from terrainkit.feasibility.gaps import gap_edges
 from terrainkit.feasibility.limits import RobotLimits
-from terrainkit.feasibility.regions import Regions
+from terrainkit.feasibility.path_edges import MAX_DEMAND, path_edges
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.free_space import free_intervals
 from terrainkit.geometry.solid_index import SolidIndex
@@ -24,21 +24,16 @@ from terrainkit.map.patch import Patch
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from concurrent.futures import Executor
 
     from terrainkit.map.generation import Progress
     from terrainkit.map.terrain_map import TerrainMap
 
-MAX_DEMAND = 2.0
-"""Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""
-
 GOAL_TOLERANCE = 1e-3
 """Largest depth of a goal below a floor that is rounding [m]."""
 
-_REACHES = (0.5, 1.0, MAX_DEMAND)
-"""Demands up to which gaps are searched one after the other: few patches need the widest ones."""
-
 _BYTES_PER_COLUMN = 2000
-"""Memory of a column with its edges [bytes]."""
+"""Memory of a column with its edges [bytes]; 700 to 1,600 were measured, with one or two floors."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,7 +75,11 @@ class PatchFeasibility:
 
 
 def assess_map(
-    terrain_map: "TerrainMap", limits: RobotLimits, progress: "Progress | None" = None
+    terrain_map: "TerrainMap",
+    limits: RobotLimits,
+    *,
+    progress: "Progress | None" = None,
+    executor: "Executor | None" = None,
 ) -> list[PatchFeasibility]:
     """Return what each patch of a map demands of a robot, row by row.
 
@@ -88,6 +87,7 @@ def assess_map(
         terrain_map: The map.
         limits: The limits of the robot.
         progress: Wraps the iterator over the patches, for a progress bar.
+        executor: Assesses the patches, such as a `ProcessPoolExecutor`; None for this process.
 
     Raises:
         ConfigError: if a goal is inside the ground or a solid, or outside of its patch.
@@ -95,12 +95,15 @@ def assess_map(
         MemoryLimitError: if the graph of a patch would not fit in memory.
     """
     require_finite(terrain_map)
-    threshold = terrain_map.config.wall_threshold
-    places: Iterator[tuple[int, int]] = iter(list(np.ndindex(terrain_map.difficulty.shape)))
-    wrapped = progress(places, terrain_map.difficulty.size) if progress else places
+    assess = partial(assess_patch, limits=limits, threshold=terrain_map.config.wall_threshold)
+    indices = list(np.ndindex(terrain_map.difficulty.shape))
+    patches = (terrain_map.patch(row, col) for row, col in indices)
+    places: Iterator[tuple[int, int]] = iter(indices)
+    places = progress(places, len(indices)) if progress else places
+    results = (executor.map if executor else map)(assess, patches)
     return [
-        replace(assess_patch(terrain_map.patch(row, col), limits, threshold), row=row, col=col)
-        for row, col in wrapped
+        replace(result, row=row, col=col)
+        for (row, col), result in zip(places, results, strict=True)
     ]
 
 
@@ -112,14 +115,13 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
         limits: The limits of the robot.
         threshold: Difference between neighboring samples above which there is a wall [m].
     """
-    cells = patch.grid.shape[0] * patch.grid.shape[1]
-    check_memory(cells * _BYTES_PER_COLUMN, f"the footholds of a patch of {cells} cells")
+    number = math.prod(patch.grid.shape) * columns_per_cell(patch) ** 2
+    check_memory(number * _BYTES_PER_COLUMN, f"the footholds of a patch of {number} columns")
     _check_goals(patch, threshold)
     columns = sample_columns(patch, threshold)
     legs = _legs(patch, columns)
     graph = FootholdGraph.build(columns, limits, _rim(patch, columns, legs))
-    edges, demand, leg_demands = _edges(graph, legs)
-    path = _Path(graph, edges, demand, legs, leg_demands)
+    path = _Path(graph, legs)
     return PatchFeasibility(
         row=0,
         col=0,
@@ -173,48 +175,20 @@ def _rim(patch: Patch, columns: Columns, legs: list[Leg]) -> NDArray[np.bool_]:
     return is_rim
 
 
-def _edges(graph: FootholdGraph, legs: list[Leg]) -> tuple[Edges, FloatArray, list[float]]:
-    """Return the edges that the least demanding path may use, their demands, and those of the legs.
-
-    Gaps are only searched between regions that no smaller demand joins than that of the narrowest
-    gap, and only up to the demand of the path without them. Wider ones would not change the result.
-    """
-    steps, size = graph.steps, graph.columns.floor.size
-    # A lower bound of the demand of all gaps: the demand of cells that touch at a corner.
-    searched = narrowest = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap
-    edges, demand, regions = steps, graph.demand(steps), None
-    for reach in _REACHES:
-        leg_demands = bottlenecks(edges, demand, legs, size)
-        max_demand = max(leg_demands)
-        if max_demand <= searched:
-            return edges, demand, leg_demands
-        if regions is None:
-            regions = Regions.build(steps, demand, graph.node_demand, narrowest)
-        edges = Edges.concatenate([steps, gap_edges(graph, regions, min(max_demand, reach))])
-        demand, searched = graph.demand(edges), reach
-    return edges, demand, bottlenecks(edges, demand, legs, size)
-
-
 class _Path:
     """The path through all legs, and its blocking place."""
 
-    def __init__(
-        self,
-        graph: FootholdGraph,
-        edges: Edges,
-        demand: FloatArray,
-        legs: list[Leg],
-        leg_demands: list[float],
-    ) -> None:
+    def __init__(self, graph: FootholdGraph, legs: list[Leg]) -> None:
         self.demand, self.limit, self.value = 0.0, "", float("nan")
         self.place = np.full(3, np.nan)
         size, position = graph.columns.floor.size, graph.columns.positions
         nodes = [legs[0][0]]
-        for (start, targets), max_demand in zip(legs, leg_demands, strict=True):
+        step_demand = graph.demand(graph.steps)
+        for start, targets in legs:
             if nodes[-1] != start:
                 break
-            is_usable = demand <= max_demand
-            usable, ratios = edges.select(is_usable), demand[is_usable]
+            usable = path_edges(graph, step_demand, (start, targets))
+            ratios = graph.demand(usable)
             ends = position(usable.end) - position(usable.start)
             length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)
             way = shortest_path(usable, length, start, targets, size)

@@ -5,7 +5,6 @@ Minimax paths on a directed graph do not follow from a minimum spanning tree; th
 at which the target can be reached is found by bisection.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,28 +32,26 @@ def find_components(edges: Edges, usable: NDArray[np.bool_], num_nodes: int) -> 
     return np.asarray(labels, dtype=np.int64)
 
 
-def bottlenecks(
-    edges: Edges, demand: FloatArray, legs: Sequence[Leg], num_nodes: int
-) -> list[float]:
-    """Return the smallest demand at which a path leads from the start of each leg to its targets.
+def bottleneck(edges: Edges, demand: FloatArray, leg: Leg, num_nodes: int) -> float:
+    """Return the smallest demand at which a path leads from the start of a leg to its targets.
 
     Args:
         edges: The edges.
         demand: Demand of each edge, shape (n,).
-        legs: Node where each path starts, and nodes of which it reaches one, shape (t,).
+        leg: Node where the path starts, and nodes of which it reaches one, shape (t,).
         num_nodes: Number of nodes.
 
     Returns:
-        The largest demand of an edge of each path; 0 if its start is a target, inf without a path.
+        The largest demand of an edge of the path; 0 if its start is a target, inf without a path.
     """
+    start, targets = leg
+    if (targets == start).any():
+        return 0.0
     order = np.argsort(edges.start, kind="stable")
     rows = np.searchsorted(edges.start[order], np.arange(num_nodes + 1))
     ends, demand = edges.end[order], demand[order]
     levels = np.unique(demand[np.isfinite(demand)])
-    return [
-        0.0 if (targets == start).any() else _bottleneck(rows, ends, demand, levels, start, targets)
-        for start, targets in legs
-    ]
+    return _bottleneck(rows, ends, demand, levels, start, targets)
 
 
 def _bottleneck(

@@ -80,6 +80,13 @@ class Columns:
         return int(column * self.floor.shape[2] + int(k))
 
 
+def columns_per_cell(patch: Patch) -> int:
+    """Return the number of columns along the side of a cell: 1 for a patch without solids."""
+    if not patch.solids.collides.any():
+        return 1
+    return math.ceil(patch.grid.cell / MAX_SPACING - 1e-9)
+
+
 def sample_columns(patch: Patch, threshold: float) -> Columns:
     """Return the columns of a patch: its samples, or finer ones if it has solids.
 
@@ -89,7 +96,7 @@ def sample_columns(patch: Patch, threshold: float) -> Columns:
     """
     grid = patch.grid
     solids = patch.solids.select(patch.solids.collides)
-    n = math.ceil(grid.cell / MAX_SPACING - 1e-9) if len(solids) else 1
+    n = columns_per_cell(patch)
     spacing = grid.cell / n
     lower = grid.lower[0] + spacing / 2, grid.lower[1] + spacing / 2
     if not len(solids):

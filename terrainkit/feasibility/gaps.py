@@ -1,4 +1,8 @@
-"""Gap edges: from the rim of one region to the rim of another, over ground without a foothold."""
+"""Gap edges: from one region to another, over ground without a foothold."""
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,127 +10,151 @@ from numpy.typing import NDArray
 from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph, ratio
-from terrainkit.feasibility.regions import Regions
 
-_MAX_PAIRS = 200_000
-"""Pairs of nodes that are evaluated at once, to bound the memory."""
+_MAX_PAIRS = 100_000
+"""Pairs of nodes that are compared at once, to bound the memory."""
 
-_MAX_ENDS = 4
-"""Largest number of gaps from a node to a region, the narrowest ones. Steps of little demand join
-the nodes of a region, so it does not matter where a gap ends, unless there is a wall in between."""
+_MAX_ENDS, _MAX_PATH_ENDS = 16, 4
+"""Largest number of gaps from a node to a region, the easiest ones: to find one, and for the path.
+Steps of little demand join the nodes of a region, so it does not matter where a gap ends, unless
+there is a wall in between."""
+
+_MORE = 8
+"""Factor by which more gaps into a region are tried where the easiest ones lead through a wall."""
 
 
-def gap_edges(graph: FootholdGraph, regions: Regions, max_demand: float) -> Edges:
-    """Return the edges over gaps with a demand below `max_demand`, in both directions.
+def gap_edges(
+    graph: FootholdGraph,
+    regions: IntArray,
+    starts: NDArray[np.bool_],
+    ends: NDArray[np.bool_],
+    max_demand: float,
+    *,
+    one_each: bool = False,
+) -> Edges:
+    """Return the edges over gaps with a demand below `max_demand`.
 
     An edge joins two regions. In between, the body passes above the higher one of both nodes, over
     any hurdle, and below any solid.
 
     Args:
         graph: The graph.
-        regions: What the steps join.
+        regions: Region of each node, which steps join below `max_demand`, shape (nodes,).
+        starts: Nodes where an edge may start, shape (nodes,).
+        ends: Nodes where an edge may end, shape (nodes,).
         max_demand: Demand above which an edge is of no use.
+        one_each: Whether one edge into each region is enough; then not all are searched.
     """
-    from scipy.spatial import cKDTree
-
-    limits, columns, steps = graph.limits, graph.columns, graph.steps
-    nodes = _rim(graph, regions)
-    nodes = nodes[graph.node_demand[nodes] < max_demand]
-    if len(nodes) < 2:
-        return steps.select(np.zeros(len(steps.start), dtype=bool))
-    points = columns.positions(nodes)
-    # The gap is shorter than the distance of the nodes by a column, or by up to sqrt(2) of it.
-    reach = max_demand * limits.gap + 1.5 * columns.spacing
-    height = max_demand * max(limits.step_up, limits.step_down)
-    # A slab of this height, and no cylinder around it, would be exact; the rest is dropped below.
-    pairs = cKDTree(points / (reach, reach, height)).query_pairs(2**0.5, output_type="ndarray")
-    first, second = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
-    start, end = _candidates(
-        graph, regions, np.concatenate([first, second]), np.concatenate([second, first]), max_demand
-    )
-    parts = [
-        _evaluate(graph, start[n : n + _MAX_PAIRS], end[n : n + _MAX_PAIRS], max_demand)
-        for n in range(0, max(len(start), 1), _MAX_PAIRS)
-    ]
+    parts = [graph.steps.select(slice(0))]
+    is_entered = np.zeros(len(regions), dtype=bool)
+    for batch in _batches(_pairs(graph, regions, starts, ends, max_demand)):
+        pairs = batch.select(~is_entered[regions[batch.end]]) if one_each else batch
+        number = _MAX_ENDS if one_each else _MAX_PATH_ENDS
+        pairs = pairs.select(_easiest(graph, pairs, number, regions[pairs.end], pairs.start))
+        if not one_each:
+            parts.append(_evaluate(graph, pairs, max_demand))
+            continue
+        number = 1
+        while len(pairs.start):
+            order = _easiest(graph, pairs, number, regions[pairs.end])
+            parts.append(_evaluate(graph, pairs.select(order), max_demand))
+            is_entered[regions[parts[-1].end]] = True
+            is_left = ~is_entered[regions[pairs.end]]
+            is_left[order] = False
+            pairs, number = pairs.select(is_left), number * _MORE
     return Edges.concatenate(parts)
 
 
-def _rim(graph: FootholdGraph, regions: Regions) -> IntArray:
-    """Return the nodes with a neighboring column where no node is joined to them."""
-    columns, steps = graph.columns, graph.steps
-    nx, ny = columns.shape
-    m = columns.floor.shape[2]
-    same = regions.joined(steps.start, steps.end, graph.node_demand[steps.start])
-    start, end = steps.start[same], steps.end[same]
-    has_neighbor = np.zeros((columns.floor.size, 4), dtype=bool)
-    move = end // m - start // m
-    for side, offset in enumerate((ny, -ny, 1, -1)):
-        has_neighbor[start[move == offset], side] = True
-    at = has_neighbor.reshape(nx, ny, m, 4)
-    at[-1, :, :, 0] = at[0, :, :, 1] = at[:, -1, :, 2] = at[:, 0, :, 3] = True  # the patch ends
-    is_node = ~np.isnan(columns.floor.reshape(-1))
-    return np.flatnonzero(is_node & ~has_neighbor.all(axis=1))
+def _batches(parts: Iterable[Edges]) -> Iterator[Edges]:
+    """Yield the edges of all parts, at least `_MAX_PAIRS` at once but for the last ones."""
+    batch, number = [], 0
+    for part in parts:
+        batch.append(part)
+        number += len(part.start)
+        if number >= _MAX_PAIRS:
+            yield Edges.concatenate(batch)
+            batch, number = [], 0
+    if batch:
+        yield Edges.concatenate(batch)
 
 
-def _candidates(
-    graph: FootholdGraph, regions: Regions, start: IntArray, end: IntArray, max_demand: float
-) -> tuple[IntArray, IntArray]:
-    """Return the pairs whose gap may be useful: the narrowest from each node to each region."""
-    limits, floor = graph.limits, graph.columns.floor.reshape(-1)
-    gap, is_apart = _gap_widths(graph.columns, start, end)
-    rise = floor[end] - floor[start]
-    demand = np.maximum.reduce(
-        [
-            graph.node_demand[start],
-            graph.node_demand[end],
-            gap / limits.gap,
-            rise / limits.step_up,
-            -rise / limits.step_down,
-        ]
-    )
-    useful = is_apart & (demand < max_demand)
-    start, end, demand = start[useful], end[useful], demand[useful]
-    apart = ~regions.joined(start, end, demand)
-    start, end, demand = start[apart], end[apart], demand[apart]
-    region = regions.labels[0, end]
-    order = np.lexsort((demand, region, start))
-    start, end, region = start[order], end[order], region[order]
-    is_first = np.ones(len(start), dtype=bool)
-    is_first[_MAX_ENDS:] = (start[_MAX_ENDS:] != start[:-_MAX_ENDS]) | (
-        region[_MAX_ENDS:] != region[:-_MAX_ENDS]
-    )
-    return start[is_first], end[is_first]
+def _pairs(
+    graph: FootholdGraph,
+    regions: IntArray,
+    starts: NDArray[np.bool_],
+    ends: NDArray[np.bool_],
+    max_demand: float,
+) -> Iterator[Edges]:
+    """Yield the gaps that may be useful, as if nothing was in between; see :func:`gap_edges`."""
+    import cv2
+
+    columns, floor = graph.columns, graph.columns.floor.reshape(-1)
+    shape = columns.floor.shape
+    max_rise, max_drop = max_demand * graph.limits.step_up, max_demand * graph.limits.step_down
+    moves, widths = _moves(columns, max_demand * graph.limits.gap)
+    n = int(moves.max(initial=0))
+    is_usable = graph.node_demand < max_demand
+    is_end = (ends & is_usable).reshape(shape)
+    near = cv2.dilate(is_end.any(axis=2).astype(np.uint8), np.ones((2 * n + 1,) * 2, np.uint8))
+    start = np.flatnonzero((starts & is_usable).reshape(shape) & (near[..., None] > 0))
+    # The nodes where an edge may end, in a frame of columns without any.
+    node = np.where(is_end, np.arange(is_end.size).reshape(shape), -1)
+    node = np.pad(node, ((n, n), (n, n), (0, 0)), constant_values=-1)
+    _, ny, m = node.shape
+    offset = (((moves[:, :1] * ny + moves[:, 1:]) * m) + np.arange(m)).reshape(-1)
+    gap = np.repeat(widths, m)
+    i, j = columns.column(start)
+    place, size = ((i + n) * ny + j + n) * m, max(_MAX_PAIRS // max(len(offset), 1), 1)
+    for first in range(0, len(start), size):
+        end = node.reshape(-1)[place[first : first + size, None] + offset]
+        which, move = np.nonzero(end >= 0)
+        begin, end, width = start[first + which], end[which, move], gap[move]
+        rise = floor[end] - floor[begin]
+        useful = (rise < max_rise) & (-rise < max_drop) & (regions[begin] != regions[end])
+        none = np.full(np.count_nonzero(useful), np.inf)
+        yield Edges(
+            start=begin[useful],
+            end=end[useful],
+            rise=np.maximum(rise[useful], 0.0),
+            drop=np.maximum(-rise[useful], 0.0),
+            gap=width[useful],
+            clearance=none,
+            width=none,
+        )
 
 
-def _gap_widths(
-    columns: Columns, start: IntArray, end: IntArray
-) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Return the width of the gap between two nodes [m], and whether they are not neighbors."""
-    (i, j), (i2, j2) = columns.column(start), columns.column(end)
-    dx, dy = np.abs(i2 - i), np.abs(j2 - j)
-    far = np.maximum(dx, dy)
+def _moves(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
+    """Return the moves over gaps below `max_gap` [m] in columns, shape (n, 2), and their gaps."""
+    # The gap is narrower than the distance of the nodes by at most a column along each axis.
+    n = min(math.ceil(max_gap / columns.spacing), max(columns.shape))
+    moves = np.argwhere(np.ones((2 * n + 1, 2 * n + 1))) - n
+    near, far = np.abs(moves).min(axis=1), np.abs(moves).max(axis=1)
     # The line leaves the cell of each node after half a column along the longer axis. Cells that
     # touch at a corner are as far apart as the circles in them.
     outside = np.where(far > 1, 1.0 - 1.0 / np.maximum(far, 1), 1.0 - 0.5**0.5)
-    return np.hypot(dx, dy) * columns.spacing * outside, (far > 1) | ((dx > 0) & (dy > 0))
+    gaps = np.hypot(near, far) * columns.spacing * outside
+    useful = ((far > 1) | (near > 0)) & (gaps < max_gap)
+    return moves[useful], gaps[useful]
 
 
-def _evaluate(graph: FootholdGraph, start: IntArray, end: IntArray, max_demand: float) -> Edges:
-    """Return the edges from `start` to `end` whose demand is below `max_demand`."""
+def _easiest(graph: FootholdGraph, pairs: Edges, number: int, *keys: IntArray) -> IntArray:
+    """Return the pairs with the smallest demands of those with the same keys."""
+    order = np.lexsort((graph.demand(pairs), *keys))
+    same = [key[order[number:]] == key[order[:-number]] for key in keys]
+    is_first = np.ones(len(order), dtype=bool)
+    is_first[number:] = ~np.logical_and.reduce(same)
+    return order[is_first]
+
+
+def _evaluate(graph: FootholdGraph, pairs: Edges, max_demand: float) -> Edges:
+    """Return the pairs with what is in between, if their demand is below `max_demand`."""
+    if not len(pairs.start):
+        return pairs
     floor = graph.columns.floor.reshape(-1)
-    gap, _ = _gap_widths(graph.columns, start, end)
-    top, clearance = _between(graph, start, end)
-    edges = Edges(
-        start=start,
-        end=end,
-        rise=top - floor[start],
-        drop=top - floor[end],
-        gap=gap,
-        clearance=clearance,
-        width=np.full(len(start), np.inf),
-    )
-    edges = edges.select(graph.demand(edges) < max_demand)
-    return _with_width(graph, edges, max_demand)
+    top, clearance = _between(graph, pairs.start, pairs.end)
+    rise, drop = top - floor[pairs.start], top - floor[pairs.end]
+    edges = replace(pairs, rise=rise, drop=drop, clearance=clearance)
+    return _with_width(graph, edges.select(graph.demand(edges) < max_demand), max_demand)
 
 
 def _between(graph: FootholdGraph, start: IntArray, end: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -135,8 +163,8 @@ def _between(graph: FootholdGraph, start: IntArray, end: IntArray) -> tuple[Floa
     floor = columns.floor.reshape(-1)
     level = np.maximum(floor[start], floor[end])
     top, clearance = level.copy(), np.full(len(start), np.inf)
-    for place, inside in _line(columns, start, end):
-        above, free = _passed(graph, place, level[inside], floor[start[inside]])
+    for a, b, inside in _line(columns, start, end):
+        above, free = _passed(graph, (a, b), level[inside], floor[start[inside]])
         top[inside] = np.maximum(top[inside], above)
         clearance[inside] = np.minimum(clearance[inside], free)
     return top, clearance
@@ -179,26 +207,24 @@ def _with_width(graph: FootholdGraph, edges: Edges, max_demand: float) -> Edges:
     """Return the edges with the free width between walls at the height of the body."""
     floor = graph.columns.floor.reshape(-1)
     level = np.maximum(floor[edges.start], floor[edges.end])
-    lines = _line(graph.columns, edges.start, edges.end)
+    lines = list(_line(graph.columns, edges.start, edges.end))
     if not lines:
         return edges
-    i, j = (np.concatenate([place[axis] for place, _ in lines]) for axis in (0, 1))
-    inside = np.concatenate([inside for _, inside in lines])
+    i, j, inside = (np.concatenate(each) for each in zip(*lines, strict=True))
     width = edges.width.copy()
     found = graph.passages.widths(i, j, level[inside], edges.clearance[inside])
     np.minimum.at(width, inside, found)
-    edges = Edges(**{**vars(edges), "width": width})
+    edges = replace(edges, width=width)
     return edges.select(graph.demand(edges) < max_demand)
 
 
 def _line(
     columns: Columns, start: IntArray, end: IntArray
-) -> list[tuple[tuple[IntArray, IntArray], NDArray[np.int64]]]:
-    """Return the columns between the nodes of each edge: those at each place, and their edges."""
+) -> Iterator[tuple[IntArray, IntArray, IntArray]]:
+    """Yield the columns between the nodes of each edge: those at each place, and their edges."""
     (i, j), (i2, j2) = columns.column(start), columns.column(end)
     di, dj = i2 - i, j2 - j
     count = 2 * np.maximum(np.abs(di), np.abs(dj))  # points half a column apart
-    lines = []
     for n in range(1, int(count.max(initial=0))):
         inside = np.flatnonzero(n < count)
         t, x, y = n / count[inside], i[inside], j[inside]
@@ -206,5 +232,4 @@ def _line(
         b = np.rint(y + t * dj[inside]).astype(np.int64)
         own = ((a == x) & (b == y)) | ((a == i2[inside]) & (b == j2[inside]))
         between = ~own
-        lines.append(((a[between], b[between]), inside[between]))
-    return lines
+        yield a[between], b[between], inside[between]

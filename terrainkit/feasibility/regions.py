@@ -1,4 +1,4 @@
-"""Regions: which nodes steps join at which demand, so that no gap is searched within a region."""
+"""Regions: the nodes that steps join below some demand, and which of them a path reaches."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -7,48 +7,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.feasibility.bottleneck import find_components
-from terrainkit.feasibility.columns import FloatArray, IntArray
+from terrainkit.feasibility.columns import IntArray
 from terrainkit.feasibility.edges import Edges
-
-_NUM_LEVELS = 8
-"""Number of demands at which nodes are joined, besides that of the narrowest gap."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Regions:
-    """The regions of a graph at some levels: nodes that steps of at most this demand join.
+    """The strongly connected components of the usable steps, and the steps from one to another.
 
-    A gap between two nodes that steps join at its own demand would not change the bottleneck.
+    A gap between two nodes of a region would not change the bottleneck.
     """
 
-    levels: FloatArray
-    """Demands in ascending order, shape (l,)."""
-
     labels: IntArray
-    """Region of each node at each level, shape (l, nodes)."""
+    """Region of each node, shape (nodes,)."""
+
+    links: NDArray[np.int32]
+    """First and second region of the steps from one to another, shape (2, n)."""
 
     @classmethod
-    def build(
-        cls, steps: Edges, demand: FloatArray, node_demand: FloatArray, narrowest: float
-    ) -> Self:
-        """Return the regions that steps form.
+    def build(cls, steps: Edges, usable: NDArray[np.bool_], num_nodes: int) -> Self:
+        """Return the regions that usable steps form.
 
         Args:
             steps: Edges between neighboring columns, in both directions.
-            demand: Demand of each step, shape (n,).
-            node_demand: Demand of each node, shape (nodes,); NaN where there is none.
-            narrowest: Lower bound of the demand of any gap, the first level.
+            usable: Which steps a path may use, shape (n,).
+            num_nodes: Number of nodes.
         """
-        above = node_demand[(node_demand > narrowest) & np.isfinite(node_demand)]
-        levels = [narrowest]
-        if len(above):
-            quantiles = np.linspace(0.0, 1.0, _NUM_LEVELS)
-            levels += np.quantile(above, quantiles, method="inverted_cdf").tolist()
-        unique = np.unique(levels)
-        labels = [find_components(steps, demand <= each, len(node_demand)) for each in unique]
-        return cls(levels=unique, labels=np.stack(labels))
+        labels = find_components(steps, usable, num_nodes)
+        ends = np.stack([labels[steps.start[usable]], labels[steps.end[usable]]])
+        return cls(labels=labels, links=ends[:, ends[0] != ends[1]].astype(np.int32))
 
-    def joined(self, first: IntArray, second: IntArray, demand: FloatArray) -> NDArray[np.bool_]:
-        """Return whether steps join pairs of nodes at a demand that is not above `demand`."""
-        level = np.maximum(np.searchsorted(self.levels, demand, side="right") - 1, 0)
-        return np.asarray(self.labels[level, first] == self.labels[level, second])
+    def reached(self, start: int, gaps: Edges) -> NDArray[np.bool_]:
+        """Return which nodes a path over steps and gaps from `start` reaches, shape (nodes,)."""
+        from scipy.sparse import csr_matrix
+        from scipy.sparse.csgraph import breadth_first_order
+
+        joined = np.stack([self.labels[gaps.start], self.labels[gaps.end]])
+        row, column = np.concatenate([self.links, joined], axis=1)
+        size = int(self.labels.max()) + 1
+        graph = csr_matrix((np.ones(len(row)), (row, column)), shape=(size, size))
+        is_reached = np.zeros(size, dtype=bool)
+        is_reached[breadth_first_order(graph, self.labels[start], return_predecessors=False)] = True
+        return is_reached[self.labels]

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from terrainkit.feasibility.assess import MAX_DEMAND, PatchFeasibility
+from terrainkit.feasibility.assess import PatchFeasibility
 from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.views.preview import Route
 
 SCHEMA_VERSION = 1

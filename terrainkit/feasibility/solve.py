@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility.assess import MAX_DEMAND, assess_patch
+from terrainkit.feasibility.assess import assess_patch
 from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.geometry.grid import Grid
 from terrainkit.map.config import MapConfig
 from terrainkit.map.patch import Patch, build_patch

@@ -29,6 +29,12 @@ def test_feasibility_prints_demands_and_writes_report(terrainkit, tmp_path, stai
     assert (tmp_path / "report.png").stat().st_size > 1000
 
 
+def test_jobs_do_not_change_the_output(terrainkit, stairs):
+    words = ("feasibility", stairs, "--robot", "quadruped")
+    one, two = terrainkit(*words), terrainkit(*words, "--jobs", 2)
+    assert (one.returncode, one.stdout) == (two.returncode, two.stdout)
+
+
 def test_limits_on_the_command_line_replace_the_derived_ones(terrainkit, stairs):
     words = ("--limit", "step_up=0.25", "step_down=0.3")
     run = terrainkit("feasibility", stairs, "--robot", "quadruped", *words)
@@ -73,6 +79,7 @@ def folder_with(tmp_path, old, new):
         (("--robot", "quadruped", "--limit", "gaps=1"), "'gaps'; did you mean 'gap'?"),
         (("--robot", "quadruped", "--limit", "crouched_height=1"), "expected less than the"),
         (("--robot", "quadruped", "-o", "no/report"), "the folder no does not exist"),
+        (("--robot", "quadruped", "--jobs", "0"), "jobs"),
     ],
 )
 def test_invalid_input_is_one_line(terrainkit, stairs, words, message):

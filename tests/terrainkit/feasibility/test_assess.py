@@ -1,6 +1,7 @@
 """The demand of a patch, against values worked out by hand."""
 
 import dataclasses
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility import RobotLimits, assess_map, assess_patch
+from terrainkit.feasibility import assess as assess_module
 from terrainkit.geometry.solids import make_boxes
 from terrainkit.terrain.registry import terrain_names
 from tests.limits import LIMITS
@@ -227,3 +229,44 @@ def test_goal_in_a_wall_is_rejected():
     goals[0, 0, 0, 0] = -5.0
     with pytest.raises(ConfigError, match="outside of its patch"):
         assess_map(wrong, LIMITS)
+
+
+def test_executor_gives_the_same_results():
+    terrain_map = generate(MapConfig(terrains=(SubTerrain(terrain="stairs"),), rows=3, cols=2))
+    expected, seen = assess_map(terrain_map, LIMITS), []
+
+    def watch(places, total):
+        assert total == 6
+        for place in places:
+            seen.append(place)
+            yield place
+
+    with ProcessPoolExecutor(2) as executor:
+        results = assess_map(terrain_map, LIMITS, progress=watch, executor=executor)
+    assert seen == [(each.row, each.col) for each in results]
+    for result, other in zip(results, expected, strict=True):
+        assert (result.row, result.col) == (other.row, other.col)
+        assert (result.demand, result.path.tolist()) == (other.demand, other.path.tolist())
+
+
+def test_executor_reports_the_first_error_and_cancels_the_rest():
+    terrain_map = generate(MapConfig(terrains=(SubTerrain(terrain="slit"),), rows=1, cols=6))
+    goals = terrain_map.goals.copy()
+    goals[0, 1, 0, 0] = -5.0
+    wrong = dataclasses.replace(terrain_map, goals=goals)
+    submitted = []
+    with ThreadPoolExecutor(1) as executor:
+        submit = executor.submit
+        executor.submit = lambda *args: submitted.append(submit(*args)) or submitted[-1]
+        with pytest.raises(ConfigError, match="outside of its patch"):
+            assess_map(wrong, LIMITS, executor=executor)
+    assert submitted[-1].cancelled()
+
+
+def test_memory_counts_the_columns_of_a_patch(monkeypatch):
+    """Solids need columns of at most 3.5 cm: 9 per cell of 0.1 m."""
+    needed = []
+    monkeypatch.setattr(assess_module, "check_memory", lambda size, _: needed.append(size))
+    assess("flat")
+    assess("slit")
+    assert needed[1] == 9 * needed[0] == 9 * 80 * 40 * 2000

@@ -1,0 +1,78 @@
+"""The edges that the least demanding path of a leg may use: steps, and gaps that make it easier."""
+
+import numpy as np
+
+from terrainkit.feasibility.bottleneck import Leg, bottleneck
+from terrainkit.feasibility.columns import FloatArray
+from terrainkit.feasibility.edges import Edges
+from terrainkit.feasibility.foothold_graph import FootholdGraph
+from terrainkit.feasibility.gaps import gap_edges
+from terrainkit.feasibility.regions import Regions
+
+MAX_DEMAND = 2.0
+"""Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""
+
+_REACHES = (0.5, 1.0, float(np.nextafter(MAX_DEMAND, np.inf)))
+"""Demands below which gaps are searched one after the other where steps alone lead nowhere: few
+patches need the widest ones."""
+
+
+def path_edges(graph: FootholdGraph, step_demand: FloatArray, leg: Leg) -> Edges:
+    """Return the edges that demand no more than the least demanding path of a leg.
+
+    Gaps are only searched while they may make the best known path easier: below its demand, and
+    from the nodes that are reached below it to the others.
+
+    Args:
+        graph: The graph.
+        step_demand: Demand of each step of the graph.
+        leg: The leg. Without a path, all steps are returned.
+    """
+    steps, num_nodes = graph.steps, graph.columns.floor.size
+    gaps = steps.select(slice(0))
+    # A lower bound of the demand of all gaps: the demand of cells that touch at a corner.
+    searched = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap
+    without_gaps = least = bottleneck(steps, step_demand, leg, num_nodes)
+    while min(least, MAX_DEMAND) > searched:
+        reach = least
+        if least > MAX_DEMAND:
+            reach = next(each for each in _REACHES if each > searched)
+        is_usable = step_demand < reach
+        regions = Regions.build(steps, is_usable, num_nodes)
+        found, is_path = _crossed(graph, regions, _below(graph, gaps, reach), leg, reach)
+        if is_path:
+            gaps, edges = found, Edges.concatenate([steps.select(is_usable), found])
+            least = bottleneck(edges, graph.demand(edges), leg, num_nodes)
+        else:
+            searched = reach
+    is_usable = step_demand <= least
+    usable = steps.select(is_usable)
+    if least == without_gaps:
+        return usable
+    # One gap into each region is enough to find the demand; a path may need to go far to it.
+    above = np.nextafter(least, np.inf)
+    gaps, regions = _below(graph, gaps, above), Regions.build(steps, is_usable, num_nodes)
+    is_reached = regions.reached(leg[0], gaps)
+    more = gap_edges(graph, regions.labels, is_reached, is_reached, above)
+    return Edges.concatenate([usable, gaps, more])
+
+
+def _crossed(
+    graph: FootholdGraph, regions: Regions, gaps: Edges, leg: Leg, max_demand: float
+) -> tuple[Edges, bool]:
+    """Return the gaps with those that lead on from them, and whether a path reaches a target."""
+    start, targets = leg
+    is_searched = np.zeros(len(regions.labels), dtype=bool)
+    while True:
+        is_reached = regions.reached(start, gaps)
+        if is_reached[targets].any():
+            return gaps, True
+        starts = is_reached & ~is_searched
+        found = gap_edges(graph, regions.labels, starts, ~is_reached, max_demand, one_each=True)
+        if not len(found.start):
+            return gaps, False
+        gaps, is_searched = Edges.concatenate([gaps, found]), is_reached
+
+
+def _below(graph: FootholdGraph, gaps: Edges, max_demand: float) -> Edges:
+    return gaps.select(graph.demand(gaps) < max_demand)
