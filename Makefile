@@ -1,4 +1,4 @@
-.PHONY: test check format bench docs wheel site browser integrations
+.PHONY: test check format bench fuzz docs wheel site browser integrations
 
 test:          ## all tests
 	python -m pytest
@@ -12,6 +12,9 @@ format:        ## format the code and apply ruff's fixes
 
 bench:         ## print the ratios of speed and memory
 	python benchmarks/run.py
+
+fuzz:          ## read damaged and hostile files for 10 minutes
+	python benchmarks/fuzz.py
 
 docs:          ## rewrite the generated docs and pictures
 	python docs/build.py

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import TerrainkitError
+from terrainkit.files.memory import check_memory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +53,7 @@ def run_isolated(
 
     Raises:
         IsolatedError: if the function fails, crashes, or exceeds a limit.
+        MemoryLimitError: if the arrays do not fit in memory.
     """
     limits = limits or ProcessLimits()
     with tempfile.TemporaryDirectory(prefix="terrainkit-") as folder:
@@ -68,6 +70,7 @@ def run_isolated(
                 timeout=limits.seconds,
                 env={**os.environ, "PYTHONPATH": import_path()},
             )
+            check_memory(result.stat().st_size, "the result of a child process")
             with np.load(result, allow_pickle=False) as arrays:
                 return dict(arrays)
         except subprocess.TimeoutExpired:

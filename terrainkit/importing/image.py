@@ -1,6 +1,7 @@
 """Read heights from a 16-bit PNG or a TIFF image."""
 
 import json
+import os
 import warnings
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,9 @@ from terrainkit.settings.toml_text import read_text
 
 _TIFF_SUFFIXES = (".tif", ".tiff")
 SUFFIXES = (".png", *_TIFF_SUFFIXES)
+
+MAX_PIXELS = 1 << 28
+"""Most pixels of an image: a map of so many samples takes tens of gigabytes."""
 
 
 def read(path: Path, options: ReadOptions) -> Raster:
@@ -65,11 +69,16 @@ def read(path: Path, options: ReadOptions) -> Raster:
 
 
 def _read_pixels(path: Path) -> dict[str, Any]:
+    # OpenCV compares the size in the header with it before it decodes.
+    os.environ["OPENCV_IO_MAX_IMAGE_PIXELS"] = str(MAX_PIXELS)
     import cv2
 
-    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    try:
+        pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        pixels = None
     if pixels is None:
-        raise ValueError("not an image, or truncated")
+        raise ValueError(f"not an image, truncated, or more than {MAX_PIXELS} pixels")
     return {"pixels": pixels}
 
 

@@ -14,7 +14,9 @@ from terrainkit.importing.options import Missing, ReadOptions
 from terrainkit.importing.source import Array, fill_missing, open_source
 from terrainkit.settings.type_hint import MAX_VALUE
 
-_BYTES_PER_VALUE = 24
+BYTES_PER_VALUE = 24
+"""Peak memory of a height of a file [bytes]."""
+
 _BYTES_PER_SAMPLE = 100
 
 _ALIGNED = 1e-4
@@ -118,7 +120,7 @@ def make_raster(
             f"{path}: got shape {values.shape} of {values.dtype}; expected a gray image or an "
             "array of numbers with two axes"
         )
-    check_memory(values.size * _BYTES_PER_VALUE, f"reading {values.size} heights from {path}")
+    check_memory(values.size * BYTES_PER_VALUE, f"reading {values.size} heights from {path}")
     cell = options.file_cell or cell
     if cell is None:
         raise ConfigError(f"file_cell: missing; {path} does not state the distance of its samples")

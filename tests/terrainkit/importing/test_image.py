@@ -1,4 +1,5 @@
 import json
+from zlib import crc32
 
 import cv2
 import numpy as np
@@ -99,7 +100,7 @@ def test_image_truncated_is_rejected(tmp_path, suffix):
     pixels = np.random.default_rng(0).integers(0, 65535, (64, 64)).astype(np.uint16)
     path = write(tmp_path / f"a{suffix}", pixels)
     path.write_bytes(path.read_bytes()[:3000])
-    with pytest.raises(HeightFileError, match=r"cannot be read: not an image, or truncated$"):
+    with pytest.raises(HeightFileError, match=r"cannot be read: not an image, truncated, or more"):
         read(path, ReadOptions(file_cell=1.0, scale=1.0))
 
 
@@ -107,10 +108,12 @@ def test_image_truncated_is_rejected(tmp_path, suffix):
 def test_image_that_claims_huge_size_is_rejected(tmp_path):
     path = write(tmp_path / "a.png", PIXELS)
     data = bytearray(path.read_bytes())
-    data[16:24] = (2**31 - 1).to_bytes(4, "big") * 2  # width and height of the IHDR chunk
-    path.write_bytes(data)
-    with pytest.raises(HeightFileError, match=r"cannot be read"):
-        read(path, ReadOptions(file_cell=1.0, scale=1.0))
+    for side in (1 << 14) + 1, 2**31 - 1:
+        data[16:24] = side.to_bytes(4, "big") * 2  # width and height of the IHDR chunk
+        data[29:33] = crc32(data[12:29]).to_bytes(4, "big")
+        path.write_bytes(data)
+        with pytest.raises(HeightFileError, match=r"more than 268435456 pixels$"):
+            read(path, ReadOptions(file_cell=1.0, scale=1.0))
 
 
 @pytest.mark.parametrize("text", ["[", '{"scale": "x"}', '{"first_sample": 3}', "[1]"])

@@ -1,0 +1,192 @@
+"""Run a command in a forked process with limits, and judge what it did.
+
+A command may write to its working folder and its temporary folder.
+"""
+
+import json
+import os
+import re
+import resource
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+KINDS = ("traceback", "hang", "memory", "files", "executed", "output", "accepted")
+"""Kinds of failures. Files are left or written elsewhere, output is not of terrainkit, and accepted
+is damage that changes the content of an archive with checksums."""
+
+SECONDS = 20
+"""Limit of the CPU time of each process, and a sixth of that of the wall-clock time [s]."""
+
+MEMORY = 2 << 30
+"""Memory beyond that of an idle command from which there is a failure [bytes]."""
+
+_ADDRESS_SPACE = 8 << 30
+
+_CALLS = ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect")
+_EXECUTES = {*_CALLS, "pickle.find_class"}
+_OWN = re.compile(
+    r"'-P', '-[cm]', '.*terrainkit|^\('(numpy|concurrent|multiproc|terrainkit|plugin)"
+)
+"""Our child processes, and the classes of what they return."""
+
+_CHANGES = {"os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.symlink", "os.link"}
+_WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT
+_OUR_LINE = re.compile(r"terrainkit: |iteration \d+/\d+: ")
+_TOO_LARGE = re.compile(r"out of memory|needs more than (?:[3-9]|\d\d)\S* GB of memory")
+_NUM_ERRORS = {0: (0,), 1: (0, 1)}
+"""Numbers of error lines by exit code; one for others."""
+
+
+class Failure(NamedTuple):
+    """What a command did that it must not do, and the line that shows it."""
+
+    kind: str
+    line: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What a forked process runs in its working folder."""
+
+    words: list[str]
+    """Words of the command line after `terrainkit`."""
+
+    path: Path = Path()
+    """The damaged file."""
+
+    check: Callable[[], str] = str
+    """Called after a success: returns why the input should have been rejected, or nothing."""
+
+    has_plugins: bool = False
+    """Whether the working folder is a folder of Python packages."""
+
+
+class Process(NamedTuple):
+    """A forked process, in a folder with `work`, `tmp` and what it printed."""
+
+    pid: int
+    folder: Path
+    start: float
+
+    def wait(self) -> bool | Failure | None:
+        """Return its failure or None at its end; until then False."""
+        pid, status, usage = os.wait4(self.pid, os.WNOHANG)
+        if not pid and time.monotonic() - self.start < 6 * SECONDS:
+            return False
+        with suppress(ProcessLookupError):
+            os.killpg(self.pid, signal.SIGKILL)
+        if not pid:
+            _, status, usage = os.wait4(self.pid, 0)
+        # The memory of a forked process includes that of this one.
+        own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        failures = self._failures(
+            os.waitstatus_to_exitcode(status), (usage.ru_maxrss - own) / 2**20
+        )
+        return next((Failure(kind, line) for kind, line in failures if line), None)
+
+    def _failures(self, code: int, gigabytes: float) -> Iterator[tuple[str, str]]:
+        """Yield kinds of failures, and lines that are empty if there is none."""
+        lines = (self.folder / "stderr").read_text(errors="replace").splitlines() or [""]
+        last, errors = lines[-1], sum(line.startswith("terrainkit: error: ") for line in lines)
+        for line in (self.folder / "audit").read_text(errors="replace").splitlines():
+            yield line.partition(" ")[0], line
+        yield "hang", f"ended by {-code}" * (code in (-signal.SIGXCPU, -signal.SIGKILL))
+        is_large = gigabytes > MEMORY / 2**30 or _TOO_LARGE.search(last)
+        yield "memory", f"{gigabytes:.1f} GB; {last}" * bool(is_large)
+        yield "traceback", f"exit code {code}: {last}" * (code not in (0, 1, 2))
+        yield from (("output", line) for line in lines if not _OUR_LINE.match(line))
+        yield (
+            "output",
+            f"exit code {code}, {errors} errors" * (errors not in _NUM_ERRORS.get(code, (1,))),
+        )
+        before = (self.folder / "before").read_text().splitlines()
+        for line in set(_listing(self.folder)).difference(before):
+            is_output = code != 2 and line.startswith("'work/out")
+            yield "files", f"exit code {code}: changed {line}" * (not is_output)
+
+
+def start(folder: Path, prepare: Callable[[], Command]) -> Process:
+    """Fork a process that changes to `folder`/work, and prepares and runs a command."""
+    for name in ("work", "tmp"):
+        (folder / name).mkdir(parents=True)
+    begin = time.monotonic()
+    if pid := os.fork():
+        return Process(pid, folder, begin)
+    code = 70
+    try:
+        os.setpgid(0, 0)
+        code = _run(folder, prepare)
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _run(folder: Path, prepare: Callable[[], Command]) -> int:
+    from terrainkit_cli.main import main
+
+    os.chdir(folder / "work")
+    for name, number in (("stdout", 1), ("stderr", 2), ("audit", 99)):
+        os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_APPEND), number)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of the libraries that write the input
+        command = prepare()
+    os.environ["TMPDIR"] = tempfile.tempdir = str(folder / "tmp")
+    log = {"words": command.words, "path": str(command.path)}
+    (folder / "command").write_text(json.dumps(log))
+    (folder / "before").write_text("\n".join(_listing(folder)))
+    if command.has_plugins:
+        sys.path.insert(0, str(folder / "work"))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (size + _ADDRESS_SPACE,) * 2)
+    sys.addaudithook(_audit_hook(folder, 99, has_plugins=command.has_plugins))
+    code = main(command.words)
+    reason = command.check() if code == 0 else ""
+    os.write(99, f"accepted {reason}\n".encode() if reason else b"")
+    return code
+
+
+def _listing(folder: Path) -> list[str]:
+    """Return a line with the name of each path in work and tmp, and the times of the files."""
+    paths = [path for name in ("work", "tmp") for path in (folder / name).rglob("*")]
+    return [
+        f"{str(path.relative_to(folder))!a} {path.is_dir() or path.lstat().st_mtime_ns}"
+        for path in paths
+        if path.name != ".ses"  # of onnxruntime
+    ]
+
+
+def _audit_hook(folder: Path, target: int, *, has_plugins: bool) -> Callable[[str, Any], None]:
+    """Return a hook that writes a line to `target` for each event that is not allowed."""
+    inside = str(folder / "work"), str(folder / "tmp"), os.devnull
+
+    def is_outside(path: Any) -> bool:
+        is_path = isinstance(path, str | bytes | Path)
+        return is_path and not os.path.abspath(os.fsdecode(path)).startswith(inside)  # noqa: PTH100
+
+    def hook(event: str, arguments: Any) -> None:
+        if event in _CHANGES or (event == "open" and arguments[2] & _WRITES):
+            kind, is_allowed = "files", not any(map(is_outside, arguments[:2]))
+        elif event in _EXECUTES:
+            kind, is_allowed = "executed", bool(_OWN.search(repr(arguments)))
+        elif event == "exec":
+            name = arguments[0].co_filename
+            kind, is_allowed = "executed", has_plugins or not name.startswith(inside)
+        else:
+            return
+        if not is_allowed:
+            os.write(target, f"{kind} {event} {arguments!r:.300}\n".encode())
+
+    return hook
