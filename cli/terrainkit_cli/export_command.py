@@ -20,9 +20,9 @@ class Export(Command):
     """Export a map to other formats, or a policy to ONNX.
 
     A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .yaml (ROS), .stl, .ply, .obj,
-    .glb or .png: the suffix of --output selects the format. A .sdf has its meshes in .stl files
-    beside it, a .png its scale in a .json file, and a .yaml an occupancy image and an image of the
-    heights.
+    .glb, .png or .py (legged_gym, LeggedGym-Ex, Isaac Gym): the suffix of --output selects the
+    format. A .sdf has its meshes in .stl files beside it, a .png its scale in a .json file, a .yaml
+    an occupancy image and an image of the heights, and a .py its arrays in an .npz file.
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt

@@ -1,5 +1,6 @@
 """The command that onboards a robot."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from shlex import quote
@@ -48,8 +49,12 @@ class Onboard(Command):
     nonconvex meshes into convex parts with CoACD; or fit a box, cylinder, capsule or sphere."""
 
     config: Annotated[tuple[str, ...], option("FRAMEWORK", is_repeated=True)] = ()
-    """Also write the configuration file of a training framework: legged_gym, leggedgym_ex,
+    """Also write the configuration files of a training framework: legged_gym, leggedgym_ex,
     isaaclab, mjlab, genesis."""
+
+    name: Annotated[str, option("NAME")] = ""
+    """Name of the robot, of its tasks in training frameworks and of their packages, such as
+    my_robot; by default that of the file."""
 
     base: Literal["auto", "floating", "fixed"] = "auto"
     """Type of the base: floating, or fixed to the world. With auto, it is floating if the file
@@ -105,8 +110,8 @@ class Onboard(Command):
         render.result(f"wrote {result.folder}; view the robot with:")
         scene = quote(str(result.folder / "scene.xml"))
         render.result(f"  python -m mujoco.viewer --mjcf={scene}")
-        for line in _train_command(result):
-            render.result(line)
+        for line in _train_commands(result):
+            render.report(f"{line}\n")  # with absolute paths: for use in another folder
         errors, warnings = _remaining_errors(result), _warnings(result)
         for error in errors:
             render.error(f"{self.file}: {error}")
@@ -123,6 +128,7 @@ class Onboard(Command):
         return OnboardOptions(
             settings=parse_settings(self.ignore, self.package, self.xacro_arg),
             collision=self.collision,
+            name=self.name,
             frameworks=tuple(word for words in self.config for word in split_commas(words)),
             floating={"auto": None, "floating": True, "fixed": False}[self.base],
             spec=self.spec,
@@ -147,17 +153,17 @@ class Onboard(Command):
         return "; --force ignores them where MuJoCo accepts the robot"
 
 
-def _train_command(result: "OnboardResult") -> list[str]:
-    """Return the command that trains the robot in mjlab, if its configuration was written."""
-    from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name
-    from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
+def _train_commands(result: "OnboardResult") -> Iterator[str]:
+    """Yield the commands that train the robot, for each framework that has them."""
+    from terrainkit_robots.onboarding.frameworks.frameworks import train_commands
 
     assert result.folder is not None
     assert result.robot is not None
-    file, _, task = train_arguments(result.robot.spec).partition(" ")
-    if not task or config_file_name("mjlab") not in result.configs:
-        return []
-    return ["train it in mjlab with:", f"  python {quote(str(result.folder / file))} {task}"]
+    for framework in result.configs:
+        place, commands = train_commands(framework, result.robot.spec, result.folder)
+        if commands:
+            yield f"train it in {place} with:"
+            yield from (f"  {command}" for command in commands)
 
 
 def _blocking_errors(result: "OnboardResult") -> str:

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ExportError, listing
+from terrainkit.export.npz import is_map_file
 from terrainkit.export.requirements import require_finite
 from terrainkit.files.atomic_write import atomic_write, check_target
 from terrainkit.files.memory import check_memory
@@ -33,7 +34,8 @@ def export_files(
 
     Raises:
         ExportError: if the suffix or an option is unknown, the format cannot represent the map, or
-            the target cannot be written; an existing target is unchanged.
+            the target cannot be written, also because a file beside it would replace a map; an
+            existing target is unchanged.
     """
     path = Path(path)
     write = get_exporter(path).export
@@ -45,7 +47,10 @@ def export_files(
     with atomic_write(path, overwrite=overwrite) as temporary:
         write(terrain_map, temporary, **options)
         names = sorted({file.name for file in temporary.parent.iterdir()} - {path.name})
-    return (path, *(path.with_name(name) for name in names))
+        files = tuple(path.with_name(name) for name in names)
+        for file in filter(is_map_file, files):
+            raise ExportError(f"cannot write {path}: {file} is a map; use another name")
+    return (path, *files)
 
 
 def check_export(path: str | Path, samples: int, *, overwrite: bool = False) -> None:

@@ -132,6 +132,15 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
         )
 
 
+def is_map_file(path: Path) -> bool:
+    """Return whether `path` is an .npz file with a map."""
+    try:
+        with open_archive(path) as archive:
+            return "format_version" in archive.names()
+    except MapFileError:
+        return False
+
+
 def read_mesh(path: str | Path) -> TriMesh | None:
     """Return the trimesh in the .npz file `path`; None if it was written without one.
 

@@ -39,9 +39,9 @@ Interval = Annotated[tuple[float, float], SORTED]
 NonNegativeInterval = Annotated[tuple[NonNegativeFloat, NonNegativeFloat], SORTED]
 
 _MAX_INT = 2**63
-# Ratios of numbers beyond these overflow single precision. Numbers that need not be positive can be
-# smaller: a computed angle of 0 has a rounding error.
-_MIN_FLOAT, _MAX_FLOAT = 1e-12, 1e9
+# Larger numbers overflow single precision; robot files have the same limit. Numbers that can be 0
+# can also be smaller: a computed angle of 0 has a rounding error.
+_MIN_FLOAT, _MAX_FLOAT = 1e-12, 1e30
 _NAMES = {int: "an integer", float: "a number", str: "a string", bool: "true or false"}
 _LIMITS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 

@@ -14,7 +14,7 @@ from stand_ins import StandIns
 
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
-from terrainkit_robots.onboarding.frameworks.frameworks import config_text
+from terrainkit_robots.onboarding.frameworks.isaaclab import config_text
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 
 STAND_INS = ("carb", "cv2", "flatdict", "h5py", "hid", "isaacsim", "omni", "onnx", "pxr", "usdrt")
@@ -58,6 +58,6 @@ stiffness = {joint: 0.0 if "knee" in joint else 20.0 for joint in spec.joint_ord
 robot = ConfigRobot(spec=replace(spec, stiffness=stiffness))
 wheeled = {"__file__": __file__, "__name__": "wheeled"}
 sys.modules["wheeled"] = ModuleType("wheeled")
-exec(config_text("isaaclab", robot), wheeled)
+exec(config_text(robot), wheeled)
 assert wheeled["RoughEnvCfg"]().actions.joint_vel.joint_names == [".*_knee_joint"]
 print(f"Isaac Lab {version('isaaclab')}: the tasks of three robots are valid; simulator: stand-in")

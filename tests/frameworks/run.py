@@ -8,8 +8,9 @@ import os
 import subprocess
 import sys
 import tempfile
-import venv
 from pathlib import Path
+
+from pythons import find_python
 
 FOLDER = Path(__file__).parent
 PACKAGES = {
@@ -22,8 +23,20 @@ PACKAGES = {
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
     "drake": [["drake==1.51.1"]],
     "sdformat": [],
+    "leggedgym_ex": [
+        ["torch==2.8.0", "genesis-world==0.3.14"],
+        ["wandb", "tensorboard", "pandas", "xlsxwriter", "pygame", "warp-lang"],
+    ],
+    "legged_gym": [["torch==2.4.1", "numpy<1.24", "scipy", "matplotlib", "tensorboard"]],
 }
 """Arguments of `pip install` for each check."""
+
+CHECKOUTS = {"leggedgym_ex": "LEGGEDGYM_EX", "legged_gym": "LEGGED_GYM"}
+"""Variable with the folder of a framework that is no package. The check runs beside its
+environment, in which terrainkit is not installed."""
+
+PYTHONS = {"legged_gym": "3.8"}
+"""Version of Python of an environment, where it is not that of this program."""
 
 
 def main() -> None:
@@ -33,17 +46,29 @@ def main() -> None:
     arguments = parser.parse_args()
     failed = []
     for name in arguments.names:
-        python = arguments.environments / name / "bin" / "python"
+        if CHECKOUTS.get(name, "PATH") not in os.environ:
+            print(f"{name}: not run; set {CHECKOUTS[name]} to the folder of a checkout")
+            continue
+        version = PYTHONS.get(name)
+        interpreter = find_python(version) if version else sys.executable
+        if interpreter is None:
+            print(f"{name}: not run; there is no Python {version} on PATH or in pyenv")
+            continue
+        environment = arguments.environments.absolute() / name
+        python = environment / "bin" / "python"
         if not python.exists():
-            venv.create(python.parents[1], with_pip=True)
-        for packages in [["-e", FOLDER.parents[1]], *PACKAGES[name]]:
+            subprocess.run([interpreter, "-m", "venv", environment], check=True)
+        own = [] if name in CHECKOUTS else [["-e", FOLDER.parents[1]]]
+        for packages in [*own, *PACKAGES[name]]:
             subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
         with tempfile.TemporaryDirectory() as folder:
             scripts = sorted(FOLDER.glob(f"{name}*_check.py"))
-            checks = [subprocess.run([python, script, folder]) for script in scripts]
+            command = [sys.executable] if name in CHECKOUTS else [python]
+            more = [python] if name in CHECKOUTS else []
+            checks = [subprocess.run([*command, each, folder, *more]) for each in scripts]
         if name == "mjlab":  # trains onboarded robots
             test = FOLDER.parent / "terrainkit_robots/onboarding/frameworks/test_mjlab.py"
-            variables = os.environ | {"TERRAINKIT_MJLAB_PYTHON": str(python.absolute())}
+            variables = os.environ | {"TERRAINKIT_MJLAB_PYTHON": str(python)}
             pytest = [sys.executable, "-m", "pytest", "-n", "0", test]
             checks.append(subprocess.run(pytest, env=variables))
         if any(each.returncode for each in checks):

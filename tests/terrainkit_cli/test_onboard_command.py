@@ -46,6 +46,40 @@ def test_onboard_quadruped(here, tmp_path):
     assert (tmp_path / "robot/genesis_config.py").exists()
 
 
+def test_onboard_name_is_that_of_the_task(here, tmp_path):
+    words = ("quadruped", "--name", "quad", NO_PICTURES, "--config", "leggedgym_ex")
+    code, out, err = here(*words)
+    assert (code, err) == (0, "")
+    assert f"  cp -r {tmp_path / 'quad'} legged_gym/envs/quad\n" in out
+    assert "train.py --task=quad --headless\n" in out
+    for file in ("__init__.py", "quad.py", "quad_config.py"):
+        assert (tmp_path / "quad" / file).is_file()
+    assert 'name = "quad"' in (tmp_path / "quad/robot.toml").read_text()
+    assert '<robot name="quad"' in (tmp_path / "quad/robot.urdf").read_text()
+    (tmp_path / "quad/quad.py").write_text("# Mine.\n")
+    (tmp_path / "quad/__pycache__").mkdir()
+    assert here(*words, "--overwrite")[0] == 0
+    assert (tmp_path / "quad/quad.py.before").read_text() == "# Mine.\n"
+    assert here(*words, "--overwrite")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("go2", "'go2', a folder of LeggedGym-Ex; expected another name, such as --name my_go2"),
+        ("genesis", "name: got 'genesis', a framework; expected another one"),
+        ("My Robot", "name: got 'My Robot'; expected a name such as my_robot"),
+    ],
+)
+def test_onboard_rejects_name(here, tmp_path, name, message):
+    before = list(tmp_path.iterdir())
+    words = ("quadruped", "--name", name, NO_PICTURES, "--config", "leggedgym_ex,genesis")
+    code, _, err = here(*words)
+    assert code == 2
+    assert message in one_line(err)
+    assert list(tmp_path.iterdir()) == before
+
+
 def test_onboard_skips_unsupported_framework(here, tmp_path):
     words = ("arm.urdf", NO_PICTURES, "--config", "legged_gym,isaaclab")
     code, out, err = here(*words)

@@ -68,8 +68,10 @@ def onboarded(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], Onbo
 
     @cache
     def run(file: Path) -> OnboardResult:
+        # LeggedGym-Ex has a go2 and a g1.
+        name = "" if "bundled" in file.parts else f"my_{file.stem.lower()}"
         options = OnboardOptions(
-            frameworks=framework_names(), unsafe_fixes=True, render_images=False
+            name=name, frameworks=framework_names(), unsafe_fixes=True, render_images=False
         )
         return onboard(file, tmp_path_factory.mktemp("onboarded") / "robot", options)
 

@@ -38,7 +38,7 @@ def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
 
 def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -> Site:
     body = facts.bodies[leg.limb.chain[-1]]
-    local = _pose_in_body(body, foot)
+    local = pose_in_body(body, foot)
     box = bounds(_ground_contacts(body, poses[body.index], facts), facts.meshes)
     if box is None:
         return Site(name=foot, body=foot, pose=np.eye(4))
@@ -80,7 +80,7 @@ def _imu(facts: "Facts") -> tuple[Body, Matrix] | None:
     imu = facts.model.imu
     if imu is not None and imu[0] in facts.body_of:
         body = facts.body_of[imu[0]]
-        return body, _pose_in_body(body, imu[0]) @ imu[1]
+        return body, pose_in_body(body, imu[0]) @ imu[1]
     base = _base(facts)
     for link, pose in zip(base.links, base.poses, strict=True):
         if "imu" in link.name.lower():
@@ -92,6 +92,7 @@ def _base(facts: "Facts") -> Body:
     return next((body for body in facts.bodies if not body.virtual), facts.bodies[0])
 
 
-def _pose_in_body(body: Body, link: str) -> Matrix:
+def pose_in_body(body: Body, link: str) -> Matrix:
+    """Return the pose of a link in the frame of its body."""
     names = [each.name for each in body.links]
     return body.poses[names.index(link)]

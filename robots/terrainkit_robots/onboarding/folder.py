@@ -1,19 +1,22 @@
 """The folder of an onboarded robot, which is written completely or not at all."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from terrainkit.errors import ExportError
 from terrainkit.files.atomic_write import atomic_folder
+from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.text import free_name, names
 
 _BACKUP_SUFFIX = ".before"
 """Suffix of backups of edited files."""
 
-_GENERATED = frozenset({"robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes"})
-"""Files and folders that onboarding writes, except those that users edit."""
+_GENERATED = frozenset(
+    {"robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes", "__pycache__"}
+)
+"""Files and folders that onboarding or Python writes, except those that users edit."""
 
 
 def check_folder(target: Path, *, overwrite: bool) -> None:
@@ -40,7 +43,7 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
         raise ExportError(
             f"{target} contains no {SPEC_FILE}; only folders of onboarded robots are overwritten"
         )
-    editable = _editable_files()
+    editable = _editable_files(contents)
     foreign = [
         name for name in contents if name not in _GENERATED and _original_name(name) not in editable
     ]
@@ -51,12 +54,17 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
         )
 
 
-def _editable_files() -> frozenset[str]:
-    """Return the names of the files that users edit: the spec and framework configurations."""
-    from terrainkit_robots.onboarding.frameworks import frameworks
+def _editable_files(contents: Iterable[str]) -> set[str]:
+    """Return the names of the files that users edit.
 
-    file_names = map(frameworks.config_file_name, frameworks.framework_names())
-    return frozenset({SPEC_FILE, *file_names})
+    They are the spec, the configurations, and the files of a package with its own configuration:
+    __init__.py, NAME.py and NAME_config.py.
+    """
+    names = {_original_name(name) for name in contents}
+    modules = {name for name in names if name.replace(".py", "_config.py") in names - {name}}
+    configs = {name.replace(".py", "_config.py") for name in modules}
+    frameworks = {f"{name}_config.py" for name in framework_names()}
+    return {SPEC_FILE, "__init__.py", *modules, *configs, *frameworks}
 
 
 def _original_name(name: str) -> str:
@@ -75,12 +83,11 @@ def find_edits(target: Path, files: Mapping[str, bytes]) -> dict[str, bytes]:
     Raises:
         ExportError: if a file cannot be read.
     """
-    editable = _editable_files()
     try:
+        paths = sorted(target.iterdir()) if target.is_dir() else []
+        editable = _editable_files(path.name for path in paths)
         existing = {
-            path.name: path.read_bytes()
-            for path in (sorted(target.iterdir()) if target.is_dir() else ())
-            if _original_name(path.name) in editable
+            path.name: path.read_bytes() for path in paths if _original_name(path.name) in editable
         }
     except OSError as error:
         raise ExportError(f"cannot read {target}: {error.strerror or error}") from error

@@ -1,6 +1,6 @@
 """The onboarding pipeline: check a robot file, fix it, write its folder and verify the result."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,7 +13,8 @@ from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.lint.settings import Settings, read_settings
 from terrainkit_robots.onboarding.folder import check_folder, find_edits, new_folder, write_files
-from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, robot_config_text
+from terrainkit_robots.onboarding.frameworks.frameworks import check_framework, robot_config_files
+from terrainkit_robots.onboarding.frameworks.naming import package_name
 from terrainkit_robots.onboarding.placeholder_effort import placeholder_effort
 from terrainkit_robots.onboarding.repairs import with_repairs_marked_safe
 from terrainkit_robots.onboarding.report_md import report_markdown
@@ -54,6 +55,9 @@ class OnboardOptions:
 
     frameworks: tuple[str, ...] = ()
     """Training frameworks to write a configuration for."""
+
+    name: str = ""
+    """Name of the robot and of its tasks; by default that of the file."""
 
     floating: bool | None = None
     """Whether the base is floating; None to decide from the file and the legs."""
@@ -119,7 +123,12 @@ def onboard(
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
     path, options = Path(path), options or OnboardOptions()
-    config_names = {name: config_file_name(name) for name in options.frameworks}
+    for framework in options.frameworks:
+        check_framework(framework)
+    if options.name and package_name(options.name) != options.name:
+        raise ConfigError(
+            f"name: got {options.name!r}; expected a name such as {package_name(options.name)}"
+        )
     if output is not None:
         check_folder(Path(output), overwrite=options.overwrite)
     user_spec = None
@@ -131,11 +140,12 @@ def onboard(
         raise TerrainkitError(f"{path}: {rule.code}: {rule.reason}")
     if not options.force and any(map(is_blocking, report.findings)):
         return OnboardResult(report=report, fixed=fixed)
-    target = Path(output or plain_name(report.facts.model))
+    target = Path(output or options.name or plain_name(report.facts.model))
     check_folder(target, overwrite=options.overwrite)
     options.on_step("deriving the default pose and the gains")
     robot_files = make_robot_files(
         report.facts,
+        name=options.name,
         collision=options.collision,
         floating=options.floating,
         user_spec=user_spec,
@@ -144,16 +154,19 @@ def onboard(
         cache_dir=options.cache_dir,
         progress=options.progress,
     )
-    configs, skipped_configs = _config_files(config_names, robot_files)
+    configs, skipped_configs = _config_files(options.frameworks, robot_files)
+    files = {name: data for each in configs.values() for name, data in each.items()}
+    if len(files) < sum(map(len, configs.values())):
+        raise ConfigError(f"name: got {robot_files.spec.name!r}, a framework; expected another one")
     result = OnboardResult(
         report=report,
         fixed=fixed,
         folder=target,
         robot=robot_files,
-        configs=tuple(configs),
+        configs={framework: tuple(each) for framework, each in configs.items()},
         skipped_configs=skipped_configs,
     )
-    return _write_folder(result, target, {**robot_files.files, **configs}, options)
+    return _write_folder(result, target, {**robot_files.files, **files}, options)
 
 
 def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[Finding, ...]]:
@@ -180,21 +193,18 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
 
 
 def _config_files(
-    file_names: Mapping[str, str], robot_files: RobotFiles
-) -> tuple[dict[str, bytes], dict[str, str]]:
-    """Return the configurations by file name, and why frameworks are skipped.
-
-    Args:
-        file_names: File of the configuration of each framework.
-        robot_files: The robot.
-    """
-    configs: dict[str, bytes] = {}
+    frameworks: Iterable[str], robot_files: RobotFiles
+) -> tuple[dict[str, dict[str, bytes]], dict[str, str]]:
+    """Return the files for each framework by name, and why frameworks are skipped."""
+    configs: dict[str, dict[str, bytes]] = {}
     skipped: dict[str, str] = {}
-    for name, file in file_names.items():
+    for framework in frameworks:
         try:
-            configs[file] = robot_config_text(name, robot_files.facts, robot_files.spec).encode()
+            texts = robot_config_files(framework, robot_files.facts, robot_files.spec)
         except ConfigError as error:
-            skipped[name] = str(error)
+            skipped[framework] = str(error)
+        else:
+            configs[framework] = {name: text.encode() for name, text in texts.items()}
     return configs, skipped
 
 

@@ -252,12 +252,12 @@ def _next_steps(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
         ("compare the two files", f"terrainkit check-robot {urdf} --against {mjcf}"),
     ]
     arguments = train_arguments(robot.spec)
-    if arguments.partition(" ")[0] in result.configs:
+    if arguments and "mjlab" in result.configs:
         commands.append(("train the robot in mjlab", f"python {arguments}"))
     yield "```sh"
     for purpose, command in commands:
         yield f"{command}  # {purpose}"
     yield "```\n"
     if result.configs:
-        rows = [(name, "see its docstring") for name in result.configs]
+        rows = [(files[0], "see its docstring") for files in result.configs.values()]
         yield from titled_list("Framework configurations", rows)

@@ -32,8 +32,8 @@ class OnboardResult:
     verification: "Verification | None" = None
     """The comparison of the written files with the source, and the standing test."""
 
-    configs: tuple[str, ...] = ()
-    """Names of the framework configurations."""
+    configs: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names of the files for each framework. The first one is the configuration."""
 
     skipped_configs: Mapping[str, str] = field(default_factory=dict)
     """Why the configuration of a requested framework was not written, by framework."""

@@ -70,6 +70,7 @@ class SpecOverride:
 def make_robot_files(
     source: Facts,
     *,
+    name: str = "",
     collision: "CollisionMethod" = "keep",
     floating: bool | None = None,
     user_spec: SpecOverride | None = None,
@@ -82,6 +83,7 @@ def make_robot_files(
 
     Args:
         source: Facts of the source file.
+        name: Name of the robot; by default that of the overriding spec or the file.
         collision: How collision meshes are simplified.
         floating: Whether the base is floating; by default as in the overriding spec or the file,
             or as the legs suggest.
@@ -113,6 +115,8 @@ def make_robot_files(
     if user_spec is not None:
         spec_changes = _check_user_spec(Facts(model, meshes, spec=user_spec.spec), user_spec)
     spec = _make_spec(Facts(model, meshes), user_spec, gain_set)
+    if name:
+        model, spec = replace(model, name=name), replace(spec, name=name)
     facts = Facts(_set_motor_limits(model, spec), meshes, spec=spec)
     excluded, contact_changes = _excluded_contacts(facts)
     texts = {

@@ -32,7 +32,7 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
     if result.verification.free_standing is not None:
         yield "free", _free_standing_text(result.verification.free_standing)
     if result.configs:
-        yield "configs", names(result.configs)
+        yield "configs", names(file for files in result.configs.values() for file in files)
     for framework, reason in result.skipped_configs.items():
         yield "skipped", f"{framework}: {reason}"
     pictures = f"{count(len(result.images), 'picture')} in report.md"

@@ -14,8 +14,11 @@ from terrainkit.curriculum import SamplerName
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import Config
 from terrainkit.settings.type_hint import (
+    MAX_VALUE,
+    SORTED,
     Fraction,
     Interval,
+    NonNegative,
     NonNegativeFloat,
     NonNegativeInterval,
     PositiveFloat,
@@ -23,6 +26,9 @@ from terrainkit.settings.type_hint import (
 )
 
 HiddenDims = Annotated[tuple[Annotated[int, Meta(ge=1, le=65536)], ...], Meta(min_length=1)]
+Duration = Annotated[float, Meta(gt=0, le=MAX_VALUE)]
+Velocity = Annotated[float, Meta(ge=-MAX_VALUE, le=MAX_VALUE)]
+Velocities = Annotated[tuple[Velocity, Velocity], SORTED]
 ScanPoints = Annotated[tuple[float, ...], Meta(min_length=1)]
 Activation = Literal[
     "elu", "selu", "relu", "crelu", "lrelu", "tanh", "sigmoid", "softplus", "gelu", "swish", "mish"
@@ -35,7 +41,7 @@ class Env(Config):
 
     num_envs: PositiveInt = 128
     """Number of parallel environments; fewer need fewer samples, more use a GPU better."""
-    episode_length_s: Annotated[float, Meta(gt=0, le=1e6)] = 20.0
+    episode_length_s: Duration = 20.0
     """Length after which an episode is truncated [s]."""
     num_threads: Annotated[int, Meta(ge=0, le=4096)] = 0
     """Threads of the physics simulation; 0 for one per processor."""
@@ -122,11 +128,11 @@ class Asset(Config):
 class Commands(Config):
     """Ranges from which velocity commands are sampled."""
 
-    lin_vel_x: Interval = (-1.0, 1.0)
+    lin_vel_x: Velocities = (-1.0, 1.0)
     """Forward velocity [m/s]."""
-    lin_vel_y: Interval = (-0.5, 0.5)
+    lin_vel_y: Velocities = (-0.5, 0.5)
     """Velocity to the left [m/s]."""
-    ang_vel_yaw: Interval = (-1.0, 1.0)
+    ang_vel_yaw: Velocities = (-1.0, 1.0)
     """Yaw velocity to the left [rad/s]; with a heading command, its limits."""
     heading: Interval = (-3.14159, 3.14159)
     """Heading in the world frame [rad]."""
@@ -140,7 +146,7 @@ class Commands(Config):
     forward velocity. The levels then depend on the share of the goals that a robot reaches."""
     waypoint_radius: PositiveFloat = 0.4
     """Horizontal distance at which a goal is reached [m]."""
-    resampling_time: PositiveFloat = 10.0
+    resampling_time: Duration = 10.0
     """Time after which a new command is sampled [s]."""
     min_norm: NonNegativeFloat = 0.2
     """Norm below which linear and yaw velocity commands are set to zero [m/s, rad/s]."""
@@ -171,7 +177,7 @@ class DomainRand(Config):
     """Largest zero offset of each joint, sampled at each reset [rad]."""
     action_delay: NonNegativeInterval | None = None
     """Delay of the actions, sampled at each reset, in multiples of `sim.dt` [s]; none: no delay."""
-    push_interval_s: NonNegativeFloat = 15.0
+    push_interval_s: NonNegative = 15.0
     """Time between pushes [s]; 0 for no pushes."""
     max_push_vel_xy: NonNegativeFloat = 1.0
     """Largest velocity that a push adds along x and along y [m/s]."""
@@ -231,7 +237,7 @@ class Rewards(Config):
 class Termination(Config):
     """Conditions that end an episode as a fall."""
 
-    contact_force: NonNegativeFloat = 1.0
+    contact_force: NonNegative = 1.0
     """Largest contact force on a termination body [N]."""
     tilt: Annotated[float, Meta(gt=0, le=math.pi)] = 1.3
     """Largest angle between the z axes of base and world [rad]."""

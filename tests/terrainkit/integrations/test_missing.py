@@ -5,7 +5,6 @@ import pytest
 
 FRAMEWORKS = {
     "genesis": "genesis",
-    "isaacgym": "isaacgym",
     "isaaclab": "isaaclab",
     "mjlab": "mjlab",
     "playground": "jax",

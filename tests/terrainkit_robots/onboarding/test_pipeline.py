@@ -96,11 +96,13 @@ def check_scene(folder, facts, spec):
 def test_onboard_writes_expected_files(onboarded):
     result = onboarded(QUADRUPED)
     assert sorted(path.name for path in result.folder.iterdir()) == [
+        "__init__.py",
         "genesis_config.py",
         "isaaclab_config.py",
         "legged_gym_config.py",
-        "leggedgym_ex_config.py",
         "mjlab_config.py",
+        "quadruped.py",
+        "quadruped_config.py",
         "report.md",
         "robot.toml",
         "robot.urdf",
@@ -207,7 +209,7 @@ def test_onboard_arm_without_legs(tmp_path):
 
 def test_onboard_skips_unsupported_framework(tmp_path):
     result = onboard_arm(tmp_path, frameworks=("legged_gym", "isaaclab"))
-    assert result.configs == ("isaaclab_config.py",)
+    assert result.configs == {"isaaclab": ("isaaclab_config.py",)}
     assert "no legs" in result.skipped_configs["legged_gym"]
     assert dict(summarize(result))["skipped"].startswith("legged_gym: arm has no legs")
     assert not (result.folder / "legged_gym_config.py").exists()

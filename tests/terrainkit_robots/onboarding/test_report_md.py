@@ -269,7 +269,7 @@ def test_report_lists_findings_and_skipped_rules(quadruped):
 
 
 def test_report_lists_configurations(quadruped):
-    text = report_markdown(replace(quadruped, configs=("mjlab_config.py",)))
+    text = report_markdown(replace(quadruped, configs={"mjlab": ("mjlab_config.py",)}))
     assert "- mjlab\\_config.py" in section(text, "Next steps")
 
 
@@ -292,7 +292,7 @@ def test_report_escapes_names(quadruped):
         report=report,
         verification=verification,
         fixed=(finding(subject=NASTY, message=NASTY),),
-        configs=(NASTY,),
+        configs={"isaaclab": (NASTY,)},
         images_error=NASTY,
     )
     text = report_markdown(result)

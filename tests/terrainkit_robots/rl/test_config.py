@@ -75,12 +75,12 @@ def with_value(section, name, value):
         (
             "noise.noise_level",
             1e300,
-            "noise_level: got 1e.300, which is beyond 1e.09",
+            "noise_level: got 1e.300, which is beyond 1e.30",
         ),
         (
             "normalization.obs_scales.lin_vel",
             1e38,
-            "lin_vel: got 1e.38, which is beyond 1e.09",
+            "lin_vel: got 1e.38, which is beyond 1e.30",
         ),
         ("commands.resampling_time", 0, "expected a number > 0"),
         ("domain_rand.friction", (-0.1, 1), "friction: got .*each a number >= 0"),

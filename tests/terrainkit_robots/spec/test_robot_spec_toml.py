@@ -21,9 +21,9 @@ from terrainkit_robots.spec.robot_spec import (
 )
 
 NAMES = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=12)
-NUMBERS = st.floats(-1e9, 1e9)
+NUMBERS = st.floats(-1e30, 1e30)
 NON_NEGATIVE = NUMBERS.map(abs)
-POSITIVE = st.floats(1e-12, 1e9)
+POSITIVE = st.floats(1e-12, 1e30)
 PAIRS = st.tuples(NUMBERS, NUMBERS).map(sorted).map(tuple)
 LISTS = st.lists(NAMES, unique=True, max_size=4).map(tuple)
 ORIGINS = st.builds(

@@ -37,6 +37,9 @@ class ConfigRobot:
     roles: Mapping[str, str] = field(default_factory=dict)
     """Role of each joint of the legs, such as hip, knee or ankle."""
 
+    foot_height: float = 0.0
+    """Height of the frames of the feet above the ground when the robot stands [m]."""
+
     @property
     def title(self) -> str:
         """Return the name of the robot for messages."""

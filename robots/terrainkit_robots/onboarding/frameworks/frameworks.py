@@ -1,16 +1,21 @@
 """The training frameworks for which a configuration can be written.
 
-Each framework is a module of this package with a flag `LEGGED_ONLY` and a function `config_text`.
+Each framework is a module of this package with a flag `LEGGED_ONLY` and a function `config_text`,
+or `config_files` if there are several files. `train_commands` returns how to train the robot.
 """
 
 import importlib
 import pkgutil
 from functools import cache
+from pathlib import Path
+from statistics import fmean
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import expected_names
+from terrainkit_robots.analysis.bodies.kinematics import body_poses
+from terrainkit_robots.export.sites import pose_in_body
 from terrainkit_robots.onboarding import frameworks
 from terrainkit_robots.onboarding.derive_spec.named_bodies import body_name
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
@@ -29,39 +34,50 @@ def framework_names() -> tuple[str, ...]:
     return tuple(sorted(name for name in modules if hasattr(_get_module(name), "LEGGED_ONLY")))
 
 
-def config_file_name(name: str) -> str:
-    """Return the file name of a configuration.
-
-    Raises:
-        ConfigError: if the framework is unknown.
-    """
-    _check_name(name)
-    return f"{name}_config.py"  # a file with the name of the framework would shadow it
-
-
-def _check_name(name: str) -> None:
+def check_framework(name: str) -> None:
+    """Raise ConfigError if the framework is unknown."""
     if name not in framework_names():
         expected = expected_names(name, framework_names(), "expected")
         raise ConfigError(f"framework: got {name!r}; {expected}")
 
 
-def config_text(name: str, robot: ConfigRobot) -> str:
-    """Return the configuration of a robot, a Python file for the folder of its robot.toml.
+def config_files(name: str, robot: ConfigRobot) -> dict[str, str]:
+    """Return the files for a framework by name, for the folder of robot.toml.
+
+    The first one is the configuration, a Python file.
 
     Raises:
         ConfigError: if the framework is unknown, or does not support the robot.
+        ExportError: if the framework has another robot of that name.
     """
-    _check_name(name)
+    check_framework(name)
     module = _get_module(name)
     if module.LEGGED_ONLY:
         others = [other for other in framework_names() if not _get_module(other).LEGGED_ONLY]
         check_legs(robot, name, others)
-    text: str = module.config_text(robot)
-    return text
+    if hasattr(module, "config_files"):
+        return dict(module.config_files(robot))
+    # A file with the name of the framework would shadow it.
+    return {f"{name}_config.py": module.config_text(robot)}
 
 
-def robot_config_text(name: str, facts: "Facts", spec: RobotSpec) -> str:
-    """Return the configuration of a robot whose facts are known.
+def train_commands(name: str, spec: RobotSpec, folder: Path) -> tuple[str, list[str]]:
+    """Return where to train a robot in a framework, and the commands, if there are any.
+
+    Args:
+        name: The name of a framework.
+        spec: The spec of the robot.
+        folder: The folder of the robot.
+    """
+    module = _get_module(name)
+    if not hasattr(module, "train_commands"):
+        return name, []
+    place, commands = module.train_commands(spec, folder)
+    return place, commands
+
+
+def robot_config_files(name: str, facts: "Facts", spec: RobotSpec) -> dict[str, str]:
+    """Return the files for a framework of a robot whose facts are known.
 
     Args:
         name: The name of a framework.
@@ -69,7 +85,7 @@ def robot_config_text(name: str, facts: "Facts", spec: RobotSpec) -> str:
         spec: The spec of the robot.
 
     Raises:
-        ConfigError: if the framework is unknown, or does not support the robot.
+        TerrainkitError: as `config_files`.
     """
     joints = facts.model.joints
     robot = ConfigRobot(
@@ -78,8 +94,22 @@ def robot_config_text(name: str, facts: "Facts", spec: RobotSpec) -> str:
         limits={joint.name: joint.range for joint in joints if joint.range is not None},
         passive_joints=[j.name for j in joints if j.moves and j.name not in spec.joint_order],
         roles={name: role for leg in facts.legs for name, role in _roles(leg).items()},
+        foot_height=_foot_height(facts, spec),
     )
-    return config_text(name, robot)
+    return config_files(name, robot)
+
+
+def _foot_height(facts: "Facts", spec: RobotSpec) -> float:
+    """Return the mean height of the frames of the feet on the ground, at the default pose [m]."""
+    if facts.stance is None or not spec.feet:
+        return 0.0
+    poses = body_poses(facts.bodies, facts.default_pose)
+    bodies = [facts.body_of[foot] for foot in spec.feet]
+    frames = [
+        poses[body.index] @ pose_in_body(body, foot)
+        for body, foot in zip(bodies, spec.feet, strict=True)
+    ]
+    return float(facts.stance.height + fmean(frame[2, 3] for frame in frames))
 
 
 def _roles(leg: "Leg") -> dict[str, str]:

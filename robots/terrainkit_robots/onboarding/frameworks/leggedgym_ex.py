@@ -1,5 +1,9 @@
-"""Write the configuration of a robot for LeggedGym-Ex: Isaac Gym, Genesis and Isaac Lab."""
+"""Write the task of a robot for LeggedGym-Ex: walking in Genesis, Isaac Gym and Isaac Lab."""
 
+from pathlib import Path
+from shlex import quote
+
+from terrainkit.errors import ExportError, listing
 from terrainkit_robots.onboarding.frameworks import legged_robot
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
@@ -8,6 +12,7 @@ from terrainkit_robots.onboarding.frameworks.source import (
     assignment,
     comment,
     docstring,
+    fill,
     float_literal,
     format_collection,
     format_strings,
@@ -15,90 +20,102 @@ from terrainkit_robots.onboarding.frameworks.source import (
     join_lines,
     string_literal,
 )
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 LEGGED_ONLY = True
 """Whether the framework supports only robots with legs."""
 
-_REWARD_SCALES = {
-    "tracking_lin_vel": "1.0",
-    "tracking_ang_vel": "0.5",
-    "lin_vel_z": "-2.0",
-    "ang_vel_xy": "-0.05",
-    "torques": "-1e-5",
-    "dof_acc": "-2.5e-7",
-    "dof_pos_limits": "-1.0",
-    "action_rate": "-0.01",
-    "feet_air_time": "1.0",
-    "collision": "-1.0",
-}
-"""Reward scales of legged_gym, and one for joint limits. The defaults in LeggedGym-Ex are 0."""
+_FOLDERS = frozenset({"base", "bipedal_walker", "g1", "go2", "tron1_pf", "tron1_sf"})
+"""The folders in `legged_gym/envs` of LeggedGym-Ex 0.3.0."""
+
+_CONFIG = Path(__file__).with_name("leggedgym_ex_config.txt")
+"""The configuration; what does not depend on the robot is as in LeggedGym-Ex's task go2."""
+
+_TASK = Path(__file__).with_name("leggedgym_ex_task.txt")
+"""The environment and its registration."""
+
+
+def config_files(robot: ConfigRobot) -> dict[str, str]:
+    """Return the files of the package of the robot in `legged_gym/envs`, by name.
+
+    Raises:
+        ConfigError: if LeggedGym-Ex does not support the names of the bodies.
+        ExportError: if LeggedGym-Ex has a task of that name.
+    """
+    package = package_name(robot.spec.name)
+    if package in _FOLDERS:
+        raise ExportError(
+            f"name of the task: got {package!r}, a folder of LeggedGym-Ex; expected another name, "
+            f"such as --name my_{package}"
+        )
+    about = f"{robot.title} for LeggedGym-Ex"
+    task = fill(
+        _TASK.read_text(),
+        about=docstring([f"{about}: the environment and its task, written by terrainkit."]),
+        name=class_name(robot.spec.name),
+        package=package,
+    )
+    return {
+        f"{package}_config.py": config_text(robot),
+        f"{package}.py": join_lines([task]),
+        "__init__.py": join_lines([docstring([f"{about}."])]),
+    }
 
 
 def config_text(robot: ConfigRobot) -> str:
-    """Return the text of `leggedgym_ex_config.py`.
+    """Return the text of the configuration.
 
     Raises:
         ConfigError: if LeggedGym-Ex does not support the names of the bodies.
     """
-    name = class_name(robot.spec.name)
-    return join_lines(
-        [
-            docstring(_about(robot, name)),
-            ["", *legged_robot.BEFORE_IMPORTS, "from legged_gym import SIMULATOR"],
-            [
-                "from legged_gym.envs.base.legged_robot_config import (",
-                "    LeggedRobotCfg,",
-                "    LeggedRobotCfgPPO,",
-                ")",
-                "",
-            ],
-            legged_robot.HERE,
-            ["", "", f"class {name}Cfg(LeggedRobotCfg):"],
-            legged_robot.class_of("env", "LeggedRobotCfg", _env(robot))[1:],
-            legged_robot.class_of("init_state", "LeggedRobotCfg", legged_robot.init_state(robot)),
-            legged_robot.class_of("control", "LeggedRobotCfg", _control(robot)),
-            legged_robot.class_of("asset", "LeggedRobotCfg", _asset(robot)),
-            legged_robot.class_of("rewards", "LeggedRobotCfg", _rewards(robot)),
-            ["", "", f"class {name}CfgPPO(LeggedRobotCfgPPO):"],
-            legged_robot.class_of("runner", "LeggedRobotCfgPPO", _runner(robot))[1:],
-        ]
+    count, package = len(robot.spec.joint_order), package_name(robot.spec.name)
+    config = fill(
+        _CONFIG.read_text(),
+        about=docstring(_about(robot)),
+        before_imports=legged_robot.BEFORE_IMPORTS,
+        here=legged_robot.HERE,
+        name=class_name(robot.spec.name),
+        package=package,
+        num_observations=str(9 + 3 * count),
+        num_actions=str(count),
+        init_state=legged_robot.init_state(robot),
+        control=_control(robot),
+        asset=_asset(robot),
+        rewards=legged_robot.rewards(robot),
+        foot_height=float_literal(robot.foot_height),
+        dof_pos_limits=_dof_pos_limits(robot),
     )
+    return join_lines([config])
 
 
-def _about(robot: ConfigRobot, name: str) -> list[str]:
+def train_commands(spec: RobotSpec, folder: Path) -> tuple[str, list[str]]:
+    """Return where to train a robot, and the commands."""
+    return "the folder of LeggedGym-Ex", _commands(package_name(spec.name), str(folder.absolute()))
+
+
+def _commands(package: str, folder: str) -> list[str]:
+    # The file may lack a newline at the end.
+    line = rf"\nfrom legged_gym.envs.{package} import {package}\n"
+    return [
+        f"cp -r {quote(folder)} legged_gym/envs/{package}",
+        f"printf '{line}' >> legged_gym/envs/__init__.py",
+        f"SIMULATOR=genesis python legged_gym/scripts/train.py --task={package} --headless",
+    ]
+
+
+def _about(robot: ConfigRobot) -> list[str]:
     package = package_name(robot.spec.name)
     return [
         f"{robot.title} for LeggedGym-Ex: flat ground.",
         GENERATED_NOTE,
-        f"Copy the folder to legged_gym/envs/{package} and register the robot in "
-        "legged_gym/envs/__init__.py:",
-        "\n".join(
-            [
-                f"    from legged_gym.envs.{package}.leggedgym_ex_config import (",
-                f"        {name}Cfg,",
-                f"        {name}CfgPPO,",
-                "    )",
-                "    task_registry.register(",
-                f'        "{package}", LeggedRobot, {name}Cfg(), {name}CfgPPO()',
-                "    )",
-            ]
-        ),
-        "Isaac Gym reads robot.urdf; Genesis reads robot.xml (robot.urdf in versions without "
-        "xml_file). With Isaac Lab, legged_gym/simulator/isaaclab_simulator.py selects actuators "
+        "Train it in the folder of LeggedGym-Ex, in Isaac Gym without SIMULATOR:",
+        "\n".join(indent(_commands(package, "FOLDER"))),
+        "The files read robot.urdf. Versions of LeggedGym-Ex with xml_file read robot.xml in "
+        "Genesis. With Isaac Lab, legged_gym/simulator/isaaclab_simulator.py selects actuators "
         f"by asset.name: add a branch for {string_literal(package)}.",
         "With Isaac Gym, LeggedGym-Ex uses the permutation from its joint order to dof_names also "
         "for the inverse. This is correct only if the permutation is its own inverse; otherwise "
         "set dof_names, dof_armature and dof_vel_limits in the order that it prints.",
-    ]
-
-
-def _env(robot: ConfigRobot) -> list[str]:
-    count = len(robot.spec.joint_order)
-    return [
-        "# Observations: 3 linear velocity, 3 gravity, 3 angular velocity,",
-        "# 3 commands; position, velocity and last action of each joint.",
-        f"num_observations = {12 + 3 * count}",
-        f"num_actions = {count}",
     ]
 
 
@@ -112,6 +129,15 @@ def _control(robot: ConfigRobot) -> list[str]:
         "# Control time step [s].",
         "dt = 0.02",
     ]
+
+
+def _dof_pos_limits(robot: ConfigRobot) -> list[str]:
+    """Return the scale of the reward for joint limits."""
+    limits = robot.spec.joint_order if robot.limits is None else robot.limits
+    if unlimited := [joint for joint in robot.spec.joint_order if joint not in limits]:
+        note = f"LeggedGym-Ex computes NaN for joints without limits: {listing(unlimited)}."
+        return [*comment(note, depth=3), "dof_pos_limits = 0.0"]
+    return ["dof_pos_limits = -1.0"]
 
 
 def _asset(robot: ConfigRobot) -> list[str]:
@@ -138,21 +164,4 @@ def _asset(robot: ConfigRobot) -> list[str]:
         *comment("Bodies on fixed joints that Genesis does not merge.", depth=2),
         *format_collection("links_to_keep = ", format_strings(spec.feet), depth=2),
         *legged_robot.shapes(),
-    ]
-
-
-def _rewards(robot: ConfigRobot) -> list[str]:
-    return [
-        *legged_robot.rewards(robot),
-        "",
-        "class scales(LeggedRobotCfg.rewards.scales):",
-        *indent(["# The default scales of legged_gym; in LeggedGym-Ex the defaults are 0."]),
-        *indent(f"{name} = {weight}" for name, weight in _REWARD_SCALES.items()),
-    ]
-
-
-def _runner(robot: ConfigRobot) -> list[str]:
-    return [
-        "run_name = SIMULATOR",
-        f"experiment_name = {string_literal(package_name(robot.spec.name))}",
     ]

@@ -1,6 +1,8 @@
 """Write the configuration of a robot for mjlab: entity, actuators and velocity task."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from shlex import quote
 
 from terrainkit_robots.onboarding.frameworks import mjlab_task
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
@@ -90,6 +92,12 @@ def train_arguments(spec: RobotSpec) -> str:
     if not (spec.feet and spec.joint_order and spec.floating):
         return ""
     return f"mjlab_config.py {mjlab_task.task_id(spec, 'Flat')}"
+
+
+def train_commands(spec: RobotSpec, folder: Path) -> tuple[str, list[str]]:
+    """Return where to train a robot, and the command."""
+    file, _, task = train_arguments(spec).partition(" ")
+    return "mjlab", [f"python {quote(str(folder / file))} {task}"] if task else []
 
 
 def config_text(robot: ConfigRobot) -> str:

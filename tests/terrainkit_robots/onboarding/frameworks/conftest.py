@@ -9,7 +9,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
-from terrainkit_robots.onboarding.frameworks.frameworks import config_file_name, config_text
+from terrainkit_robots.onboarding.frameworks.frameworks import config_files
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
 
 LEGS = ("FL", "FR", "RL", "RR")
@@ -136,6 +136,11 @@ def in_usd(name):
     return f"a{plain}" if plain.startswith("_") else plain
 
 
+def config_text(framework, robot):
+    """Return the configuration of a robot."""
+    return next(iter(config_files(framework, robot).values()))
+
+
 class Strict:
     """A namespace that rejects new attributes."""
 
@@ -203,7 +208,7 @@ def load(tmp_path, monkeypatch):
     def run(framework, spec, stand_ins, **known):
         for name, stand_in in stand_ins.items():
             monkeypatch.setitem(sys.modules, name, stand_in)
-        path = tmp_path / config_file_name(framework)
+        path = tmp_path / f"{framework}_config.py"
         path.write_text(config_text(framework, ConfigRobot(spec=spec, **known)), encoding="utf-8")
         located = importlib.util.spec_from_file_location("loaded_config", path)
         loaded = importlib.util.module_from_spec(located)

@@ -13,13 +13,23 @@ from terrainkit_robots.onboarding import frameworks as package
 from terrainkit_robots.onboarding.frameworks import frameworks
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.frameworks import (
-    config_file_name,
-    config_text,
+    check_framework,
+    config_files,
     framework_names,
-    robot_config_text,
+    robot_config_files,
 )
 
 LEGGED = ("legged_gym", "leggedgym_ex")
+
+
+def config_text(framework, robot):
+    """Return the configuration of a robot."""
+    return next(iter(config_files(framework, robot).values()))
+
+
+def robot_config_text(framework, facts, spec):
+    """Return the configuration of a robot whose facts are known."""
+    return next(iter(robot_config_files(framework, facts, spec).values()))
 
 
 def test_framework_names_include_added_module(tmp_path, monkeypatch, robots):
@@ -38,13 +48,13 @@ def test_framework_names_include_added_module(tmp_path, monkeypatch, robots):
         frameworks.framework_names.cache_clear()
 
 
-def test_framework_names_are_sorted():
+def test_framework_names_are_sorted(robots):
     assert framework_names() == ("genesis", "isaaclab", "legged_gym", "leggedgym_ex", "mjlab")
-    assert config_file_name("mjlab") == "mjlab_config.py"
+    assert set(config_files("mjlab", ConfigRobot(spec=robots.quadruped()))) == {"mjlab_config.py"}
     with pytest.raises(ConfigError, match="got 'gazebo'; expected: genesis, isaaclab, "):
         config_text("gazebo", None)
     with pytest.raises(ConfigError, match="framework: got"):
-        config_file_name("../../evil")
+        check_framework("../../evil")
 
 
 @pytest.mark.parametrize("framework", LEGGED)
@@ -164,7 +174,7 @@ def test_legged_frameworks_reject_unactuated_joints(robots, framework):
         config_text(framework, ConfigRobot(spec=robots.quadruped(), passive_joints=["tail_joint"]))
 
 
-def test_robot_config_text_finds_unactuated_joints(robots, bundled_xml):
+def test_robot_config_files_finds_unactuated_joints(robots, bundled_xml):
     facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()
     fewer = replace(spec, joint_order=spec.joint_order[:-1])
@@ -172,7 +182,7 @@ def test_robot_config_text_finds_unactuated_joints(robots, bundled_xml):
         robot_config_text("legged_gym", facts, fewer)
 
 
-def test_robot_config_text_uses_bodies_and_limits(robots, bundled_xml):
+def test_robot_config_files_uses_bodies_and_limits(robots, bundled_xml):
     """The range of the calf joints is 1.88 rad; the soft limits of the spec span 1.5 rad: 0.796."""
     facts = Facts(load_robot(bundled_xml.with_suffix(".urdf")), Meshes())
     spec = robots.quadruped()

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
-from terrainkit_robots.onboarding.frameworks.frameworks import config_text
+from terrainkit_robots.onboarding.frameworks.genesis import config_text
 
 PROBE = Path(__file__).with_name("genesis_probe.py")
 
@@ -160,7 +160,7 @@ def test_genesis_config_in_genesis(robots, tmp_path, bundled_xml, which):
             "TERRAINKIT_GENESIS_PYTHON is not set to a Python interpreter with genesis-world"
         )
     shutil.copy(bundled_xml.with_suffix(".urdf"), tmp_path / "robot.urdf")
-    text = config_text("genesis", ConfigRobot(spec=getattr(robots, which)(), bodies=robots.bodies))
+    text = config_text(ConfigRobot(spec=getattr(robots, which)(), bodies=robots.bodies))
     (tmp_path / "genesis_config.py").write_text(text)
     command = [python, PROBE, tmp_path, which]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

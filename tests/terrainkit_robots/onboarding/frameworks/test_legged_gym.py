@@ -1,8 +1,13 @@
 """Tests of the configurations for legged_gym and LeggedGym-Ex, with stub modules."""
 
+import ast
 from pathlib import Path
 
 import pytest
+
+from terrainkit.errors import ExportError
+from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
+from terrainkit_robots.onboarding.frameworks.frameworks import config_files
 
 CLASSES = {
     "init_state": {"pos": [], "rot": [], "lin_vel": [], "ang_vel": [], "default_joint_angles": {}},
@@ -23,12 +28,49 @@ MORE = {
     "control": {"dt": 0.02},
     "asset": {"xml_file": "", "base_link_name": "", "dof_names": [], "dof_armature": []}
     | {"links_to_keep": [], "dof_vel_limits": []},
+    "rewards": {"only_positive_rewards": True, "foot_clearance_target": 0.04}
+    | {"foot_height_offset": 0.0, "foot_clearance_tracking_sigma": 0.01},
+    "terrain": {"mesh_type": "plane", "curriculum": False, "measure_heights": False},
+    "commands": {"curriculum": False, "max_curriculum": 1.0, "num_commands": 4}
+    | {"resampling_time": 10.0, "heading_command": True},
+    "domain_rand": {"randomize_friction": True, "friction_range": [], "randomize_base_mass": True}
+    | {"added_mass_range": [], "push_robots": True, "push_interval_s": 15, "max_push_vel_xy": 1.0}
+    | {"randomize_com_displacement": True, "com_pos_x_range": [], "com_pos_y_range": []}
+    | {"com_pos_z_range": []},
+    "normalization": {"clip_observations": 100.0, "clip_actions": 100.0},
+    "noise": {"add_noise": True, "noise_level": 1.0},
+    "sim": {"dt": 0.005, "substeps": 1},
 }
 """Additional fields of LeggedGym-Ex."""
 
-SCALES = ("tracking_lin_vel", "tracking_ang_vel", "lin_vel_z", "ang_vel_xy", "torques", "dof_acc")
-SCALES += ("dof_pos_limits", "action_rate", "feet_air_time", "collision")
-"""Some of the rewards of LeggedGym-Ex."""
+SCALES = ("dof_pos_limits", "collision", "tracking_lin_vel", "tracking_ang_vel", "lin_vel_z")
+SCALES += ("base_height", "ang_vel_xy", "orientation", "dof_vel", "dof_acc", "action_rate")
+SCALES += ("action_smoothness", "torques", "feet_air_time", "foot_clearance")
+"""The rewards of LeggedGym-Ex's task go2."""
+
+NESTED = {
+    ("rewards", "scales"): SCALES,
+    ("commands", "ranges"): ("lin_vel_x", "lin_vel_y", "ang_vel_yaw", "heading"),
+    ("normalization", "obs_scales"): (
+        *("lin_vel", "ang_vel", "dof_pos"),
+        *("dof_vel", "height_measurements"),
+    ),
+    ("noise", "noise_scales"): (
+        *("dof_pos", "dof_vel", "lin_vel", "ang_vel"),
+        *("gravity", "height_measurements"),
+    ),
+}
+"""Fields of the classes in the classes of LeggedGym-Ex."""
+
+PPO = {
+    "policy": ("init_noise_std", "actor_hidden_dims", "critic_hidden_dims", "activation"),
+    "algorithm": ("entropy_coef", "learning_rate", "schedule", "gamma", "lam", "desired_kl"),
+    "runner": (
+        *("run_name", "experiment_name", "num_steps_per_env"),
+        *("max_iterations", "save_interval"),
+    ),
+}
+"""Classes and fields of LeggedRobotCfgPPO."""
 
 
 @pytest.fixture
@@ -36,17 +78,19 @@ def frameworks(stand_in):
     """Return stub modules of legged_gym or LeggedGym-Ex."""
 
     def make(more):
-        parts = {
-            name: stand_in.part(name, **fields, **more.get(name, {}))
-            for name, fields in CLASSES.items()
-        }
-        scales = stand_in.part("scales", **dict.fromkeys(SCALES, 0.0))
-        parts["rewards"] = stand_in.part("rewards", scales=scales, **CLASSES["rewards"])
-        runner = stand_in.part("runner", run_name="", experiment_name="test", max_iterations=1500)
+        fields = {name: CLASSES.get(name, {}) | more.get(name, {}) for name in CLASSES | more}
+        for (name, nested), values in NESTED.items():
+            if more:
+                values = dict.fromkeys(values, 0.0)
+                fields[name] = {**fields[name], nested: stand_in.part(nested, **values)}
+        parts = {name: stand_in.part(name, **values) for name, values in fields.items()}
+        ppo = {name: stand_in.part(name, **dict.fromkeys(keys)) for name, keys in PPO.items()}
         config = stand_in.module(
             "legged_gym.envs.base.legged_robot_config",
             LeggedRobotCfg=stand_in.part("LeggedRobotCfg", **parts),
-            LeggedRobotCfgPPO=stand_in.part("LeggedRobotCfgPPO", runner=runner),
+            LeggedRobotCfgPPO=stand_in.part(
+                "LeggedRobotCfgPPO", seed=1, runner_class_name="", **ppo
+            ),
         )
         modules = {
             "legged_gym": stand_in.module("legged_gym", SIMULATOR="genesis"),
@@ -119,11 +163,12 @@ def test_legged_gym_config_of_quadruped(load, frameworks, robots, tmp_path):
 
 def test_leggedgym_ex_config_of_quadruped(load, frameworks, robots, tmp_path):
     spec = robots.quadruped(velocity={".*_calf_joint": 15.7})
-    loaded = load("leggedgym_ex", spec, frameworks(MORE), bodies=robots.bodies, limits=RANGES)
+    known = {"bodies": robots.bodies, "limits": RANGES, "foot_height": 0.022}
+    loaded = load("leggedgym_ex", spec, frameworks(MORE), **known)
     config = loaded.Quad4Cfg
     check_joints(config, robots, spec)
     check_contacts(config.asset, spec, robots.bodies)
-    assert config.env.num_observations == 48
+    assert config.env.num_observations == 9 + 3 * 12
     assert config.control.dt == config.control.decimation * 0.005
     assert Path(config.asset.file.format()) == tmp_path / "robot.urdf"
     assert Path(config.asset.xml_file.format()) == tmp_path / "robot.xml"
@@ -134,10 +179,44 @@ def test_leggedgym_ex_config_of_quadruped(load, frameworks, robots, tmp_path):
     assert config.asset.dof_vel_limits == list(speeds.values())
     assert config.asset.links_to_keep == list(spec.feet)
     assert config.rewards.scales.tracking_lin_vel == 1.0
+    assert config.rewards.foot_height_offset == 0.022
+    assert config.commands.curriculum
     assert loaded.Quad4CfgPPO.runner.run_name == "genesis"
     # Genesis requires exactly one matching key for each joint.
     for joint in spec.joint_order:
         assert sum(key in joint for key in config.control.stiffness) == 1
+
+
+def test_leggedgym_ex_has_classes_of_every_section(load, frameworks, robots):
+    loaded = load("leggedgym_ex", robots.quadruped(), frameworks(MORE))
+    sections = {name for name in vars(loaded.Quad4Cfg) if not name.startswith("__")}
+    assert sections == {*CLASSES, *MORE}
+    assert {*PPO, "seed", "runner_class_name"} <= vars(loaded.Quad4CfgPPO).keys()
+    scales = vars(loaded.Quad4Cfg.rewards.scales)
+    assert {name for name in scales if not name.startswith("__")} == set(SCALES)
+
+
+def test_leggedgym_ex_has_no_reward_for_missing_limits(load, frameworks, robots):
+    """Genesis returns infinite limits, whose mean is NaN."""
+    spec = robots.quadruped()
+    limits = dict.fromkeys(spec.joint_order, (-1.0, 1.0))
+    for missing, scale in ((), -1.0), (("FL_hip_joint",), 0.0):
+        known = {name: limits[name] for name in spec.joint_order if name not in missing}
+        loaded = load("leggedgym_ex", spec, frameworks(MORE), limits=known)
+        assert loaded.Quad4Cfg.rewards.scales.dof_pos_limits == scale
+
+
+def test_leggedgym_ex_files_are_a_package(robots):
+    files = config_files("leggedgym_ex", ConfigRobot(spec=robots.quadruped(), bodies=robots.bodies))
+    assert set(files) == {"quad_4_config.py", "quad_4.py", "__init__.py"}
+    for text in files.values():
+        ast.parse(text, feature_version=(3, 8))
+    assert "from legged_gym.envs.quad_4.quad_4_config import (" in files["quad_4.py"]
+
+
+def test_leggedgym_ex_rejects_name_of_its_own_robot(robots):
+    with pytest.raises(ExportError, match=r"got 'go2', a folder of LeggedGym-Ex; .* --name my_go2"):
+        config_files("leggedgym_ex", ConfigRobot(spec=robots.quadruped(name="Go2")))
 
 
 def test_legged_gym_config_uses_largest_armature(load, frameworks, robots):

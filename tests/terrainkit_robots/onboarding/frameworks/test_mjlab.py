@@ -14,7 +14,7 @@ import pytest
 
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
-from terrainkit_robots.onboarding.frameworks.frameworks import config_text
+from terrainkit_robots.onboarding.frameworks.mjlab import config_text
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
@@ -267,7 +267,7 @@ def mjlab_python():
 @pytest.mark.parametrize("which", ["quadruped", "wheeled"])
 def test_mjlab_config_in_mjlab(robots, tmp_path, bundled_xml, mjlab_python, which):
     shutil.copy(bundled_xml, tmp_path / "robot.xml")
-    text = config_text("mjlab", ConfigRobot(spec=getattr(robots, which)(), bodies=robots.bodies))
+    text = config_text(ConfigRobot(spec=getattr(robots, which)(), bodies=robots.bodies))
     (tmp_path / "mjlab_config.py").write_text(text)
     command = [mjlab_python, PROBE, tmp_path, which]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)

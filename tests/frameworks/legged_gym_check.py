@@ -1,0 +1,37 @@
+"""Onboard a robot for legged_gym, and train it on a map with the classes of legged_gym.
+
+Isaac Gym has a stand-in without physics. LEGGED_GYM is the folder of legged_gym, which is copied;
+rsl_rl 1.0.2 is the folder rsl_rl beside it.
+"""
+
+import ast
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+from checkouts import FOLDER, compare, copy_checkout, export_map, run_command, terrainkit_command
+
+HERE = Path(__file__).parent
+
+checkout = copy_checkout("LEGGED_GYM")
+robot = ("quadruped", "--name", "quad", "--gains", "train", "--no-pictures")
+terrainkit_command("onboard", *robot, "--config", "legged_gym")
+# The steps of the docstring: copy the folder, and add the lines.
+envs = checkout / "legged_gym/envs"
+shutil.copytree(FOLDER / "quad", envs / "quad")
+about = ast.get_docstring(ast.parse((FOLDER / "quad/legged_gym_config.py").read_text()))
+lines = [line[4:] for line in about.splitlines() if line.startswith("    ")]
+with (envs / "__init__.py").open("a") as file:
+    file.write("\n".join(["", *lines, ""]))
+
+terrain_map = export_map(envs / "quad")
+rsl_rl = Path(os.environ["LEGGED_GYM"]).absolute().parent / "rsl_rl"
+modules = (rsl_rl, HERE / "isaacgym_stand_in")
+run_command(f"python {HERE / 'legged_gym_map.py'} quad {FOLDER / 'seen.npz'}", checkout, *modules)
+seen = np.load(FOLDER / "seen.npz")
+shift, mesh = compare(terrain_map, seen), terrain_map.mesh()
+assert np.abs(seen["vertices"] + shift - mesh.vertices).max() < 1e-4
+assert (seen["triangles"] == mesh.triangles).all()
+assert seen["friction"] == terrain_map.config.static_friction
+print(f"the mesh of {len(mesh.triangles)} triangles is in place")
