@@ -16,7 +16,7 @@ def read(path: Path, options: ReadOptions) -> Raster:
     try:
         # Mapped: a file that claims a larger array than it holds is an error, not an allocation.
         values = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (ValueError, OSError, EOFError, OverflowError) as error:
+    except Exception as error:  # numpy's parser of headers raises various errors
         reason = " ".join(str(error).split())
         raise HeightFileError(f"{path}: not an .npy file, or truncated: {reason}") from error
     return make_raster(path, values, options)

@@ -57,3 +57,13 @@ def test_npy_that_claims_huge_size_is_rejected(tmp_path, count):
     (tmp_path / "a.npy").write_bytes(data.replace(b"50, 50", count[:30] + b", 5").ljust(len(data)))
     with pytest.raises(TerrainkitError):
         read(tmp_path / "a.npy", METER)
+
+
+@pytest.mark.parametrize("old", [b"{'descr", b"'<f4'", b"False", b"(2, 3)", b"}"])
+@pytest.mark.parametrize("new", [b"", b"(", b"'", b"{", b"[" * 200, b"\xff", b"\0", b"1j"])
+def test_npy_with_damaged_header_is_rejected(tmp_path, old, new):
+    path = tmp_path / "a.npy"
+    np.save(path, np.zeros((2, 3), np.float32))
+    path.write_bytes(path.read_bytes().replace(old, new, 1))
+    with pytest.raises(HeightFileError, match=r"a\.npy: "):
+        read(path, METER)
