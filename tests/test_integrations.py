@@ -1,5 +1,6 @@
 import ast
 import re
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,7 +30,7 @@ def m(tmp_path, monkeypatch):
 
 
 def test_integrations_all_blocks_are_tested():
-    assert len(BLOCKS) == 18
+    assert len(BLOCKS) == 20
 
 
 def test_numpy_block_reads_map(m):
@@ -55,11 +56,25 @@ def test_scripts_of_checks_are_short():
 
 def test_blocks_import_what_the_adapters_define():
     imports = re.findall(r"^from (terrainkit\.integrations\.\w+) import (.+)$", PAGE, re.MULTILINE)
-    assert len(imports) == 7
+    assert len(imports) == 9
     for module, names in imports:
         path = ROOT / f"{module.replace('.', '/')}.py"
         defined = {getattr(node, "name", "") for node in ast.parse(path.read_text()).body}
         assert set(names.split(", ")) <= defined, module
+
+
+def test_isaaclab_page_imports_mesh(m, monkeypatch):
+    m.save("scan.stl")
+    page = (ROOT / "docs/isaaclab.md").read_text()
+    code = re.search(r"```python\n(.*?)```", page, re.DOTALL)[1]
+    assert len(code.splitlines()) <= 5
+    adapter = SimpleNamespace(terrain_importer_cfg=tk.TerrainMap.load)
+    monkeypatch.setitem(sys.modules, "terrainkit.integrations.isaaclab", adapter)
+    env_cfg = SimpleNamespace(scene=SimpleNamespace())
+    exec(code, {"env_cfg": env_cfg})
+    found = env_cfg.scene.terrain
+    xy = m.env_origins[:, :, :2].reshape(-1, 2)
+    np.testing.assert_allclose(found.height(xy), m.height(xy), atol=1e-3)
 
 
 @pytest.mark.usefixtures("m")

@@ -7,7 +7,8 @@ defaults would apply otherwise.
 """
 
 import itertools
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 from xml.etree import ElementTree as ET
@@ -23,11 +24,9 @@ from terrainkit.geometry.box_decomposition import (
     merge_boxes,
     neighborhood,
 )
-from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh.closed import THICKNESS
 from terrainkit.geometry.mesh.node_grid import NodeGrid
 from terrainkit.geometry.solid_raster import SolidRaster
-from terrainkit.geometry.solids import Solids
 from terrainkit.geometry.surface import HeightfieldSurface
 from terrainkit.settings.text import format_numbers
 from terrainkit.settings.type_hint import convert
@@ -61,6 +60,33 @@ _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_MARGIN` more samples on each side: sample i of
 the map is i + _MARGIN here."""
 
+_ROTATIONAL_FRICTION = (0.005, 0.0001)
+"""Torsional and rolling friction, MuJoCo's defaults."""
+
+_GEOM_DEFAULTS = {
+    "contype": 1,
+    "conaffinity": 1,
+    "condim": 3,
+    "group": 0,
+    "priority": 0,
+    "friction": (1.0, *_ROTATIONAL_FRICTION),
+    "solmix": 1,
+    "solref": (0.02, 1),
+    "solimp": (0.9, 0.95, 0.001, 0.5, 2),
+    "margin": 0,
+    "gap": 0,
+    "rgba": (0.55, 0.55, 0.52, 1),
+}
+"""The attributes of geoms that do not set them. The friction is that of the map."""
+
+SITE_DEFAULTS = {
+    "type": "box",
+    "size": (0.15, 0.03, 0.03),
+    "group": 0,
+    "rgba": (0.2, 0.4, 0.8, 1),
+}
+"""The attributes of all sites."""
+
 MAX_BOXES = 100
 """Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
 step of the bundled quadruped takes about 1.8 times that on a plane. Three runs of
@@ -89,13 +115,126 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
 
 def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -> None:
     """Write the map as MJCF to an open file; see :func:`export`."""
+    model = make_model(terrain_map, collision)
+    root = ET.Element("mujoco")
+    custom = ET.SubElement(root, "custom")
+    # MuJoCo has one sliding friction and no restitution; keep the values for other readers.
+    for name, value in terrain_map.config.contact.items():
+        ET.SubElement(custom, "numeric", name=f"terrain_{name}", data=format_numbers(value))
+    default = ET.SubElement(ET.SubElement(root, "default"), "default", {"class": "terrain"})
+    ET.SubElement(default, "geom", _as_text(model.geom_defaults))
+    ET.SubElement(default, "site", _as_text(SITE_DEFAULTS))
+    asset = ET.SubElement(root, "asset")
+    for name, vertices in model.hulls().items():
+        mesh = {"name": name, "vertex": vertices.ravel(), "inertia": "convex"}
+        ET.SubElement(asset, "mesh", _as_text(mesh))
+    world = ET.SubElement(root, "worldbody")
+    for each in model.geoms():
+        ET.SubElement(world, "geom", {"class": "terrain", **_as_text(each)})
+    for each in model.sites():
+        ET.SubElement(world, "site", {"name": each["name"], "class": "terrain", **_as_text(each)})
+    # The elevation data are the larger part of the file, so they are not kept as one text.
+    file.write('<?xml version="1.0" encoding="utf-8"?>\n<mujoco model="terrain">\n  <asset>\n')
+    for name, (part, _) in model.hfields.items():
+        _write_hfield(file, name, model.heights, part, terrain_map.grid.cell)
+    file.write("  </asset>\n")
+    for section in root:  # MuJoCo merges the two sections <asset>
+        ET.indent(section, level=1)
+        file.write(f"  {ET.tostring(section, encoding='unicode').strip()}\n")
+    file.write("</mujoco>\n")
+
+
+def _as_text(attributes: dict[str, Any]) -> dict[str, str]:
+    return {
+        name: value if isinstance(value, str) else format_numbers(*np.ravel(value))
+        for name, value in attributes.items()
+    }
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Model:
+    """The MuJoCo model of a map.
+
+    The attributes of its elements have their names in MJCF. A value is a text, a number or an
+    array.
+    """
+
+    terrain_map: "TerrainMap"
+
+    heights: NDArray[np.float32]
+    """Heights of the map, lowered under boxes [m]."""
+
+    boxes: list[tuple[NDArray[np.float64], NDArray[np.float64], float]]
+    """Center [m], half size [m] and friction of each box of the ground."""
+
+    hfields: dict[str, tuple[_Part, float]]
+    """Samples and friction of each heightfield, by name."""
+
+    @property
+    def geom_defaults(self) -> dict[str, Any]:
+        """The attributes of all geoms that do not set them."""
+        friction = (self.terrain_map.config.static_friction, *_ROTATIONAL_FRICTION)
+        return _GEOM_DEFAULTS | {"friction": friction}
+
+    def hulls(self) -> dict[str, NDArray[np.float32]]:
+        """Return the vertices of the mesh of each hull [m], shape (n, 3), by name."""
+        return {f"solid_{k}": each for k, each in enumerate(self.terrain_map.solids.hulls())}
+
+    def geoms(self) -> Iterator[dict[str, Any]]:
+        """Yield the attributes of each geom: first of the ground, then of the solids."""
+        for center, half_size, friction in self.boxes:
+            box = {"type": "box", "pos": center, "size": half_size}
+            yield box | self._friction(friction)
+        for name, (part, friction) in self.hfields.items():
+            low = self.heights[_on_map(part, self.heights.shape)].min()
+            grid = self.terrain_map.grid
+            middle = [((each.start + each.stop) / 2 - _MARGIN) * grid.cell for each in part]
+            pos = (*np.add(grid.lower, middle), low)
+            yield {"type": "hfield", "hfield": name, "pos": pos} | self._friction(friction)
+        solids = self.terrain_map.solids
+        shapes = itertools.chain(
+            [_shape("box", row, [3, 4, 5]) for row in solids.boxes],
+            [_shape("cylinder", row, [3, 5]) for row in solids.cylinders],
+            [{"type": "mesh", "mesh": name} for name in self.hulls()],
+        )
+        flags = zip(shapes, solids.friction, solids.collides, solids.visible, strict=True)
+        for shape, friction, collides, visible in flags:
+            shape |= self._friction(friction)
+            if not collides:
+                shape |= {"contype": 0, "conaffinity": 0}
+            # Rays of group 3 are off by default, as for hidden geoms.
+            yield shape if visible else shape | {"group": 3}
+
+    def sites(self) -> Iterator[dict[str, Any]]:
+        """Yield a site for each goal, `goal_ROW_COL_NUMBER`, whose x axis is the heading."""
+        goals = self.terrain_map.goals
+        for row, col, k in np.argwhere(~np.isnan(goals[..., 0])).tolist():
+            *pos, heading = goals[row, col, k].tolist()
+            quat = (np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2))
+            yield {"name": f"goal_{row}_{col}_{k}", "pos": pos, "quat": quat}
+
+    def _friction(self, friction: float) -> dict[str, Any]:
+        """Return the attributes of a geom whose friction is not that of the map.
+
+        Its priority is above that of a robot, since MuJoCo otherwise uses the larger of two
+        frictions. NaN is the friction of the map.
+        """
+        static = self.terrain_map.config.static_friction
+        if np.isnan(friction) or np.float32(friction) == np.float32(static):
+            return {}
+        return {"friction": (friction, *_ROTATIONAL_FRICTION), "priority": 2}
+
+
+def _shape(kind: str, row: NDArray[np.float32], size: list[int]) -> dict[str, Any]:
+    return {"type": kind, "pos": row[:3], "size": row[size], "quat": row[6:]}
+
+
+def make_model(terrain_map: "TerrainMap", collision: Collision) -> Model:
+    """Return the MuJoCo model of a map; see :func:`export`."""
     collision = convert("collision", collision, Collision)
     decomposition = collision_boxes(terrain_map, collision)
-    root = ET.Element("mujoco")
-    _add_contact_settings(root, terrain_map)
-    asset = ET.SubElement(root, "asset")
-    world = ET.SubElement(root, "worldbody")
-    heights, static = terrain_map.heights, float(terrain_map.config.static_friction)
+    heights = terrain_map.heights
+    boxes: list[tuple[NDArray[np.float64], NDArray[np.float64], float]] = []
     if decomposition is None:
         height = _border_height(terrain_map)
         if height is None:
@@ -103,32 +242,17 @@ def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -
             parts = [(slice(0, x), slice(0, y))]
         else:
             parts = [_patches_part(terrain_map)]
-            for box in _border_boxes(terrain_map, height):
-                _add_box(world, *box)
+            static = terrain_map.config.static_friction
+            boxes = [(*box, static) for box in _border_boxes(terrain_map, height)]
     else:
         heights = without_boxes(heights, decomposition)
         parts = _uncovered_parts(terrain_map, decomposition)
-        for center, half_size, friction in zip(
-            decomposition.centers, decomposition.half_sizes, decomposition.friction, strict=True
-        ):
-            _set_friction(_add_box(world, center, half_size), friction, static)
+        centers, half_sizes = decomposition.centers, decomposition.half_sizes
+        boxes = list(zip(centers, half_sizes, decomposition.friction, strict=True))
     split = [each for part in parts for each in _split_by_friction(terrain_map, part)]
     is_single = decomposition is None and len(split) == 1
     hfields = {"terrain" if is_single else f"terrain_{k}": each for k, each in enumerate(split)}
-    for name, (part, friction) in hfields.items():
-        geom = _add_hfield_geom(world, name, terrain_map.grid, heights, part)
-        _set_friction(geom, friction, static)
-    _add_solids(asset, world, terrain_map.solids, static)
-    _add_goals(world, terrain_map.goals)
-    # The elevation data are the larger part of the file, so they are not kept as one text.
-    file.write('<?xml version="1.0" encoding="utf-8"?>\n<mujoco model="terrain">\n  <asset>\n')
-    for name, (part, _) in hfields.items():
-        _write_hfield(file, name, heights, part, terrain_map.grid.cell)
-    file.write("  </asset>\n")
-    for section in root:  # MuJoCo merges the two sections <asset>
-        ET.indent(section, level=1)
-        file.write(f"  {ET.tostring(section, encoding='unicode').strip()}\n")
-    file.write("</mujoco>\n")
+    return Model(terrain_map=terrain_map, heights=heights, boxes=boxes, hfields=hfields)
 
 
 def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecomposition | None:
@@ -157,35 +281,6 @@ def _is_flat(terrain_map: "TerrainMap") -> bool:
         if not flat_cells(nodes).all():
             return False
     return True
-
-
-def _add_contact_settings(root: ET.Element, terrain_map: "TerrainMap") -> None:
-    """Add the friction and restitution of the ground, and the default class of all geoms."""
-    config = terrain_map.config
-    # MuJoCo has one sliding friction and no restitution; keep the values for other readers.
-    custom = ET.SubElement(root, "custom")
-    for name, value in config.contact.items():
-        ET.SubElement(custom, "numeric", name=f"terrain_{name}", data=format_numbers(value))
-    terrain = ET.SubElement(ET.SubElement(root, "default"), "default", {"class": "terrain"})
-    ET.SubElement(
-        terrain,
-        "geom",
-        contype="1",
-        conaffinity="1",
-        condim="3",
-        group="0",
-        priority="0",
-        friction=format_numbers(config.static_friction, 0.005, 0.0001),
-        solmix="1",
-        solref="0.02 1",
-        solimp="0.9 0.95 0.001 0.5 2",
-        margin="0",
-        gap="0",
-        rgba="0.55 0.55 0.52 1",
-    )
-    ET.SubElement(
-        terrain, "site", type="box", size="0.15 0.03 0.03", group="0", rgba="0.2 0.4 0.8 1"
-    )
 
 
 def _part_edges(terrain_map: "TerrainMap") -> list[NDArray[np.int64]]:
@@ -256,6 +351,8 @@ def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Pa
     """
     friction = terrain_map.friction[_on_map(part, terrain_map.friction.shape)]
     x, y = changes(friction), changes(friction.T)
+    if len(x) == len(y) == 2:
+        return [(part, float(friction[0, 0]))]
     i, j = (each.ravel() for each in np.indices((len(x) - 1, len(y) - 1)))
     values = friction[x[i], y[j]]
     for edges, samples in zip((x, y), part, strict=True):
@@ -273,48 +370,45 @@ def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Pa
     return result
 
 
-def _set_friction(geom: ET.Element, friction: float, static: float) -> None:
-    """Set the friction of a geom if it is not that of the map.
-
-    Its priority is above that of a robot, since MuJoCo otherwise uses the larger of two frictions.
-    """
-    if np.float32(friction) != np.float32(static):
-        geom.set("friction", format_numbers(friction, 0.005, 0.0001))
-        geom.set("priority", "2")
-
-
-def _add_hfield_geom(
-    world: ET.Element, name: str, grid: Grid, heights: NDArray[np.float32], part: _Part
-) -> ET.Element:
-    """Add the geom of the heightfield of a part."""
-    low = heights[_on_map(part, heights.shape)].min()
-    middle = [((each.start + each.stop) / 2 - _MARGIN) * grid.cell for each in part]
-    position = format_numbers(*np.add(grid.lower, middle), low)
-    about = {"class": "terrain", "type": "hfield", "hfield": name, "pos": position}
-    return ET.SubElement(world, "geom", about)
-
-
 def _write_hfield(
     file: TextIO, name: str, heights: NDArray[np.float32], part: _Part, cell: float
 ) -> None:
     """Write the heightfield of a part, row by row; the first row is that of the largest y."""
-    samples = heights[_on_map(part, heights.shape)]
-    low = float(samples.min())
-    units = max(int(_elevation_units(samples.max(), low)), 1)  # MuJoCo requires a range above 0
+    low = float(heights[_on_map(part, heights.shape)].min())
     # Samples beyond the map, where there is no border, have the height of its edge.
     x, y = (
         np.clip(np.arange(each.start, each.stop) - _MARGIN, 0, size - 1)
         for each, size in zip(part, heights.shape, strict=True)
     )
+    size = format_numbers(*hfield_size(heights, part, cell))
     # MuJoCo's rows are along y, its columns along x.
-    size = format_numbers(
-        (len(x) - 1) * cell / 2, (len(y) - 1) * cell / 2, units * _ELEVATION_UNIT, THICKNESS
-    )
     file.write(f'    <hfield name="{name}" nrow="{len(y)}" ncol="{len(x)}" size="{size}"')
     file.write(' elevation="')
     for j in y[::-1].tolist():
         file.write(" ".join(map(str, _elevation_units(heights[x, j], low).tolist())) + "\n")
     file.write('"/>\n')
+
+
+def hfield_size(
+    heights: NDArray[np.float32], part: _Part, cell: float
+) -> tuple[float, float, float, float]:
+    """Return the half sizes along x and y, the range and the depth of a heightfield [m]."""
+    samples = heights[_on_map(part, heights.shape)]
+    units = max(int(_elevation_units(samples.max(), float(samples.min()))), 1)  # MuJoCo needs > 0
+    x, y = ((each.stop - each.start - 1) * cell / 2 for each in part)
+    return x, y, units * _ELEVATION_UNIT, THICKNESS
+
+
+def hfield_elevation(heights: NDArray[np.float32], part: _Part) -> NDArray[np.int64]:
+    """Return the elevation data of a heightfield, shape (ny, nx), from the smallest x and y."""
+    samples = heights[_on_map(part, heights.shape)]
+    beyond = [
+        (max(_MARGIN - each.start, 0), max(each.stop - _MARGIN - size, 0))
+        for each, size in zip(part, heights.shape, strict=True)
+    ]
+    if any(map(any, beyond)):
+        samples = np.pad(samples, beyond, mode="edge")
+    return _elevation_units(samples, float(samples.min())).T
 
 
 def _elevation_units(heights: Any, low: float) -> NDArray[np.int64]:
@@ -376,52 +470,3 @@ def without_boxes(
     """Return the heights, lowered at samples that only affect cells covered by boxes."""
     lowered = np.logical_and.reduce(neighborhood(decomposition.covered))
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)
-
-
-def _add_box(
-    world: ET.Element, center: NDArray[np.float64], half_size: NDArray[np.float64]
-) -> ET.Element:
-    position, size = format_numbers(*center), format_numbers(*half_size)
-    return ET.SubElement(world, "geom", {"class": "terrain"}, type="box", pos=position, size=size)
-
-
-def _add_solids(asset: ET.Element, world: ET.Element, solids: Solids, static: float) -> None:
-    """Add one geom for each solid. Rays of group 3 are off by default, as for hidden geoms."""
-    hulls = solids.hulls()
-    for k, vertices in enumerate(hulls):
-        text = format_numbers(*vertices.ravel())
-        ET.SubElement(asset, "mesh", name=f"solid_{k}", vertex=text, inertia="convex")
-    shapes = [("box", [3, 4, 5], row) for row in solids.boxes]
-    shapes += [("cylinder", [3, 5], row) for row in solids.cylinders]
-    attributes = [
-        {
-            "type": kind,
-            "pos": format_numbers(*row[:3]),
-            "size": format_numbers(*row[size]),
-            "quat": format_numbers(*row[6:]),
-        }
-        for kind, size, row in shapes
-    ]
-    attributes += [{"type": "mesh", "mesh": f"solid_{k}"} for k in range(len(hulls))]
-    flags = zip(solids.friction, solids.collides, solids.visible, strict=True)
-    for given, (friction, collides, visible) in zip(attributes, flags, strict=True):
-        geom = ET.SubElement(world, "geom", {"class": "terrain", **given})
-        if not np.isnan(friction):
-            _set_friction(geom, friction, static)
-        if not collides:
-            geom.set("contype", "0")
-            geom.set("conaffinity", "0")
-        if not visible:
-            geom.set("group", "3")
-
-
-def _add_goals(world: ET.Element, goals: NDArray[np.float32]) -> None:
-    """Add a site for each goal, `goal_ROW_COL_NUMBER`, whose x axis is the heading."""
-    for row, col, k in np.argwhere(~np.isnan(goals[..., 0])).tolist():
-        *position, heading = goals[row, col, k].tolist()
-        pose = {
-            "pos": format_numbers(*position),
-            "quat": format_numbers(np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2)),
-        }
-        name = f"goal_{row}_{col}_{k}"
-        ET.SubElement(world, "site", {"name": name, "class": "terrain", **pose})

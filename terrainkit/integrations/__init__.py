@@ -22,6 +22,16 @@ def missing(framework: str, install: str) -> ModuleNotFoundError:
     return ModuleNotFoundError(f"{framework} is not installed; install it with: {install}")
 
 
+def column_names(terrain_map: TerrainMap) -> list[str]:
+    """Return a unique name for each column, such as `stairs` and `stairs#2`."""
+    names: list[str] = []
+    for types in terrain_map.patch_names.T:
+        name = str(types[0]) if (types == types[0]).all() else "mixed"
+        count = sum(each.split("#")[0] == name for each in names)
+        names.append(f"{name}#{count + 1}" if count else name)
+    return names
+
+
 def pad_points(points: NDArray[np.floating], origins: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return the points of each patch [m], shape (rows, cols, k, 3), without NaN.
 

@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.curriculum import SamplerName
 from terrainkit.export.mjcf import Collision
 from terrainkit.importing.options import ImportOptions
-from terrainkit.integrations import missing
+from terrainkit.integrations import column_names, missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
 from terrainkit.map.import_map import ImportedMap
 from terrainkit.map.terrain_map import TerrainMap
@@ -17,6 +18,8 @@ from terrainkit.map.terrain_mesh import import_terrain_mesh
 
 try:
     import mujoco
+    from mjlab.envs import ManagerBasedRlEnvCfg
+    from mjlab.managers import CurriculumTermCfg, TerminationTermCfg
     from mjlab.terrains import (
         FlatPatchSamplingCfg,
         SubTerrainCfg,
@@ -24,6 +27,8 @@ try:
         TerrainGeneratorCfg,
     )
     from mjlab.terrains.terrain_generator import TerrainGenerator, TerrainOutput
+
+    from terrainkit.integrations import terrain_curriculum
 except ModuleNotFoundError as error:
     raise missing("mjlab", "pip install mjlab") from error
 
@@ -74,6 +79,33 @@ def terrain_entity_cfg(
     )
 
 
+def use_terrain_curriculum(
+    cfg: ManagerBasedRlEnvCfg,
+    *,
+    command_name: str = "twist",
+    sampler: SamplerName | None = "levels",
+) -> None:
+    """Replace the terrain curriculum of a task by a sampler of :mod:`terrainkit.curriculum`.
+
+    It also works with the terrain of mjlab's generator. The progress of a robot is measured along
+    its commands, in every step. Robots that solve the last level stay on the last levels. The mean
+    level and the success of each terrain, and the success of each level, are logged as
+    `Curriculum/terrain_levels`.
+
+    Args:
+        cfg: Configuration of the environment, which is changed.
+        command_name: Name of the velocity command.
+        sampler: Name of the sampler: levels, uniform, learning_progress or prioritized_replay; None
+            to keep every robot on its patch. Its seed is the one of `cfg`.
+    """
+    cfg.terminations[terrain_curriculum.PROGRESS] = TerminationTermCfg(
+        func=terrain_curriculum.TerrainProgress, params={"command_name": command_name}
+    )
+    cfg.curriculum[terrain_curriculum.LEVELS] = CurriculumTermCfg(
+        func=terrain_curriculum.TerrainLevels, params={"sampler": sampler}
+    )
+
+
 def import_terrain(
     cfg: TerrainGeneratorCfg, *, options: ImportOptions | None = None
 ) -> ImportedMap:
@@ -98,16 +130,6 @@ def import_terrain(
         terrain_names=tuple(cfg.sub_terrains) if cfg.curriculum else ("mjlab",),
         options=options,
     )
-
-
-def column_names(terrain_map: TerrainMap) -> list[str]:
-    """Return a unique name for each column, such as `stairs` and `stairs#2`."""
-    names: list[str] = []
-    for types in terrain_map.patch_names.T:
-        name = str(types[0]) if (types == types[0]).all() else "mixed"
-        count = sum(each.split("#")[0] == name for each in names)
-        names.append(f"{name}#{count + 1}" if count else name)
-    return names
 
 
 @dataclass(kw_only=True)

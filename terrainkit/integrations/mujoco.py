@@ -1,12 +1,11 @@
 """Maps in MuJoCo models."""
 
-from io import StringIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from terrainkit.errors import ExportError
-from terrainkit.export.mjcf import Collision, write_model
+from terrainkit.export import mjcf
 from terrainkit.files.memory import check_memory
 from terrainkit.integrations import load_map
 
@@ -18,12 +17,12 @@ if TYPE_CHECKING:
 
     from terrainkit.map.terrain_map import TerrainMap
 
-_BYTES_PER_SAMPLE = 32
-"""Peak memory per sample of a heightfield as text and in MuJoCo [bytes]; measured: 26 to 31."""
+_BYTES_PER_SAMPLE = 24
+"""Peak memory per sample of a heightfield, also when it is compiled [bytes]; measured: 17 to 24."""
 
 
 def make_spec(
-    source: "TerrainMap | str | Path", *, collision: Collision = "auto"
+    source: "TerrainMap | str | Path", *, collision: mjcf.Collision = "auto"
 ) -> "mujoco.MjSpec":
     """Return the map as a MuJoCo model specification.
 
@@ -36,13 +35,47 @@ def make_spec(
     terrain_map = load_map(source)
     samples = terrain_map.heights.size
     check_memory(samples * _BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
-    file = StringIO()
-    write_model(terrain_map, file, collision)
-    return mujoco.MjSpec.from_string(file.getvalue())
+    model = mjcf.make_model(terrain_map, collision)
+    spec = mujoco.MjSpec()
+    spec.modelname = "terrain"
+    for name, value in terrain_map.config.contact.items():
+        spec.add_numeric(name=f"terrain_{name}", data=[value])
+    default = spec.add_default("terrain", spec.default)
+    for name, value in _fields(model.geom_defaults).items():
+        setattr(default.geom, name, value)
+    for name, value in _fields(mjcf.SITE_DEFAULTS).items():
+        setattr(default.site, name, value)
+    for name, vertices in model.hulls().items():
+        convex = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        spec.add_mesh(name=name, uservert=vertices.ravel(), inertia=convex)
+    for name, (part, _) in model.hfields.items():
+        elevation = mjcf.hfield_elevation(model.heights, part)
+        nrow, ncol = elevation.shape
+        size = mjcf.hfield_size(model.heights, part, terrain_map.grid.cell)
+        # MuJoCo reads a memoryview twice as fast as an array.
+        data = elevation.astype(np.float32).ravel().data
+        spec.add_hfield(name=name, nrow=nrow, ncol=ncol, size=size, userdata=data)
+    for each in model.geoms():
+        spec.worldbody.add_geom(default, **_fields(each))
+    for each in model.sites():
+        spec.worldbody.add_site(default, **_fields(each))
+    return spec
+
+
+def _fields(attributes: dict[str, Any]) -> dict[str, Any]:
+    """Return attributes of MJCF as fields of a specification."""
+    import mujoco
+
+    fields = dict(attributes)
+    for kind in fields.keys() & {"mesh", "hfield"}:
+        fields[f"{kind}name"] = fields.pop(kind)
+    if "type" in fields:
+        fields["type"] = getattr(mujoco.mjtGeom, f"mjGEOM_{fields['type'].upper()}")
+    return fields
 
 
 def add_map(
-    spec: "mujoco.MjSpec", source: "TerrainMap | str | Path", *, collision: Collision = "auto"
+    spec: "mujoco.MjSpec", source: "TerrainMap | str | Path", *, collision: mjcf.Collision = "auto"
 ) -> None:
     """Add the map to the world body of `spec`, in world coordinates.
 

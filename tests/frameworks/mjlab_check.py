@@ -1,6 +1,10 @@
 """Run a map with solids in mjlab's rough task. Needs mjlab; `make integrations` runs it."""
 
+import os
+import re
+import subprocess
 import sys
+import time
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +21,7 @@ from parkour import CONFIG
 
 import terrainkit
 from terrainkit.integrations.mjlab import import_terrain, terrain_entity_cfg
+from terrainkit.integrations.mujoco import make_spec
 from terrainkit.map.validate import validate
 
 path = Path(sys.argv[1]) / "map.npz"
@@ -26,6 +31,7 @@ terrain_map.save(path)
 cfg = load_env_cfg("Mjlab-Velocity-Rough-Unitree-Go1")
 cfg.scene.num_envs, cfg.episode_length_s = 16, 0.4
 cfg.scene.terrain = terrain_entity_cfg(path, max_init_terrain_level=2)
+cfg.events["reset_base"].params["pose_range"] = {}  # robots that stay at the origin move down
 env = ManagerBasedRlEnv(cfg, device="cpu")
 env.reset()
 terrain, center = env.scene.terrain, np.array([*terrain_map.grid.center, 0.0])
@@ -62,14 +68,58 @@ for name, sensor in env.scene.sensors.items():
         assert np.median(gap) < 1e-4, (name, np.median(gap))
 print(f"mjlab {version('mjlab')}: {off.sum()} of 200 rays off by more than 1 mm, next to walls")
 
+# The plug-in of the documentation, with mjlab's own `train`.
+folder = path.parent
+page = (Path(__file__).parents[2] / "docs/integrations.md").read_text()
+(code,) = re.findall(r"```python\n(import mjlab\.tasks.*?)```", page, re.DOTALL)
+(folder / "my_tasks.py").write_text(code)
+(folder / "my_tasks-0.1.0.dist-info").mkdir()
+(folder / "my_tasks-0.1.0.dist-info/METADATA").write_text("Name: my-tasks\nVersion: 0.1.0\n")
+entry_point = "[mjlab.tasks]\nmy_tasks = my_tasks\n"
+(folder / "my_tasks-0.1.0.dist-info/entry_points.txt").write_text(entry_point)
+command = [sys.executable, "-m", "mjlab.scripts.train", "Map-Go1", "--env.scene.num-envs", "4"]
+command += ["--agent.max-iterations", "2", "--agent.logger", "tensorboard", "--gpu-ids", "None"]
+variables = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), *sys.path[1:]])}
+train = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True)
+assert "Learning iteration 1/2" in train.stdout, train.stderr
+assert "terrain_progress" in train.stdout
+print("train: 2 iterations of the plug-in in docs/integrations.md")
+
+
+def mjlab_terrain(cfg):
+    """Return a specification with the terrain of mjlab's generator, and its origins."""
+    spec, generator = mujoco.MjSpec(), TerrainGenerator(cfg)
+    generator.compile(spec)
+    return spec, generator.terrain_origins
+
+
+def cpu_time(function):
+    """Return the CPU time of a call [s], the best of ten."""
+    times = []
+    for _ in range(10):
+        start = time.process_time()
+        function()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+# The specification of 200 patches of a map, and of the 70 patches of mjlab's curriculum.
+preset = terrainkit.generate(terrainkit.MapConfig(rows=10, cols=20, preset="mjlab"))
+cfg = replace(ROUGH_TERRAINS_CFG, seed=1, curriculum=True)
+times = [
+    cpu_time(lambda: make_spec(preset, collision="boxes")),
+    cpu_time(lambda: mjlab_terrain(cfg)),
+]
+ratio = times[0] / times[1]
+assert ratio <= 1.0, times
+print(f"make_spec: {times[0]:.3f} s, {ratio:.2f} of the time of mjlab's generator")
+
 # The reverse: a terrain of mjlab's generator as a map.
 cfg = replace(ROUGH_TERRAINS_CFG, seed=1, curriculum=True, num_rows=4, border_width=2.0)
 found = import_terrain(cfg).terrain_map
 assert found.patch_names[0].tolist() == list(cfg.sub_terrains)
 assert not (issues := validate(found)), issues
-spec = mujoco.MjSpec()
-generator = TerrainGenerator(cfg)
-generator.compile(spec)
+spec, origins = mjlab_terrain(cfg)
 model = spec.compile()
 data = mujoco.MjData(model)
 mujoco.mj_forward(model, data)
@@ -81,7 +131,7 @@ for x, y in np.random.default_rng(0).uniform(lower + 0.1, upper - 0.1, (200, 2))
 # Walls of the map are halfway between two samples, and heights between samples are interpolated.
 errors = np.array(errors)
 assert np.quantile(errors, 0.9) < 0.03, errors
-kept = np.linalg.norm(found.env_origins - generator.terrain_origins, axis=-1) < 0.05
+kept = np.linalg.norm(found.env_origins - origins, axis=-1) < 0.05
 print(
     f"import: height error median {np.median(errors) * 1e3:.1f} mm, 90 % within "
     f"{np.quantile(errors, 0.9) * 1e3:.0f} mm; {kept.mean():.0%} of the origins kept"

@@ -4,7 +4,9 @@ python tests/frameworks/run.py [NAME ...] [--environments FOLDER]
 """
 
 import argparse
+import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -18,7 +20,8 @@ PACKAGES = {
     "pybullet": [["pybullet==3.2.7"]],
     "warp": [["newton==1.8.0", "mujoco-warp==4.0.0"]],
     "mjx": [["mujoco-mjx==3.17.0"]],
-    "isaaclab": [["torch", "packaging", "gymnasium"], ["--no-deps", "isaaclab==2.3.2.post1"]],
+    "isaaclab2": [["torch", "packaging", "gymnasium"], ["--no-deps", "isaaclab==2.3.2.post1"]],
+    "isaaclab3": [["isaaclab==3.0.0"]],
     "genesis": [["torch"], ["genesis-world==1.4.5"]],
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
     "drake": [["drake==1.51.1"]],
@@ -35,8 +38,24 @@ CHECKOUTS = {"leggedgym_ex": "LEGGEDGYM_EX", "legged_gym": "LEGGED_GYM"}
 """Variable with the folder of a framework that is no package. The check runs beside its
 environment, in which terrainkit is not installed."""
 
-PYTHONS = {"legged_gym": "3.8"}
+PYTHONS = {"legged_gym": "3.8", "isaaclab3": "3.12"}
 """Version of Python of an environment, where it is not that of this program."""
+
+KEPT = ("mjlab", "isaaclab3")
+"""Environments in which an installation of terrainkit must not change another package."""
+
+
+def changed_packages(python):
+    """Return the installed packages that an installation of terrainkit would change."""
+    pip = [python, "-m", "pip", "--disable-pip-version-check"]
+    dry_run = [*pip, "install", "-q", "--dry-run", "--report", "-", FOLDER.parents[1]]
+    installed, report = (
+        json.loads(subprocess.run(each, check=True, capture_output=True, text=True).stdout)
+        for each in ([*pip, "list", "--format", "json"], dry_run)
+    )
+    names = {re.sub("[-_.]+", "-", each["name"].lower()) for each in installed}
+    changed = {each["metadata"]["name"] for each in report["install"]} - {"terrainkit"}
+    return [each for each in changed if re.sub("[-_.]+", "-", each.lower()) in names]
 
 
 def main() -> None:
@@ -59,7 +78,9 @@ def main() -> None:
         if not python.exists():
             subprocess.run([interpreter, "-m", "venv", environment], check=True)
         own = [] if name in CHECKOUTS else [["-e", FOLDER.parents[1]]]
-        for packages in [*own, *PACKAGES[name]]:
+        for packages in [*PACKAGES[name], *own]:
+            if packages in own and name in KEPT and (changed := changed_packages(python)):
+                sys.exit(f"{name}: terrainkit would change {', '.join(changed)}")
             subprocess.run([python, "-m", "pip", "install", "-q", *packages], check=True)
         with tempfile.TemporaryDirectory() as folder:
             scripts = sorted(FOLDER.glob(f"{name}*_check.py"))

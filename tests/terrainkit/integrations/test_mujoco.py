@@ -12,12 +12,28 @@ def parkour():
     return tk.generate(config)
 
 
-def test_make_spec_is_saved_model(parkour, tmp_path):
-    path = parkour.save(tmp_path / "map.xml", collision="boxes")
-    saved = mujoco.MjModel.from_xml_path(str(path))
-    model = make_spec(parkour, collision="boxes").compile()
-    np.testing.assert_array_equal(model.geom_pos, saved.geom_pos)
-    np.testing.assert_array_equal(model.geom_size, saved.geom_size)
+@pytest.mark.parametrize("collision", ["boxes", "hfield"])
+def test_specs_are_the_saved_model(tmp_path, collision):
+    slippery = tk.SubTerrain(terrain="crawl", friction=(0.5, 0.25), proportion=2.0)
+    terrains = (slippery, tk.SubTerrain(terrain="rough_slope"), tk.SubTerrain(terrain="rocks"))
+    # Without a border, heightfields extend beyond the map.
+    for border in (0.0, 1.0):
+        size = {"rows": 2, "cols": 4, "patch_size": (8.0, 6.0), "border": border}
+        terrain_map = tk.generate(tk.MapConfig(terrains=terrains, static_friction=0.8, **size))
+        path = terrain_map.save(tmp_path / "map.xml", collision=collision, overwrite=True)
+        saved = mujoco.MjModel.from_xml_path(str(path))
+        robot = mujoco.MjSpec.from_string(
+            "<mujoco><default><geom contype='0' margin='0.3'/><site group='2'/></default></mujoco>"
+        )
+        add_map(robot, terrain_map, collision=collision)
+        for model in (make_spec(terrain_map, collision=collision).compile(), robot.compile()):
+            assert model.nhfield == saved.nhfield > 0
+            assert model.nmesh == saved.nmesh > 0 < saved.nsite
+            np.testing.assert_array_equal(model.hfield_data, saved.hfield_data)
+            for name in dir(saved):
+                if name.startswith(("geom_", "site_", "hfield_", "numeric_")):
+                    found, expected = getattr(model, name), getattr(saved, name)
+                    np.testing.assert_allclose(found, expected, atol=2e-5, err_msg=name)
 
 
 def test_add_map_supports_ball_on_ground_and_solids(parkour, tmp_path):

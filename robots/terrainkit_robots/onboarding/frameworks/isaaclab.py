@@ -102,17 +102,19 @@ _REGISTER = """
         disable_env_checker=True,
         kwargs={
             "env_cfg_entry_point": "$package.isaaclab_config:RoughEnvCfg",
-            "rsl_rl_cfg_entry_point": (
-                "isaaclab_tasks.manager_based.locomotion.velocity.config.go2.agents."
-                "rsl_rl_ppo_cfg:UnitreeGo2RoughPPORunnerCfg"
-            ),
+            "rsl_rl_cfg_entry_point": velocity_env_cfg.__package__
+            + ".config.go2.agents.rsl_rl_ppo_cfg:UnitreeGo2RoughPPORunnerCfg",
         },
     )
 """
 
 _TASK_IMPORTS = [
     "from isaaclab.utils import configclass",
-    "from isaaclab_tasks.manager_based.locomotion.velocity import velocity_env_cfg",
+    "",
+    "try:",
+    "    from isaaclab_tasks.core.velocity import velocity_env_cfg",
+    "except ModuleNotFoundError:  # Isaac Lab 2",
+    "    from isaaclab_tasks.manager_based.locomotion.velocity import velocity_env_cfg",
 ]
 
 _TASK = '''
@@ -180,7 +182,7 @@ def config_text(robot: ConfigRobot) -> str:
 def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
-        f"{robot.title} for Isaac Lab 2: articulation"
+        f"{robot.title} for Isaac Lab 2 and 3: articulation"
         + (" and velocity task." if is_legged else "."),
         f"{GENERATED_NOTE} A pattern matches the whole name of a joint or body, and each name is "
         "matched by one pattern.",

@@ -44,7 +44,7 @@ BuiltinVelocityActuatorCfg has the same fields except for the stiffness."""
 _ENTITY = '''
 $about
 
-$dataclasses
+$standard
 from pathlib import Path
 
 import mujoco
@@ -112,7 +112,7 @@ def config_text(robot: ConfigRobot) -> str:
     entity = fill(
         _ENTITY,
         about=docstring(_about(robot, has_task=has_task)),
-        dataclasses=["from dataclasses import replace"] * has_task,
+        standard=["import argparse", "import sys", "from dataclasses import replace"] * has_task,
         actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
         task_imports=mjlab_task.IMPORTS.split("\n") if has_task else [],
         robot_xml=sum_assignment("ROBOT_XML", PARENT_FOLDER, "/", string_literal(robot.spec.mjcf)),
@@ -150,6 +150,7 @@ def _training(robot: ConfigRobot) -> list[str]:
     return [
         "Train it with mjlab 1.6, on flat ground or with Rough for Flat:",
         f"    python {train_arguments(robot.spec)} \\\n        --env.scene.num-envs 4096",
+        "With `--map map.npz` and terrainkit installed, a map is the ground of the Rough task.",
         "mjlab's other commands, such as `play`, find the tasks if a package with an entry point "
         "in the group `mjlab.tasks` calls `register_tasks`.",
     ]

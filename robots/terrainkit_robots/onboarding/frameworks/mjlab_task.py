@@ -63,8 +63,12 @@ def ground_contact(name, bodies, mode="body", **options) -> ContactSensorCfg:
     )
 
 
-def velocity_env_cfg(rough: bool, play: bool = False) -> ManagerBasedRlEnvCfg:
-    """Return mjlab's velocity task for this robot, on rough or flat ground."""
+def velocity_env_cfg(
+    rough: bool,
+    play: bool = False,
+    map_path: str | None = None,
+) -> ManagerBasedRlEnvCfg:
+    """Return mjlab's velocity task for this robot, on flat or rough ground, or on a map.npz."""
     cfg = make_velocity_env_cfg()
     cfg.scene.entities = {"robot": get_robot_cfg()}
     cfg.viewer.body_name = BASE
@@ -115,6 +119,14 @@ def velocity_env_cfg(rough: bool, play: bool = False) -> ManagerBasedRlEnvCfg:
         cfg.sim.nconmax = 100
         cfg.sim.contact_sensor_maxmatch = cfg.sim.mujoco.ccd_iterations = 500
         cfg.scene.terrain.terrain_generator.curriculum = True
+        if map_path is not None:
+            from terrainkit.integrations.mjlab import (
+                terrain_entity_cfg,
+                use_terrain_curriculum,
+            )
+
+            cfg.scene.terrain = terrain_entity_cfg(map_path)
+            use_terrain_curriculum(cfg)
         cfg.rewards["upright"].params["terrain_sensor_names"] = ("terrain_scan",)
     else:
         cfg.sim.nconmax, cfg.sim.njmax = None, 500
@@ -134,14 +146,15 @@ def velocity_env_cfg(rough: bool, play: bool = False) -> ManagerBasedRlEnvCfg:
     return cfg
 
 
-def register_tasks() -> None:
-    """Register the tasks, with the PPO of mjlab's Go1."""
+def register_tasks(map_path: str | None = None) -> None:
+    """Register the tasks, or with a map the rough one on it, with the PPO of mjlab's Go1."""
     runner = replace(unitree_go1_ppo_runner_cfg(), experiment_name=EXPERIMENT)
-    for task_id, rough in ((FLAT_TASK, False), (ROUGH_TASK, True)):
+    tasks = ((FLAT_TASK, False), (ROUGH_TASK, True))
+    for task_id, rough in tasks if map_path is None else tasks[1:]:
         register_mjlab_task(
             task_id=task_id,
-            env_cfg=velocity_env_cfg(rough),
-            play_env_cfg=velocity_env_cfg(rough, play=True),
+            env_cfg=velocity_env_cfg(rough, map_path=map_path),
+            play_env_cfg=velocity_env_cfg(rough, play=True, map_path=map_path),
             rl_cfg=runner,
             runner_cls=VelocityOnPolicyRunner,
         )
@@ -150,7 +163,10 @@ def register_tasks() -> None:
 if __name__ == "__main__":
     from mjlab.scripts.train import main
 
-    register_tasks()
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("--map")
+    options, sys.argv[1:] = parser.parse_known_args()
+    register_tasks(options.map)
     main()
 '''
 

@@ -12,6 +12,7 @@ from typing import Any
 import mujoco
 import pytest
 
+from terrainkit import MapConfig, generate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.mjlab import config_text
@@ -274,15 +275,18 @@ def test_mjlab_config_in_mjlab(robots, tmp_path, bundled_xml, mjlab_python, whic
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("terrain", ["Flat", "Rough"])
+@pytest.mark.parametrize("terrain", ["Flat", "Rough", "map"])
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_mjlab_trains_onboarded_robot(tmp_path, mjlab_python, name, terrain):
+    if is_map := terrain == "map":
+        generate(MapConfig(rows=2, cols=4, preset="stairs")).save(tmp_path / "map.npz")
+        terrain = "Rough"
     options = OnboardOptions(frameworks=("mjlab",), render_images=False)
     onboard(bundled.urdf_path(name), tmp_path / "robot", options)
     task = f"Mjlab-Velocity-{terrain}-{name.capitalize()}"
     command = [mjlab_python, "robot/mjlab_config.py", task, "--env.scene.num-envs", "4"]
     command += ["--agent.max-iterations", "2", "--agent.logger", "tensorboard"]
-    command += ["--gpu-ids", "None"]
+    command += ["--gpu-ids", "None", *["--map", "map.npz"] * is_map]
     done = subprocess.run(
         command,
         capture_output=True,
@@ -292,3 +296,4 @@ def test_mjlab_trains_onboarded_robot(tmp_path, mjlab_python, name, terrain):
     )
     assert done.returncode == 0, done.stderr
     assert "Learning iteration 1/2" in done.stdout
+    assert ("terrain_progress" in done.stdout) == is_map

@@ -5,59 +5,25 @@ Needs the wheel of Isaac Lab without its dependencies; `make integrations` runs 
 
 import importlib.util
 import sys
-from dataclasses import field
 from importlib.metadata import version
 from pathlib import Path
-from types import ModuleType
-from unittest.mock import MagicMock
+from types import SimpleNamespace
 
 import numpy as np
 import torch
 from stand_ins import StandIns
 
-STAND_INS = ("carb", "flatdict", "gymnasium", "hid", "isaacsim", "omni", "prettytable", "pxr")
-STAND_INS += ("einops", "toml", "transformers", "warp", "yaml")
+STAND_INS = ("carb", "cv2", "flatdict", "h5py", "hid", "isaacsim", "omni", "onnx", "pxr", "usdrt")
+STAND_INS += ("einops", "matplotlib", "prettytable", "toml", "transformers", "warp", "yaml")
 
 
 sys.meta_path.insert(0, StandIns(STAND_INS))
 source = Path(importlib.util.find_spec("isaaclab").origin).parent / "source" / "isaaclab"
 if source.exists():  # the wheel has the package inside of a package of the same name
     sys.modules.pop("isaaclab", None)
-    sys.path.insert(0, str(source))
+    sys.path[:0] = [str(source), str(source.with_name("isaaclab_contrib"))]
 
-from isaaclab.utils import configclass  # noqa: E402
-
-
-@configclass
-class RigidBodyMaterialCfg:
-    """The fields of Isaac Lab's class, which is defined in a module of the simulator."""
-
-    static_friction: float = 0.5
-    dynamic_friction: float = 0.5
-    restitution: float = 0.0
-    friction_combine_mode: str = "average"
-    restitution_combine_mode: str = "average"
-
-
-@configclass
-class PreviewSurfaceCfg:
-    """A visual material."""
-
-    diffuse_color: tuple = field(default=(0.0, 0.0, 0.0))
-
-
-simulator = ModuleType("isaaclab.sim")
-simulator.RigidBodyMaterialCfg, simulator.PreviewSurfaceCfg = (
-    RigidBodyMaterialCfg,
-    PreviewSurfaceCfg,
-)
-simulator.SimulationContext = MagicMock()
-simulator.SimulationContext.instance.return_value.device = "cpu"
-simulator.__getattr__ = MagicMock(side_effect=lambda name: MagicMock(name=name))
-sys.modules["isaaclab.sim"] = simulator
-for name in ("isaaclab.markers", "isaaclab.markers.config", "isaaclab.utils.warp"):
-    sys.modules[name] = MagicMock()
-
+import isaaclab.sim  # noqa: E402
 import isaaclab.terrains.terrain_importer  # noqa: E402
 from isaaclab.terrains import TerrainGenerator  # noqa: E402
 from isaaclab.terrains.config.rough import ROUGH_TERRAINS_CFG  # noqa: E402
@@ -68,6 +34,8 @@ from terrainkit.importing import import_terrain_mesh  # noqa: E402
 from terrainkit.integrations.isaaclab import terrain_importer_cfg  # noqa: E402
 from terrainkit.map.validate import validate  # noqa: E402
 
+simulation = SimpleNamespace(device="cpu", cfg=None)
+isaaclab.sim.SimulationContext.instance = lambda: simulation
 prims = {}
 isaaclab.terrains.terrain_importer.create_prim_from_mesh = lambda path, mesh, **materials: (
     prims.update({path: (mesh, materials["physics_material"])})

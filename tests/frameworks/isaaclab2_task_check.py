@@ -47,8 +47,8 @@ for name, foot in (("quadruped", ".*_foot"), ("biped", ".*_ankle_roll_link")):
     for group in ("actions", "commands", "curriculum", "events", "observations"):
         # A misspelled term would be a new one.
         assert vars(getattr(task, group)).keys() == vars(getattr(default, group)).keys()
-    agent = config.__doc__.split("rsl_rl_cfg_entry_point")[1].split(")")[0].split('"')
-    module, _, made = (agent[2] + agent[4]).partition(":")
+    agent = config.__doc__.split("rsl_rl_cfg_entry_point")[1].split('"')[2]
+    module, _, made = f"{config.velocity_env_cfg.__package__}{agent}".partition(":")
     path = (source / "isaaclab_tasks").joinpath(*module.split(".")).with_suffix(".py")
     assert f"class {made}(" in path.read_text(), (module, made)
 
