@@ -72,6 +72,15 @@ def plugin_errors(plugin: str | None, *passed: type[BaseException]) -> Iterator[
         raise PluginError(f"{plugin}: {' '.join(cause.split())}") from error
 
 
+@contextmanager
+def prefixed_errors(prefix: str) -> Iterator[None]:
+    """Put `prefix` in front of the message of a TerrainkitError."""
+    try:
+        yield
+    except TerrainkitError as error:
+        raise type(error)(f"{prefix}{error}") from error.__cause__ or error
+
+
 MAX_LISTED = 80
 """Names that an error message lists at most."""
 

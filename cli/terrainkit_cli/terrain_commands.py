@@ -266,11 +266,9 @@ class CheckMap(Command):
             blocked = print_impassable(results, derived, self.map)
         if issues:
             render.result(f"\n{self.map}: {count(len(issues), 'issue')}")
-            return 1
-        if blocked:
-            return 1
-        render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no issues")
-        return 0
+        elif not blocked:
+            render.result(f"{self.map}: {terrain_map.difficulty.size} patches, no issues")
+        return 1 if issues else blocked
 
 
 @dataclass(frozen=True, kw_only=True)

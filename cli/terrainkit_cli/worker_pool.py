@@ -1,36 +1,20 @@
 """A pool of processes for a command."""
 
 import signal
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING
 
-from terrainkit.errors import TerrainkitError
-
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from concurrent.futures import Executor
 
 
-@contextmanager
-def worker_pool(jobs: int) -> "Iterator[Executor | None]":
-    """Yield an executor of `jobs` processes; None for 1, which is this process.
-
-    Raises:
-        TerrainkitError: if a process ended unexpectedly.
-    """
+def worker_pool(jobs: int) -> "AbstractContextManager[Executor | None]":
+    """Return the context of an executor of `jobs` processes; None for 1, which is this process."""
     if jobs == 1:
-        yield None
-        return
+        return nullcontext()
     from concurrent.futures import ProcessPoolExecutor
-    from concurrent.futures.process import BrokenProcessPool
 
-    try:
-        with ProcessPoolExecutor(jobs, initializer=_reset_signals) as executor:
-            yield executor
-    except BrokenProcessPool:
-        raise TerrainkitError(
-            "a worker process ended unexpectedly, for example for lack of memory; use fewer --jobs"
-        ) from None
+    return ProcessPoolExecutor(jobs, initializer=_reset_signals)
 
 
 def _reset_signals() -> None:

@@ -420,12 +420,10 @@ def _border_height(terrain_map: "TerrainMap") -> float | None:
     """Return the height of the border [m]; None if it is not level, as in some edited maps."""
     (x, *_, x1), (y, *_, y1) = terrain_map.config.patch_edges
     heights = terrain_map.heights
-    sides = [
-        side for side in (heights[:x], heights[x1:], heights[:, :y], heights[:, y1:]) if side.size
-    ]
-    if not sides:
+    if not terrain_map.config.border_cells:
         return 0.0
     height = heights[0, 0]
+    sides = heights[:x], heights[x1:], heights[:, :y], heights[:, y1:]
     is_level = all(side.min() == side.max() == height for side in sides)
     return float(height) if is_level else None
 

@@ -17,13 +17,13 @@ from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND, path_edges
 from terrainkit.files.memory import check_memory
+from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.free_space import free_intervals
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.surface import surface_at
 from terrainkit.map.patch import Patch
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from concurrent.futures import Executor
 
     from terrainkit.map.generation import Progress
@@ -93,14 +93,14 @@ def assess_map(
         ConfigError: if a goal is inside the ground or a solid, or outside of its patch.
         ExportError: if a height is not finite.
         MemoryLimitError: if the graph of a patch would not fit in memory.
+        TerrainkitError: if the executor fails, for example because its processes end.
     """
     require_finite(terrain_map)
     assess = partial(assess_patch, limits=limits, threshold=terrain_map.config.wall_threshold)
     indices = list(np.ndindex(terrain_map.difficulty.shape))
     patches = (terrain_map.patch(row, col) for row, col in indices)
-    places: Iterator[tuple[int, int]] = iter(indices)
-    places = progress(places, len(indices)) if progress else places
-    results = (executor.map if executor else map)(assess, patches)
+    places = progress(iter(indices), len(indices)) if progress else indices
+    results = parallel_map(executor, assess, patches)
     return [
         replace(result, row=row, col=col)
         for (row, col), result in zip(places, results, strict=True)

@@ -5,6 +5,7 @@ Minimax paths on a directed graph do not follow from a minimum spanning tree; th
 at which the target can be reached is found by bisection.
 """
 
+from bisect import bisect_left
 from typing import Any
 
 import numpy as np
@@ -51,26 +52,10 @@ def bottleneck(edges: Edges, demand: FloatArray, leg: Leg, num_nodes: int) -> fl
     rows = np.searchsorted(edges.start[order], np.arange(num_nodes + 1))
     ends, demand = edges.end[order], demand[order]
     levels = np.unique(demand[np.isfinite(demand)])
-    return _bottleneck(rows, ends, demand, levels, start, targets)
-
-
-def _bottleneck(
-    rows: IntArray,
-    ends: IntArray,
-    demand: FloatArray,
-    levels: FloatArray,
-    start: int,
-    targets: IntArray,
-) -> float:
-    """Return the smallest of the levels at which a path leads to a target; see `_reaches`."""
-    low, high = 0, len(levels)  # the answer is levels[low] to levels[high]; the last stands for inf
-    while low < high:
-        middle = (low + high) // 2
-        if _reaches(rows, ends, demand <= levels[middle], start, targets):
-            high = middle
-        else:
-            low = middle + 1
-    return float(levels[low]) if low < len(levels) else float("inf")
+    number = bisect_left(
+        levels, True, key=lambda level: _reaches(rows, ends, demand <= level, start, targets)
+    )
+    return float(levels[number]) if number < len(levels) else float("inf")
 
 
 def shortest_path(

@@ -14,10 +14,12 @@ from terrainkit.feasibility.foothold_graph import FootholdGraph, ratio
 _MAX_PAIRS = 100_000
 """Pairs of nodes that are compared at once, to bound the memory."""
 
-_MAX_ENDS, _MAX_PATH_ENDS = 16, 4
-"""Largest number of gaps from a node to a region, the easiest ones: to find one, and for the path.
-Steps of little demand join the nodes of a region, so it does not matter where a gap ends, unless
-there is a wall in between."""
+_MAX_ENDS = 4
+"""Largest number of gaps from a node to a region, the easiest ones. Steps of little demand join the
+nodes of a region, so it does not matter where a gap ends, unless there is a wall in between."""
+
+_MAX_SEARCHED_ENDS = 16
+"""The same where one gap into each region is enough: most are not evaluated."""
 
 _MORE = 8
 """Factor by which more gaps into a region are tried where the easiest ones lead through a wall."""
@@ -49,12 +51,9 @@ def gap_edges(
     is_entered = np.zeros(len(regions), dtype=bool)
     for batch in _batches(_pairs(graph, regions, starts, ends, max_demand)):
         pairs = batch.select(~is_entered[regions[batch.end]]) if one_each else batch
-        number = _MAX_ENDS if one_each else _MAX_PATH_ENDS
+        number = _MAX_SEARCHED_ENDS if one_each else _MAX_ENDS
         pairs = pairs.select(_easiest(graph, pairs, number, regions[pairs.end], pairs.start))
-        if not one_each:
-            parts.append(_evaluate(graph, pairs, max_demand))
-            continue
-        number = 1
+        number = 1 if one_each else len(pairs.start)
         while len(pairs.start):
             order = _easiest(graph, pairs, number, regions[pairs.end])
             parts.append(_evaluate(graph, pairs.select(order), max_demand))

@@ -11,6 +11,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.feasibility.assess import assess_patch
 from terrainkit.feasibility.limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
+from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.grid import Grid
 from terrainkit.map.config import MapConfig
 from terrainkit.map.patch import Patch, build_patch
@@ -83,12 +84,10 @@ def solve_ranges(
     parts = [_parts(sub_terrain) for sub_terrain in config.sub_terrains]
     jobs = {_key(part): part for each in parts for part in each}
     solve = partial(_solve, samples, limits, demand)
-    results = (executor.map if executor else map)(solve, jobs.values())
+    results = parallel_map(executor, solve, jobs.values())
     indices = iter([(0, k) for k in range(len(jobs))])
     steps = progress(indices, len(jobs)) if progress else indices
-    solved = dict(
-        zip(jobs, (result for _, result in zip(steps, results, strict=True)), strict=True)
-    )
+    solved = {key: result for key, _, result in zip(jobs, steps, results, strict=True)}
     return [
         _solved(sub_terrain, [solved[_key(part)] for part in each])
         for sub_terrain, each in zip(config.sub_terrains, parts, strict=True)

@@ -49,7 +49,7 @@ def run_isolated(
     Args:
         function: A function of a module.
         *arguments: Its arguments, which are pickled.
-        limits: ProcessLimits of the child process.
+        limits: Limits of the child process; None for the defaults.
 
     Raises:
         IsolatedError: if the function fails, crashes, or exceeds a limit.

@@ -175,11 +175,8 @@ def check_solids(solids: object) -> None:
         raise ConfigError(f"solids: got {type(solids).__name__}; expected Solids")
     for name, like in vars(Solids.empty()).items():
         array = np.asarray(getattr(solids, name))
-        if (
-            array.dtype != like.dtype
-            or array.ndim != like.ndim
-            or array.shape[1:] != like.shape[1:]
-        ):
+        kinds = [(each.dtype, each.ndim, each.shape[1:]) for each in (array, like)]
+        if kinds[0] != kinds[1]:
             got, expected = (f"{each.dtype} {each.shape}" for each in (array, like))
             raise ConfigError(f"solids.{name}: got {got}; expected {expected} with any first size")
     shapes, counts = np.concatenate([solids.boxes, solids.cylinders]), solids.hull_counts

@@ -42,7 +42,10 @@ def read(path: Path, options: ReadOptions) -> Raster:
         start = file.read(_MAX_HEADER_BYTES)
         lines = re.match(rb"(?:\s*[A-Za-z]\w*[ \t]+[^\s]+[ \t]*\r?\n)*", start)
         length = lines.end() if lines else 0
-        header = _read_header(path, start[:length])
+        words = start[:length].decode(errors="replace").lower().split()
+        header = {
+            k: _number(path, k, text) for k, text in zip(words[::2], words[1::2], strict=True)
+        }
         nodata = header.pop("nodata_value", -9999.0)
         rows, cols, cell = _size(path, header, path.stat().st_size - length)
         file.seek(length)
@@ -59,13 +62,6 @@ def read(path: Path, options: ReadOptions) -> Raster:
         lower=(lower[0], lower[1]),
         nodata=nodata,
     )
-
-
-def _read_header(path: Path, data: bytes) -> dict[str, float]:
-    words = data.decode(errors="replace").lower().split()
-    return {
-        key: _number(path, key, text) for key, text in zip(words[::2], words[1::2], strict=True)
-    }
 
 
 def _size(path: Path, header: dict[str, float], num_bytes: int) -> tuple[int, int, float]:

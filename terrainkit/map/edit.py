@@ -7,14 +7,13 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.errors import ConfigError
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.generation import pad_poses
-from terrainkit.map.patch import place_spawns, with_headings
-from terrainkit.map.spawn import find_spawn
+from terrainkit.map.patch import find_origin, with_headings
+from terrainkit.map.spawn import find_spawn, sample_spawns
 from terrainkit.map.terrain_map import TerrainMap
-from terrainkit.settings.type_hint import MAX_VALUE
+from terrainkit.terrain.patch_geometry import checked_heights
 
 _Map = TypeVar("_Map", bound=TerrainMap)
 
@@ -22,12 +21,9 @@ _Map = TypeVar("_Map", bound=TerrainMap)
 def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None) -> _Map:
     """Return a map with other heights or solids; see :meth:`TerrainMap.edited`."""
     config = replace(terrain_map.config, mode="custom")
-    new = terrain_map.heights if heights is None else np.asarray(heights, dtype=np.float32)
-    if new.shape != terrain_map.grid.shape or not (np.abs(new) <= MAX_VALUE).all():
-        raise ConfigError(
-            f"heights: got shape {new.shape}; expected finite values of shape "
-            f"{terrain_map.grid.shape}"
-        )
+    new = terrain_map.heights
+    if heights is not None:
+        new = checked_heights(heights, terrain_map.grid, "heights: got")
     solids = assign_solids(config, terrain_map.solids if solids is None else solids)
     goals = terrain_map.goals.copy()
     raised = replace(terrain_map, heights=new)
@@ -92,6 +88,6 @@ def place_patch_spawns(
     else:
         x, y = spawns[0, :2].tolist()
         rng = partial(np.random.default_rng, [config.seed, row, col])
-        name = f"patch ({row}, {col})"
-        positions = place_spawns(config, name, grid, block, near, (x, y), rng)
+        origin = find_origin(config, f"patch ({row}, {col})", grid, block, near, (x, y))
+        positions = sample_spawns(config, grid, block, near, origin, rng)
     return with_headings(positions, goals)

@@ -1,7 +1,6 @@
 """Generate a TerrainMap from a MapConfig."""
 
 import itertools
-import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
@@ -12,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import TerrainkitError, TerrainkitWarning, listing
+from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.files.memory import check_memory
+from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types, terrain_and_difficulty
@@ -35,15 +35,6 @@ _BYTES_PER_PATCH = 2000
 _MAX_TASKS = 64
 """Largest number of tasks of an executor. A task of many patches has less overhead per patch."""
 
-_TRIAL_TIME = 0.5
-"""Time of the patches that are built in this process before an executor may be used [s]."""
-
-_SENDING_TIME = 2e-4
-"""Time that it takes to send a patch to this process [s]; measured: 0.1 to 0.2 ms."""
-
-_MIN_SAVED_TIME = 2.0
-"""Time of the other patches above which an executor is used [s]; a process starts in a second."""
-
 
 def generate(
     config: MapConfig, *, progress: Progress | None = None, executor: "Executor | None" = None
@@ -53,9 +44,8 @@ def generate(
     Args:
         config: The configuration. The same config gives the same bytes on every machine.
         progress: Wraps the iterator over the patches, for a progress bar.
-        executor: Builds the patches after the first, such as a `ProcessPoolExecutor` or
-            dask.distributed's `Client.get_executor()`, unless they are faster in this process; None
-            for this process. The map does not depend on it.
+        executor: Builds the patches, such as a `ProcessPoolExecutor` or dask.distributed's
+            `Client.get_executor()`; None for this process. The map does not depend on it.
 
     Returns:
         The map.
@@ -153,28 +143,10 @@ def _build_patches(
 ) -> Generator[tuple[int, Patch], None, None]:
     """Yield terrain type and patch of each (row, col), row by row."""
     indices = list(itertools.product(range(config.rows), range(config.cols)))
-    build = partial(_build_task, config, columns)
-    start = time.process_time()
-    for done, index in enumerate(indices):
-        elapsed = time.process_time() - start
-        saved = (len(indices) - done) * (elapsed / max(done, 1) - _SENDING_TIME)
-        if executor and elapsed >= _TRIAL_TIME and saved >= _MIN_SAVED_TIME:
-            break
-        yield from build([index])
-    else:
-        return
-    length = -(-(len(indices) - done) // _MAX_TASKS)
-    tasks = [indices[first : first + length] for first in range(done, len(indices), length)]
-    try:
-        for patches in executor.map(build, tasks):
-            yield from patches
-    except TerrainkitError:
-        raise
-    except Exception as error:  # each kind of executor has its own errors
-        reason = " ".join(f"{type(error).__name__}: {error}".split()).strip(":.")
-        raise TerrainkitError(
-            f"an executor failed to build patches: {reason}; use fewer processes if memory is short"
-        ) from error
+    length = -(-len(indices) // _MAX_TASKS) if executor else 1
+    tasks = [indices[start : start + length] for start in range(0, len(indices), length)]
+    for patches in parallel_map(executor, partial(_build_task, config, columns), tasks):
+        yield from patches
 
 
 def _build_task(

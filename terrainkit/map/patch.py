@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, plugin_errors
+from terrainkit.errors import ConfigError, plugin_errors, prefixed_errors
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
@@ -30,6 +30,7 @@ from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, Value
 from terrainkit.terrain.patch_geometry import (
     PatchGeometry,
+    checked_geometry,
     checked_heights,
     real_array,
     uniform_friction,
@@ -146,10 +147,8 @@ def build_patch(
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
         PluginError: if a terrain or overlay that is not built in fails.
     """
-    try:
+    with prefixed_errors(f"patch ({row}, {col}): "):
         return _build_patch(config, sub_terrain, difficulty, row, col)
-    except ConfigError as error:
-        raise type(error)(f"patch ({row}, {col}): {error}") from error.__cause__ or error
 
 
 def _build_patch(
@@ -157,30 +156,36 @@ def _build_patch(
 ) -> Patch:
     grid, name, plugin = config.patch_grid(row, col), sub_terrain.name, sub_terrain.plugin
     terrain = sub_terrain.at(difficulty)
-    overlays = [_overlay_at(overlay, difficulty) for overlay in sub_terrain.overlays]
-    child_rng = partial(_child_rng, config, terrain, row, col)
+    overlays = []
+    for overlay in sub_terrain.overlays:
+        with plugin_errors(registry.plugin_name(type(overlay))):
+            overlays.append(overlay.at(difficulty))
+
+    def child_rng(stream: int) -> np.random.Generator:
+        # The heights of a terrain may use SOLIDS_STREAM, too, to have the layout of its solids.
+        return patch_rng(config, terrain, row, col).spawn(stream + 1)[stream]
+
     with plugin_errors(plugin):
         _check_slopes(terrain, config)
         rng: Any = patch_rng(config, terrain, row, col) if terrain.has_random_heights else None
         heights = terrain.build(grid, rng)
-        geometry = _terrain_geometry(
-            config, sub_terrain, terrain, difficulty, heights, grid, child_rng
-        )
-        geometry = geometry.checked(grid) if plugin else geometry
+        friction = sub_terrain.friction_at(difficulty)
+        geometry = _terrain_geometry(config, terrain, friction, heights, grid, child_rng)
+        geometry = checked_geometry(geometry, grid) if plugin else geometry
     spawn_offset = 0.0
     if overlays:
         geometry, spawn_offset = _apply_overlays(config, name, geometry, overlays, child_rng)
     heights, position = geometry.heights, geometry.spawn
     solids = _place_solids(name, geometry, (row, col))
     goals = _place_goals(config, name, geometry)
+    origin = find_origin(config, name, grid, heights, solids, position)
     spawns_rng = partial(child_rng, SPAWNS_STREAM)
-    spawns = place_spawns(config, name, grid, heights, solids, position, spawns_rng)
+    spawns = sample_spawns(config, grid, heights, solids, origin, spawns_rng)
     x, y, _ = spawns[0].tolist()
     requested, realized = _parameters(terrain, grid)
     for k, overlay in enumerate(overlays):
-        values = zip((requested, realized), _parameters(overlay, grid), strict=True)
-        for of_patch, own in values:
-            of_patch |= {overlay_path(k, n): v for n, v in own.items()}
+        for values, own in zip((requested, realized), _parameters(overlay, grid), strict=True):
+            values |= {overlay_path(k, name): value for name, value in own.items()}
     return Patch(
         terrain=name,
         difficulty=difficulty,
@@ -193,11 +198,6 @@ def _build_patch(
         spawns=with_headings(spawns, goals, geometry.heading),
         spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
     )
-
-
-def _overlay_at(overlay: Overlay, difficulty: float) -> Overlay:
-    with plugin_errors(registry.plugin_name(type(overlay))):
-        return overlay.at(difficulty)
 
 
 def _parameters(owner: Terrain | Overlay, grid: Grid) -> tuple[dict[str, Value], dict[str, Value]]:
@@ -213,22 +213,10 @@ def _parameters(owner: Terrain | Overlay, grid: Grid) -> tuple[dict[str, Value],
     return requested, realized
 
 
-def _child_rng(
-    config: MapConfig, terrain: Terrain, row: int, col: int, stream: int
-) -> "np.random.Generator":
-    """Return a child of the generator of a patch, in its initial state.
-
-    The streams are numbered in :mod:`terrainkit.map.layout`. The heights of a terrain may use
-    `SOLIDS_STREAM`, too, to have the layout of its solids.
-    """
-    return patch_rng(config, terrain, row, col).spawn(stream + 1)[stream]
-
-
 def _terrain_geometry(
     config: MapConfig,
-    sub_terrain: SubTerrain,
     terrain: Terrain,
-    difficulty: float,
+    friction: float | None,
     heights: NDArray[np.float32],
     grid: Grid,
     child_rng: Callable[[int], "np.random.Generator"],
@@ -241,16 +229,14 @@ def _terrain_geometry(
     if type(terrain).goals is not Terrain.goals:
         raw = terrain.goals(grid, heights, child_rng(SOLIDS_STREAM))
         goals = real_array(raw).reshape(-1, 4)
-    friction = sub_terrain.friction_at(difficulty)
     if friction is not None:
         own = np.where(np.isnan(solids.friction), friction, solids.friction).astype(np.float32)
         solids = dataclasses.replace(solids, friction=own)
-    else:
-        friction = config.static_friction
+    ground_friction = config.static_friction if friction is None else friction
     return PatchGeometry(
         grid=grid,
         heights=heights,
-        friction=uniform_friction(friction, grid.shape),
+        friction=uniform_friction(ground_friction, grid.shape),
         solids=solids,
         goals=goals,
         spawn=terrain.spawn(grid),
@@ -270,48 +256,19 @@ def _apply_overlays(
     The overlays keep the ground level at the spawn origin of the terrain without overlays.
     """
     grid, position = geometry.grid, geometry.spawn
-    x, y, _ = _find_origin(config, name, grid, geometry.heights, geometry.solids, position)
+    x, y, _ = find_origin(config, name, grid, geometry.heights, geometry.solids, position)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
     for k, overlay in enumerate(overlays):
         with plugin_errors(plugin := registry.plugin_name(type(overlay))):
             geometry = overlay.apply(geometry, child_rng(OVERLAYS_STREAM + k))
             if plugin:
-                geometry = PatchGeometry.checked(geometry, grid)
-        heights = checked_heights(
-            geometry.heights, grid, f"{overlay.kind()}: apply(): got heights of"
-        )
+                geometry = checked_geometry(geometry, grid)
+        heights = checked_heights(geometry.heights, grid, f"{overlay.kind()}: apply(): got")
         geometry = dataclasses.replace(geometry, heights=heights)
     return geometry, max(abs(x - position[0]), abs(y - position[1]))
 
 
-def place_spawns(
-    config: MapConfig,
-    name: str,
-    grid: Grid,
-    heights: NDArray[np.float32],
-    solids: Solids,
-    position: tuple[float, float],
-    rng: Callable[[], np.random.Generator],
-) -> NDArray[np.float64]:
-    """Return the spawn positions of a patch [m], shape (k, 3); see :mod:`terrainkit.map.spawn`.
-
-    Args:
-        config: Configuration of the map.
-        name: Name of the patch in the error.
-        grid: Grid of the patch.
-        heights: Heights of the patch [m], shape `grid.shape`.
-        solids: Solids on the patch.
-        position: Preferred position of the first, x and y [m].
-        rng: Returns the random number generator of the others; slow, so called only if needed.
-
-    Raises:
-        ConfigError: if the patch has no place to spawn.
-    """
-    origin = _find_origin(config, name, grid, heights, solids, position)
-    return sample_spawns(config, grid, heights, solids, origin, rng)
-
-
-def _find_origin(
+def find_origin(
     config: MapConfig,
     name: str,
     grid: Grid,
@@ -319,7 +276,11 @@ def _find_origin(
     solids: Solids,
     position: tuple[float, float],
 ) -> tuple[float, float, float]:
-    """Return the spawn origin of a patch [m]; see :func:`place_spawns`."""
+    """Return the spawn origin of a patch [m]; see :func:`.find_spawn`.
+
+    Raises:
+        ConfigError: if patch `name` has no place to spawn.
+    """
     origin = find_spawn(config, grid, heights, solids, position)
     if origin is None:
         raise ConfigError(

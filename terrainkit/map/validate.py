@@ -289,17 +289,10 @@ def _check_edges(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
     if repeated:
         yield f"{repeated} edges are shared by more than two faces or by faces of opposite winding"
     boundary = mesh.vertices[mesh.boundary(numbers)].astype(np.float64)
-    inside = ~_is_on_outline(boundary, terrain_map).any(axis=1)
+    corners = np.array([terrain_map.grid.lower, terrain_map.grid.upper])
+    # Distance of each edge from the four sides of the map.
+    distance = np.abs(boundary[:, :, None, :2] - corners).max(axis=1)
+    inside = (distance >= TOLERANCE).all(axis=(1, 2))
     if inside.any():
         x, y = boundary[inside][0, 0, :2]
         yield f"{int(inside.sum())} edges have only one face, for example at ({x:.2f}, {y:.2f})"
-
-
-def _is_on_outline(edges: NDArray[np.float64], terrain_map: TerrainMap) -> NDArray[np.bool_]:
-    """Return whether each edge lies on each of the four sides of the map, shape (n, 4)."""
-    sides = [
-        np.abs(edges[..., k] - line[k]).max(axis=1) < TOLERANCE
-        for line in (terrain_map.grid.lower, terrain_map.grid.upper)
-        for k in (0, 1)
-    ]
-    return np.stack(sides, axis=1)

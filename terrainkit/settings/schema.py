@@ -7,7 +7,13 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Self
 
-from terrainkit.errors import ConfigError, TerrainkitError, is_built_in, plugin_errors
+from terrainkit.errors import (
+    ConfigError,
+    TerrainkitError,
+    is_built_in,
+    plugin_errors,
+    prefixed_errors,
+)
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit.settings.toml_text import key_text, line_text, parse_toml, read_text
@@ -74,13 +80,9 @@ class Config:
             if field.name not in values and is_required(field):
                 expected = describe(hints[field.name])
                 raise ConfigError(f"{path}{field.name}: missing; expected {expected}")
-        made: Any = cls if default is None else type(default)
-        plugin = None if is_built_in(made) else f"{made.__module__}:{made.__qualname__}"
-        try:
-            with plugin_errors(plugin, TerrainkitError):
-                return cls(**values) if default is None else dataclasses.replace(default, **values)
-        except ConfigError as error:
-            raise ConfigError(f"{path}{error}") from error
+        plugin = None if is_built_in(kind) else f"{kind.__module__}:{kind.__qualname__}"
+        with prefixed_errors(path), plugin_errors(plugin, TerrainkitError):
+            return cls(**values) if default is None else dataclasses.replace(default, **values)
 
     @classmethod
     def from_toml(cls, text: str, default: Self | None = None) -> Self:
@@ -99,10 +101,8 @@ class Config:
             ConfigError: if the file cannot be read, is larger than a megabyte, or is invalid.
         """
         text = read_text(path)
-        try:
+        with prefixed_errors(f"{path}: "):
             return cls.from_toml(text, default)
-        except ConfigError as error:
-            raise ConfigError(f"{path}: {error}") from error
 
     def with_defaults(self) -> Self:
         """Return a config with the defaults of its class.

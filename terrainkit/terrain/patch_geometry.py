@@ -48,31 +48,6 @@ class PatchGeometry:
     heading: float = 0.0
     """Heading of a robot on a patch without goals [rad]."""
 
-    def checked(self, grid: Grid) -> Self:
-        """Return the patch that a plugin made on `grid`, with arrays of the documented types.
-
-        Raises:
-            ConfigError: if a value has another shape or is out of range.
-            TypeError: if values are not real numbers.
-        """
-        if not isinstance(self, PatchGeometry):
-            raise ConfigError(f"got {type(self).__name__}; expected a PatchGeometry")
-        friction, goals = real_array(self.friction), real_array(self.goals)
-        pose = real_array([*self.spawn, self.heading, self.spawn_radius])
-        goal_values = np.where(np.isnan(goals) & _MAY_BE_NAN, 0, goals)
-        numbers = {
-            "friction": (np.where(friction < 0, np.nan, friction), grid.shape),
-            "goals": (goal_values, (min(len(goals), MAX_GOALS), 4)),
-            "spawn, heading and spawn_radius": (pose, (4,)),
-        }
-        for name, (values, shape) in numbers.items():
-            if values.shape != shape or not (np.abs(values) <= MAX_VALUE).all():
-                raise ConfigError(f"{name}: got shape {values.shape}; expected {shape}, finite")
-        check_solids(self.solids)
-        heights = checked_heights(self.heights, grid, "got heights of")
-        friction = friction.astype(np.float32)
-        return replace(self, grid=grid, heights=heights, friction=friction, goals=goals)
-
     def transformed(self, matrix: ArrayLike) -> Self:
         """Return the patch rotated or reflected about its center.
 
@@ -98,6 +73,32 @@ class PatchGeometry:
             spawn=(x, y),
             heading=float(_turn(np.array(self.heading), matrix)),
         )
+
+
+def checked_geometry(geometry: object, grid: Grid) -> PatchGeometry:
+    """Return the geometry that a plugin made on `grid`, with arrays of the documented types.
+
+    Raises:
+        ConfigError: if it is no `PatchGeometry`, or a value has another shape or is out of range.
+        TypeError: if values are not real numbers.
+    """
+    if not isinstance(geometry, PatchGeometry):
+        raise ConfigError(f"got {type(geometry).__name__}; expected a PatchGeometry")
+    friction, goals = real_array(geometry.friction), real_array(geometry.goals)
+    pose = real_array([*geometry.spawn, geometry.heading, geometry.spawn_radius])
+    goal_values = np.where(np.isnan(goals) & _MAY_BE_NAN, 0, goals)
+    numbers = {
+        "friction": (np.where(friction < 0, np.nan, friction), grid.shape),
+        "goals": (goal_values, (min(len(goals), MAX_GOALS), 4)),
+        "spawn, heading and spawn_radius": (pose, (4,)),
+    }
+    for name, (values, shape) in numbers.items():
+        if values.shape != shape or not (np.abs(values) <= MAX_VALUE).all():
+            raise ConfigError(f"{name}: got shape {values.shape}; expected {shape}, finite")
+    check_solids(geometry.solids)
+    heights = checked_heights(geometry.heights, grid, "got heights of")
+    friction = friction.astype(np.float32)
+    return replace(geometry, grid=grid, heights=heights, friction=friction, goals=goals)
 
 
 def checked_heights(heights: ArrayLike, grid: Grid, got: str) -> NDArray[np.float32]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self
 
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors
+from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors, prefixed_errors
 from terrainkit.settings.schema import Config, field_keys
 from terrainkit.settings.text import closest
 from terrainkit.settings.type_hint import MAX_VALUE, convert, show
@@ -90,7 +90,7 @@ class SubTerrain(Config):
         keys = field_keys(kind).keys() - {"parameters"}
         own = {key: table[key] for key in table if key in keys}
         parameters = {key: value for key, value in table.items() if key not in own}
-        try:
+        with prefixed_errors(f"{path.removesuffix('.')}: "):
             if "terrain" not in own and (near := closest("terrain", parameters)):
                 raise ConfigError(f"got the key {near!r}; did you mean 'terrain'?")
             if isinstance(parameters.get("elements"), Mapping):
@@ -98,8 +98,6 @@ class SubTerrain(Config):
             if "overlays" in own:
                 own["overlays"] = _read_overlays(own["overlays"])
             return super().from_table({**own, "parameters": parameters}, default)
-        except ConfigError as error:
-            raise ConfigError(f"{path.removesuffix('.')}: {error}") from error
 
     def to_table(self) -> dict[str, Any]:
         """Return the keys of a `[[terrains]]` table."""
@@ -159,9 +157,7 @@ def _read_overlays(tables: Any) -> tuple[Overlay, ...]:
     overlays = []
     for k, table in enumerate(tables):
         parameters = dict(table)
-        try:
+        with prefixed_errors(f"overlays[{k}]: "):
             name = convert("overlay", parameters.pop("overlay", None), str)
             overlays.append(registry.make_overlay(name, parameters))
-        except ConfigError as error:
-            raise ConfigError(f"overlays[{k}]: {error}") from error
     return tuple(overlays)

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors
+from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors, prefixed_errors
 from terrainkit.features.blocks import number_that_fits
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
@@ -251,11 +251,9 @@ def _block(grid: Grid, span: slice) -> Grid:
 @contextmanager
 def _element_errors(number: int, terrain: Terrain) -> Iterator[None]:
     """Name an element in errors."""
-    try:
-        with plugin_errors(registry.plugin_name(type(terrain))):
-            yield
-    except ConfigError as error:
-        raise type(error)(f"course.{_path(number)}: {error}") from error.__cause__ or error
+    plugin = registry.plugin_name(type(terrain))
+    with prefixed_errors(f"course.{_path(number)}: "), plugin_errors(plugin):
+        yield
 
 
 def _child(rng: np.random.Generator) -> np.random.Generator:

@@ -33,11 +33,16 @@ _ROUNDING = 1e-6
 """Value by which a slider may exceed its limits: browsers round to at most 7 decimals."""
 
 _RANGE = Meta(ge=-(10**6), le=10**6)
-Number = Annotated[int, _RANGE] | Annotated[float, _RANGE]
+_Number = Annotated[int, _RANGE] | Annotated[float, _RANGE]
 """A number in a message; NaN is out of range, too."""
 
+_REFUSAL = (
+    "This viewer answers only at localhost, and at the names of its machine if it was started with "
+    "--host. For another machine, forward its port: ssh -L 8080:localhost:8080 MACHINE\n"
+)
+
 _DECODER = msgspec.msgpack.Decoder(
-    dict[str, bool | Number | str | tuple[Number, ...] | dict[str, bool | Number | str]]
+    dict[str, bool | _Number | str | tuple[_Number, ...] | dict[str, bool | _Number | str]]
 )
 
 _LOGGER = logging.getLogger(__name__)
@@ -58,10 +63,10 @@ def viewer_server(host: str, port: int) -> Iterator[viser.ViserServer]:
     Yields:
         The server; it has no scene yet.
     """
-    hosts, handles = allowed_hosts(host), dict[str, Any]()
+    hosts, handles = _allowed_hosts(host), dict[str, Any]()
 
     def check(connection: ServerConnection, request: Request, response: Response) -> Response:
-        if not is_allowed(request.headers, hosts):
+        if not _is_allowed(request.headers, hosts):
             return connection.respond(HTTPStatus.FORBIDDEN, _REFUSAL)
         # Without it, a link with ?websocket=ADDRESS has the page run the code of another server.
         policy = f"connect-src 'self' ws://{request.headers['Host']} data: blob:"
@@ -70,7 +75,7 @@ def viewer_server(host: str, port: int) -> Iterator[viser.ViserServer]:
 
     class Connection(ServerConnection):
         async def recv(self, decode: bool | None = None) -> Any:  # noqa: ARG002
-            while not is_valid(message := await super().recv(decode=False), handles):
+            while not _is_valid(message := await super().recv(decode=False), handles):
                 pass
             return message
 
@@ -99,13 +104,7 @@ def viewer_server(host: str, port: int) -> Iterator[viser.ViserServer]:
             server.stop()
 
 
-_REFUSAL = (
-    "This viewer answers only at localhost, and at the names of its machine if it was started with "
-    "--host. For another machine, forward its port: ssh -L 8080:localhost:8080 MACHINE\n"
-)
-
-
-def allowed_hosts(host: str) -> re.Pattern[str]:
+def _allowed_hosts(host: str) -> re.Pattern[str]:
     """Return the pattern of Host headers that a server on `host` answers.
 
     They are loopback addresses, the name of the machine and `host`, with any port, as tunnels have
@@ -121,7 +120,7 @@ def allowed_hosts(host: str) -> re.Pattern[str]:
     return re.compile(rf"({addresses}|\[?({either})\]?)(:\d+)?", re.IGNORECASE)
 
 
-def is_allowed(headers: Headers, hosts: re.Pattern[str]) -> bool:
+def _is_allowed(headers: Headers, hosts: re.Pattern[str]) -> bool:
     """Return whether a request is from a page of this server, or not from a page.
 
     A page of another site has another Origin. If its name was bound to an address of this machine
@@ -132,7 +131,7 @@ def is_allowed(headers: Headers, hosts: re.Pattern[str]) -> bool:
     return own_origins.issuperset(headers.get_all("Origin")) and bool(hosts.fullmatch(host))
 
 
-def is_valid(message: bytes, handles: Mapping[str, Any]) -> bool:
+def _is_valid(message: bytes, handles: Mapping[str, Any]) -> bool:
     """Return whether a message is the pose of a camera, or a value of one of the controls.
 
     Args:
@@ -146,14 +145,14 @@ def is_valid(message: bytes, handles: Mapping[str, Any]) -> bool:
                 distance = math.dist(camera.position, camera.look_at)
                 return min(distance, math.hypot(*camera.up_direction)) > _MIN_LENGTH
             case {"type": "GuiUpdateMessage", "uuid": str(uuid), "updates": dict(new)}:
-                return [*new] == ["value"] and is_value(handles.get(uuid), new["value"])
+                return [*new] == ["value"] and _accepts(handles.get(uuid), new["value"])
     except ValueError:
         pass
     return False
 
 
-def is_value(handle: Any, value: object) -> bool:
-    """Return whether a control can have a value; disabled ones and other kinds cannot."""
+def _accepts(handle: Any, value: object) -> bool:
+    """Return whether a control accepts a value; disabled ones and other kinds accept none."""
     match handle:
         case viser.GuiCheckboxHandle(disabled=False) | viser.GuiButtonHandle(disabled=False):
             return isinstance(value, bool)

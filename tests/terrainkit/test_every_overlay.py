@@ -132,5 +132,5 @@ def test_overlay_hook_with_wrong_heights_is_rejected():
         def apply(self, patch, rng):  # noqa: ARG002
             return dataclasses.replace(patch, heights=patch.heights[1:])
 
-    with pytest.raises(ConfigError, match=r"careless: apply\(\): got heights of shape \(79"):
+    with pytest.raises(ConfigError, match=r"overlay careless .*: got heights of shape \(79"):
         patch_of("flat", (Careless(),))

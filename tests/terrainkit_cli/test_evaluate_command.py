@@ -168,7 +168,10 @@ def test_exported_policy_is_evaluated(here, tmp_path, monkeypatch):
         ((*outside[:3], "biped"), "policy.json: joints.name, the policy belongs to another robot"),
         ((*outside[:3], "hare"), "no task or robot folder 'hare'"),
         (("--policy", "gone.onnx", "--robot", "biped"), "cannot read gone.onnx: No such file"),
-        (("--policy", "text.onnx", "--robot", "biped"), "text.onnx is not an ONNX file"),
+        (
+            ("--policy", "text.onnx", "--robot", "biped"),
+            "text.onnx is not a policy: not an ONNX file",
+        ),
     ):
         code, out, err = here(*words)
         assert (code, out) == (2, "")

@@ -23,9 +23,14 @@ def map_file(tmp_path):
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("host", ["localhost", pytest.param("::1", marks=IPV6)])
 def test_view_serves_until_it_is_ended(map_file, host, number):
-    command = [sys.executable, "-m", "terrainkit_cli.main", "view", map_file, "--host", host]
+    with socket.create_server(("localhost", 0)) as free:  # other tests may start at port 8080
+        port = str(free.getsockname()[1])
+    options = "--host", host, "--port", port
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-m", "terrainkit_cli.main", "view", map_file, *options],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as run:
         line = run.stdout.readline()
         address = re.match(r"http://(localhost|\[::1\]):\d+(?= shows .*map\.npz)", line)

@@ -1,7 +1,5 @@
 """The full mesh: two triangles per quad, and the faces of quads with walls."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,8 +32,7 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
 def quad_faces(node_grid: NodeGrid, quads: NDArray[np.bool_]) -> tuple[RowBuffer, RowBuffer]:
     """Return the triangles of the quads in the mask `quads`, and the vertices that they add."""
     triangles, centers = RowBuffer(np.int32), RowBuffer(np.float32)
-    for pairs in _split_quads(node_grid, quads & ~node_grid.has_wall):
-        triangles.append(pairs)
+    _append_pairs(triangles, node_grid, quads & ~node_grid.has_wall)
     walled = np.flatnonzero(quads & node_grid.has_wall)
     for faces, added in wall_quads(node_grid, walled, node_grid.vertex_count):
         triangles.append(faces)
@@ -43,8 +40,8 @@ def quad_faces(node_grid: NodeGrid, quads: NDArray[np.bool_]) -> tuple[RowBuffer
     return triangles, centers
 
 
-def _split_quads(node_grid: NodeGrid, quads: NDArray[np.bool_]) -> Iterator[NDArray[np.int32]]:
-    """Yield the two triangles of each quad in the mask `quads`, in blocks of shape (2 n, 3).
+def _append_pairs(triangles: RowBuffer, node_grid: NodeGrid, quads: NDArray[np.bool_]) -> None:
+    """Append the two triangles of each quad in the mask `quads`.
 
     The diagonal runs from (i, j) to (i + 1, j + 1), as in MuJoCo's heightfields.
     """
@@ -58,4 +55,4 @@ def _split_quads(node_grid: NodeGrid, quads: NDArray[np.bool_]) -> Iterator[NDAr
         pairs[:, 0, 2] = pairs[:, 1, 1] = corners + (ny + 1)
         pairs[:, 0, 1] = corners + ny
         pairs[:, 1, 2] = corners + 1
-        yield pairs.reshape(-1, 3)
+        triangles.append(pairs.reshape(-1, 3))

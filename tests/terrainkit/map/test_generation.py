@@ -4,10 +4,8 @@ import re
 import subprocess
 import sys
 import tracemalloc
-from concurrent.futures import CancelledError, ProcessPoolExecutor, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import fields, replace
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -227,14 +225,6 @@ def same_bytes(one, other):
     )
 
 
-@pytest.fixture
-def eager(monkeypatch):
-    """Let executors build all patches, also those of small maps."""
-    monkeypatch.setattr("terrainkit.map.generation._TRIAL_TIME", 0.0)
-    monkeypatch.setattr("terrainkit.map.generation._MIN_SAVED_TIME", -np.inf)
-
-
-@pytest.mark.usefixtures("eager")
 @pytest.mark.parametrize("pool", [ThreadPoolExecutor, ProcessPoolExecutor])
 @pytest.mark.parametrize("config", [SMALL, TALL], ids=["small", "tall"])
 def test_generate_with_an_executor_gives_same_bytes(pool, config):
@@ -242,36 +232,6 @@ def test_generate_with_an_executor_gives_same_bytes(pool, config):
         assert same_bytes(generate(config, executor=executor), generate(config))
 
 
-@pytest.mark.parametrize(
-    ("seconds", "expected"),
-    [
-        (0.0001, 0),  # faster to build than to send
-        (0.02, 0),  # 80 patches take 1.6 s, less than the start of processes
-        (0.125, 76),  # the first four take half a second
-        (9.0, 79),
-    ],
-)
-def test_generate_uses_an_executor_where_it_saves_time(monkeypatch, seconds, expected):
-    clock = Mock(side_effect=[0, *np.arange(200) * seconds])
-    monkeypatch.setattr("terrainkit.map.generation.time.process_time", clock)
-    executor = Mock(map=Mock(side_effect=map))
-    made = generate(TALL, executor=executor)
-    tasks = [task for call in executor.map.call_args_list for task in call.args[1]]
-    assert sum(map(len, tasks)) == expected
-    assert same_bytes(made, generate(TALL))
-
-
-@pytest.mark.usefixtures("eager")
-@pytest.mark.parametrize("error", [BrokenProcessPool("a process\nended"), CancelledError()])
-def test_generate_reports_a_failed_executor_in_one_line(error):
-    executor = Mock(map=Mock(side_effect=error))
-    with pytest.raises(
-        TerrainkitError, match=rf"failed to build .*: {type(error).__name__}\b.*; use "
-    ):
-        generate(SMALL, executor=executor)
-
-
-@pytest.mark.usefixtures("eager")
 def test_generate_on_a_dask_cluster_gives_same_bytes(tmp_path):
     distributed = pytest.importorskip(
         "distributed", reason="needs the extra distributed: pip install 'terrainkit[distributed]'"
@@ -284,7 +244,6 @@ def test_generate_on_a_dask_cluster_gives_same_bytes(tmp_path):
     assert same_bytes(made, generate(TALL))
 
 
-@pytest.mark.usefixtures("eager")
 def test_generate_with_an_executor_wraps_every_patch():
     seen = []
 
@@ -298,7 +257,6 @@ def test_generate_with_an_executor_wraps_every_patch():
     assert seen == [((row, col), 80) for row in range(40) for col in range(2)]
 
 
-@pytest.mark.usefixtures("eager")
 def test_generate_with_an_executor_reports_the_first_error():
     wide = SubTerrain(terrain="pit", parameters={"side": 20.0})
     config = replace(TALL, terrains=(OBSTACLES, wide))

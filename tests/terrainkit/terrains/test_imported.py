@@ -118,7 +118,7 @@ def test_imported_map_of_missing_file_has_issues(file, tmp_path):
     terrain_map = imported_map(file)
     (tmp_path / "plane.npy").unlink()
     messages = [issue.message for issue in validate(terrain_map)]
-    assert messages[0].startswith("patch (0, 0) cannot be generated from its config: no file")
+    assert messages[0].startswith("cannot be generated from the config: patch (0, 0): no file")
 
 
 def test_imported_sha256_must_match(grid, rng, file):
