@@ -9,7 +9,6 @@ written elsewhere. The first input of each kind of failure is minimized and kept
 
 import argparse
 import importlib
-import itertools
 import json
 import os
 import re
@@ -19,10 +18,12 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
-from fuzzing.forked import KINDS, Failure, Process, start
+from fuzzing.forked import KINDS, Failure, run_forked
 from fuzzing.surfaces import FILE, Surface, load_surfaces, prepare, prepare_seed
 
 KEPT = Path(__file__).parents[1] / ".fuzz"
@@ -47,29 +48,30 @@ class Fuzzer:
             importlib.import_module(name)
         self.seeds = FILE.with_name("seeds") / surface.name
         for k, line in enumerate(surface.seeds):
-            process = start(folder / f"seed_{k}", partial(prepare_seed, self.seeds, line))
-            failure = _finish(process)
+            failure = run_forked(folder / f"seed_{k}", partial(prepare_seed, self.seeds, line))
             if failure and failure.kind != "files":
                 raise RuntimeError(f"{surface.name}: {line}: {failure.line}")
-            self.seeds = process.folder / "work"
+            self.seeds = folder / f"seed_{k}" / "work"
 
     def run(self, seconds: float, inputs: int) -> None:
         """Read inputs for some time, and at least a number of them."""
-        end, running, indices = time.monotonic() + seconds, {}, itertools.count()
-        while running or time.monotonic() < end or self.num_tried < inputs:
-            is_more = time.monotonic() < end or self.num_tried + len(running) < inputs
-            if is_more and len(running) < (os.cpu_count() or 1):
-                index = next(indices)
-                running[index] = self._start(index)
-            for index, process in list(running.items()):
-                if (failure := process.wait()) is not False:
-                    self.num_tried += 1
-                    del running[index]
-                    if failure:
-                        self.failures[index] = failure
-                    else:
-                        shutil.rmtree(process.folder)
-            time.sleep(0.002)
+        end, number = time.monotonic() + seconds, os.cpu_count() or 1
+        with ProcessPoolExecutor(number, get_context("fork")) as pool:
+            while (missing := inputs - self.num_tried) > 0 or time.monotonic() < end:
+                count = min(missing, 8 * number) if missing > 0 else 8 * number
+                indices = range(self.num_tried, self.num_tried + count)
+                failures = zip(indices, pool.map(self.read_input, indices), strict=True)
+                self.failures |= {index: failure for index, failure in failures if failure}
+                self.num_tried = indices.stop
+
+    def read_input(self, index: int, data: bytes | None = None) -> Failure | None:
+        """Read an input, whose damaged file may have other content, in a forked process."""
+        make = partial(prepare, self.surface, self.seeds, self.seed, index, data)
+        folder = self.folder / f"{index}_{time.monotonic_ns()}"
+        failure = run_forked(folder, make)
+        if not failure or data is not None:
+            shutil.rmtree(folder)
+        return failure
 
     def keep_failures(self) -> Iterator[str]:
         """Keep an input of each kind of failure, and yield a line about it."""
@@ -81,20 +83,16 @@ class Fuzzer:
             folder = self._keep(indices[0], failure)
             yield f"{folder}, {len(indices)} times: {failure.kind}: {failure.line[:300]}"
 
-    def _start(self, index: int, data: bytes | None = None) -> Process:
-        make = partial(prepare, self.surface, self.seeds, self.seed, index, data)
-        return start(self.folder / f"{index}_{time.monotonic_ns()}", make)
-
     def _keep(self, index: int, expected: Failure) -> str:
         """Write the input with the fewest bytes that fails in the same way; return its folder."""
         target = KEPT / self.surface.name / f"{self.seed}_{index}"
         shutil.rmtree(target, ignore_errors=True)
-        source = next(self.folder.glob(f"{index}_*"))
+        (source,) = self.folder.glob(f"{index}_*")
         shutil.copytree(source, target, symlinks=True, ignore=_pipes)
         path = target / "work" / json.loads((target / "command").read_text())["path"]
 
         def fails(data: bytes) -> bool:
-            failure = _finish(self._start(index, data))
+            failure = self.read_input(index, data)
             return failure is not None and _signature(failure) == _signature(expected)
 
         if expected.kind != "hang" and path.is_file() and path.stat().st_size < _MAX_MINIMIZED:
@@ -123,12 +121,6 @@ def _signature(failure: Failure) -> str:
 
 def _pipes(folder: str, names: list[str]) -> list[str]:
     return [name for name in names if Path(folder, name).is_fifo()]
-
-
-def _finish(process: Process) -> Failure | None:
-    while (failure := process.wait()) is False:
-        time.sleep(0.002)
-    return failure
 
 
 def measure(surfaces: list[Surface], seed: int, seconds: float, inputs: int) -> Iterator[Fuzzer]:

@@ -74,9 +74,7 @@ def test_fork_finds_what_a_command_must_not_do(tmp_path, monkeypatch, forked, na
         Path("input").write_text("0")
         return forked.Command(words=[])
 
-    process = forked.start(tmp_path, prepare)
-    while (failure := process.wait()) is False:
-        time.sleep(0.01)
+    failure = forked.run_forked(tmp_path, prepare)
     assert (failure and failure.kind) == kind, failure
 
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 KINDS = ("traceback", "hang", "memory", "files", "executed", "output", "accepted")
 """Kinds of failures. Files are left or written elsewhere, output is not of terrainkit, and accepted
@@ -66,61 +66,55 @@ class Command:
     check: Callable[[], str] = str
     """Called after a success: returns why the input should have been rejected, or nothing."""
 
-    has_plugins: bool = False
-    """Whether the working folder is a folder of Python packages."""
 
+def run_forked(folder: Path, prepare: Callable[[], Command]) -> Failure | None:
+    """Run a command in a forked process; return what it did that it must not do.
 
-class Process(NamedTuple):
-    """A forked process, in a folder with `work`, `tmp` and what it printed."""
-
-    pid: int
-    folder: Path
-    start: float
-
-    def wait(self) -> bool | Failure | None:
-        """Return its failure or None at its end; until then False."""
-        pid, status, usage = os.wait4(self.pid, os.WNOHANG)
-        if not pid and time.monotonic() - self.start < 6 * SECONDS:
-            return False
-        with suppress(ProcessLookupError):
-            os.killpg(self.pid, signal.SIGKILL)
-        if not pid:
-            _, status, usage = os.wait4(self.pid, 0)
-        # The memory of a forked process includes that of this one.
-        own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        failures = self._failures(
-            os.waitstatus_to_exitcode(status), (usage.ru_maxrss - own) / 2**20
-        )
-        return next((Failure(kind, line) for kind, line in failures if line), None)
-
-    def _failures(self, code: int, gigabytes: float) -> Iterator[tuple[str, str]]:
-        """Yield kinds of failures, and lines that are empty if there is none."""
-        lines = (self.folder / "stderr").read_text(errors="replace").splitlines() or [""]
-        last, errors = lines[-1], sum(line.startswith("terrainkit: error: ") for line in lines)
-        for line in (self.folder / "audit").read_text(errors="replace").splitlines():
-            yield line.partition(" ")[0], line
-        yield "hang", f"ended by {-code}" * (code in (-signal.SIGXCPU, -signal.SIGKILL))
-        is_large = gigabytes > MEMORY / 2**30 or _TOO_LARGE.search(last)
-        yield "memory", f"{gigabytes:.1f} GB; {last}" * bool(is_large)
-        yield "traceback", f"exit code {code}: {last}" * (code not in (0, 1, 2))
-        yield from (("output", line) for line in lines if not _OUR_LINE.match(line))
-        yield (
-            "output",
-            f"exit code {code}, {errors} errors" * (errors not in _NUM_ERRORS.get(code, (1,))),
-        )
-        before = (self.folder / "before").read_text().splitlines()
-        for line in set(_listing(self.folder)).difference(before):
-            is_output = code != 2 and line.startswith("'work/out")
-            yield "files", f"exit code {code}: changed {line}" * (not is_output)
-
-
-def start(folder: Path, prepare: Callable[[], Command]) -> Process:
-    """Fork a process that changes to `folder`/work, and prepares and runs a command."""
+    Args:
+        folder: A new folder for `work`, `tmp` and what the process printed.
+        prepare: Called in `work` by the forked process: returns the command.
+    """
     for name in ("work", "tmp"):
         (folder / name).mkdir(parents=True)
-    begin = time.monotonic()
-    if pid := os.fork():
-        return Process(pid, folder, begin)
+    end = time.monotonic() + 6 * SECONDS
+    own = _memory()[1]  # a forked process starts with it
+    if not (child := os.fork()):
+        _run_and_exit(folder, prepare)
+    pid, status, usage = os.wait4(child, os.WNOHANG)
+    while not pid and time.monotonic() < end:
+        time.sleep(0.002)
+        pid, status, usage = os.wait4(child, os.WNOHANG)
+    with suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    if not pid:
+        _, status, usage = os.wait4(child, 0)
+    code, gigabytes = os.waitstatus_to_exitcode(status), usage.ru_maxrss / 2**20 - own / 2**30
+    found = _failures(folder, code, gigabytes)
+    return next((Failure(kind, line) for kind, line in found if line), None)
+
+
+def _failures(folder: Path, code: int, gigabytes: float) -> Iterator[tuple[str, str]]:
+    """Yield kinds of failures, and lines that are empty if there is none."""
+    lines = (folder / "stderr").read_text(errors="replace").splitlines() or [""]
+    last, errors = lines[-1], sum(line.startswith("terrainkit: error: ") for line in lines)
+    for line in (folder / "audit").read_text(errors="replace").splitlines():
+        yield line.partition(" ")[0], line
+    yield "hang", f"ended by {-code}" * (code in (-signal.SIGXCPU, -signal.SIGKILL))
+    is_large = gigabytes > MEMORY / 2**30 or _TOO_LARGE.search(last)
+    yield "memory", f"{gigabytes:.1f} GB; {last}" * bool(is_large)
+    yield "traceback", f"exit code {code}: {last}" * (code not in (0, 1, 2))
+    yield from (("output", line) for line in lines if not _OUR_LINE.match(line))
+    yield (
+        "output",
+        f"exit code {code}, {errors} errors" * (errors not in _NUM_ERRORS.get(code, (1,))),
+    )
+    before = (folder / "before").read_text().splitlines()
+    for line in set(_listing(folder)).difference(before):
+        is_output = code != 2 and line.startswith("'work/out")
+        yield "files", f"exit code {code}: changed {line}" * (not is_output)
+
+
+def _run_and_exit(folder: Path, prepare: Callable[[], Command]) -> NoReturn:
     code = 70
     try:
         os.setpgid(0, 0)
@@ -146,16 +140,19 @@ def _run(folder: Path, prepare: Callable[[], Command]) -> int:
     log = {"words": command.words, "path": str(command.path)}
     (folder / "command").write_text(json.dumps(log))
     (folder / "before").write_text("\n".join(_listing(folder)))
-    if command.has_plugins:
-        sys.path.insert(0, str(folder / "work"))
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
-    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (size + _ADDRESS_SPACE,) * 2)
-    sys.addaudithook(_audit_hook(folder, 99, has_plugins=command.has_plugins))
+    resource.setrlimit(resource.RLIMIT_AS, (_memory()[0] + _ADDRESS_SPACE,) * 2)
+    sys.addaudithook(_audit_hook(folder, 99))
     code = main(command.words)
     reason = command.check() if code == 0 else ""
     os.write(99, f"accepted {reason}\n".encode() if reason else b"")
     return code
+
+
+def _memory() -> tuple[int, int]:
+    """Return the address space and the resident memory without files of this process [bytes]."""
+    size, resident, shared, *_ = map(int, Path("/proc/self/statm").read_text().split())
+    return size * resource.getpagesize(), (resident - shared) * resource.getpagesize()
 
 
 def _listing(folder: Path) -> list[str]:
@@ -168,8 +165,9 @@ def _listing(folder: Path) -> list[str]:
     ]
 
 
-def _audit_hook(folder: Path, target: int, *, has_plugins: bool) -> Callable[[str, Any], None]:
+def _audit_hook(folder: Path, target: int) -> Callable[[str, Any], None]:
     """Return a hook that writes a line to `target` for each event that is not allowed."""
+    has_plugins = str(folder / "work") in sys.path
     inside = str(folder / "work"), str(folder / "tmp"), os.devnull
 
     def is_outside(path: Any) -> bool:

@@ -4,6 +4,7 @@ import io
 import os
 import shlex
 import shutil
+import sys
 import tomllib
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -72,6 +73,8 @@ def prepare(
     """
     rng, hostile = Random(f"{seed} {surface.name} {index}"), surface.hostile[index : index + 1]
     shutil.copytree(seeds, ".", dirs_exist_ok=True)
+    if surface.has_plugins:
+        sys.path.insert(0, str(Path.cwd()))
     check: Any = str
     if hostile:
         path = Path(hostile[0]["file"])
@@ -88,7 +91,7 @@ def prepare(
         path.write_bytes(data)
     line = surface.commands[pattern][0] if hostile else rng.choice(surface.commands[pattern])
     words = [word.replace("{}", str(path)) for word in shlex.split(line)]
-    return Command(words=words, path=path, check=check, has_plugins=surface.has_plugins)
+    return Command(words=words, path=path, check=check)
 
 
 def _write_hostile(path: Path, entry: dict[str, Any]) -> None:

@@ -26,8 +26,8 @@ TRAINING_KEYS = {"optimizer_state_dict", "processes", "logger"}
 _MAYBE_NAN = {"heading", "speed", "goals", "success", "returns", "score"}
 """Names of the numbers that may be NaN: none, or unknown."""
 
-_NON_NEGATIVE = {"_var", "_std", "step", "exp_avg_sq"}
-"""Names of the numbers of networks and of Adam that are not negative; integers never are."""
+_NON_NEGATIVE = {"_var", "_std", "step", "exp_avg_sq", "lr"}
+"""Names of the floats of networks and of Adam that are not negative. No integer is negative."""
 
 
 class Checkpoint(TypedDict):
@@ -65,8 +65,9 @@ def read_checkpoint(path: Path) -> dict[str, Any]:
         with open_regular(path) as file:
             _check_archive(path, file)
             file.seek(0)
-            with warnings.catch_warnings():  # of content that no checkpoint of terrainkit has
-                warnings.simplefilter("error")
+            with warnings.catch_warnings():
+                # torch warns of kinds of tensors that no checkpoint of terrainkit has.
+                warnings.simplefilter("error", UserWarning)
                 state: dict[str, Any] = torch.load(file, map_location="cpu", weights_only=True)
         policy_state(state)
     except msgspec.ValidationError as error:
@@ -102,9 +103,10 @@ def check_state(name: str, got: Any, expected: Any) -> None:
 
     Args:
         name: Path of the part, for the error.
-        got: The part: tensors and numbers, text and None, in dicts, lists and tuples.
-        expected: A part with the required keys, types, and dtypes and shapes of tensors. A list has
-            one element, the form of all, and `...` is for anything.
+        got: The part: tensors, numbers, text and None, in dicts and lists.
+        expected: An example: a dict with the required keys, a list with one element, whose form all
+            elements have, a tensor of the dtype and shape, a value of the type, or `...` for
+            anything.
     """
     if expected is ...:
         return
@@ -180,6 +182,6 @@ def open_checkpoint(
             )
     try:
         yield state
-    except (ConfigError, RuntimeError, LookupError, ValueError, TypeError, OverflowError) as error:
+    except (RuntimeError, LookupError, ValueError, TypeError, OverflowError) as error:
         reason = " ".join(str(error).split())[:300]
         raise ConfigError(f"{path} does not fit its robot, task and map: {reason}") from error

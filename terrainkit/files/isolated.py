@@ -62,13 +62,15 @@ def run_isolated(
         # -P: no module is imported from the current folder, which may be a stranger's.
         start = f"import sys; from {__name__} import main; main(*sys.argv[1:])"
         command = [sys.executable, "-P", "-c", start, str(request), str(result)]
+        # Each thread of OpenBLAS takes 40 MB of the address space, before any work.
+        variables = {"PYTHONPATH": import_path(), "OPENBLAS_NUM_THREADS": "1"}
         try:
             subprocess.run(
                 command,
                 check=True,
                 capture_output=True,
                 timeout=limits.seconds,
-                env={**os.environ, "PYTHONPATH": import_path()},
+                env=os.environ | variables,
             )
             check_memory(result.stat().st_size, "the result of a child process")
             with np.load(result, allow_pickle=False) as arrays:

@@ -9,26 +9,15 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
 from terrainkit.files.isolated import IsolatedError
-from terrainkit.geometry.convex_decomposition import convex_decomposition
+from terrainkit.geometry.convex_decomposition import SEARCH, convex_decomposition
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh import closed_mesh, merged_mesh
 from terrainkit.geometry.mesh.solid_mesh import manifold
 from terrainkit.geometry.solids import MAX_HULL_VERTICES, Solids, make_hulls
 from terrainkit.importing.columns import MIN_GAP, Columns
 
-PARAMETERS = {
-    "threshold": 0.03,
-    "max_convex_hull": 32,
-    "preprocess_resolution": 30,
-    "resolution": 1000,
-    "mcts_nodes": 10,
-    "mcts_iterations": 20,
-    "mcts_max_depth": 2,
-    "decimate": True,
-    "max_ch_vertex": 64,
-    "seed": 0,
-}
-"""Parameters of CoACD: a shorter search than its defaults, in seconds instead of minutes."""
+PARAMETERS = {**SEARCH, "threshold": 0.03, "max_convex_hull": 32}
+"""Parameters of CoACD."""
 
 MIN_VOLUME = 1e-6
 """Volume of the smallest solid [m3]."""

@@ -5,10 +5,8 @@ from concurrent.futures import Future
 from dataclasses import replace
 from math import isclose
 from pathlib import Path
-from queue import SimpleQueue
 from threading import Thread
 from typing import Any
-from weakref import finalize
 
 import msgspec
 import onnxruntime
@@ -39,7 +37,6 @@ _TABLES = {
 _COMPARED = "format_version timing observation action control_type joints feet gait height_scan"
 """Keys that state what the policy receives and what its actions do."""
 
-
 _OF_THE_ROBOT = ("joints.frictionloss", "joints.passive_damping")
 """Keys that may differ between the robot and that of the training."""
 
@@ -61,12 +58,7 @@ class OnnxPolicy:
             raise ConfigError(f"{path} is not a policy: {error}") from error
         self.num_obs, self.num_actions = loaded["sizes"].tolist()
         self.description = loaded["text"].tobytes()
-        self._calls: SimpleQueue[Any] = SimpleQueue()
-        session = make_session(loaded["model"].tobytes())
-        # A signal interrupts waiting for a thread, but not a call. The process does not wait for
-        # this thread when it ends.
-        Thread(target=_serve, args=(session, self._calls), daemon=True).start()
-        finalize(self, self._calls.put, None)
+        self._session = make_session(loaded["model"].tobytes())
 
     def __call__(self, obs: torch.Tensor) -> FloatArray:
         """Return actions (n, a) for observations (n, k).
@@ -77,7 +69,10 @@ class OnnxPolicy:
         result: Future[FloatArray] = Future()
         options = onnxruntime.RunOptions()
         options.log_severity_level = 4
-        self._calls.put((obs.numpy(force=True), options, result))
+        # A signal interrupts waiting for a thread, but not a call of native code. The process does
+        # not wait for a daemon thread when it ends.
+        arguments = result, self._session, obs.numpy(force=True), options
+        Thread(target=_set_result, args=arguments, daemon=True).start()
         try:
             return result.result(LIMITS.seconds)
         except TimeoutError:
@@ -88,13 +83,11 @@ class OnnxPolicy:
             options.terminate = True  # ends the call if it is still running
 
 
-def _serve(session: onnxruntime.InferenceSession, calls: "SimpleQueue[Any]") -> None:
-    """Answer calls until one is None."""
-    for obs, options, result in iter(calls.get, None):
-        try:
-            result.set_result(call_model(session, obs, options))
-        except Exception as error:
-            result.set_exception(error)
+def _set_result(result: Future[FloatArray], *arguments: Any) -> None:
+    try:
+        result.set_result(call_model(*arguments))
+    except Exception as error:
+        result.set_exception(error)
 
 
 def open_onnx(path: Path, robot: str | Path) -> PolicySpec:

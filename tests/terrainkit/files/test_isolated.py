@@ -1,5 +1,7 @@
+import importlib
 import os
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,15 @@ def test_isolated_returns_arrays():
     arrays = run_isolated(dict, [("heights", heights)])
     assert list(arrays) == ["heights"]
     assert np.array_equal(arrays["heights"], heights)
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="Linux only")
+def test_isolated_address_space_does_not_depend_on_the_number_of_cpus(tmp_path, monkeypatch):
+    code = "import os\ndef threads():\n    return {'number': len(os.listdir('/proc/self/task'))}\n"
+    (tmp_path / "own_threads.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    threads = importlib.import_module("own_threads").threads
+    assert run_isolated(threads)["number"] == 1  # numpy of PyPI has one for each CPU
 
 
 def test_isolated_imports_nothing_from_the_current_folder(tmp_path, monkeypatch):

@@ -349,9 +349,8 @@ class TestUserReward:
         (ValueError("two\nlines"), "ValueError: two lines"),
         (SystemExit(0), "SystemExit: 0"),
         (None, "TypeError: Cannot cast .*"),
-        (1.0, r"got shape \(\); expected \(3,\) with finite values"),
-        (np.zeros((3, 1)), r"got shape \(3, 1\); expected \(3,\) with finite values"),
-        (np.full(3, np.nan), r"got shape \(3,\); expected \(3,\) with finite values"),
+        (1.0, r"got shape \(\); expected \(3,\)"),
+        (np.zeros((3, 1)), r"got shape \(3, 1\); expected \(3,\)"),
         (np.zeros(3, complex), "TypeError: Cannot cast .*"),
     ],
 )

@@ -165,6 +165,11 @@ OF_ENV = "processes 0 env"
             "fast",
             "param_groups.0.lr: got str; exp",
         ),
+        (
+            "optimizer_state_dict param_groups 0 lr",
+            -1.0,
+            "lr: got -1; expected finite numbers >= 0",
+        ),
         ("processes", [], "processes: got none; expected one or more"),
         ("processes", DELETED, "state.processes: got nothing"),
         (OF_ENV, 3, "env: got int; expected dict"),

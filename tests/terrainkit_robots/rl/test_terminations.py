@@ -77,7 +77,7 @@ def step(env):
 
 
 class TestInEnvironment:
-    @pytest.mark.parametrize(("limit", "falls"), [(1.0, True), (1e9, False)])
+    @pytest.mark.parametrize(("limit", "falls"), [(1.0, True), (1e6, False)])
     def test_trunk_contact_terminates(self, nominal_env, limit, falls):
         env = nominal_env(termination=Termination(contact_force=limit))
         env.sim.qpos[1, 2] = 0.05

@@ -106,10 +106,11 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
     _check_cost(model.sources, with_files=with_meshes)
     import mujoco
 
+    replaced = _without_repeated_names(model) if with_meshes else {}
     try:
         with quiet_mujoco():
             if with_meshes:
-                mujoco.MjModel.from_xml_path(str(model.file), _replaced_file(model))
+                mujoco.MjModel.from_xml_path(str(model.file), replaced)
             else:
                 mujoco.MjModel.from_xml_string(*_without_meshes(model))
     except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
@@ -119,18 +120,19 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
         message = " ".join(next(informative, "no reason").split())
         element = re.search(r"Element name '([^']*)'", text)
         line = re.search(r"^Element .*\bline (\d+)$", text, re.MULTILINE)
+        is_unchanged = with_meshes and not replaced and len(model.sources) == 1
         return LoadError(
             message=truncate(message, 200),
             element=element[1] if element else "",
-            line=int(line[1]) if line and with_meshes and len(model.sources) == 1 else 0,
+            line=int(line[1]) if line and is_unchanged else 0,
         )
     return None
 
 
-def _replaced_file(model: RobotModel) -> dict[str, bytes]:
-    """Return the content of a URDF by its name, if it differs from the file: without shape names.
+def _without_repeated_names(model: RobotModel) -> dict[str, bytes]:
+    """Return a URDF in which names of shapes repeat without these names, by its file name.
 
-    MuJoCo prints a warning for each name that repeats, and ignores it.
+    MuJoCo ignores a repeated name, but prints a warning.
     """
     from lxml import etree
 

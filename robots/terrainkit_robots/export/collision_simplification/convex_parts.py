@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from terrainkit.errors import TerrainkitError
 from terrainkit.files.isolated import IsolatedError
-from terrainkit.geometry.convex_decomposition import convex_decomposition
+from terrainkit.geometry.convex_decomposition import SEARCH, convex_decomposition
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
     is_valid,
     read_parts,
@@ -19,21 +18,9 @@ from terrainkit_robots.export.collision_simplification.decomposition_cache impor
 from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.surface import MeshError, Surface
 
-PARAMETERS: Mapping[str, float | int | bool] = {
-    "threshold": 0.05,
-    "max_convex_hull": 16,
-    "preprocess_resolution": 30,
-    "resolution": 1000,
-    "mcts_nodes": 10,
-    "mcts_iterations": 20,
-    "mcts_max_depth": 2,
-    "decimate": True,
-    "max_ch_vertex": 64,
-    "seed": 0,
-}
-"""CoACD's default threshold, a number of parts that a simulator of thousands of robots can handle,
-and the maximum number of vertices of PhysX on a GPU. The search is a tenth of CoACD's default,
-which fits the shells of robots equally well within a few percent, in seconds instead of minutes."""
+PARAMETERS = {**SEARCH, "threshold": 0.05, "max_convex_hull": 16}
+"""CoACD's default threshold, and a number of parts that a simulator of thousands of robots can
+handle."""
 
 _MAX_FACES = 50_000
 """Larger meshes are decimated first."""

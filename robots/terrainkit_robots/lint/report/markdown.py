@@ -3,16 +3,10 @@
 import re
 from collections.abc import Iterator, Sequence
 
+from terrainkit_robots.lint.report import summary
 from terrainkit_robots.lint.report.escape import escape_control
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
-from terrainkit_robots.lint.report.summary import (
-    LIKELY,
-    format_location,
-    group_skipped,
-    summarize_findings,
-    summarize_fixes,
-)
 from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.text import display_path
 
@@ -25,8 +19,8 @@ def to_text(reports: Sequence[Report]) -> str:
 def _section(report: Report) -> Iterator[str]:
     model = report.facts.model
     yield f"## {cell(display_path(model.file))}\n"
-    fixes = summarize_fixes([report])
-    yield f"**{summarize_findings([report])}**{f' ({fixes})' if fixes else ''}\n"
+    fixes = summary.summarize_fixes([report])
+    yield f"**{summary.summarize_findings([report])}**{f' ({fixes})' if fixes else ''}\n"
     yield "| | |\n|---|---|"
     for label, text in robot_summary(report):
         yield f"| {label.strip()} | {cell(text)} |"
@@ -36,7 +30,7 @@ def _section(report: Report) -> Iterator[str]:
     unfixed = [(f.code, f"{f.subject or f.name}: {why}") for f, why in report.unfixed]
     yield from titled_list("Not fixed", unfixed)
     yield from findings_table(group_findings(model, report.findings))
-    skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
+    skipped = [(codes, reason) for _, codes, reason in summary.group_skipped(report.skipped)]
     yield from titled_list("Not checked or ignored", skipped)
 
 
@@ -57,7 +51,7 @@ def findings_table(groups: Sequence[FindingGroup]) -> Iterator[str]:
         yield from map(_finding_row, groups)
         yield ""
     if any(group.first.certainty == "likely" for group in groups):
-        yield f"{LIKELY}.\n".capitalize()
+        yield f"{summary.LIKELY}.\n".capitalize()
 
 
 def _finding_row(group: FindingGroup) -> str:
@@ -65,7 +59,7 @@ def _finding_row(group: FindingGroup) -> str:
     cells = (
         finding.severity,
         f"{finding.code} {finding.name}",
-        format_location(finding),
+        summary.format_location(finding),
         _text(group) + (" (likely)" if finding.certainty == "likely" else ""),
         finding.hint,
     )

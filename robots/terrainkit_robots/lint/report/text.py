@@ -7,16 +7,10 @@ from itertools import groupby
 from pathlib import Path
 
 from terrainkit.settings.text import truncate
+from terrainkit_robots.lint.report import summary
 from terrainkit_robots.lint.report.escape import escape_control
 from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
-from terrainkit_robots.lint.report.summary import (
-    LIKELY,
-    format_location,
-    group_skipped,
-    summarize_findings,
-    summarize_fixes,
-)
 from terrainkit_robots.lint.rule import Finding, Severity
 from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.text import count, display_path
@@ -131,7 +125,7 @@ def _rule(groups: Sequence[FindingGroup], robot_file: Path, width: int) -> Itera
 
 def _entry(group: FindingGroup, text: str, robot_file: Path, width: int) -> Iterator[Line]:
     first = group.first
-    place = escape_control(format_location(first))
+    place = escape_control(summary.format_location(first))
     if first.file == robot_file:  # its path is in the header
         place = f"line {first.line}" if first.line else ""
     location = Span(f"  {place}: " if place else "  ", "cyan")
@@ -153,7 +147,7 @@ def _help(findings: Sequence[Finding], *, verbose: bool) -> Iterator[Line]:
     """Yield what `(likely)` means, and how to get help on notes, which are listed without help."""
     shown = [finding for finding in findings if verbose or finding.severity != "note"]
     if any(finding.certainty == "likely" for finding in shown):
-        label, text = LIKELY.split(" ", 1)
+        label, text = summary.LIKELY.split(" ", 1)
         yield Span(f"{label} ", "dim"), Span(text)
     codes = [finding.code for finding in findings if finding.severity == "note"]
     if codes and not verbose:
@@ -167,7 +161,7 @@ def _skipped(report: Report, width: int) -> Iterator[Line]:
     for finding, reason in report.unfixed:
         text = escape_control(f"{finding.code} {finding.subject}: {reason}")
         yield from _wrap(Span("not fixed: ", _STYLES["warning"]), text, width, indent=11)
-    for is_warning, codes, reason in group_skipped(report.skipped):
+    for is_warning, codes, reason in summary.group_skipped(report.skipped):
         label = Span("warning: ", _STYLES["warning"]) if is_warning else Span("skipped: ", "dim")
         text = escape_control(f"{codes}: {reason}" if codes else reason)
         yield from _wrap(label, text, width, indent=len(label.text))
@@ -176,8 +170,8 @@ def _skipped(report: Report, width: int) -> Iterator[Line]:
 def _counts(label: str, reports: Sequence[Report]) -> Line:
     verdicts = {report.verdict for report in reports}
     style = "bold red" if "fail" in verdicts else "bold yellow" if "warn" in verdicts else ""
-    fixes = summarize_fixes(reports)
-    counts = Span(summarize_findings(reports), style or "bold green")
+    fixes = summary.summarize_fixes(reports)
+    counts = Span(summary.summarize_findings(reports), style or "bold green")
     return Span(label, "bold"), counts, Span(f" ({fixes})" if fixes else "")
 
 

@@ -2,20 +2,9 @@
 
 from collections.abc import Iterator
 
+from terrainkit_robots.onboarding.frameworks import source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import package_name
-from terrainkit_robots.onboarding.frameworks.source import (
-    GENERATED_NOTE,
-    PARENT_FOLDER,
-    dict_entries,
-    docstring,
-    float_literal,
-    format_collection,
-    format_strings,
-    join_lines,
-    string_literal,
-    sum_assignment,
-)
 
 LEGGED_ONLY = False
 """Whether the framework supports only robots with legs."""
@@ -83,18 +72,23 @@ def build(scene, n_envs=0):
 def config_text(robot: ConfigRobot) -> str:
     """Return the text of `genesis_config.py`."""
     spec = robot.spec
-    height = float_literal(spec.spawn_height or 0.0)
-    return join_lines(
+    height = source.float_literal(spec.spawn_height or 0.0)
+    return source.join_lines(
         [
-            docstring(_about(robot)),
+            source.docstring(_about(robot)),
             ["", "from pathlib import Path", "", "import genesis as gs", ""],
-            [*sum_assignment("ROBOT_URDF", PARENT_FOLDER, "/", string_literal(spec.urdf)), ""],
+            [
+                *source.sum_assignment(
+                    "ROBOT_URDF", source.PARENT_FOLDER, "/", source.string_literal(spec.urdf)
+                ),
+                "",
+            ],
             robot.provenance_comment("spawn_height", prefix="x, y, z"),
             [f"POSITION = (0.0, 0.0, {height})"],
             ["# Whether the base is fixed to the world.", f"FIXED = {not spec.floating}", ""],
             _bodies(robot),
             ["", "# The order of actions and observations."],
-            format_collection("JOINTS = ", format_strings(spec.joint_order)),
+            source.format_collection("JOINTS = ", source.format_strings(spec.joint_order)),
             *(["", *_table(robot, name, field)] for name, field in _TABLES.items()),
             *_scales(robot),
             ["", *_FUNCTIONS.rstrip().split("\n")],
@@ -106,7 +100,7 @@ def _about(robot: ConfigRobot) -> list[str]:
     package = package_name(robot.spec.name)
     return [
         f"{robot.title} for Genesis: entity, gains and default pose.",
-        GENERATED_NOTE,
+        source.GENERATED_NOTE,
         f"Copy the folder into your Python package as {package}, and use",
         "\n".join(
             [
@@ -129,19 +123,21 @@ def _bodies(robot: ConfigRobot) -> list[str]:
     contacts = (*spec.penalized_contacts, *spec.termination_contacts)
     kept = dict.fromkeys([*spec.feet, *contacts])
     return [
-        *format_collection("FEET = ", format_strings(spec.feet)),
+        *source.format_collection("FEET = ", source.format_strings(spec.feet)),
         "# Bodies whose contacts are penalized.",
-        *format_collection("PENALIZED = ", format_strings(spec.penalized_contacts)),
+        *source.format_collection("PENALIZED = ", source.format_strings(spec.penalized_contacts)),
         "# Bodies whose ground contact terminates an episode.",
-        *format_collection("TERMINATION = ", format_strings(spec.termination_contacts)),
+        *source.format_collection(
+            "TERMINATION = ", source.format_strings(spec.termination_contacts)
+        ),
         "# Bodies that are not merged into their parents.",
-        *format_collection("LINKS_TO_KEEP = ", format_strings(kept)),
+        *source.format_collection("LINKS_TO_KEEP = ", source.format_strings(kept)),
     ]
 
 
 def _table(robot: ConfigRobot, name: str, field: str) -> list[str]:
     values = robot.all_joint_values(field) if field in _REQUIRED else robot.joint_values(field)
-    lines = format_collection(f"{name} = ", dict_entries(values), "{}")
+    lines = source.format_collection(f"{name} = ", source.dict_entries(values), "{}")
     return [*robot.provenance_comment(field), *lines]
 
 
@@ -153,4 +149,6 @@ def _scales(robot: ConfigRobot) -> Iterator[list[str]]:
         ("SPEED_SCALE", robot.velocity_joints, "velocity", robot.velocity_scale_comment()),
     ):
         yield ["", f"# Change of the {target} target for an action of 1.", *comment]
-        yield format_collection(f"{name} = ", dict_entries(robot.action_scales(joints)), "{}")
+        yield source.format_collection(
+            f"{name} = ", source.dict_entries(robot.action_scales(joints)), "{}"
+        )

@@ -2,13 +2,9 @@
 
 from collections.abc import Mapping
 
+from terrainkit_robots.onboarding.frameworks import source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.patterns import merge_patterns
-from terrainkit_robots.onboarding.frameworks.source import (
-    dict_entries,
-    float_literal,
-    format_collection,
-)
 
 
 def initial_state(robot: ConfigRobot, patterns: Mapping[str, str], *, depth: int) -> list[str]:
@@ -20,11 +16,11 @@ def initial_state(robot: ConfigRobot, patterns: Mapping[str, str], *, depth: int
         depth: Indentation of the fields, in steps of four spaces.
     """
     pose = robot.all_joint_values("default_pose")
-    entries = dict_entries(merge_patterns(pose, patterns))
+    entries = source.dict_entries(merge_patterns(pose, patterns))
     return [
         *robot.provenance_comment("spawn_height", depth=depth, prefix="x, y, z"),
-        f"pos=(0.0, 0.0, {float_literal(robot.spec.spawn_height or 0.0)}),",
+        f"pos=(0.0, 0.0, {source.float_literal(robot.spec.spawn_height or 0.0)}),",
         *robot.provenance_comment("default_pose", depth=depth),
-        *format_collection("joint_pos=", entries, "{}", depth=depth, suffix=","),
+        *source.format_collection("joint_pos=", entries, "{}", depth=depth, suffix=","),
         'joint_vel={".*": 0.0},',
     ]

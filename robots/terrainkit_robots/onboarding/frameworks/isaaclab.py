@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.onboarding.frameworks import source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_name, package_name
@@ -11,22 +12,6 @@ from terrainkit_robots.onboarding.frameworks.patterns import (
     merge_names,
     merge_patterns,
     usd_patterns,
-)
-from terrainkit_robots.onboarding.frameworks.source import (
-    GENERATED_NOTE,
-    PARENT_FOLDER,
-    assignment,
-    dict_entries,
-    docstring,
-    fill,
-    float_literal,
-    format_collection,
-    format_floats,
-    format_strings,
-    indent,
-    join_lines,
-    string_literal,
-    sum_assignment,
 )
 
 LEGGED_ONLY = False
@@ -158,17 +143,19 @@ def config_text(robot: ConfigRobot) -> str:
     spec, actuators = robot.spec, _actuators(robot)
     name = f"{constant_name(spec.name)}_CFG"
     is_legged = bool(spec.feet) and spec.floating
-    config = fill(
+    config = source.fill(
         _CONFIG,
-        about=docstring(_about(robot, name, is_legged)),
+        about=source.docstring(_about(robot, name, is_legged)),
         kinds=", ".join(sorted(set(actuators.values()))),
         task_imports=_TASK_IMPORTS if is_legged else [],
-        urdf=sum_assignment("ROBOT_URDF", PARENT_FOLDER, "/", string_literal(spec.urdf)),
+        urdf=source.sum_assignment(
+            "ROBOT_URDF", source.PARENT_FOLDER, "/", source.string_literal(spec.urdf)
+        ),
         name=name,
         fix_base=str(not spec.floating),
         init_state=initial_state(robot, usd_patterns(robot.all_joints), depth=2),
         soft_limit=robot.soft_limit_comment(depth=1),
-        factor=float_literal(robot.soft_limit_factor),
+        factor=source.float_literal(robot.soft_limit_factor),
         actuators=[
             line
             for (part, joints), kind in actuators.items()
@@ -176,7 +163,7 @@ def config_text(robot: ConfigRobot) -> str:
         ],
         scales=_scales(robot),
     )
-    return join_lines([config, _task(robot, name) if is_legged else []])
+    return source.join_lines([config, _task(robot, name) if is_legged else []])
 
 
 def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
@@ -184,14 +171,14 @@ def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
     paragraphs = [
         f"{robot.title} for Isaac Lab 2 and 3: articulation"
         + (" and velocity task." if is_legged else "."),
-        f"{GENERATED_NOTE} A pattern matches the whole name of a joint or body, and each name is "
-        "matched by one pattern.",
+        f"{source.GENERATED_NOTE} A pattern matches the whole name of a joint or body, and each "
+        "name is matched by one pattern.",
         f"Copy the folder into your Python package as {package}, and use",
         f"    from {package}.isaaclab_config import {name}\n\n"
         f'    robot = {name}.replace(prim_path="{{ENV_REGEX_NS}}/Robot")',
     ]
     if is_legged:
-        register = fill(_REGISTER, robot=class_name(robot.spec.name), package=package)
+        register = source.fill(_REGISTER, robot=class_name(robot.spec.name), package=package)
         paragraphs += ["or register the task, with Isaac Lab's PPO of the Go2:"]
         paragraphs += ["\n".join(register)]
     if robot.velocity_joints:
@@ -237,20 +224,20 @@ def _actuators(robot: ConfigRobot) -> dict[tuple[str, tuple[str, ...]], str]:
 def _actuator(robot: ConfigRobot, name: str, kind: str, joints: Sequence[str]) -> list[str]:
     """Return the source of an actuator of some joints."""
     patterns = usd_patterns(robot.all_joints)
-    names = format_strings(merge_names(joints, patterns))
-    lines = format_collection("joint_names_expr=", names, depth=3, suffix=",")
-    for field, source in _FIELDS[kind].items():
+    names = source.format_strings(merge_names(joints, patterns))
+    lines = source.format_collection("joint_names_expr=", names, depth=3, suffix=",")
+    for field, key in _FIELDS[kind].items():
         required = field in ("stiffness", "damping")
-        known = robot.all_joint_values(source) if required else robot.joint_values(source)
+        known = robot.all_joint_values(key) if required else robot.joint_values(key)
         values = {joint: known[joint] for joint in joints if joint in known}
         if values:
-            lines += robot.provenance_comment(source, depth=3)
+            lines += robot.provenance_comment(key, depth=3)
             complete = len(values) == len(joints)
             lines += _value(f"{field}=", values, patterns, complete=complete, depth=3, suffix=",")
         if kind == _DC_MOTOR and field == "effort_limit":
-            lines.append(f"saturation_effort={float_literal(values[joints[0]])},")
+            lines.append(f"saturation_effort={source.float_literal(values[joints[0]])},")
     friction = ["friction=0.0,"] if kind == _DC_MOTOR else []
-    return [f'"{name}": {kind}(', *indent([*lines, *friction]), "),"]
+    return [f'"{name}": {kind}(', *source.indent([*lines, *friction]), "),"]
 
 
 def _scales(robot: ConfigRobot) -> list[str]:
@@ -263,11 +250,11 @@ def _scales(robot: ConfigRobot) -> list[str]:
     if robot.velocity_joints:
         lines += ["", *robot.velocity_scale_comment()]
         lines += _value("SPEED_SCALE = ", robot.action_scales(robot.velocity_joints), patterns)
-        wheels = format_strings(merge_names(robot.velocity_joints, patterns))
-        lines += format_collection("WHEELS = ", wheels)
+        wheels = source.format_strings(merge_names(robot.velocity_joints, patterns))
+        lines += source.format_collection("WHEELS = ", wheels)
     if robot.position_joints and (robot.velocity_joints or robot.passive_joints):
-        joints = format_strings(merge_names(robot.position_joints, patterns))
-        lines += format_collection("JOINTS = ", joints)
+        joints = source.format_strings(merge_names(robot.position_joints, patterns))
+        lines += source.format_collection("JOINTS = ", joints)
     return lines
 
 
@@ -281,17 +268,17 @@ def _value(
     suffix: str = "",
 ) -> list[str]:
     """Return a statement with one number if all joints have the same value, else with a dict."""
-    different = set(format_floats(values.values()))
+    different = set(source.format_floats(values.values()))
     if complete and len(different) == 1:
         return [f"{prefix}{different.pop()}{suffix}"]
-    entries = dict_entries(merge_patterns(values, patterns))
-    return format_collection(prefix, entries, "{}", depth=depth, suffix=suffix)
+    entries = source.dict_entries(merge_patterns(values, patterns))
+    return source.format_collection(prefix, entries, "{}", depth=depth, suffix=suffix)
 
 
 def _task(robot: ConfigRobot, name: str) -> list[str]:
     """Return the names of bodies, and the class of the velocity task."""
-    low, high = format_floats(robot.spec.reset_range)
-    return fill(
+    low, high = source.format_floats(robot.spec.reset_range)
+    return source.fill(
         _TASK,
         bodies=_bodies(robot),
         name=name,
@@ -336,13 +323,15 @@ def _contact_term(term: str, name: str, bodies: Sequence[str]) -> str:
 def _bodies(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     patterns = usd_patterns(robot.all_bodies)
-    lines = assignment("BASE", string_literal(patterns[robot.check_bodies([spec.base], "base")[0]]))
+    lines = source.assignment(
+        "BASE", source.string_literal(patterns[robot.check_bodies([spec.base], "base")[0]])
+    )
     for name, field in (
         ("FEET", "feet"),
         ("PENALIZED", "penalized_contacts"),
         ("TERMINATION", "termination_contacts"),
     ):
         names = robot.check_bodies(getattr(spec, field), field)
-        merged = format_strings(merge_names(names, patterns))
-        lines += format_collection(f"{name} = ", merged)
+        merged = source.format_strings(merge_names(names, patterns))
+        lines += source.format_collection(f"{name} = ", merged)
     return lines

@@ -1,15 +1,8 @@
 """Write the configuration of a robot for legged_gym: rough terrain in Isaac Gym."""
 
-from terrainkit_robots.onboarding.frameworks import legged_robot
+from terrainkit_robots.onboarding.frameworks import legged_robot, source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
-from terrainkit_robots.onboarding.frameworks.source import (
-    GENERATED_NOTE,
-    docstring,
-    float_literal,
-    join_lines,
-    string_literal,
-)
 
 _NUM_HEIGHTS = 17 * 11
 """Number of height samples in the observations of legged_gym on rough terrain."""
@@ -28,9 +21,9 @@ def config_text(robot: ConfigRobot) -> str:
         ConfigError: if legged_gym does not support the names of the bodies.
     """
     name = class_name(robot.spec.name)
-    return join_lines(
+    return source.join_lines(
         [
-            docstring(_about(robot, name)),
+            source.docstring(_about(robot, name)),
             ["", *legged_robot.BEFORE_IMPORTS],
             [
                 "from legged_gym.envs.base.legged_robot_config import (",
@@ -58,7 +51,7 @@ def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     paragraphs = [
         f"{robot.title} for legged_gym: rough terrain.",
-        GENERATED_NOTE,
+        source.GENERATED_NOTE,
         f"Copy the folder to legged_gym/envs/{package} and register the robot in "
         "legged_gym/envs/__init__.py:",
         "\n".join(
@@ -109,12 +102,12 @@ def _asset(robot: ConfigRobot) -> list[str]:
         *legged_robot.shapes(),
         *robot.provenance_comment("armature", depth=2),
         *difference,
-        f"armature = {float_literal(armature)}",
+        f"armature = {source.float_literal(armature)}",
     ]
 
 
 def _runner(robot: ConfigRobot) -> list[str]:
     return [
         'run_name = ""',
-        f"experiment_name = {string_literal(f'rough_{package_name(robot.spec.name)}')}",
+        f"experiment_name = {source.string_literal(f'rough_{package_name(robot.spec.name)}')}",
     ]

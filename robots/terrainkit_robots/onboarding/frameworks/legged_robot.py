@@ -3,19 +3,9 @@
 from collections.abc import Sequence
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit_robots.onboarding.frameworks import source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import package_name
-from terrainkit_robots.onboarding.frameworks.source import (
-    assignment,
-    comment,
-    dict_entries,
-    float_literal,
-    format_collection,
-    format_strings,
-    indent,
-    string_literal,
-    sum_assignment,
-)
 from terrainkit_robots.onboarding.frameworks.substrings import (
     Keys,
     common_key,
@@ -67,19 +57,19 @@ def check_legs(robot: ConfigRobot, name: str, others: Sequence[str]) -> None:
 
 def class_of(name: str, base: str, body: list[str]) -> list[str]:
     """Return the source of a nested class, indented, after a blank line."""
-    return indent(["", f"class {name}({base}.{name}):", *indent(body)])
+    return source.indent(["", f"class {name}({base}.{name}):", *source.indent(body)])
 
 
 def init_state(robot: ConfigRobot) -> list[str]:
     """Return the spawn position and the default joint angles."""
-    height = float_literal(robot.spec.spawn_height or 0.0)
+    height = source.float_literal(robot.spec.spawn_height or 0.0)
     angles = robot.all_joint_values("default_pose")
-    entries = dict_entries(angles)
+    entries = source.dict_entries(angles)
     return [
         *robot.provenance_comment("spawn_height", depth=2, prefix="x, y, z"),
         f"pos = [0.0, 0.0, {height}]",
         *robot.provenance_comment("default_pose", depth=2),
-        *format_collection("default_joint_angles = ", entries, "{}", depth=2),
+        *source.format_collection("default_joint_angles = ", entries, "{}", depth=2),
     ]
 
 
@@ -107,7 +97,7 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
     scale, difference = robot.shared_value(moved, "median", depth=2)
     if held:
         note = f"Set the actions of these joints to 0, to hold the default pose: {listing(held)}."
-        difference += comment(note, depth=2)
+        difference += source.comment(note, depth=2)
     velocity_note = ""
     if robot.velocity_joints:
         joints = listing(robot.velocity_joints)
@@ -119,16 +109,16 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
     return [
         "# P: actions are joint position targets.",
         'control_type = "P"',
-        *comment(velocity_note, depth=2),
+        *source.comment(velocity_note, depth=2),
         "# A key applies to every joint whose name contains it.",
-        *comment(warning, depth=2),
+        *source.comment(warning, depth=2),
         *robot.provenance_comment("stiffness", depth=2),
         *_table("stiffness", {key: pair[0] for key, pair in values.items()}),
         *robot.provenance_comment("damping", depth=2),
         *_table("damping", {key: pair[1] for key, pair in values.items()}),
         *robot.provenance_comment("action_scale", depth=2),
         *difference,
-        f"action_scale = {float_literal(scale)}",
+        f"action_scale = {source.float_literal(scale)}",
         "# Simulation steps per policy step: 4 steps of 0.005 s, 50 Hz.",
         "decimation = 4",
     ]
@@ -150,7 +140,7 @@ def contacts(robot: ConfigRobot) -> list[str]:
         )
     return [
         "# Every body whose name contains it is a foot.",
-        *assignment("foot_name", string_literal(foot_name), depth=2),
+        *source.assignment("foot_name", source.string_literal(foot_name), depth=2),
         *_body_keys(robot, "penalized_contacts", "penalize_contacts_on"),
         *_body_keys(robot, "termination_contacts", "terminate_after_contacts_on"),
     ]
@@ -173,25 +163,27 @@ def rewards(robot: ConfigRobot) -> list[str]:
     """Return the targets and limits of rewards."""
     return [
         *robot.soft_limit_comment(depth=2),
-        f"soft_dof_pos_limit = {float_literal(robot.soft_limit_factor)}",
+        f"soft_dof_pos_limit = {source.float_literal(robot.soft_limit_factor)}",
         *robot.provenance_comment("base_height_target", depth=2),
-        f"base_height_target = {float_literal(robot.spec.base_height_target or 0.0)}",
+        f"base_height_target = {source.float_literal(robot.spec.base_height_target or 0.0)}",
     ]
 
 
 def asset_name(robot: ConfigRobot) -> str:
     """Return the statement that names the actor."""
-    return f"name = {string_literal(package_name(robot.spec.name))}"
+    return f"name = {source.string_literal(package_name(robot.spec.name))}"
 
 
 def path_in_folder(attribute: str, name: str) -> list[str]:
     """Return a statement with the path of a file in the folder of the configuration."""
     escaped = name.replace("{", "{{").replace("}", "}}")
-    return sum_assignment(attribute, "HERE", "+", string_literal("/" + escaped), depth=2)
+    return source.sum_assignment(
+        attribute, "HERE", "+", source.string_literal("/" + escaped), depth=2
+    )
 
 
 def _table(name: str, values: dict[str, float]) -> list[str]:
-    return format_collection(f"{name} = ", dict_entries(values), "{}", depth=2)
+    return source.format_collection(f"{name} = ", source.dict_entries(values), "{}", depth=2)
 
 
 def _body_keys(robot: ConfigRobot, field: str, attribute: str) -> list[str]:
@@ -199,5 +191,8 @@ def _body_keys(robot: ConfigRobot, field: str, attribute: str) -> list[str]:
     result = keys_for(names, robot.all_bodies)
     lines = []
     for key, name in result.clashes:
-        lines += comment(f"{key} also matches {name}.", depth=2)
-    return [*lines, *format_collection(f"{attribute} = ", format_strings(result.keys), depth=2)]
+        lines += source.comment(f"{key} also matches {name}.", depth=2)
+    return [
+        *lines,
+        *source.format_collection(f"{attribute} = ", source.format_strings(result.keys), depth=2),
+    ]

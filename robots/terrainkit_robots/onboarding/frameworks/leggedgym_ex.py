@@ -4,22 +4,9 @@ from pathlib import Path
 from shlex import quote
 
 from terrainkit.errors import ExportError, listing
-from terrainkit_robots.onboarding.frameworks import legged_robot
+from terrainkit_robots.onboarding.frameworks import legged_robot, source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
-from terrainkit_robots.onboarding.frameworks.source import (
-    GENERATED_NOTE,
-    assignment,
-    comment,
-    docstring,
-    fill,
-    float_literal,
-    format_collection,
-    format_strings,
-    indent,
-    join_lines,
-    string_literal,
-)
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 LEGGED_ONLY = True
@@ -49,16 +36,16 @@ def config_files(robot: ConfigRobot) -> dict[str, str]:
             f"such as --name my_{package}"
         )
     about = f"{robot.title} for LeggedGym-Ex"
-    task = fill(
+    task = source.fill(
         _TASK.read_text(),
-        about=docstring([f"{about}: the environment and its task, written by terrainkit."]),
+        about=source.docstring([f"{about}: the environment and its task, written by terrainkit."]),
         name=class_name(robot.spec.name),
         package=package,
     )
     return {
         f"{package}_config.py": config_text(robot),
-        f"{package}.py": join_lines([task]),
-        "__init__.py": join_lines([docstring([f"{about}."])]),
+        f"{package}.py": source.join_lines([task]),
+        "__init__.py": source.join_lines([source.docstring([f"{about}."])]),
     }
 
 
@@ -69,9 +56,9 @@ def config_text(robot: ConfigRobot) -> str:
         ConfigError: if LeggedGym-Ex does not support the names of the bodies.
     """
     count, package = len(robot.spec.joint_order), package_name(robot.spec.name)
-    config = fill(
+    config = source.fill(
         _CONFIG.read_text(),
-        about=docstring(_about(robot)),
+        about=source.docstring(_about(robot)),
         before_imports=legged_robot.BEFORE_IMPORTS,
         here=legged_robot.HERE,
         name=class_name(robot.spec.name),
@@ -82,10 +69,10 @@ def config_text(robot: ConfigRobot) -> str:
         control=_control(robot),
         asset=_asset(robot),
         rewards=legged_robot.rewards(robot),
-        foot_height=float_literal(robot.foot_height),
+        foot_height=source.float_literal(robot.foot_height),
         dof_pos_limits=_dof_pos_limits(robot),
     )
-    return join_lines([config])
+    return source.join_lines([config])
 
 
 def train_commands(spec: RobotSpec, folder: Path) -> tuple[str, list[str]]:
@@ -107,12 +94,12 @@ def _about(robot: ConfigRobot) -> list[str]:
     package = package_name(robot.spec.name)
     return [
         f"{robot.title} for LeggedGym-Ex: flat ground.",
-        GENERATED_NOTE,
+        source.GENERATED_NOTE,
         "Train it in the folder of LeggedGym-Ex, in Isaac Gym without SIMULATOR:",
-        "\n".join(indent(_commands(package, "FOLDER"))),
+        "\n".join(source.indent(_commands(package, "FOLDER"))),
         "The files read robot.urdf. Versions of LeggedGym-Ex with xml_file read robot.xml in "
         "Genesis. With Isaac Lab, legged_gym/simulator/isaaclab_simulator.py selects actuators "
-        f"by asset.name: add a branch for {string_literal(package)}.",
+        f"by asset.name: add a branch for {source.string_literal(package)}.",
         "With Isaac Gym, LeggedGym-Ex uses the permutation from its joint order to dof_names also "
         "for the inverse. This is correct only if the permutation is its own inverse; otherwise "
         "set dof_names, dof_armature and dof_vel_limits in the order that it prints.",
@@ -136,16 +123,16 @@ def _dof_pos_limits(robot: ConfigRobot) -> list[str]:
     limits = robot.spec.joint_order if robot.limits is None else robot.limits
     if unlimited := [joint for joint in robot.spec.joint_order if joint not in limits]:
         note = f"LeggedGym-Ex computes NaN for joints without limits: {listing(unlimited)}."
-        return [*comment(note, depth=3), "dof_pos_limits = 0.0"]
+        return [*source.comment(note, depth=3), "dof_pos_limits = 0.0"]
     return ["dof_pos_limits = -1.0"]
 
 
 def _asset(robot: ConfigRobot) -> list[str]:
     spec = robot.spec
     armature, velocities = robot.joint_values("armature"), robot.joint_values("velocity")
-    armatures = [float_literal(armature.get(joint, 0.0)) for joint in spec.joint_order]
+    armatures = [source.float_literal(armature.get(joint, 0.0)) for joint in spec.joint_order]
     limits = [
-        float_literal(velocities[joint]) if joint in velocities else 'float("inf")'
+        source.float_literal(velocities[joint]) if joint in velocities else 'float("inf")'
         for joint in spec.joint_order
     ]
     base = robot.check_bodies([spec.base], "base")[0]
@@ -154,14 +141,14 @@ def _asset(robot: ConfigRobot) -> list[str]:
         *legged_robot.path_in_folder("file", spec.urdf),
         *legged_robot.path_in_folder("xml_file", spec.mjcf),
         *legged_robot.contacts(robot),
-        *assignment("base_link_name", string_literal(base), depth=2),
+        *source.assignment("base_link_name", source.string_literal(base), depth=2),
         "# The order of actions and observations.",
-        *format_collection("dof_names = ", format_strings(spec.joint_order), depth=2),
+        *source.format_collection("dof_names = ", source.format_strings(spec.joint_order), depth=2),
         *robot.provenance_comment("armature", depth=2, prefix="In the order of dof_names"),
-        *format_collection("dof_armature = ", armatures, depth=2),
+        *source.format_collection("dof_armature = ", armatures, depth=2),
         *robot.provenance_comment("velocity", depth=2, prefix="In the order of dof_names"),
-        *format_collection("dof_vel_limits = ", limits, depth=2),
-        *comment("Bodies on fixed joints that Genesis does not merge.", depth=2),
-        *format_collection("links_to_keep = ", format_strings(spec.feet), depth=2),
+        *source.format_collection("dof_vel_limits = ", limits, depth=2),
+        *source.comment("Bodies on fixed joints that Genesis does not merge.", depth=2),
+        *source.format_collection("links_to_keep = ", source.format_strings(spec.feet), depth=2),
         *legged_robot.shapes(),
     ]

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import quote
 
-from terrainkit_robots.onboarding.frameworks import mjlab_task
+from terrainkit_robots.onboarding.frameworks import mjlab_task, source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.initial_state import initial_state
 from terrainkit_robots.onboarding.frameworks.naming import package_name
@@ -12,20 +12,6 @@ from terrainkit_robots.onboarding.frameworks.patterns import (
     merge_names,
     merge_patterns,
     mjlab_patterns,
-)
-from terrainkit_robots.onboarding.frameworks.source import (
-    GENERATED_NOTE,
-    PARENT_FOLDER,
-    dict_entries,
-    docstring,
-    fill,
-    float_literal,
-    format_collection,
-    format_strings,
-    indent,
-    join_lines,
-    string_literal,
-    sum_assignment,
 )
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -109,18 +95,20 @@ def config_text(robot: ConfigRobot) -> str:
     patterns = mjlab_patterns(robot.all_joints)
     has_task = bool(train_arguments(robot.spec))
     kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
-    entity = fill(
+    entity = source.fill(
         _ENTITY,
-        about=docstring(_about(robot, has_task=has_task)),
+        about=source.docstring(_about(robot, has_task=has_task)),
         standard=["import argparse", "import sys", "from dataclasses import replace"] * has_task,
         actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
         task_imports=mjlab_task.IMPORTS.split("\n") if has_task else [],
-        robot_xml=sum_assignment("ROBOT_XML", PARENT_FOLDER, "/", string_literal(robot.spec.mjcf)),
+        robot_xml=source.sum_assignment(
+            "ROBOT_XML", source.PARENT_FOLDER, "/", source.string_literal(robot.spec.mjcf)
+        ),
         init_state=initial_state(robot, patterns, depth=1),
         articulation=_articulation(robot, patterns),
         scales=_scales(robot, patterns),
     )
-    return join_lines([entity, mjlab_task.task(robot) if has_task else []])
+    return source.join_lines([entity, mjlab_task.task(robot) if has_task else []])
 
 
 def _about(robot: ConfigRobot, *, has_task: bool) -> list[str]:
@@ -128,7 +116,7 @@ def _about(robot: ConfigRobot, *, has_task: bool) -> list[str]:
     title = f"{robot.title} for mjlab: entity" + (", actuators and velocity task." * has_task)
     paragraphs = [
         title if has_task else f"{title} and actuators.",
-        f"{GENERATED_NOTE} A pattern matches the whole name of a joint.",
+        f"{source.GENERATED_NOTE} A pattern matches the whole name of a joint.",
         *_training(robot) * has_task,
         f"Copy the folder into your Python package as {package}, and use",
         f"    from {package}.mjlab_config import get_robot_cfg\n\n"
@@ -159,37 +147,39 @@ def _training(robot: ConfigRobot) -> list[str]:
 def _articulation(robot: ConfigRobot, patterns: Mapping[str, str]) -> list[str]:
     """Return the source of the actuators; joints with the same values share an actuator."""
     tables = {
-        field: robot.joint_values(source)
+        field: robot.joint_values(key)
         if field in ("effort_limit", "armature")
-        else robot.all_joint_values(source)
-        for field, source in _FIELDS.items()
+        else robot.all_joint_values(key)
+        for field, key in _FIELDS.items()
     }
     groups: dict[tuple[str, ...], list[str]] = {}
     for joint in robot.spec.joint_order:
         is_wheel = joint in robot.velocity_joints
         arguments = [
-            f"{field}={float_literal(values[joint])},"
+            f"{field}={source.float_literal(values[joint])},"
             for field, values in tables.items()
             if joint in values and not (is_wheel and field == "stiffness")
         ]
         groups.setdefault((_VELOCITY if is_wheel else _POSITION, *arguments), []).append(joint)
     actuators = []
     for (kind, *arguments), joints in groups.items():
-        names = format_strings(merge_names(joints, patterns))
-        expression = format_collection("target_names_expr=", names, "()", depth=3, suffix=",")
-        actuators += [f"{kind}(", *indent([*expression, *arguments]), "),"]
+        names = source.format_strings(merge_names(joints, patterns))
+        expression = source.format_collection(
+            "target_names_expr=", names, "()", depth=3, suffix=","
+        )
+        actuators += [f"{kind}(", *source.indent([*expression, *arguments]), "),"]
     origins = [
         line
-        for field, source in _FIELDS.items()
-        for line in robot.provenance_comment(source, prefix=field.replace("_", " ").capitalize())
+        for field, key in _FIELDS.items()
+        for line in robot.provenance_comment(key, prefix=field.replace("_", " ").capitalize())
     ]
-    block = ["    actuators=(", *indent(actuators, 2), "    ),"]
+    block = ["    actuators=(", *source.indent(actuators, 2), "    ),"]
     return [
         *origins,
         "ARTICULATION = EntityArticulationInfoCfg(",
         *(block if actuators else ["    actuators=(),"]),
-        *indent(robot.soft_limit_comment(depth=1)),
-        f"    soft_joint_pos_limit_factor={float_literal(robot.soft_limit_factor)},",
+        *source.indent(robot.soft_limit_comment(depth=1)),
+        f"    soft_joint_pos_limit_factor={source.float_literal(robot.soft_limit_factor)},",
         ")",
     ]
 
@@ -198,14 +188,14 @@ def _scales(robot: ConfigRobot, patterns: Mapping[str, str]) -> list[str]:
     """Return the action scales of joints with position targets and with velocity targets."""
 
     def entries(joints: Sequence[str]) -> list[str]:
-        return dict_entries(merge_patterns(robot.action_scales(joints), patterns))
+        return source.dict_entries(merge_patterns(robot.action_scales(joints), patterns))
 
     lines = []
     if robot.position_joints or not robot.velocity_joints:
         origin = robot.provenance_comment("action_scale")
         lines += ["", "# For JointPositionActionCfg.scale.", *origin]
-        lines += format_collection("ACTION_SCALE = ", entries(robot.position_joints), "{}")
+        lines += source.format_collection("ACTION_SCALE = ", entries(robot.position_joints), "{}")
     if robot.velocity_joints:
         lines += ["", "# For JointVelocityActionCfg.scale.", *robot.velocity_scale_comment()]
-        lines += format_collection("SPEED_SCALE = ", entries(robot.velocity_joints), "{}")
+        lines += source.format_collection("SPEED_SCALE = ", entries(robot.velocity_joints), "{}")
     return lines

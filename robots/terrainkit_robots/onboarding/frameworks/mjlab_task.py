@@ -3,20 +3,13 @@
 import re
 
 from terrainkit_robots.export.mjcf import COLLISION_SUFFIX
+from terrainkit_robots.onboarding.frameworks import source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import class_name, package_name
 from terrainkit_robots.onboarding.frameworks.patterns import (
     merge_names,
     merge_patterns,
     mjlab_patterns,
-)
-from terrainkit_robots.onboarding.frameworks.source import (
-    assignment,
-    dict_entries,
-    fill,
-    format_collection,
-    format_strings,
-    string_literal,
 )
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -192,7 +185,7 @@ def task_id(spec: RobotSpec, terrain: str) -> str:
 
 def task(robot: ConfigRobot) -> list[str]:
     """Return the names that the task needs, its functions, and the command that trains it."""
-    return ["", "", *fill(_TASK, names=_names(robot), actions=_actions(robot))]
+    return ["", "", *source.fill(_TASK, names=_names(robot), actions=_actions(robot))]
 
 
 def _names(robot: ConfigRobot) -> list[str]:
@@ -202,14 +195,14 @@ def _names(robot: ConfigRobot) -> list[str]:
     feet = [name.rsplit("/", maxsplit=1)[-1] for name in robot.check_bodies(spec.feet, "feet")]
     geoms = [rf"{re.escape(foot)}{COLLISION_SUFFIX}\d*" for foot in feet]
     return [
-        *assignment("FLAT_TASK", string_literal(task_id(spec, "Flat"))),
-        *assignment("ROUGH_TASK", string_literal(task_id(spec, "Rough"))),
-        f"EXPERIMENT = {string_literal(package_name(spec.name))}",
+        *source.assignment("FLAT_TASK", source.string_literal(task_id(spec, "Flat"))),
+        *source.assignment("ROUGH_TASK", source.string_literal(task_id(spec, "Rough"))),
+        f"EXPERIMENT = {source.string_literal(package_name(spec.name))}",
         "",
         "# Names in robot.xml; a pattern matches a whole name.",
-        *assignment("BASE", string_literal(base)),
-        *format_collection("FEET = ", format_strings(feet), "()"),
-        *format_collection("FOOT_GEOMS = ", format_strings(geoms), "()"),
+        *source.assignment("BASE", source.string_literal(base)),
+        *source.format_collection("FEET = ", source.format_strings(feet), "()"),
+        *source.format_collection("FOOT_GEOMS = ", source.format_strings(geoms), "()"),
         "# Bodies whose contacts with the ground are penalized, or end an episode.",
         *_bodies(robot, "PENALIZED", "penalized_contacts"),
         *_bodies(robot, "TERMINATION", "termination_contacts"),
@@ -224,7 +217,7 @@ def _names(robot: ConfigRobot) -> list[str]:
 def _bodies(robot: ConfigRobot, name: str, field: str) -> list[str]:
     bodies = robot.check_bodies(getattr(robot.spec, field), field)
     patterns = merge_names(bodies, mjlab_patterns(robot.all_bodies))
-    return format_collection(f"{name} = ", format_strings(patterns), "()")
+    return source.format_collection(f"{name} = ", source.format_strings(patterns), "()")
 
 
 def _foot_clearance(leg_length: float | None) -> float:
@@ -238,8 +231,8 @@ def _pose_std(robot: ConfigRobot, name: str, index: int) -> list[str]:
         joint: _POSE_STD.get(robot.roles.get(joint, ""), _DEFAULT_POSE_STD)[index]
         for joint in joints
     }
-    entries = dict_entries(merge_patterns(stds, mjlab_patterns(joints)))
-    return format_collection(f"{name} = ", entries, "{}")
+    entries = source.dict_entries(merge_patterns(stds, mjlab_patterns(joints)))
+    return source.format_collection(f"{name} = ", entries, "{}")
 
 
 def _actions(robot: ConfigRobot) -> list[str]:

@@ -45,6 +45,18 @@ def test_mujoco_load_error_names_element(tmp_path):
     assert refusal.element == "base"
 
 
+def test_mujoco_load_error_has_no_line_with_repeated_shape_names(tmp_path):
+    shape = '<collision name="c"><geometry><sphere radius="1"/></geometry></collision>'
+    text = (
+        f'<?xml version="1.0"?>\n<!-- a robot -->\n<robot name="r"><link name="a">{shape}{shape}'
+        '</link><link name="b"/>\n<joint name="j" type="hinge"><parent link="a"/><child link="b"/>'
+        "</joint></robot>"
+    )
+    refusal = mujoco_load_error(facts_of(tmp_path, text, "r.urdf").model)
+    assert refusal.message == "invalid joint type in URDF joint definition"
+    assert refusal.line == 0  # MuJoCo reads another text
+
+
 @pytest.mark.parametrize("with_meshes", [True, False])
 def test_mujoco_load_error_has_line_of_urdf(tmp_path, with_meshes):
     text = (
