@@ -5,12 +5,25 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
+from terrainkit.errors import ExportError
+
 _BINARY: int = getattr(os, "O_BINARY", 0)
 """Windows opens files in text mode without it."""
 
 
 class SpecialFileError(OSError):
     """A path that is a folder, a pipe or a device; the message lacks its subject."""
+
+
+def is_utf8(path: Path) -> bool:
+    """Return whether a path is UTF-8; MuJoCo and TensorBoard open no others."""
+    return str(path).encode(errors="replace").decode() == str(path)
+
+
+def require_utf8(path: Path) -> None:
+    """Raise ExportError if a path is not UTF-8."""
+    if not is_utf8(path.absolute()):
+        raise ExportError(f"cannot write {path}: its name is not UTF-8")
 
 
 def open_regular(path: Path) -> BinaryIO:

@@ -122,8 +122,18 @@ class Config:
         return {name: getattr(self, name) for name in field_types(kind)}
 
     def to_toml(self) -> str:
-        """Return the config as TOML with comments; :meth:`from_toml` restores it."""
-        return "\n".join([*_toml_lines("", self), ""])
+        """Return the config as TOML with comments; :meth:`from_toml` restores it.
+
+        Raises:
+            ConfigError: if it has a file name that is not UTF-8, as TOML must be.
+        """
+        text = "\n".join([*_toml_lines("", self), ""])
+        try:
+            text.encode()
+        except UnicodeEncodeError as error:
+            line = text[: error.end].rpartition("\n")[2]
+            raise ConfigError(f"got {truncate(line)!a}; expected a name that is UTF-8") from None
+        return text
 
 
 @cache

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from terrainkit.errors import ExportError
 from terrainkit.files.atomic_write import atomic_folder
+from terrainkit_robots.files import require_utf8
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.text import free_name, names
@@ -25,6 +26,7 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
     Raises:
         ExportError: if the folder must not be overwritten, or its parent does not exist.
     """
+    require_utf8(target)
     try:
         if not target.parent.is_dir():
             raise ExportError(f"cannot write {target}: the folder {target.parent} does not exist")

@@ -22,6 +22,7 @@ from terrainkit.settings.schema import Config
 from terrainkit.settings.text import expected_names
 from terrainkit.settings.toml_text import read_text
 from terrainkit_robots.checkpoint import TRAINING_KEYS, read_checkpoint
+from terrainkit_robots.files import require_utf8
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE, Robot
@@ -122,6 +123,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
 
 def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
     """Write a new folder with some files, completely or not at all."""
+    require_utf8(folder)
     with atomic_folder(folder) as new:
         if folder.is_dir() and any(folder.iterdir()):
             hint = f"choose another folder, or continue with --resume {folder}"

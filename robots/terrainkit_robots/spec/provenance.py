@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, Provenance, RobotSpec
+from terrainkit_robots.text import one_line
 
 
 def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec:
@@ -15,7 +16,7 @@ def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec
         derived: The spec that is derived without it.
         file: File of the edited spec.
     """
-    given = Provenance(origin="given", reason=f"in {file}")
+    given = Provenance(origin="given", reason=f"in {one_line(file)}")
     provenance: dict[str, Provenance] = {}
     for name in {key.partition(".")[0]: None for key in derived.provenance}:
         provenance |= dict(_field_provenance(name, spec, derived, given))

@@ -90,3 +90,9 @@ def test_from_toml_suggests_key_of_nested_config():
 
 def test_flatten_yields_dotted_names():
     assert dict(flatten(Robot(legs=4)))["motor.effort"] == 1.0
+
+
+def test_to_toml_rejects_name_that_is_not_utf8():
+    config = Motor(names=("hip", "a\udcff"))
+    with pytest.raises(ConfigError, match=r"got .*a\\udcff'; expected a name that is UTF-8"):
+        config.to_toml()

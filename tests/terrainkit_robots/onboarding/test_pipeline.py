@@ -197,6 +197,14 @@ def onboard_arm(tmp_path, *replacements, **changes):
     return onboard(file, tmp_path / "robot", options(**changes))
 
 
+def test_onboard_reads_but_does_not_write_name_that_is_not_utf8(tmp_path):
+    file = tmp_path / "\udcff.urdf"
+    file.write_text(ARM)
+    assert onboard(file, tmp_path / "robot", options()).folder == tmp_path / "robot"
+    with pytest.raises(ExportError, match="its name is not UTF-8"):
+        onboard(file, tmp_path / "\udcff", options())
+
+
 def test_onboard_arm_without_legs(tmp_path):
     result = onboard_arm(tmp_path)
     spec = RobotSpec.load(result.folder / "robot.toml")

@@ -18,7 +18,7 @@ from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
 from terrainkit_robots.description.model import RobotModel
 from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
-from terrainkit_robots.files import open_regular
+from terrainkit_robots.files import is_utf8, open_regular
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 if TYPE_CHECKING:
@@ -101,6 +101,8 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
         raise NotAttemptedError(
             f"number of bodies: got {len(model.links)}; expected at most {_MAX_BODIES} for MuJoCo"
         )
+    if not is_utf8(model.file):
+        raise NotAttemptedError("MuJoCo opens only paths that are UTF-8")
     if not with_meshes and model.kind != "urdf":
         raise NotAttemptedError("only URDF is compiled without its mesh files")
     _check_cost(model.sources, with_files=with_meshes)

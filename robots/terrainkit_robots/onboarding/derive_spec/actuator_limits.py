@@ -9,6 +9,7 @@ from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
+from terrainkit_robots.text import one_line
 
 if TYPE_CHECKING:
     from terrainkit_robots.simulation.gain import Gain
@@ -180,4 +181,4 @@ def _suggested(reason: str) -> Provenance:
 
 
 def _from_file(facts: Facts) -> Provenance:
-    return Provenance(origin="declared", reason=f"in {facts.model.file.name}")
+    return Provenance(origin="declared", reason=f"in {one_line(facts.model.file.name)}")

@@ -21,7 +21,7 @@ from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
 from terrainkit_robots.spec.column import Column, collect_provenance, rounded, rounded_length
 from terrainkit_robots.spec.name_patterns import by_pattern
 from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
-from terrainkit_robots.text import names
+from terrainkit_robots.text import names, one_line
 
 if TYPE_CHECKING:
     from terrainkit_robots.simulation.gain import Gain
@@ -124,7 +124,8 @@ def _pose_and_gain_columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[st
 
 
 def _pose_provenance(facts: Facts) -> Provenance:
-    declared = Provenance(origin="declared", reason=f"first keyframe of {facts.model.file.name}")
+    reason = f"first keyframe of {one_line(facts.model.file.name)}"
+    declared = Provenance(origin="declared", reason=reason)
     if facts.legs:
         if is_standing_keyframe(facts.leg_model):
             return declared
