@@ -32,13 +32,16 @@ def test_view_serves_until_it_is_ended(map_file, host, number):
         stderr=subprocess.PIPE,
         text=True,
     ) as run:
-        line = run.stdout.readline()
-        address = re.match(r"http://(localhost|\[::1\]):\d+(?= shows .*map\.npz)", line)
-        assert address, line
-        with urlopen(address.group(), timeout=10) as response:
-            assert response.status == 200
-        run.send_signal(number)
-        assert run.communicate(timeout=30) == ("", "")
+        try:
+            line = run.stdout.readline()
+            address = re.match(r"http://(localhost|\[::1\]):\d+(?= shows .*map\.npz)", line)
+            assert address, line
+            with urlopen(address.group(), timeout=10) as response:
+                assert response.status == 200
+            run.send_signal(number)
+            assert run.communicate(timeout=30) == ("", "")
+        finally:
+            run.kill()
     assert run.returncode == 0
 
 
