@@ -10,8 +10,6 @@ import subprocess
 import sys
 import tempfile
 import textwrap
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,7 +79,9 @@ def run_isolated(
             lines = error.stderr.decode(errors="replace").strip().splitlines()
             reason = lines[-1] if lines and error.returncode > 0 else "the process crashed"
             raise IsolatedError(textwrap.shorten(reason, 200, placeholder="...")) from None
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        except TerrainkitError:
+            raise
+        except Exception as error:  # damaged arrays raise various errors of zipfile and numpy
             raise IsolatedError(f"the result cannot be read: {error}") from None
 
 

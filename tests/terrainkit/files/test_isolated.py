@@ -57,6 +57,23 @@ def test_isolated_result_is_read_without_pickle():
         run_isolated(dict, [("a", np.array([print], dtype=object))])
 
 
+def test_isolated_rejects_result_with_damaged_header(tmp_path, monkeypatch):
+    code = """
+import atexit, sys, zipfile
+def write():  # as a reader that was taken over
+    with zipfile.ZipFile(sys.argv[2], "w") as file:
+        file.writestr("a.npy", b"\\x93NUMPY\\x01\\x00\\x02\\x00{'")
+def damage():
+    atexit.register(write)
+    return {}
+"""
+    (tmp_path / "own_result.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    damage = importlib.import_module("own_result").damage
+    with pytest.raises(IsolatedError, match=r"^the result cannot be read: "):
+        run_isolated(damage)
+
+
 @pytest.mark.usefixtures("import_in_process")
 def test_main_needs_memory():
     with pytest.raises(IsolatedError, match=r"^needs more than 8 GB of memory$"):
