@@ -101,8 +101,8 @@ class View(Command):
             run = show(server)
             host = f"[{self.host}]" if ":" in self.host else self.host
             address = f"http://{host}:{server.get_port()}"
-            render.result(f"{address} shows {self.source}; Ctrl+C ends it")
             with suppress(KeyboardInterrupt, Terminated):
+                render.result(f"{address} shows {self.source}; Ctrl+C ends it")
                 run()
         return 0
 
