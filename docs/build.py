@@ -1,4 +1,4 @@
-"""Build the generated docs: terrains.md, rules.md, config.md, cli.md, the README's table, pictures.
+"""Build the generated docs: terrains.md, rules.md, config.md, cli.md, pictures.
 
 python docs/build.py              write them
 python docs/build.py TERRAIN...   write all texts, and the pictures of these terrains only
@@ -44,7 +44,6 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 
 DOCS = Path(__file__).parent
 PICTURES = DOCS / "pictures"
-README = DOCS.parent / "README.md"
 NOTE = "<!-- Written by docs/build.py: change the docstrings, not this file. -->\n"
 SEED = 3
 
@@ -57,11 +56,13 @@ def terrains_page() -> str:
         "0 to difficulty 1. Replace it with one value or another range in a",
         "[configuration file](conventions.md#configuration-files) or with `--set`. The pictures",
         "show difficulty 0.1, 0.5 and 1 on patches of 8 m x 8 m, with holes truncated.\n",
-        terrain_table("#"),
+        "| terrain | range | description |",
+        "|---|---|---|",
+        *(summary_row(terrain_doc(name)) for name in registry.terrain_names()),
     ]
     parts += ["", *(terrain_section(terrain_doc(name)) for name in registry.terrain_names())]
     parts += [OVERLAYS, "| overlay | range | description |", "|---|---|---|"]
-    parts += [summary_row(overlay_doc(name), "#") for name in registry.overlay_names()]
+    parts += [summary_row(overlay_doc(name)) for name in registry.overlay_names()]
     for name in registry.overlay_names():
         about = overlay_doc(name)
         parts.append(f"\n### {name}\n\n{about.text}\n\n" + "\n".join(parameter_rows(about)))
@@ -84,12 +85,6 @@ def terrains_page() -> str:
     return "\n".join(parts) + "\n"
 
 
-def terrain_table(link: str) -> str:
-    rows = ["| terrain | range | description |", "|---|---|---|"]
-    rows += [summary_row(terrain_doc(name), link) for name in registry.terrain_names()]
-    return "\n".join(rows)
-
-
 OVERLAYS = """## Overlays
 
 An overlay changes the patches of any terrain. Overlays are applied in the order that is given; see
@@ -97,16 +92,9 @@ An overlay changes the patches of any terrain. Overlays are applied in the order
 """
 
 
-def summary_row(about: TerrainDoc, link: str) -> str:
+def summary_row(about: TerrainDoc) -> str:
     ranges = ", ".join(f"{p.name} {p.easy} to {p.hard}" for p in about.parameters if p.hard)
-    return f"| [{about.name}]({link}{about.name}) | {ranges} | {about.text.splitlines()[0]} |"
-
-
-def readme() -> str:
-    text = README.read_text()
-    before, start, rest = text.partition("<!-- terrains -->\n")
-    _, end, after = rest.partition("<!-- /terrains -->")
-    return before + start + terrain_table("docs/terrains.md#") + "\n" + end + after
+    return f"| [{about.name}](#{about.name}) | {ranges} | {about.text.splitlines()[0]} |"
 
 
 def terrain_section(about: TerrainDoc) -> str:
@@ -320,7 +308,6 @@ def main() -> int:
     }
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
-        stale += ["README.md"] if README.read_text() != readme() else []
         pictures = [
             f"{name}.png"
             for name in (
@@ -338,7 +325,6 @@ def main() -> int:
         return 1 if stale else 0
     for name, text in pages.items():
         (DOCS / name).write_text(text)
-    README.write_text(readme())
     for name in names:
         draw_terrain(name)
     if not names:
