@@ -33,7 +33,8 @@ _ACTION_FACTOR = 0.75
 
 _MAX_ACTION_SCALE = {"revolute": 0.25, "prismatic": 0.025}
 """Largest action scale [rad] or [m], as in legged_gym. mjlab's 0.25 * effort / stiffness is 0.1 rad
-at the hips of the bundled quadruped, which then learned more slowly (docs/training.md)."""
+at the hips of the bundled quadruped, which then learned more slowly
+(benchmarks/results/learning.md)."""
 
 _WHEEL_ACTION_FACTOR = 0.25
 """Share of the largest speed of a wheel that an action of 1 commands."""
@@ -121,7 +122,7 @@ def action_scale_column(
     It is the same for all joints of the legs, but less where it would exceed a share of the effort
     or of the joint range. The target of a wheel, which has no stiffness, is a speed [rad/s]. On a
     robot with legs, it is 0 for the other joints, which hold the default pose: g1 learned to
-    balance only without noise on its arms and waist (docs/training.md).
+    balance only without noise on its arms and waist (benchmarks/results/policies.md).
 
     Args:
         facts: The robot.
