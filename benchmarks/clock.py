@@ -16,7 +16,7 @@ def seconds(function: Callable[[], Any]) -> float:
 
 
 def ratio(function: Callable[[], Any], reference: Callable[[], Any], num_runs: int = 9) -> float:
-    """Return the median run time of `function` divided by that of `reference`."""
+    """Return the ratio of the median run times of `function` and `reference`."""
     function(), reference()
     pairs = [(seconds(function), seconds(reference)) for _ in range(num_runs)]
     return statistics.median(a for a, _ in pairs) / statistics.median(b for _, b in pairs)

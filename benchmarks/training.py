@@ -42,7 +42,7 @@ def run() -> Iterator[tuple[str, float]]:
 
 
 def _relative_speed(env: LeggedEnv) -> float:
-    """Return the speed of the environment divided by that of MuJoCo alone."""
+    """Return the speed of the environment divided by the speed of MuJoCo alone."""
     generator = torch.Generator().manual_seed(0)
     batch, count = env.sim.batch, env.cfg.control.decimation
     mujoco_times, env_times = [], []

@@ -24,10 +24,10 @@ KINDS = ("traceback", "hang", "memory", "files", "executed", "output", "accepted
 is damage that changes the content of an archive with checksums."""
 
 SECONDS = 20
-"""Limit of the CPU time of each process, and a sixth of that of the wall-clock time [s]."""
+"""Limit of the CPU time of each process [s]. The limit of the wall-clock time is six times this."""
 
 MEMORY = 2 << 30
-"""Memory beyond that of an idle command from which there is a failure [bytes]."""
+"""Memory above an idle command's that counts as a failure [bytes]."""
 
 _ADDRESS_SPACE = 8 << 30
 

@@ -145,5 +145,5 @@ EDITS: dict[str, tuple[Mutator, ...]] = {
 
 
 def mutators(suffix: str) -> tuple[Mutator, ...]:
-    """Return the mutators of a file; those of text if its suffix is not known."""
+    """Return the mutators of a file; if its suffix is not known, the mutators of text."""
     return *DAMAGE, *EDITS.get(suffix, _TEXT) * 2

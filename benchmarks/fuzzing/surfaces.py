@@ -40,8 +40,8 @@ class Surface:
 
     hostile: list[dict[str, Any]] = field(default_factory=list)
     """Inputs that are always tried: `file`, `text`, and `repeat`, which follows `times` times. With
-    `find`, the text replaces the first such part of the file. The text of an ONNX file is that of
-    its parser; what is found in it becomes bytes that are no text."""
+    `find`, the text replaces the first such part of the file. The text of an ONNX file is in the
+    syntax of `onnx.parser`; what is found in it becomes bytes that are no text."""
 
     has_plugins: bool = False
     """Whether the folder is a folder of Python packages."""
@@ -69,7 +69,7 @@ def prepare(
         seeds: Folder of its valid files.
         seed: Seed of all inputs.
         index: Number of the input.
-        data: Content that replaces that of the damaged file.
+        data: Content that replaces the content of the damaged file.
     """
     rng, hostile = Random(f"{seed} {surface.name} {index}"), surface.hostile[index : index + 1]
     shutil.copytree(seeds, ".", dirs_exist_ok=True)

@@ -153,7 +153,7 @@ class Mutant:
         return format(value, match[2] or ".9g") if isinstance(value, float) else str(value)
 
     def fill_names(self, templates: Sequence[str]) -> Iterator[str]:
-        """Yield the texts of templates; those of one expression can have several values."""
+        """Yield the texts of templates; a template that is one expression can have several."""
         for template in templates:
             match = _PLACEHOLDER.fullmatch(template)
             value = self.xpath(match[1]) if match and match[1] else self.fill(template)

@@ -26,7 +26,7 @@ def format_numbers(values: Iterable[float], digits: int = 9) -> str:
 
 
 def mirror_names(name: str) -> list[str]:
-    """Return a name, and that of its mirror image if there is one."""
+    """Return a name, and the name of its mirror image if there is one."""
     for left, right in _SIDES:
         for one, other in ((left, right), (right, left)):
             if name.startswith(one):

@@ -119,7 +119,7 @@ class Feasibility(Command):
 
 
 def robot_limits(robot: str, limits: Sequence[str]) -> "DerivedLimits":
-    """Return the limits of a robot with those of --limit.
+    """Return the limits of a robot, overridden by --limit.
 
     Raises:
         ConfigError: if there is no such robot, it has no legs, or a limit is invalid.

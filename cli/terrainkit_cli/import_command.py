@@ -65,6 +65,6 @@ def _report_lines(report: "ImportReport", *, has_solids: bool) -> list[str]:
         lines.append(
             f"overhangs over {report.overhang_area:.2f} m2, of which {report.lost_area:.2f} m2 are "
             f"lost; largest error {report.max_error:.3f} m at ({x:.2f}, {y:.2f})"
-            + ("" if has_solids else "; --solids keeps those of closed bodies")
+            + ("" if has_solids else "; --solids keeps overhangs of closed bodies")
         )
     return lines

@@ -54,7 +54,7 @@ class Onboard(Command):
 
     name: Annotated[str, option("NAME")] = ""
     """Name of the robot, of its tasks in training frameworks and of their packages, such as
-    my_robot; by default that of the file."""
+    my_robot; by default the robot's name in the file."""
 
     base: Literal["auto", "floating", "fixed"] = "auto"
     """Type of the base: floating, or fixed to the world. With auto, it is floating if the file

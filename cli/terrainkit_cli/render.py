@@ -78,7 +78,7 @@ def has_colors() -> bool:
 
 
 def width() -> int:
-    """Return the width of a report: that of the terminal, from 60 to 120 columns."""
+    """Return the width of a report: the width of the terminal, from 60 to 120 columns."""
     return min(max(shutil.get_terminal_size().columns, 60), 120)
 
 
@@ -93,7 +93,7 @@ def error(message: str) -> None:
 
 
 def _print_message(message: str) -> None:
-    with suppress(OSError):  # such as that of a closed terminal
+    with suppress(OSError):  # such as from a closed terminal
         print(f"terrainkit: {_relative_paths(message)}", file=sys.stderr, flush=True)
 
 
@@ -193,7 +193,7 @@ def drop_stdout() -> None:
 
 
 LINE_INTERVAL, TERMS_INTERVAL = 10, 50
-"""Iterations between lines without a terminal: those of progress, those of success and rewards."""
+"""Iterations between lines of progress, and of success and rewards, if there is no terminal."""
 
 
 @contextmanager
@@ -218,7 +218,7 @@ def _training_line(progress: "TrainingProgress") -> None:
         terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
         rewards = [f"{name} {value}" for name, value in _training_rewards(progress)]
         lines.append(terms + rewards)
-    with suppress(OSError):  # such as that of a closed terminal
+    with suppress(OSError):  # such as from a closed terminal
         for line in filter(None, lines):
             print(f"iteration {iteration}/{last}: {', '.join(line)}", file=sys.stderr, flush=True)
 

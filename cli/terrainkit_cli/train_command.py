@@ -30,8 +30,8 @@ class Train(ConfigCommand):
     and number of threads give the same policy. With torchrun, each process simulates a part of the
     environments.
 
-    The options of the groups below are the values of the task; the defaults shown are those of
-    ROBOT, --resume and --config.
+    The options of the groups below are the values of the task; the defaults shown come from ROBOT,
+    --resume and --config.
     """
 
     ALIASES: ClassVar[Mapping[str, str]] = {
@@ -44,7 +44,7 @@ class Train(ConfigCommand):
     """Name of a bundled task, or a folder written by terrainkit onboard."""
 
     config: Annotated[str, option("PATH")] = ""
-    """Task file (.toml) whose values override those of ROBOT; options override both."""
+    """Task file (.toml) whose values override the robot's task; options override both."""
 
     terrain: TerrainName = ""
     """plane (the default), a map (.npz), or a map config (.toml)."""
@@ -53,11 +53,11 @@ class Train(ConfigCommand):
     """Folder of the run, new or empty; by default logs/ROBOT/DATE-TIME."""
 
     resume: Annotated[str, option("RUN")] = ""
-    """Continue a run: its folder, or one of its checkpoints. Robot, terrain and task default to
-    those of the run. Training continues in the same folder, as if it had not been interrupted.
-    With another terrain or task, a new run starts with the networks of this run. It also starts
-    with its optimizer state if --algorithm.learning-rate and --algorithm.schedule are the same, and
-    with its terrain levels if the map is the same."""
+    """Continue a run: its folder, or one of its checkpoints. Robot, terrain and task default to the
+    run's own. Training continues in the same folder, as if it had not been interrupted. With
+    another terrain or task, a new run starts with the networks of this run. It also starts with its
+    optimizer state if --algorithm.learning-rate and --algorithm.schedule are the same, and with its
+    terrain levels if the map is the same."""
 
     device: Device = "cpu"
     """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""
@@ -71,7 +71,7 @@ class Train(ConfigCommand):
 
     @classmethod
     def load_config(cls, words: Sequence[str]) -> "Task":
-        """Return the task before options: that of the run, or of the robot; then --config."""
+        """Return the task before options: the task of the run or the robot, then --config."""
         given, rest = cls.split(words)
         if resume := given.get("resume"):
             from terrainkit_robots.rl.run import open_run

@@ -157,7 +157,7 @@ def open_checkpoint(
 ) -> Iterator[dict[str, Any]]:
     """Yield the content of a checkpoint after checking that it fits a robot and its observations.
 
-    Errors in the block, such as those of `check_state`, become ConfigErrors that name the file.
+    Errors in the block, such as an error of `check_state`, become ConfigErrors that name the file.
 
     Args:
         path: The checkpoint.

@@ -23,9 +23,9 @@ class LearningProgressSampler(UniformSampler):
     of which follows faster. It is 0 on patches that always or never succeed. Half of it counts
     for the adjacent levels, where the next progress is likely. From I. Kanitscheider
     et al., Multi-task curriculum learning in a complex, visual, hard-exploration domain: Minecraft,
-    2021 (arXiv:2106.14876); the absolute value and the share of uniform samples are those of
-    R. Portelas et al., Teacher algorithms for curriculum learning of Deep RL in continuously
-    parameterized environments, 2019 (arXiv:1910.07224).
+    2021 (arXiv:2106.14876); the absolute value and the share of uniform samples from R. Portelas
+    et al., Teacher algorithms for curriculum learning of Deep RL in continuously parameterized
+    environments, 2019 (arXiv:1910.07224).
     """
 
     def __init__(self, rows: int, cols: int, num_envs: int, **options: Any) -> None:

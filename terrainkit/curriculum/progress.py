@@ -20,8 +20,8 @@ class CommandProgress:
     yaw rate, and walks at the commanded velocity in the frame that turns with it. The progress of a
     robot is the integral of its velocity along the velocity of the reference, in the world frame.
     At no time is it larger than the distance that was commanded until then, so that sliding down
-    a slope gains nothing. The yaw of the reference starts at that of the robot, again with
-    each new linear velocity command, so that small errors of the yaw rate do not add up.
+    a slope gains nothing. The reference takes over the robot's yaw at the start and with each new
+    linear velocity command, so that small errors of the yaw rate do not add up.
 
     legged_gym compares the distance from the spawn origin with the commanded speed times the length
     of the episode. By this measure, a robot succeeds that drifts sideways, or slides down a
@@ -80,7 +80,7 @@ class CommandProgress:
             command: Commanded velocity of the step, forward and left [m/s], shape (n, 2) or more
                 columns.
             yaw_rate: Commanded yaw rate of the step [rad/s], shape (n,). If headings are commanded,
-                it is that of the reference: compute it from the attribute `yaw`.
+                the yaw rate of the reference: compute it from the attribute `yaw`.
             dt: Length of the step [s].
         """
         new = to_numpy("command", command)[:, :2].astype(np.float64)

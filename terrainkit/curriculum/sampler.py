@@ -115,8 +115,8 @@ class PatchSampler:
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Continue from a :meth:`state_dict` of a sampler with the same map and seed.
 
-        With another number of environments, those of a column get the levels that the environments
-        of this column had.
+        If the number of environments differs, the saved levels of each column are repeated or cut
+        to its new number of environments.
 
         Raises:
             ConfigError: if the state belongs to another map, or to another sampler.

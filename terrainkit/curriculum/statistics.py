@@ -54,7 +54,7 @@ def add_to_means(
     Args:
         means: Running mean of each patch, shape (rows, cols).
         patches: Patch of each value, row times columns plus column, shape (k,).
-        values: Values, shape (k,). Those of the same patch are averaged first.
+        values: Values, shape (k,). Values of the same patch are averaged first.
         decay: Weight of the previous mean for each value.
     """
     count = np.bincount(patches, minlength=means.size).reshape(means.shape)

@@ -33,8 +33,8 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         path: Target; the arrays have the same name with the suffix .npz.
 
     Raises:
-        ExportError: if the name is not that of a Python module, the map has several friction
-            coefficients, or solids that only collide or are only visible.
+        ExportError: if the file name is not the name of a Python module, the map has several
+            friction coefficients, or solids that only collide or are only visible.
     """
     if not path.stem.isidentifier() or keyword.iskeyword(path.stem):
         raise ExportError(

@@ -77,7 +77,7 @@ _GEOM_DEFAULTS = {
     "gap": 0,
     "rgba": (0.55, 0.55, 0.52, 1),
 }
-"""The attributes of geoms that do not set them. The friction is that of the map."""
+"""Default attributes of geoms. The friction is the friction of the map."""
 
 SITE_DEFAULTS = {
     "type": "box",
@@ -214,9 +214,9 @@ class Model:
             yield {"name": f"goal_{row}_{col}_{k}", "pos": pos, "quat": quat}
 
     def _friction(self, friction: float) -> dict[str, Any]:
-        """Return the attributes of a geom whose friction is not that of the map.
+        """Return the attributes of a geom with its own friction.
 
-        Its priority is above that of a robot, since MuJoCo otherwise uses the larger of two
+        Its priority is higher than a robot's, since MuJoCo otherwise uses the larger of two
         frictions. NaN is the friction of the map.
         """
         static = self.terrain_map.config.static_friction
@@ -373,7 +373,7 @@ def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Pa
 def _write_hfield(
     file: TextIO, name: str, heights: NDArray[np.float32], part: _Part, cell: float
 ) -> None:
-    """Write the heightfield of a part, row by row; the first row is that of the largest y."""
+    """Write the heightfield of a part, row by row; the first row has the largest y."""
     low = float(heights[_on_map(part, heights.shape)].min())
     # Samples beyond the map, where there is no border, have the height of its edge.
     x, y = (

@@ -65,7 +65,7 @@ def require_whole_solids(terrain_map: TerrainMap, what: str) -> None:
 
 
 def warn_about_losses(terrain_map: TerrainMap, what: str) -> None:
-    """Warn about friction and visibility, of which `what` has only those of the ground."""
+    """Warn if the map has several frictions or partial solids, which `what` cannot represent."""
     if count := _num_partial_solids(terrain_map):
         warnings.warn(
             f"{what} has the solids that collide, visible or not: "

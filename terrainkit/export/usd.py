@@ -133,7 +133,7 @@ def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> No
 
 
 def _solid_material(usd_stage: Any, friction: float, contact: dict[str, float]) -> Any:
-    """Return the material of solids with this friction; NaN for that of the ground."""
+    """Return the material of solids with this friction; NaN is the friction of the ground."""
     if np.isnan(friction):
         return _material(usd_stage, "ground_material", contact)
     name = f"friction_{friction:g}".replace(".", "_").replace("-", "_")

@@ -78,7 +78,7 @@ class FootholdGraph:
         )
 
     def demand(self, edges: Edges) -> FloatArray:
-        """Return the demand of each edge, those of its nodes included, shape (n,)."""
+        """Return the demand of each edge and its two nodes, shape (n,)."""
         nodes = np.maximum(self.node_demand[edges.start], self.node_demand[edges.end])
         ratios = [ratio(name, values, self.limits) for name, values in _quantities(edges)]
         return largest([nodes, *ratios])

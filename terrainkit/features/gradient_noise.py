@@ -64,7 +64,7 @@ def fractal_noise(
             are left out.
         octaves: Number of octaves.
         rng: Generator of the random numbers.
-        gain: Amplitude of an octave divided by that of the one before.
+        gain: Ratio of the amplitudes of an octave and the previous octave.
     """
     total = perlin_noise(grid, wavelength, rng)
     for k in range(1, octaves):

@@ -154,7 +154,7 @@ class Archive:
         check_memory(needed, f"{key} in {self.path}")
 
     def check_value(self, key: str, expected: float | tuple[float, ...]) -> None:
-        """Raise MapFileError if the values of `key` differ from those of the config."""
+        """Raise MapFileError if the values of `key` differ from the values in the config."""
         found = self.array(key, "f8", np.shape(expected))
         if not np.allclose(found, expected, rtol=1e-9, atol=1e-9):
             raise MapFileError(

@@ -7,7 +7,7 @@ from terrainkit.errors import MemoryLimitError
 
 _CONTROL_GROUPS = Path("/sys/fs/cgroup")
 _OWN_GROUP = Path("/proc/self/cgroup")
-"""Where Linux lists the control groups (version 2), and those of this process."""
+"""Where Linux lists the control groups (version 2), and the groups of this process."""
 
 MIN_CHECKED_BYTES = 1 << 28
 """Requests below this size always pass [bytes]."""

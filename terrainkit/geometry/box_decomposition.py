@@ -21,7 +21,7 @@ height, since the time would grow with its square. Below it, a box may extend un
 the edge of the block, where it can merge with one in the next block."""
 
 _BYTES_PER_CELL = 17
-"""Peak memory per cell without that of the boxes, which are few [bytes]; measured: 15 to 16."""
+"""Peak memory per cell, without the boxes, which are few [bytes]; measured: 15 to 16."""
 
 MAX_LENGTHS = (16.0, 32.0)
 """Distances along x and y at which a row of merged boxes is divided [m]. Long boxes enlarge many

@@ -67,8 +67,8 @@ def free_intervals(
 def clearance(heights: NDArray[np.float64], bounds: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the free height above the ground on each vertical line [m], shape (n,).
 
-    It is inf under the open sky, and 0 where a solid covers the ground. The arguments are those of
-    :func:`free_intervals`.
+    It is inf under the open sky, and 0 where a solid covers the ground. The arguments are the same
+    as in :func:`free_intervals`.
     """
     bottom, top = bounds[..., 0], bounds[..., 1]
     above = top > heights[:, None] + CONTACT  # solids within the ground do not count; NaN is False

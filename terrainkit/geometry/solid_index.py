@@ -162,9 +162,9 @@ def _half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]
 
     Returns:
         Unit normal n and distance d of each, shape (k, 4): the points p with n . p <= d; and the
-        number of half-spaces of each solid, shape (n,). Those of a cylinder are the sides of the
-        box around it. Widening the round side of a cylinder that lies on the ground would also
-        raise it; the box limits its height.
+        number of half-spaces of each solid, shape (n,). The half-spaces of a cylinder include the
+        sides of its bounding box. Widening the round side of a cylinder that lies on the ground
+        would also raise it; the box limits its height.
     """
     shapes = np.concatenate([solids.boxes, solids.cylinders])
     normals = np.swapaxes(rotation_matrices(shapes[:, 6:]), 1, 2)

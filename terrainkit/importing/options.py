@@ -52,7 +52,7 @@ class ImportOptions(ReadOptions):
     """
 
     cell: Size | None = None
-    """Distance between two samples of the map [m]; none: that of the file, 0.1 for meshes."""
+    """Distance between two samples of the map [m]; none: as in the file, 0.1 for meshes."""
 
     missing: Missing = "reject"
     """Missing heights: an error, the nearest height, or the lowest height of the map."""
@@ -71,7 +71,7 @@ class ImportOptions(ReadOptions):
     """Size of a patch along x and y [m]; none: as large as fits."""
 
     border: NonNegative = 0.0
-    """Width of the ground around the patches [m]: that of the file, and its edge beyond."""
+    """Width of the ground around the patches [m]; heights are from the file, beyond it its edge."""
 
     slope_threshold: Size | None = 0.75
     """Slope between two samples above which the ground becomes a vertical wall; none: no walls."""

@@ -141,7 +141,7 @@ def make_raster(
 def _scale_and_offset(
     path: Path, dtype: np.dtype[Any], options: ReadOptions, scale: float | None, offset: float
 ) -> tuple[float, float]:
-    """Return the height of a unit and of the value 0 [m]: those of the options, or of the file."""
+    """Return the height of a unit and of the value 0 [m], from the options or the file."""
     if options.height_range:
         if dtype.kind != "u":
             raise ConfigError(

@@ -1,6 +1,6 @@
 """Source: heights that can be sampled at any position, and the readers of files.
 
-Positions are those of the file: x to the right and y up for images, east and north for grids.
+Positions are in the file's frame: x to the right and y up for images, east and north for grids.
 """
 
 from collections.abc import Callable, Mapping

@@ -41,9 +41,9 @@ def terrain_entity_cfg(
 ) -> TerrainEntityCfg:
     """Return the configuration of a terrain entity with the map, centered at the world origin.
 
-    mjlab's own terrain generator places one sub-terrain for each column of the map, so that levels,
-    origins, bounds and names in the log are those of its curriculum. The flat patches `spawn` and
-    `goal` are the spawn positions and the goals of the map.
+    mjlab's own terrain generator places one sub-terrain for each column of the map, so that its
+    curriculum works with the map: levels, origins, bounds and names in the log. The flat patches
+    `spawn` and `goal` are the spawn positions and the goals of the map.
 
     Args:
         path: Path of a .npz file. mjlab writes its configuration to a file, so a map itself is not

@@ -131,7 +131,7 @@ class MapConfig(Config):
 
     @cached_property
     def sub_terrains(self) -> tuple[SubTerrain, ...]:
-        """The sub-terrains of the map: the custom ones, or those of the preset."""
+        """The sub-terrains of the map: `terrains`, or the sub-terrains of the preset."""
         return self.terrains or presets.get_preset(self.preset)
 
     @property

@@ -26,7 +26,7 @@ but is the stream of the spawn positions of the same patch, `SPAWNS_STREAM`."""
 
 _COLUMN_KEY = (2,)
 """Spawn key of the random numbers of a column, since [seed, col] alone equals [seed, col, 0]. The
-stream is that of the first overlay on patch (col, 0), `OVERLAYS_STREAM`."""
+first overlay on patch (col, 0), `OVERLAYS_STREAM`, has the same stream."""
 
 
 def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:

@@ -64,7 +64,7 @@ def _diff_configs(a: MapConfig, b: MapConfig) -> Iterator[str]:
 
 
 def _values(config: MapConfig) -> dict[str, Any]:
-    """Return the values of a config by key; those of sub-terrains as `terrains[0].proportion`."""
+    """Return the values of a config by key; keys of sub-terrains are `terrains[0].proportion`."""
     table = config.to_table()
     for k, sub_terrain in enumerate(table.pop("terrains", ())):
         values = sub_terrain.to_table()

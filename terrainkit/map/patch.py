@@ -57,7 +57,7 @@ class PatchParameters:
     """Values after snapping to the cells, by name; (x, y) where the two axes differ."""
 
     def differing(self, other: "PatchParameters") -> list[str]:
-        """Return the names of the parameters that differ from those of `other`."""
+        """Return the names of the parameters that differ between this and `other`."""
         pairs = (self.requested, other.requested), (self.realized, other.realized)
         names = dict.fromkeys([*self.requested, *other.requested])
         return [name for name in names if any(a.get(name) != b.get(name) for a, b in pairs)]

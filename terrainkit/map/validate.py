@@ -122,7 +122,7 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
         )
     if patch.parameters != expected.parameters:
         yield (
-            f"{location}: the recorded parameters differ from those of its config: "
+            f"{location}: the recorded parameters differ from its config: "
             f"{listing(patch.parameters.differing(expected.parameters))}"
         )
     is_same = {
@@ -133,10 +133,10 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
     }
     for what, same in is_same.items():
         if not same:
-            yield f"{location}: the {what} differ from those of its config"
+            yield f"{location}: the {what} differ from its config"
     moved = float(np.abs(patch.origin[:2] - expected.origin[:2]).max())
     if moved > TOLERANCE:
-        yield f"{location}: the spawn origin is {moved:.3f} m from that of its config"
+        yield f"{location}: the spawn origin is {moved:.3f} m from its place in the config"
     if expected.spawn_offset > expected.grid.cell:
         yield (
             f"{location}: no flat disk at the spawn position of {expected.terrain}: the origin is "

@@ -27,7 +27,7 @@ class Noise(Overlay):
     """Largest change of the heights, up and down [m]."""
 
     pattern: str = parameter.choice("uniform", "perlin")
-    """Independent heights at equidistant points like those of `rough`, or hills like `perlin`."""
+    """Independent heights at equidistant points, as in `rough`, or hills, as in `perlin`."""
 
     spacing: float = parameter.scalar(0.2, allow_zero=False)
     """Distance between two random heights or gradients [m]; about the diameter of a hill."""

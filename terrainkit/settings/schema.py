@@ -34,7 +34,7 @@ class Config:
     """
 
     def __post_init__(self) -> None:
-        """Validate every field, those of a subclass included.
+        """Validate every field, including the fields of a subclass.
 
         Raises:
             ConfigError: if a value has the wrong type or is out of range.
@@ -155,7 +155,7 @@ def is_required(field: "dataclasses.Field[Any]") -> bool:
 
 
 def flatten(config: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield name and value of each field, those of nested configs included ("env.num_envs")."""
+    """Yield name and value of each field, including fields of nested configs ("env.num_envs")."""
     kind: Any = type(config)
     for name in field_types(kind) if isinstance(config, Config) else ():
         value = getattr(config, name)

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 class Overlay(Parameterized, Config, ABC):
     """A change to the patches of any terrain.
 
-    An overlay is a frozen dataclass with the method :meth:`apply`. Its fields are declared like
-    those of a terrain. Unlike a terrain, it may hold ranges (easy, hard), as its defaults do:
-    :meth:`at` interpolates them.
+    An overlay is a frozen dataclass with the method :meth:`apply`. Its fields are declared like a
+    terrain's. Unlike a terrain, it may hold ranges (easy, hard), as its defaults do: :meth:`at`
+    interpolates them.
     """
 
     def __post_init__(self) -> None:

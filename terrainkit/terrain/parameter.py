@@ -259,7 +259,7 @@ def convert_range(
 ) -> Value | tuple[Value, Value]:
     """Return `value`, which may be a range (easy, hard), as the type of the parameter.
 
-    A list is a tuple. The arguments are those of :func:`convert_parameter`.
+    A list becomes a tuple. The arguments are the same as in :func:`convert_parameter`.
 
     Raises:
         ConfigError: if a value has another type or is out of range, or a range is not allowed.

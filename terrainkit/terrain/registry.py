@@ -100,12 +100,12 @@ def _registered_names(group: _Group) -> tuple[str, ...]:
 def register_terrain(terrain: _Terrain) -> _Terrain:
     """Register a terrain class, so that its name can be used in TOML and in maps.
 
-    The name is that of the class in snake_case, `my_terrain` for `MyTerrain`. A class that is
-    defined again, as in a notebook, replaces the previous one. Use it as a decorator above
-    `@dataclass`, or as a function.
+    The name is the class name in snake_case, `my_terrain` for `MyTerrain`. A class that is defined
+    again, as in a notebook, replaces the previous one. Use it as a decorator above `@dataclass`, or
+    as a function.
 
     Args:
-        terrain: The class. Nothing changes if it is built in, or that of an installed package.
+        terrain: The class. Nothing changes if it is built in or belongs to an installed package.
 
     Returns:
         `terrain`.
@@ -138,7 +138,7 @@ def _register(group: _Group, item: Any) -> None:
             _get.cache_clear()
     elif existing is not item:
         raise ConfigError(
-            f"the name {name!r} of {_path(item)} is that of {_path(existing)}; expected another "
+            f"the name {name!r} of {_path(item)} is taken by {_path(existing)}; expected another "
             "class name"
         )
 
@@ -172,7 +172,7 @@ def _path(item: type[Any]) -> str:
 
 
 def get_terrain(name: str) -> type[Terrain]:
-    """Return the terrain class `name`: a built-in or registered one, or that of a plugin.
+    """Return the terrain class `name`, which is built in, registered, or from a plugin.
 
     Raises:
         ConfigError: if there is no such terrain, or a plugin cannot be loaded.
@@ -181,7 +181,7 @@ def get_terrain(name: str) -> type[Terrain]:
 
 
 def get_overlay(name: str) -> type[Overlay]:
-    """Return the overlay class `name`: a built-in or registered one, or that of a plugin.
+    """Return the overlay class `name`, which is built in, registered, or from a plugin.
 
     Raises:
         ConfigError: if there is no such overlay, or a plugin cannot be loaded.

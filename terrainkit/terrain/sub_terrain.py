@@ -133,7 +133,7 @@ class SubTerrain(Config):
 
     @cached_property
     def declarations(self) -> dict[str, Parameter]:
-        """The parameters of the terrain by name, and those of its overlays by path."""
+        """The parameters of the terrain by name, and the parameters of its overlays by path."""
         with plugin_errors(self.plugin):
             declared = dict(self.at(1.0).declarations())
         for k, overlay in enumerate(self.overlays):
@@ -146,7 +146,7 @@ _FRICTION = Parameter(easy=1.0, hard=1.0)
 
 
 def overlay_path(number: int, name: str) -> str:
-    """Return the name of a parameter of overlay `number` among those of a patch."""
+    """Return the name of a parameter of overlay `number` in the parameters of a patch."""
     return f"overlays[{number}].{name}"
 
 

@@ -46,8 +46,8 @@ class Terrain(Parameterized, ABC):
     """
 
     has_random_heights: ClassVar[bool] = True
-    """Whether :meth:`heights` takes random numbers. Where it does not, maps save the time of
-    creating a generator, which is that of a small patch, and pass None."""
+    """Whether :meth:`heights` takes random numbers. Where it does not, maps pass None: creating a
+    generator takes as long as a small patch."""
 
     def __post_init__(self) -> None:
         for name, parameter in parameters_of(type(self)).items():
@@ -147,7 +147,7 @@ class Terrain(Parameterized, ABC):
         """Return the goals in their order, x, y, z [m] and heading [rad], shape (k, 4).
 
         A z of NaN stands for the height of the ground. By default there are none. The arguments
-        are those of :meth:`solids`.
+        are the same as in :meth:`solids`.
         """
         return np.empty((0, 4))
 

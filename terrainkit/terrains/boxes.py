@@ -43,7 +43,7 @@ class Boxes(FlatTerrain):
     """Side of the square at the center without boxes [m]."""
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
-        """Return the boxes; those of a pyramid are inside each other."""
+        """Return the boxes; the boxes of a pyramid are inside each other."""
         xy, r = self._boxes(grid, rng)
         layers = 1 + (rng.random(len(xy)) * self.layers).astype(np.int64)
         box = np.repeat(np.arange(len(xy)), layers)

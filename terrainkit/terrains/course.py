@@ -123,16 +123,16 @@ class Course(Lane):
         return replace(course, elements=tuple(elements))
 
     def requested(self) -> dict[str, Value]:
-        """Return the parameters before snapping, those of the elements by path."""
+        """Return the parameters before snapping; parameters of elements have paths as keys."""
         names = ", ".join(each.terrain for each in self.elements)
         return {**super().requested(), "elements": names, **dict(self._element_values(None))}
 
     def realized(self, grid: Grid) -> dict[str, Value]:
-        """Return the parameters after snapping, those of the elements by path."""
+        """Return the parameters after snapping; parameters of elements have paths as keys."""
         return {**super().realized(grid), **dict(self._element_values(grid))}
 
     def declarations(self) -> dict[str, Parameter]:
-        """Return the declarations of the parameters, those of the elements by path."""
+        """Return the declared parameters; parameters of elements have paths as keys."""
         declared = super().declarations()
         for k, (element, terrain) in enumerate(zip(self.elements, self._terrains, strict=True)):
             if element.element_length is not None:
@@ -168,7 +168,7 @@ class Course(Lane):
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
-        """Return a goal in the middle of each platform but that of the spawn."""
+        """Return a goal in the middle of each platform except the spawn platform."""
         spans = [span for _, span in self._layout(grid, rng)]
         begin, end = [0, *(each.stop for each in spans)], [*(each.start for each in spans)]
         middle = np.add(begin, [*end, grid.shape[0]]) / 2
@@ -262,5 +262,5 @@ def _child(rng: np.random.Generator) -> np.random.Generator:
 
 
 def _path(number: int, name: str = "") -> str:
-    """Return the name of an element, or of one of its parameters, among those of the course."""
+    """Return the path of an element, or of one of its parameters, in the course's parameters."""
     return f"elements[{number}].{name}".rstrip(".")

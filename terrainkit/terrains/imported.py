@@ -47,7 +47,7 @@ class Imported(Terrain):
     """Part of the file."""
 
     vertical_exaggeration: float = parameter.scalar(0.2, 1.0)
-    """Factor of the heights; 1 for those of the file."""
+    """Factor of the heights; 1 keeps the heights of the file."""
 
     platform: float = parameter.platform(2.0, slopes_away=True)
     """Side of the flat square at the center [m]."""

@@ -129,8 +129,8 @@ def foot_contacts(radius: float, cell: float) -> int:
 def box_step_time(num_boxes: int) -> float:
     """Return the estimated time of a step on boxes, relative to a plane.
 
-    It is linear in the logarithm of the number of boxes between those of `BOX_COSTS`, and beyond
-    the largest of them.
+    Between the entries of `BOX_COSTS`, and beyond the last one, it is linear in the logarithm of
+    the number of boxes.
     """
     logs, costs = np.log(list(BOX_COSTS)), list(BOX_COSTS.values())
     log = math.log(max(num_boxes, 1))

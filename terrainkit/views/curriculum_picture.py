@@ -13,8 +13,8 @@ _MAX_LABEL = 40
 def draw_statistics(statistics: PatchStatistics, terrain_names: NDArray[np.str_]) -> bytes:
     """Return a PNG with a row per column of the map, and a cell per level.
 
-    The color of a cell is the success; the number is that of the episodes. A cell without one is
-    gray.
+    The color of a cell is the success, and its number is the number of episodes. A cell without
+    episodes is gray.
 
     Args:
         statistics: Statistics of the patches of a map.

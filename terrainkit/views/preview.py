@@ -128,7 +128,7 @@ def render_preview(
     height, span = ground.shape[:2]
     image = np.full((height + above + below, span + left + right, 3), _BACKGROUND, dtype=np.uint8)
     image[above : above + height, left : left + span] = ground
-    tops = terrain_map.solids.bounds()[1][:, 2]  # the color of a solid is that of its top
+    tops = terrain_map.solids.bounds()[1][:, 2]  # the color of a solid shows the height of its top
     low = min(float(heights.min()), tops.min(initial=np.inf))
     high = max(float(heights.max()), tops.max(initial=-np.inf))
     _draw_color_bar(image[above : above + height, left + span :], low, high)

@@ -1,7 +1,7 @@
 """Run the block of docs/integrations.md in MuJoCo Playground with MJX on the CPU.
 
 `make integrations` runs it. Playground clones MuJoCo Menagerie for the meshes of the robot, which
-robots do not collide with; here they are those of mjlab's wheel.
+robots do not collide with; here the meshes of mjlab's wheel replace them.
 """
 
 import importlib.util

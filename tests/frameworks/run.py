@@ -39,7 +39,7 @@ CHECKOUTS = {"leggedgym_ex": "LEGGEDGYM_EX", "legged_gym": "LEGGED_GYM"}
 environment, in which terrainkit is not installed."""
 
 PYTHONS = {"legged_gym": "3.8", "isaaclab3": "3.12"}
-"""Version of Python of an environment, where it is not that of this program."""
+"""Version of Python of an environment, where it is not the version that runs this program."""
 
 KEPT = ("mjlab", "isaaclab3")
 """Environments in which an installation of terrainkit must not change another package."""

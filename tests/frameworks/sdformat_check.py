@@ -32,4 +32,4 @@ for preset, rows in (("parkour", 4), ("legged_gym", 10)):
         assert valid in text
         broken.write_text(text.replace(valid, invalid, 1))
         assert not is_valid(broken), invalid
-    print(f"libsdformat 12: {preset} is valid; the errors above are those of broken files")
+    print(f"libsdformat 12: {preset} is valid; the errors above are from broken files")

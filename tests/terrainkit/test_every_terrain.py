@@ -184,7 +184,7 @@ def test_every_terrain_depends_on_the_seed(terrain, given_parameters):
 
 @every_terrain
 def test_every_terrain_depends_on_shape_cell_and_generator_only(terrain, given_parameters):
-    """Check that the heights are those of an earlier build, another place and global state."""
+    """Check that an earlier build, another place and global state do not change the heights."""
     here, there = (
         Grid(shape=(73, 51), cell=0.1, lower=lower) for lower in ((0.0, 0.0), (72.0, -13.0))
     )

@@ -49,7 +49,7 @@ class Sort(Command):
 
 
 def parsed(*words):
-    """Return the values that words set, without those of `file`."""
+    """Return the values that words set, without the value of `file`."""
     values, default = asdict(Sort.parse(words)), asdict(Sort.parse(["a"]))
     return {name: value for name, value in values.items() if value != default[name]}
 

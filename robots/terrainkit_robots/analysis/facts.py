@@ -265,7 +265,7 @@ class Facts:
 
     @cached_property
     def uncopied_pairs(self) -> tuple[MirrorPair, ...]:
-        """The pairs of mirrored joints without those of copied assemblies, parents first."""
+        """The pairs of mirrored joints outside copied assemblies, parents first."""
         copied = {pair.left.body.index for pair in self.copied_pairs}
         return tuple(p for p in self.mirror_pairs if p.left.body.index not in copied)
 

@@ -164,8 +164,8 @@ class Geometry:
     """Coefficient of sliding friction; MJCF only."""
 
     priority: int = 0
-    """Priority of `friction` and `condim` over those of the other geometry of a contact; MJCF
-    only."""
+    """Priority of `friction` and `condim`; the geometry of a contact with the higher priority
+    decides. MJCF only."""
 
     condim: int = 3
     """Dimension of the contact space: 1 without friction; MJCF only."""

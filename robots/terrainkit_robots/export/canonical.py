@@ -1,8 +1,8 @@
 """Convert a robot to a canonical form that URDF and MJCF can represent.
 
-Links are those of the main tree, each after its parent. Axes are unit vectors, positions count from
-the zero of the file, and masses are numbers. What cannot be represented is removed and listed in
-`changes`.
+Only the links of the main tree are kept, each after its parent. Axes are unit vectors, positions
+are measured from the zero of the file, and masses are numbers. What cannot be represented is
+removed and listed in `changes`.
 """
 
 import re

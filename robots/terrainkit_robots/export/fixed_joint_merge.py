@@ -17,7 +17,7 @@ from terrainkit_robots.transforms import Matrix
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MergedRobot:
-    """A robot whose only fixed joints are those of its feet."""
+    """A robot whose only fixed joints are at its feet."""
 
     model: RobotModel
 

@@ -98,7 +98,7 @@ class Violation:
     """Name of the link, joint, mesh or file. By default, the name of the element."""
 
     source: Source | None = None
-    """File and line. By default, those of the element."""
+    """File and line. By default, file and line of the element."""
 
     hint: str = ""
     """How to correct it. By default, the `Fix:` section of the rule."""

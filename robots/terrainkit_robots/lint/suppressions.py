@@ -154,7 +154,7 @@ def _scope(
 ) -> tuple["etree._Element", "etree._Element | None"]:
     """Return the element to which a comment applies, and a parent to which it applies as well.
 
-    The comment applies to the children of the element, but not to those of the parent.
+    The comment applies to the children of the element, but not to the other children of the parent.
     """
     parent = comment.getparent()
     if parent is None:

@@ -1,6 +1,6 @@
 """Compare written robot files with their source: link poses, masses and joint inertias.
 
-The kinematics of the source are computed by this package, those of the written files by MuJoCo.
+This package computes the kinematics of the source, and MuJoCo the kinematics of the written files.
 """
 
 import math

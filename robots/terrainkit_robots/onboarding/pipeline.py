@@ -57,7 +57,7 @@ class OnboardOptions:
     """Training frameworks to write a configuration for."""
 
     name: str = ""
-    """Name of the robot and of its tasks; by default that of the file."""
+    """Name of the robot and of its tasks; by default the robot's name in the file."""
 
     floating: bool | None = None
     """Whether the base is floating; None to decide from the file and the legs."""

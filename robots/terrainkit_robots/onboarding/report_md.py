@@ -221,7 +221,7 @@ def _simulators(robot: "RobotFiles") -> Iterator[str]:
             lines += [f"to_{order.key} = {to}", f"from_{order.key} = {back}"]
     if lines:
         yield (
-            "Permutations between the order of robot.toml and that of a simulator: "
+            "Permutations between the order of robot.toml and the order of a simulator: "
             "`simulator_values = [values[i] for i in to_...]`.\n"
         )
         yield from ("```python", *lines, "```\n")

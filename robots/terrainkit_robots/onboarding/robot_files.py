@@ -83,7 +83,7 @@ def make_robot_files(
 
     Args:
         source: Facts of the source file.
-        name: Name of the robot; by default that of the overriding spec or the file.
+        name: Name of the robot; by default the name in the overriding spec or the file.
         collision: How collision meshes are simplified.
         floating: Whether the base is floating; by default as in the overriding spec or the file,
             or as the legs suggest.

@@ -47,7 +47,7 @@ class EvaluationConfig(Config):
 
     Attributes:
         seconds: Duration of the rollout [s].
-        terrain: Terrain as `load_terrain` takes it; None for that of the training.
+        terrain: Terrain as `load_terrain` takes it; None for the terrain of the training.
         num_envs: Number of robots; None for one per command of the grid, or several per patch.
         command: Command for all robots: forward and left velocity [m/s], yaw velocity [rad/s].
         random_commands: Whether commands are sampled as in training.
@@ -79,10 +79,11 @@ class RolloutMetrics:
     `_1s` are of velocities averaged over 1 s, without the sway of a gait. They are None if no robot
     was measured, and `success`, the fraction of successful robots, is None on a plane.
 
-    The gait is that of robots that are commanded to move, None without any; see :mod:`.gait`.
-    Tuples have one value per foot. The pitch is positive when the nose is down. `asymmetry` is the
-    larger one of swing height and duty factor, `followed` the fraction of robots that reach half of
-    their command's linear and yaw velocity, `cost_of_transport` power / (weight * speed).
+    The gait is measured on robots that are commanded to move, and None without any; see
+    :mod:`.gait`. Tuples have one value per foot. The pitch is positive when the nose is down.
+    `asymmetry` is the larger of the asymmetries of swing height and duty factor, `followed` the
+    fraction of robots that reach half of their command's linear and yaw velocity,
+    `cost_of_transport` power / (weight * speed).
     """
 
     command: tuple[float, ...] | None = None
@@ -212,7 +213,7 @@ def build_eval_env(
 
 
 def is_plane(spec: PolicySpec, terrain: str | None = None) -> bool:
-    """Return whether a terrain, or else that of the training, is a plane."""
+    """Return whether `terrain`, or the terrain of the training if it is None, is a plane."""
     return "plane" in ([terrain] if terrain else [spec.terrain, spec.task.terrain.collision])
 
 

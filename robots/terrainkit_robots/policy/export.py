@@ -150,7 +150,7 @@ def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
 def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     """Return what a controller needs to run a policy: timing, observations, actions and gains.
 
-    Units are SI and radians. Gains are those of the scene without randomization.
+    Units are SI and radians. The gains are not randomized.
     """
     from terrainkit import __version__
 

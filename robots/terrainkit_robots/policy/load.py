@@ -19,7 +19,7 @@ Policy = Callable[[TensorDict], torch.Tensor]
 
 
 def load_policy(spec: PolicySpec, env: LeggedEnv) -> Policy:
-    """Return a policy for `env`; see :func:`load_actor` for that of a run."""
+    """Return a policy for `env`; see :func:`load_actor` for the policy of a run."""
     if (policy := spec.policy) is not None:
         return lambda obs: torch.as_tensor(policy(obs["policy"]))
     if not isinstance(spec, Run):

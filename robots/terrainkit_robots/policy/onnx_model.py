@@ -18,7 +18,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.files.isolated import ProcessLimits
 
 LIMITS = ProcessLimits(seconds=30.0, memory=2 << 30)
-"""Limits of loading a model and of its first call; the time limit is also that of later calls."""
+"""Limits of loading a model and of its first call. Later calls have the same time limit."""
 
 ARENA_SIZE = 1 << 30
 """Memory that the intermediate results of all models of a process may need [bytes]."""
@@ -51,7 +51,7 @@ def load_model(
         # current folder.
         with TemporaryDirectory() as empty, chdir(empty):
             session = make_session(model)
-    except Exception as error:  # those of onnx and onnxruntime have no common class
+    except Exception as error:  # errors of onnx and onnxruntime have no common class
         raise ConfigError(f"not an ONNX file that can be loaded: {error}") from error
     num_obs = _num_observations(session)
     outputs = [each.type for each in session.get_outputs()]
@@ -87,7 +87,7 @@ def call_model(session: onnxruntime.InferenceSession, obs: Any, options: Any = N
     try:
         results = [session.run([output.name], {given.name: part}, options)[0] for part in parts]
         return np.concatenate(results)
-    except Exception as error:  # those of onnxruntime have no common class
+    except Exception as error:  # errors of onnxruntime have no common class
         reason = f"fails: {error}"
         if "BFCArena" in reason:
             reason = f"needs more than {ARENA_SIZE / 2**30:g} GB of memory"

@@ -38,7 +38,7 @@ _COMPARED = "format_version timing observation action control_type joints feet g
 """Keys that state what the policy receives and what its actions do."""
 
 _OF_THE_ROBOT = ("joints.frictionloss", "joints.passive_damping")
-"""Keys that may differ between the robot and that of the training."""
+"""Keys that may differ between the robot and the robot of the training."""
 
 
 class _Description(msgspec.Struct):

@@ -86,7 +86,7 @@ class InitState(Config):
     """Random initial state of an episode. Heights and default pose are in the robot's spec."""
 
     reset_range: NonNegativeInterval | None = None
-    """Factors on the default joint positions; none: those of the robot's spec."""
+    """Factors on the default joint positions; none: from the robot's spec."""
     position: NonNegativeFloat = 0.5
     """Largest offset from the spawn origin along x and along y, where the terrain allows it [m]."""
     yaw: NonNegativeFloat = 3.14159
@@ -99,7 +99,7 @@ class InitState(Config):
 
 @dataclass(frozen=True, kw_only=True)
 class Control(Config):
-    """Actions and PD control. Values that are none are those of the robot's spec."""
+    """Actions and PD control. Values that are none come from the robot's spec."""
 
     control_type: Literal["P", "V", "T"] = "P"
     """Quantity that an action controls: position, velocity or torque of each joint."""
@@ -164,7 +164,7 @@ class DomainRand(Config):
     """Domain randomization."""
 
     friction: NonNegativeInterval | None = (0.5, 1.25)
-    """Friction coefficient of the robot's contacts; none: that of the robot."""
+    """Friction coefficient of the robot's contacts; none: the robot's own."""
     added_mass: Interval | None = (-0.07, 0.07)
     """Mass added to the base, as a fraction of the robot's mass."""
     com_shift: NonNegativeFloat = 0.03

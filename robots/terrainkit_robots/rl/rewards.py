@@ -2,8 +2,8 @@
 
 Each takes the state of n robots and returns n numbers, before the scale and the time step. Scales
 are dimensionless: they fit robots of any size, since a term is divided by its unit in `UNITS`. The
-gait is that of Siekmann et al., Sim-to-Real Learning of All Common Bipedal Gaits via Periodic
-Reward Composition, 2021: each foot has a phase, in which it should be in the air or on the ground.
+gait follows Siekmann et al., Sim-to-Real Learning of All Common Bipedal Gaits via Periodic Reward
+Composition, 2021: each foot has a phase, in which it should be in the air or on the ground.
 """
 
 from collections.abc import Callable

@@ -255,7 +255,7 @@ def last_checkpoint(run: Run) -> Path:
 def prepare_run_folder(
     folder: Path | None, robot: str | Path, terrain: str | Path, task: Task, continued: Run | None
 ) -> Path:
-    """Return the folder to write: that of the continued run, unless it has later checkpoints."""
+    """Return the folder to write: the continued run's, unless it has later checkpoints."""
     if folder is None and continued is not None:
         saved = checkpoints(continued.folder)
         if saved and saved[max(saved)] == continued.checkpoint:

@@ -34,7 +34,7 @@ OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
 
 
 class TrainingProgress(NamedTuple):
-    """The progress of training; means are those of the last 100 episodes."""
+    """The progress of training, with means over the last 100 episodes."""
 
     folder: Path | None
     iteration: int
@@ -283,7 +283,7 @@ class LeggedRunner(OnPolicyRunner):
     def _optimizer_state(self, state: Mapping[str, Any]) -> dict[str, Any]:
         """Return what the optimizer loads from a checkpoint: the moments and the learning rate.
 
-        The other settings are those of the task.
+        The other settings come from the task.
         """
         saved, optimizer = state["optimizer_state_dict"], self.alg.optimizer
         groups = optimizer.state_dict()["param_groups"]

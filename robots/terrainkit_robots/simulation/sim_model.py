@@ -95,7 +95,7 @@ class SimModel:
         return 6 if self.floating else 0
 
     def units(self, name: str) -> JointUnits:
-        """Return the units of a joint. Any other name, such as that of the base, is revolute."""
+        """Return the units of a joint. Any other name, such as the base's, counts as revolute."""
         import mujoco
 
         if name not in self.joints:

@@ -28,7 +28,7 @@ length over the number of legs. A weaker spring does not hold it upright."""
 
 _TRAIN_FACTOR = 0.36
 """Stiffness for training over weight times leg length. It is 0.30 to 0.39 for the gains that a1 and
-go2 (20), h1 (150) and g1 (80 to 100) are trained with, and 0.24 for those of anymal_c (80)."""
+go2 (20), h1 (150) and g1 (80 to 100) are trained with, and 0.24 for anymal_c (80)."""
 
 _MIN_LEG_ERROR = 1.0
 """Error at which a joint of a leg reaches its effort limit, at least [rad]. Published gains of all

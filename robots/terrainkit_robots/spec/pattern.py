@@ -47,7 +47,7 @@ def max_matches(pattern: str, max_length: int) -> int:
     Raises:
         ConfigError: if a group is repeated, which has no such bound, or is of a special kind.
     """
-    # Of each open group: the ways of its finished alternatives, and those of the current one.
+    # Of each open group: the ways of its finished alternatives, and of the current one.
     groups, previous = [[0, 1]], ""
     for token in _TOKEN.findall(pattern):
         if token == "(?":

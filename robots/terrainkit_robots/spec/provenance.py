@@ -12,7 +12,7 @@ def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec
     """Return a spec with the provenance of its values: as derived where equal, else given.
 
     Args:
-        spec: The edited spec. Its own provenance may be that of replaced values.
+        spec: The edited spec. Its own provenance may describe values that were replaced.
         derived: The spec that is derived without it.
         file: File of the edited spec.
     """
@@ -26,7 +26,7 @@ def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec
 def _field_provenance(
     name: str, spec: RobotSpec, derived: RobotSpec, given: Provenance
 ) -> Iterator[tuple[str, Provenance]]:
-    """Yield the provenance of a field, and that of single values of a table."""
+    """Yield the provenance of a field, and of single values of a table."""
     value, derived_value = getattr(spec, name), getattr(derived, name)
     known = {k: v for k, v in derived.provenance.items() if k.partition(".")[0] == name}
     if value == derived_value:

@@ -3,7 +3,7 @@
 Flat quads are merged to rectangles, quads that are flat along one axis to rows, and straight
 walls of constant height to panels with a flat strip on both sides. Each polygon keeps the boundary
 vertices that its neighbors use, so large and small faces share all vertices. The surface is exactly
-that of the full mesh.
+the surface of the full mesh.
 """
 
 import itertools

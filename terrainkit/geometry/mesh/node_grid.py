@@ -69,7 +69,7 @@ class NodeGrid:
         """Raise MemoryLimitError if a mesh would not fit in memory.
 
         Args:
-            num_vertices: Number of vertices without those of quads with walls.
+            num_vertices: Number of vertices, without the vertices of quads with walls.
             quads: Mask of the quads that are not merged.
         """
         x, y = self.walls_x, self.walls_y

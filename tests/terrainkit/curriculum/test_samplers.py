@@ -214,8 +214,8 @@ def test_adaptive_samplers_avoid_what_cannot_be_learned(kind):
 def test_learning_progress_is_the_difference_of_two_means():
     sampler = LearningProgressSampler(4, 1, 4, max_init_level=0)
     sampler.update([0], [1.0])
-    # The means of level 0 are 0.5 and 0.2. A quarter of the difference is that of level 1, and one
-    # more is its own, where there is no level below.
+    # The means of level 0 are 0.5 and 0.2. Level 1 gets a quarter of the difference, and level 0
+    # keeps the quarter of a level below, which does not exist.
     expected = 0.2 / 4 + 0.8 * np.array([3 / 4, 1 / 4, 0, 0])
     assert sampler.probs().ravel() == pytest.approx(expected)
 

@@ -70,7 +70,7 @@ def test_closest_value_is_used_where_extrapolation_does_not_reach_the_demand():
 
 
 def test_elements_of_a_course_are_solved_one_by_one():
-    """Hurdles of 0.2 and 0.9 of the limit of a step, 0.2 m, and gaps of at most that of 0.4 m."""
+    """Hurdles are 0.2 and 0.9 of the step limit, 0.2 m, and gaps up to the gap limit, 0.4 m."""
     hurdles = Element(terrain="hurdles", parameters={"height": (0.05, 0.3)})
     gaps = Element(terrain="gap_track", element_length=4.0)
     solved = solve("course", size=(8.0, 4.0), elements=(hurdles, gaps))
@@ -118,7 +118,7 @@ def test_equal_elements_are_solved_once():
 
 
 def test_overlays_count_at_the_ends_of_the_map():
-    """The demands are those of patches without noise at level 0, and with noise at level 1."""
+    """The demands equal the demands of patches without noise at level 0, with noise at level 1."""
     noise = make_overlay("noise", {"amplitude": (0.0, 0.05)})
     slope = SubTerrain(terrain="slope", overlays=(noise,))
     config = MapConfig(terrains=(slope,), rows=2, cols=3, border=0, patch_size=(6.0, 4.0))

@@ -90,7 +90,7 @@ def test_validate_finds_origin_on_uneven_ground(sound):
     moved, (check, message) = found(moved_origin(sound, 2, 5, origin))
     assert moved == (
         "patches",
-        "patch (2, 5): the spawn origin is 2.000 m from that of its config",
+        "patch (2, 5): the spawn origin is 2.000 m from its place in the config",
     )
     assert check == "spawn"
     assert message.startswith(
@@ -101,7 +101,7 @@ def test_validate_finds_origin_on_uneven_ground(sound):
 def test_validate_finds_moved_origin(sound):
     origin = sound.env_origins[0, 3] + np.float32([0.3, 0, 0])
     assert found(moved_origin(sound, 0, 3, origin)) == [
-        ("patches", "patch (0, 3): the spawn origin is 0.300 m from that of its config")
+        ("patches", "patch (0, 3): the spawn origin is 0.300 m from its place in the config")
     ]
 
 
@@ -133,7 +133,7 @@ def test_validate_finds_spawns_on_one_another(with_spawns):
     edited = changed(with_spawns, "spawns", (0, 0, slice(1, 3), 0), [2.0, 2.75])
     edited = changed(edited, "spawns", (0, 0, slice(1, 3), 1), 4.0)
     assert found(edited) == [
-        ("patches", "patch (0, 0): the spawn positions differ from those of its config"),
+        ("patches", "patch (0, 0): the spawn positions differ from its config"),
         (
             "spawn",
             "patch (0, 0): spawn 2 is 0.750 m from spawn 1; expected at least 1 m, two spawn radii",
@@ -144,7 +144,7 @@ def test_validate_finds_spawns_on_one_another(with_spawns):
 def test_validate_finds_missing_spawn(with_spawns):
     edited = changed(with_spawns, "spawns", (0, 0, 2), np.nan)
     assert found(edited) == [
-        ("patches", "patch (0, 0): the spawn positions differ from those of its config")
+        ("patches", "patch (0, 0): the spawn positions differ from its config")
     ]
 
 

@@ -201,10 +201,10 @@ def test_register_terrain_replaces_class_defined_again():
 @pytest.mark.usefixtures("registered")
 def test_register_terrain_rejects_name_of_another_class():
     registry.register_terrain(make_ramp())
-    with pytest.raises(ConfigError, match=r"'ramp_up' of a\.RampUp is that of __main__\.RampUp; "):
+    with pytest.raises(ConfigError, match=r"'ramp_up' of a\.RampUp is taken by __main__\.RampUp; "):
         registry.register_terrain(make_ramp("a"))
     stairs = type("Stairs", (registry.get_terrain("stairs"),), {"__module__": "a"})
-    with pytest.raises(ConfigError, match=r"'stairs' of a\.Stairs is that of terrainkit\.t"):
+    with pytest.raises(ConfigError, match=r"'stairs' of a\.Stairs is taken by terrainkit\.t"):
         registry.register_terrain(dataclass(frozen=True, kw_only=True)(stairs))
 
 
@@ -319,7 +319,7 @@ def test_map_of_own_overlay_needs_registration(tmp_path):
             dataclass(frozen=True, kw_only=True)(
                 type("Mirror", (registry.get_overlay("mirror"),), {"__module__": "a"})
             ),
-            r"the name 'mirror' of a\.Mirror is that of terrainkit\.overlays\.mirror\.Mirror; ",
+            r"the name 'mirror' of a\.Mirror is taken by terrainkit\.overlays\.mirror\.Mirror; ",
         ),
     ],
 )

@@ -109,9 +109,7 @@ def test_imported_map_of_changed_file_has_issues(file):
     terrain_map = imported_map(file)
     np.save(file, plane((160, 120), 0.1) * 1.5)
     messages = [issue.message for issue in validate(terrain_map)]
-    assert (
-        "patch (0, 0): the recorded parameters differ from those of its config: sha256" in messages
-    )
+    assert "patch (0, 0): the recorded parameters differ from its config: sha256" in messages
 
 
 def test_imported_map_of_missing_file_has_issues(file, tmp_path):

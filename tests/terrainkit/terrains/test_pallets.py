@@ -25,7 +25,7 @@ def test_pallets_are_a_deck_on_three_runners(half, sides, grid):
     assert runners[:, 2] + runners[:, 5] == pytest.approx(0.7 * height)
     assert runners[:, 2] - runners[:, 5] == pytest.approx(-SINK)
     assert 2 * runners[:, 3] == pytest.approx(length)
-    # The outer sides of the outer runners are those of the deck.
+    # The outer sides of the outer runners are flush with the deck.
     outer = np.linalg.norm(runners[0, :2] - runners[2, :2]) + 2 * runners[0, 4]
     assert outer == pytest.approx(width)
     assert runners[1, :2] == pytest.approx(deck[:2])

@@ -152,7 +152,7 @@ def test_preview_of_a_long_map_is_limited():
 
 
 def test_preview_draws_solids_and_goals(solid_map):
-    """The color at the center of the box is mixed from that of its top and of the ground."""
+    """The color at the center of the box mixes the colors of its top and the ground."""
     bare = dataclasses.replace(
         solid_map, solids=Solids.empty(), goals=np.full_like(solid_map.goals, np.nan)
     )

@@ -407,7 +407,7 @@ def written(request, robot_file, tmp_path_factory):
 
 class TestRobots:
     def test_mujoco_loads_urdf(self, written):
-        """Names, masses and kinematics are those of the source."""
+        """Names, masses and kinematics equal the source."""
         with quiet_mujoco():
             model = mujoco.MjModel.from_xml_path(str(written.path))
         facts = written.source

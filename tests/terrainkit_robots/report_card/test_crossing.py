@@ -45,7 +45,7 @@ def test_robots_take_the_routes_in_turn(make_progress):
     progress.update(np.zeros(5, bool))
     crossed = [each == "crossed" for each in outcomes(progress)]
     assert sum(crossed) == 4
-    assert not crossed[4]  # its route is that of the first robot
+    assert not crossed[4]  # it has the route of the first robot
     assert progress.seconds[crossed].tolist() == [0.5] * 4
     assert np.isnan(progress.seconds[4])
 

@@ -82,7 +82,7 @@ class TestObservations:
 
     @pytest.mark.parametrize("on_map", [False, True])
     def test_foot_forces_are_in_units_of_weight(self, nominal_env, map_ground, on_map):
-        # The model's total mass includes that of the ground, thousands of tons.
+        # The model's total mass includes the ground, thousands of tons.
         env = nominal_env(4, on_map and map_ground)
         env.curriculum.levels[:] = 0
         env.reset()
@@ -254,7 +254,7 @@ class TestTermination:
         assert rewards[1] == pytest.approx(-2.0, abs=0.1)
 
     def test_unstable_state_gets_only_termination_reward(self, nominal_env):
-        # Its state is that of MuJoCo's reset, which must not be rewarded.
+        # Its state is the state after MuJoCo's reset, which must not be rewarded.
         env = nominal_env(3, rewards=Rewards(termination=-3.0))
         for value in (np.nan, 1e12, np.inf):  # each time
             env.sim.qvel[1, 7] = value

@@ -26,7 +26,7 @@ def scene(scene_of):
 
 
 def weight_of(scene):
-    """Return the weight of the robot, without that of the ground."""
+    """Return the weight of the robot, without the ground."""
     return scene.model.body_subtreemass[scene.base] * 9.81
 
 

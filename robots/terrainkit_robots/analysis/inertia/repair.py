@@ -41,8 +41,8 @@ class InertiaRepair:
     def fix(self, link: Link) -> Fix | None:
         """Return the edits that give a link a physical inertia; None if there are none.
 
-        The first inertia that exists is taken: that of the mirror image, the physical inertia
-        nearest to the declared one, and that of a solid box around the body.
+        The first inertia that exists is taken, in this order: the inertia of the mirror image, the
+        physical inertia nearest to the declared one, the inertia of a solid box around the body.
         """
         inertial = link.inertial
         if inertial is None or inertial.inertia is None:
@@ -80,9 +80,9 @@ class InertiaRepair:
     ) -> tuple[Matrix | None, str]:
         """Return a physical inertia in the inertial frame of a link, and what it is."""
         candidates = (
-            (self._mirror_inertia(link), "that of its mirror image"),
-            (self._nearest(link, declared), "the nearest physical one"),
-            (self._solid_box(link, inertial), "that of a solid box around the body"),
+            (self._mirror_inertia(link), "the inertia of its mirror image"),
+            (self._nearest(link, declared), "the nearest physical inertia"),
+            (self._solid_box(link, inertial), "the inertia of a solid box around the body"),
         )
         return next((each for each in candidates if each[0] is not None), (None, ""))
 

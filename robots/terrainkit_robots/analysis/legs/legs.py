@@ -169,7 +169,7 @@ def _roles(
 def _foot_link(limb: Limb, bodies: Sequence[Body]) -> str:
     """Return the link at the tip that is named a foot, or else has the lowest shape.
 
-    A frame without shapes, such as that of a sensor in the sole, is the last choice.
+    A frame without shapes, such as the frame of a sensor in the sole, is the last choice.
     """
     body = bodies[limb.chain[-1]]
     pose = body.zero_pose

@@ -370,7 +370,7 @@ def _penalty_axis(leg: Leg, robot: LegModel, poses: Sequence[Matrix], hip_point:
     """Return the horizontal unit vector in the plane of a leg that points away from the middle.
 
     Zero for robots that do not have four legs, for a leg in the middle, and for a leg that points
-    sideways as that of a spider.
+    sideways like a spider's.
     """
     middle = np.mean([_hip_point(other, robot, poses) for other in robot.legs], axis=0)
     forward = np.cross(leg.pitch, [0.0, 0.0, 1.0])

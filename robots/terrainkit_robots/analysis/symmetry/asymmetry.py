@@ -82,7 +82,7 @@ def find_misalignments(
             displaced |= misalignment.pair.indices
             if misalignment.distance and _is_half_rotation(left, right):
                 continue
-            # The zero of many arm joints is that of the motor, which differs from left to right.
+            # Many arm joints have the zero of their motor, which differs from left to right.
             if left.body.index in leg_bodies or misalignment.is_axis or misalignment.distance:
                 found.append(misalignment)
         displaced |= pair.indices
@@ -156,7 +156,7 @@ def has_flipped_axes(left: MirrorSide, right: MirrorSide) -> bool:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlippedJoint:
-    """A joint of a leg whose axis is opposite to that of all other legs."""
+    """A joint of a leg whose axis is opposite to the axes of all other legs."""
 
     joint: Joint
 
@@ -171,7 +171,7 @@ class FlippedJoint:
 
 
 def find_flipped_joints(legs: Sequence[Leg], bodies: Sequence[Body]) -> Iterator[FlippedJoint]:
-    """Yield the joints of legs whose axes are opposite to those of all other legs."""
+    """Yield the joints of legs whose axes are opposite to the axes of all other legs."""
     lengths = {len(leg.limb.chain) for leg in legs}
     if len(legs) < _MIN_LEGS or len(lengths) != 1:
         return

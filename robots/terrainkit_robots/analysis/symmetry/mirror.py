@@ -72,7 +72,7 @@ class Mirror:
 
     offset: float = 0.0
     """Distance of the plane from the trunk's origin along the normal [m]. Nonzero if the frame of
-    the trunk is at one side, such as that of an IMU."""
+    the trunk is at one side, such as at an IMU."""
 
     def image(self, vectors: Matrix) -> Matrix:
         """Return mirrored vectors, shape (..., 3)."""
@@ -145,7 +145,7 @@ def detect_mirror(legs: Sequence[Leg], bodies: Sequence[Body]) -> Mirror:
 
 
 def _plane_normal(legs: Sequence[Leg]) -> Matrix:
-    """Return y, or x if most legs bend about x, as those of a robot that walks along y."""
+    """Return y, or x if most legs bend about x, as in a robot that walks along y."""
     lateral = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) for leg in legs)
     radial = any(0.5 < abs(leg.pitch[0]) < 0.87 for leg in legs)  # legs all around, as a spider's
     is_x = 2 * lateral > len(legs) and not radial

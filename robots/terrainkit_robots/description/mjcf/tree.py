@@ -135,7 +135,7 @@ class MjcfTree:
         )
 
     def roots(self) -> list[Node]:
-        """Return the root of the model and those of the attached models."""
+        """Return the roots of the model and the attached models."""
         return [self.root, *self.attached.values()]
 
     def nodes(self) -> Iterator[Node]:
@@ -146,8 +146,7 @@ class MjcfTree:
     def write(self) -> tuple[str, dict[str, bytes], list[Node]]:
         """Return the text of the model, the files of attached models, and the node of each line.
 
-        The lines of an attached model follow those of the previous one, so that each line
-        identifies one element.
+        The models are concatenated, so that each line number identifies one element.
         """
         lines: list[Node] = []
         text = _to_text(self.root, lines)

@@ -16,7 +16,7 @@ Color = tuple[float, float, float, float]
 def named_colors(root: "etree._Element") -> dict[str, Color]:
     """Return the colors of all named materials of a robot.
 
-    Materials of the robot take precedence over those of links; the first of a name counts.
+    Materials of the robot take precedence over materials of links; the first of a name counts.
     """
     colors: dict[str, Color] = {}
     for path in ("material", "link/visual/material"):

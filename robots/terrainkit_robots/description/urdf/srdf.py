@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from lxml import etree
 
 _FOLDERS = (".", "srdf", "config", "../srdf", "../config")
-"""Folders of an SRDF, relative to that of the URDF."""
+"""Folders of an SRDF, relative to the folder of the URDF."""
 
 _MIN_KNOWN_SHARE = 0.5
 """Smallest share of the names of an SRDF that exist in the robot. Below it, the SRDF belongs to
@@ -32,7 +32,7 @@ _FREE_JOINT = "root_joint"
 def invalid_srdf(doc: XmlDocument) -> Iterator[Problem]:
     """Yield a problem if the SRDF of a URDF has names that the robot lacks.
 
-    The SRDF has the name of the URDF file, or that of the robot if no other URDF has it, and is in
+    The SRDF has the name of the URDF file, or the robot's name if no other URDF has it, and is in
     the same folder, or in srdf/ or config/ of the package.
     """
     assert doc.root is not None

@@ -190,7 +190,7 @@ class _Simplifier:
         return self._meshes.welded(path)
 
     def _is_nonconvex(self, mesh: MeshFile) -> bool:
-        """Return whether the volume of the hull is much larger than that of the mesh.
+        """Return whether the volume of the hull is much larger than the volume of the mesh.
 
         The volume of an open mesh is computed as if it were closed, which small gaps change little.
         """

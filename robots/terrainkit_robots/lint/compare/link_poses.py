@@ -138,7 +138,7 @@ def _bounds(joint: Joint, other: Joint) -> tuple[float, float]:
 def _link_poses(robot: Facts, positions: Mapping[str, Matrix], count: int) -> dict[str, Matrix]:
     if robot.model.kind != "mjcf":
         return urdf_poses(robot, positions)
-    # The positions of mimic joints are given: both robots get those of the first.
+    # The positions of mimic joints are given: both robots get the positions of the first.
     free = [
         replace(body, joint=None if body.joint is None else replace(body.joint, mimic=None))
         for body in robot.bodies

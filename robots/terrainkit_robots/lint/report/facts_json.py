@@ -19,7 +19,7 @@ _DIGITS = 6
 def facts_json(facts: "Facts", *, may_simulate: bool = False) -> dict[str, Any]:
     """Return the facts as a JSON-compatible dictionary, in SI units and radians.
 
-    All robots have the same keys. Unknown values are None. `observation_size` is that of a
+    All robots have the same keys. Unknown values are None. `observation_size` is the size for a
     legged_gym policy without height scan: 12 values for velocities, gravity and command, and
     position, velocity and last action of each actuated joint. `joint_orders` contains the joints
     in the order of the file as `file`, and for each simulator `joints`, `bodies`, whether the

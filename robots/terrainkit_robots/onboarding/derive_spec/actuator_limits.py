@@ -25,8 +25,8 @@ _HOLDING_FACTOR = 2.0
 """Smallest ratio of an unknown effort to the holding torque."""
 
 _DEFAULT_VELOCITY = {"revolute": 20.0, "prismatic": 1.0}
-"""Speed of a motor with unknown limits [rad/s] or [m/s]. Those of Go2 reach 30, of H1 14 to 23, of
-G1 20 to 37."""
+"""Speed of a motor with unknown limits [rad/s] or [m/s]. The motors of Go2 reach 30, of H1 14 to
+23, of G1 20 to 37."""
 
 _ACTION_FACTOR = 0.75
 """Share of the effort that an action of 1 commands, at most."""
@@ -163,7 +163,7 @@ def _by_kind(values: Mapping[str, float], joint: Joint) -> float:
 def _limits_in_file(
     facts: Facts, limits: Mapping[str, float | None], mirror: Mapping[str, MirrorJoint]
 ) -> Column:
-    """Return the valid limits of the file; a joint without one has that of its mirror joint."""
+    """Return the valid limits of the file; a joint without one gets its mirror joint's limit."""
     valid = {
         name: rounded(limit)
         for name, limit in limits.items()

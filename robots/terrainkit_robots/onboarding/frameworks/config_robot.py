@@ -118,7 +118,7 @@ class ConfigRobot:
             field: Name of the field of the spec.
             depth: Indentation of the comment, in steps of four spaces.
             prefix: Text before the unit.
-            unit: Unit, by default that of the field.
+            unit: Unit, by default the unit of the field.
         """
         unit, source = unit or unit_of(field), self.spec.provenance.get(field)
         text = " ".join(part for part in (prefix, unit and f"[{unit}]") if part)

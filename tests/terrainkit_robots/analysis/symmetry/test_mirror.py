@@ -297,7 +297,7 @@ def test_mirror_of_robot_along_y_is_x():
 
 
 def test_mirror_offset_of_lateral_trunk_frame():
-    # The frame of the trunk is that of a sensor at its side.
+    # The frame of the trunk is at a sensor on its side.
     path = bundled.urdf_path("quadruped")
     plain = Facts(load_robot(path))
     trunk = plain.bodies[0].top.name

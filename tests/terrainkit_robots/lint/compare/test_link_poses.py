@@ -30,7 +30,7 @@ ARM = """
 
 
 def worst(robot, count=5):
-    """Return the largest difference of our link poses to those of yourdfpy."""
+    """Return the largest difference between our link poses and yourdfpy's."""
     pairs = pair_robots(robot, robot)
     positions, _ = sample_positions(pairs, poses=count, seed=1)
     ours = link_poses(robot.bodies, positions, count=count)

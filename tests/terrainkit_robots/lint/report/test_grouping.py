@@ -43,7 +43,7 @@ def test_different_numbers_are_listed(groups):
 
 
 def test_other_names_are_listed(groups):
-    text = "mass of {}: got 1.2 kg; expected that of "
+    text = "mass of {}: got 1.2 kg; expected the mass of "
     (group,) = groups(on("FL_calf", text + "FR_calf"), on("RL_calf", text + "RR_calf"))
     assert group.also == "also 1 link: RL_calf (RR_calf)"
 

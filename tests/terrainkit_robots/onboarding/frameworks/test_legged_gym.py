@@ -103,7 +103,7 @@ def frameworks(stand_in):
 
 
 def gains_of(control, joint):
-    """Return the gains that legged_gym assigns to a joint: those of the last matching key."""
+    """Return the gains that legged_gym assigns to a joint: the gains of the last matching key."""
     keys = [key for key in control.stiffness if key in joint]
     return control.stiffness[keys[-1]], control.damping[keys[-1]]
 

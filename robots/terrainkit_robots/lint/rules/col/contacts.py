@@ -46,7 +46,7 @@ def no_foot_collision(robot: Facts) -> Violations:
             # COL007 reports shapes with disabled contacts.
             shapes = "" if _disabled_shapes(body) else "0"
         elif _is_visual_only(leg, body, robot):
-            shapes = f"0, and those of {body.top.name} end above it"
+            shapes = f"0, and the shapes of {body.top.name} end above it"
         if shapes:
             yield Violation(
                 element=robot.tree.links[leg.foot],

@@ -16,12 +16,12 @@ feet."""
 
 @rule("COL008", "foot-friction", "warning", needs=("legs",), certainty="likely")
 def foot_friction(robot: Facts) -> Violations:
-    """The friction of a foot is implausible, or differs from that of the other feet.
+    """The friction of a foot is implausible, or differs from the other feet.
 
-    MuJoCo uses the larger friction of the two geoms of a contact, or that of the geom with the
-    higher priority. The same holds for condim, which is 1 for contacts without friction. A foot
-    without friction slides; one with a friction of 100 never slips, and a policy that relies on it
-    falls on real ground.
+    MuJoCo uses the friction of the geom with the higher priority, or the larger friction if both
+    priorities are equal. The same holds for condim, which is 1 for contacts without friction. A
+    foot without friction slides. A foot with a friction of 100 never slips, and a policy that
+    relies on it falls on real ground.
 
     Fix:
         Give the geoms of all feet the same sliding friction, between 0.4 and 1.2.

@@ -114,7 +114,7 @@ def overlap_in_range(robot: Facts) -> Violations:
     """Two bodies overlap in a large part of the joint range.
 
     Exploration reaches every part of the range. If two bodies overlap in most of it, the joint
-    range or a collision shape is larger than that of the real robot.
+    range or a collision shape is larger than on the real robot.
 
     Fix:
         Compare the joint limits and the collision shapes with the real robot.

@@ -45,7 +45,7 @@ def unstable_drop(robot: Facts) -> Violations:
         Check for overlaps (COL005) and for inertias that are too small (INR006 to INR011).
 
     Source:
-        MuJoCo at a time step of 5 ms, that of legged_gym; its warnings BADQPOS, BADQVEL, BADQACC.
+        MuJoCo at legged_gym's time step of 5 ms; its warnings BADQPOS, BADQVEL, BADQACC.
     """
     model = make_sim_model(robot)
     drop = drop_test(model, height=_DROP_HEIGHT)

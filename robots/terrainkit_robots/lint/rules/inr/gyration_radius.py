@@ -45,8 +45,8 @@ def inertia_too_large(robot: Facts) -> Violations:
 
     Source:
         I <= m r^2 if all mass is within r of the center of mass. A ratio above 3 is an error; it
-        occurs in a published UR5 (wrists) and Baxter (fingers), whose values are those of other
-        parts or in other units.
+        occurs in a published UR5 (wrists) and Baxter (fingers), whose values belong to other parts
+        or have other units.
     """
     for link in robot.model.links:
         inertia = max_inertia(link)

@@ -46,7 +46,7 @@ def not_positive_definite(robot: Facts) -> Violations:
 
     Fix:
         Take the six numbers from CAD, about the center of mass, in kg m2. The unsafe fix writes the
-        nearest physically valid inertia, or that of a solid box of the size of the body.
+        nearest physically valid inertia, or the inertia of a solid box as large as the body.
 
     Source:
         MuJoCo 4.0: "inertia must have positive eigenvalues", "missing element: 'inertia'".
@@ -117,7 +117,7 @@ def triangle_inequality(robot: Facts) -> Violations:
 
     Fix:
         Take the inertia from CAD about the center of mass. The unsafe fix writes the nearest
-        physically valid inertia; MuJoCo's balanceinertia uses that of a sphere instead.
+        physically valid inertia; MuJoCo's balanceinertia uses a sphere's inertia instead.
 
     Source:
         MuJoCo 4.0: "inertia must satisfy A + B >= C", without a tolerance. Rounding to four digits

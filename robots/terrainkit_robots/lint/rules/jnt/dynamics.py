@@ -4,12 +4,12 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 _MAX_FRICTION, _MAX_LEG_FRICTION = 0.99, 0.3
-"""Allowed friction as a share of the effort, of all joints and of those of legs. Harmonic drives
+"""Allowed friction as a share of the effort, for all joints and for leg joints. Harmonic drives
 need up to 20 %."""
 
 _MIN_TOP_SPEED, _MIN_LEG_SPEED = 0.4, 3.0
-"""Smallest plausible speed at which damping consumes the whole effort, of all joints and of those
-of legs [rad/s]."""
+"""Smallest plausible speed at which damping consumes the whole effort, for all joints and for leg
+joints [rad/s]."""
 
 _MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 60.0
 """Smallest plausible share of its velocity limit that a leg joint reaches against its damping, and

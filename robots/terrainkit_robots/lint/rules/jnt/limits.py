@@ -225,7 +225,7 @@ def unlimited_joint(robot: Facts) -> Violations:
 def narrow_range(robot: Facts) -> Violations:
     """The range of a driven hinge is only a few degrees.
 
-    The limits were converted to radians twice, or those of an MJCF file are in radians although its
+    The limits were converted to radians twice, or an MJCF file has limits in radians although its
     angles are in degrees, which is the default of <compiler>. The joint hardly moves. A joint
     outside the legs is a note, unless half of all joints are concerned: a rodent's shoulder blade
     moves by 4 degrees.
@@ -267,7 +267,7 @@ def narrow_range(robot: Facts) -> Violations:
 def shifted_range(robot: Facts) -> Violations:
     """The whole range of a hinge is more than half a turn from zero.
 
-    The limits are off by a turn, or the zero position of the file is not that of the limits. The
+    The limits are off by a turn, or were measured from another zero position than the file's. The
     joint cannot reach the poses that the rest of the file assumes.
 
     Fix:

@@ -123,7 +123,7 @@ def placeholder_limit(robot: Facts) -> Violations:
         Give the peak torque and the no-load speed of the motor after the gear.
 
     Source:
-        Motors of legged robots have 20 to 400 N m and 10 to 60 rad/s; those of Atlas have 900 N m.
+        Motors of legged robots have 20 to 400 N m and 10 to 60 rad/s; Atlas has 900 N m.
     """
     weight = max(robot.total_mass, 0.0) * GRAVITY
     max_effort = {

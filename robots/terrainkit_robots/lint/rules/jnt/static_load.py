@@ -12,8 +12,8 @@ _MAX_LOAD, _MAX_LOAD_ERROR = 0.5, 0.9
 two to three times as much as standing."""
 
 _MAX_SAG = 1.0
-"""Allowed error of a position actuator that holds a leg at the standing pose [rad]. Those of
-published legged robots need 0.4 at most."""
+"""Allowed error of a position actuator that holds a leg at the standing pose [rad]. Published
+legged robots have at most 0.4."""
 
 
 @rule("JNT015", "insufficient-torque", "warning", needs=("legs",), certainty="likely")

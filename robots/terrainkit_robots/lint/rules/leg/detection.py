@@ -149,7 +149,7 @@ def leg_points_up(robot: Facts) -> Violations:
     other legs.
 
     Fix:
-        Compare the origins of the first joints of the leg with those of the others.
+        Compare the origins of the first joints of this leg and the other legs.
 
     Source:
         Comparison of the ends of limbs with the same joint types, all joints at zero.

@@ -39,7 +39,7 @@ def forward_axis(robot: Facts) -> Violations:
             means = [float(np.mean(each)) for each in positions]
             message = (
                 f"position of the {ahead} legs along {letter}: got {means[0]:.3f} m; expected more "
-                f"than that of the {behind} legs, which is {means[1]:.3f} m"
+                f"than at the {behind} legs, which are at {means[1]:.3f} m"
             )
             break
     if not message and robot.mirror.normal[0] == 1:

@@ -71,7 +71,7 @@ def nonconvex_collision(robot: Facts) -> Violations:
                 subject=used.name,
                 source=first.mesh.source,
                 message=f"volume of the convex hull of {used.label}: got {hull:.3g} m3, "
-                f"{hull / solid:.3g} times that of the mesh; expected at most {_MAX_HULL_RATIO:g} "
-                "times",
+                f"{hull / solid:.3g} times the volume of the mesh; expected at most "
+                f"{_MAX_HULL_RATIO:g} times",
                 measured={"solid": solid, "hull": hull},
             )

@@ -73,7 +73,7 @@ def dense_collision_mesh(robot: Facts) -> Violations:
 
     It is usually the visual mesh. MuJoCo and PhysX compute its hull or a decomposition each time
     the robot is loaded, and PyBullet and Gazebo may collide with every face. The contacts are no
-    better than those of a convex hull or a few primitives.
+    better than with a convex hull or a few primitives.
 
     Fix:
         Use primitives, a convex hull, or a convex decomposition (CoACD). --unsafe-fixes writes a

@@ -38,8 +38,8 @@ def mesh_of_another_link(robot: Facts) -> Violations:
     """A link has the mesh of another link.
 
     The file of the mesh has the name of another link that uses it as well, while a file with the
-    name of the link itself exists. A file name was not changed after copying a link, often that of
-    the other side.
+    name of the link itself exists. A file name was not changed after copying a link, often from the
+    other side.
 
     Fix:
         Use the mesh with the name of the link.

@@ -36,7 +36,7 @@ def wrong_axis_name(robot: Facts) -> Violations:
     bend_laterally = [abs(float(leg.pitch @ lateral)) > _MIN_COSINE for leg in robot.legs]
     reported: set[str] = set()
     for leg, bends_laterally in zip(robot.legs, bend_laterally, strict=True):
-        # A wrong axis may outvote the others of its leg, but not those of the other legs.
+        # A wrong axis may outvote the other axes of its leg, but not the axes of the other legs.
         pitch = leg.pitch if bends_laterally or not any(bend_laterally) else lateral
         roll = np.cross(pitch, up)
         expected = {"pitch": pitch, "yaw": up, "roll": roll / np.linalg.norm(roll)}

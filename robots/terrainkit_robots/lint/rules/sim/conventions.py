@@ -103,12 +103,12 @@ def merged_feet(robot: Facts) -> Violations:
 def genesis_armature(robot: Facts) -> Violations:
     """The default armature of Genesis exceeds the inertia that a joint moves.
 
-    Genesis sets the armature of a joint without one to 0.1 kg m2, ten times that of a small legged
-    robot. The joint accelerates much more slowly than in other simulators, and a policy trained
-    with it does not transfer.
+    Genesis sets the armature of a joint without one to 0.1 kg m2, ten times the armature of a small
+    legged robot. The joint accelerates much more slowly than in other simulators, and a policy
+    trained with it does not transfer.
 
     Fix:
-        Set `default_armature` of gs.morphs.URDF or gs.morphs.MJCF to that of your motor: rotor
+        Set `default_armature` of gs.morphs.URDF or gs.morphs.MJCF to your motor's armature: rotor
         inertia times the square of the gear ratio.
 
     Source:

@@ -21,7 +21,7 @@ _MAX_SHAPE_ERROR, _SHAPE_MARGIN = 0.3, 0.01
 
 @rule("SYM013", "collision-asymmetry", "warning", certainty="likely")
 def collision_asymmetry(robot: Facts) -> Violations:
-    """The collision shapes of a body are not where those of its mirror image are, or as large.
+    """The collision shapes of a body differ from its mirror image in position or size.
 
     A shape is turned, shifted or scaled on one side only, or has the mesh of another part. The legs
     collide at different positions, and one foot may reach deeper than the other. The sizes of
@@ -31,7 +31,7 @@ def collision_asymmetry(robot: Facts) -> Violations:
         Mirror the <origin> and the size of the collision shapes.
 
     Source:
-        Bounding boxes at position 0. Those of published robots agree to 30 % of their diagonal.
+        Bounding boxes at position 0. On published robots they agree to 30 % of their diagonal.
     """
     # Bodies behind a misaligned joint are elsewhere; SYM006 reports the joint.
     _, displaced = robot.misalignments
@@ -65,8 +65,8 @@ def collision_asymmetry(robot: Facts) -> Violations:
             subject=odd.body.name,
             source=odd.body.collisions[0].geometry.source,
             message=f"bounding box of the collision shapes of {odd.body.name}: got a face "
-            f"{1000 * error:.3g} mm from that of its mirror image {other.body.name}; expected at "
-            f"most {1000 * limit:.3g} mm",
+            f"{1000 * error:.3g} mm from its mirror image {other.body.name}; expected at most "
+            f"{1000 * limit:.3g} mm",
             measured={"difference": error, "mirror_image": other.body.name},
         )
 

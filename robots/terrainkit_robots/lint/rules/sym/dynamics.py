@@ -21,7 +21,7 @@ _MIN_EFFORT_SHARE = 0.1
 
 @rule("SYM009", "loss-asymmetry", "warning", certainty="likely")
 def loss_asymmetry(robot: Facts) -> Violations:
-    """The damping, friction or armature of a joint is far from that of its mirror image.
+    """The damping, friction or armature of a joint differs widely from its mirror image.
 
     Both sides have the same motor and gear. A number was mistyped or changed on one side only, and
     the robot veers to that side.
@@ -60,7 +60,7 @@ def loss_asymmetry(robot: Facts) -> Violations:
 
 @rule("SYM010", "gear-asymmetry", "warning", certainty="likely")
 def gear_asymmetry(robot: Facts) -> Violations:
-    """The gear of an actuator has another sign than that of its mirror image.
+    """The gear of an actuator has the opposite sign of its mirror image.
 
     A positive command then moves the two joints in opposite directions, although their axes and
     limits say otherwise. If all legs with such a joint agree, the sign is a convention.

@@ -36,7 +36,7 @@ _MAX_MOMENT_ERROR = 0.05
 
 @rule("SYM003", "inertia-asymmetry", "warning", certainty="likely")
 def inertia_asymmetry(robot: Facts) -> Violations:
-    """The principal moments of a body differ from those of its mirror image.
+    """The principal moments of a body differ from its mirror image.
 
     A reflection changes the signs of products of inertia, but not the principal moments. If they
     differ, a number was mistyped or changed on one side only.
@@ -101,7 +101,7 @@ def _precision(body: Body) -> float:
 
 @rule("SYM011", "product-asymmetry", "warning", certainty="likely")
 def product_asymmetry(robot: Facts) -> Violations:
-    """The inertia of a body is not turned like that of its mirror image.
+    """The principal axes of a body's inertia differ from its mirror image.
 
     The principal moments agree, but their axes do not: a product of inertia has the wrong sign, or
     two moments are exchanged. Exporters differ in the sign of the products, and copies of the other

@@ -25,7 +25,7 @@ from terrainkit_robots.transforms import Matrix
 
 @rule("SYM006", "joint-origin-asymmetry", "warning", certainty="likely")
 def joint_origin_asymmetry(robot: Facts) -> Violations:
-    """The origin of a joint does not mirror that of its mirror image.
+    """The origin of a joint is not the mirror image of its counterpart's origin.
 
     One leg is longer, mounted further out, or bent at zero. The robot leans or stands on three
     legs, and a gait learned for one side is wrong for the other.
@@ -45,11 +45,10 @@ def joint_origin_asymmetry(robot: Facts) -> Violations:
 
 @rule("SYM007", "joint-axis-asymmetry", "warning", certainty="likely")
 def joint_axis_asymmetry(robot: Facts) -> Violations:
-    """The axis of a joint does not mirror that of its mirror image.
+    """The axis of a joint is not the mirror image of its counterpart's axis.
 
     With a tilted axis the leg moves sideways. With an inverted axis the joint moves in the opposite
-    direction; this shows in its limits, which still match those of the other legs or of the mirror
-    image.
+    direction; this shows in its limits, which still match the other legs or the mirror image.
 
     Fix:
         Give the axis the numbers of the mirror image, if the frames of both joints are parallel.
@@ -81,7 +80,7 @@ def joint_axis_asymmetry(robot: Facts) -> Violations:
 
 
 def _opposite_axes(robot: Facts, reported: set[str]) -> Violations:
-    """Yield joints whose axis is opposite to that of the mirror image, but should not be."""
+    """Yield joints whose axis is opposite to the mirror image's axis, but should not be."""
     for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
         a, b = left.joint.range, right.joint.range
@@ -157,7 +156,7 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
     else:
         part = "axis" if error.is_axis else "frame"
         message = (
-            f"angle between the {part} of joint {name} and that of its mirror image {mirror}: got "
+            f"angle between the {part} of joint {name} and its mirror image {mirror}: got "
             f"{math.degrees(error.angle):.3g} deg; expected at most "
             f"{math.degrees(MAX_AXIS_ERROR):.0f} deg"
         )

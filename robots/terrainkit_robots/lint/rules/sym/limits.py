@@ -23,7 +23,7 @@ _MAX_LIMIT_DIFFERENCE = 0.01
 
 @rule("SYM004", "limit-asymmetry", "warning", certainty="likely")
 def limit_asymmetry(robot: Facts) -> Violations:
-    """The limits of a joint do not match those of its mirror image.
+    """The limits of a joint do not match its mirror image.
 
     If equal positions mirror each other, the limits must be equal. If opposite positions do, as for
     most roll and yaw joints, lower and upper must be swapped and negated. Otherwise one leg cannot
@@ -53,7 +53,7 @@ def limit_asymmetry(robot: Facts) -> Violations:
             subject=odd.joint.name,
             source=(odd.joint.limit or odd.joint).source,
             message=f"limits of joint {odd.joint.name}: got {numbers(own, '.5g', ' to ')} {unit}; "
-            f"expected {numbers(expected, '.5g', ' to ')} {unit}, mirrored from those of {name}, "
+            f"expected {numbers(expected, '.5g', ' to ')} {unit}, mirrored from {name}, "
             f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range",
             measured={
                 "lower": own[0],
@@ -72,7 +72,7 @@ def _limit_sizes(body: Body) -> Matrix | None:
 
 @rule("SYM005", "effort-asymmetry", "warning", certainty="likely")
 def effort_asymmetry(robot: Facts) -> Violations:
-    """The effort or velocity limit of a joint differs from that of its mirror image.
+    """The effort or velocity limit of a joint differs from its mirror image.
 
     Both joints have the same motor. The weaker one saturates first, and the robot veers to one
     side.

@@ -22,13 +22,14 @@ from terrainkit_robots.text import contrast, numbers
 from terrainkit_robots.transforms import Matrix
 
 _MAX_TRUNK_OFFSET, _TRUNK_OFFSET_SHARE = 0.02, 0.25
-"""Allowed distance of the trunk's center of mass from the mirror plane: at least this distance [m]
-and this share of that of the legs. Of 143 published legged robots, none exceeds 0.11."""
+"""Allowed distance of the trunk's center of mass from the mirror plane: the larger one of this
+distance [m] and this share of the legs' distance. Of 143 published legged robots, none exceeds a
+share of 0.11."""
 
 
 @rule("SYM001", "mass-asymmetry", "warning", certainty="likely")
 def mass_asymmetry(robot: Facts) -> Violations:
-    """The mass of a body differs from that of its mirror image.
+    """The mass of a body differs from its mirror image.
 
     A number was mistyped, or changed on one side only. The robot leans, and a policy learns to
     compensate for a lean that the real robot does not have.

@@ -222,8 +222,8 @@ def no_links(robot: Facts) -> Violations:
 def parent_of_another_leg(robot: Facts) -> Violations:
     """A link is attached to the link of another leg or side.
 
-    Its name says one side and that of its parent another one, while the parent of its own side has
-    no such child. The parent was not changed after copying the joint.
+    The names of the link and of its parent say different sides, while the parent on the link's own
+    side has no such child. The parent was not changed after copying the joint.
 
     Fix:
         Attach the joint to the link of its own side.

@@ -67,7 +67,7 @@ def _kinematics_message(gap: "LinkPoseDifference", other: str) -> str:
         )
     if gap.is_rotation_only:
         return (
-            f"rotation of link frames against those of {other}: got up to {angle} at {gap.link}, "
+            f"rotation of link frames relative to {other}: got up to {angle} at {gap.link}, "
             f"the same in every pose, first at {gap.first}; {expected}; all origins agree to "
             f"{1000 * gap.distance:.2g} mm"
         )

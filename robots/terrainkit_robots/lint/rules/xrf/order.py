@@ -27,7 +27,7 @@ def compare_joint_order(robot: Facts) -> Violations:
         Permute actions and observations with the lists in the message, or reorder one of the files.
 
     Source:
-        The order is that of the tree, depth first, siblings as in the file, which is MuJoCo's order
+        The order is depth first in the tree, with siblings as in the file, which is MuJoCo's order
         for both formats.
     """
     pairs, other, there = joint_pairs(robot), other_robot(robot), other_name(robot)
@@ -57,7 +57,7 @@ def _inverse(indices: Sequence[int]) -> list[int]:
 
 @rule("XRF005", "actuator-order-differs", "warning", needs=("against",))
 def compare_actuator_order(robot: Facts) -> Violations:
-    """The order of the actuators of an MJCF file differs from that of the joints.
+    """The actuators of an MJCF file have another order than its joints.
 
     Controls are ordered by actuator, positions by joint. Actions in the order of the joints, as in
     a URDF, drive the wrong joints.
@@ -66,8 +66,8 @@ def compare_actuator_order(robot: Facts) -> Violations:
         Permute actions with the lists in the message, or reorder the actuators.
 
     Source:
-        MuJoCo: `ctrl` has the order of <actuator>, `qpos` that of the bodies. In Unitree's MJCF of
-        Go2 the right legs come first in the actuators and last in the joints.
+        MuJoCo: `ctrl` has the order of <actuator>, `qpos` the order of the bodies. In Unitree's
+        MJCF of Go2 the right legs come first in the actuators and last in the joints.
     """
     other, there = other_robot(robot), other_name(robot)
     partner = dict(robot_pairs(robot).joint_names.pairs)
@@ -76,7 +76,7 @@ def compare_actuator_order(robot: Facts) -> Violations:
     common = [name for name in theirs if name in ours]
     indices = permutation([name for name in ours if name in common], common)
     within = [
-        f"actuator order of {file}: got another order than that of its joints; {difference}"
+        f"actuator order of {file}: got another order than its joints; {difference}"
         for file, difference in (
             ("this file", _actuator_difference(robot)),
             (there, _actuator_difference(other)),

@@ -19,7 +19,7 @@ _LIMIT_TOLERANCE = 1e-3
 """Distance of a position from a limit that is attributed to rounding [rad] or [m]."""
 
 _MAX_LIMIT_RATIO = 1.01
-"""Allowed ratio of a limit of the spec to that of the description, for rounding."""
+"""Allowed ratio of a limit in the spec to the limit in the description, for rounding."""
 
 
 def _report(
@@ -174,7 +174,7 @@ def spec_joints(robot: Facts) -> Violations:
 
 @rule("XRF011", "spec-joint-order", "warning", needs=("spec",))
 def spec_joint_order(robot: Facts) -> Violations:
-    """The joint order of the spec differs from that of the file.
+    """The joint order of the spec differs from the file.
 
     A policy trained with one order moves the wrong legs with the other. Actions and observations
     must be permuted; the message contains the indices.
@@ -183,7 +183,7 @@ def spec_joint_order(robot: Facts) -> Violations:
         Permute actions and observations, or use the order of the file in joint_order.
 
     Source:
-        The order of the actuators in an MJCF, else that of the tree, depth first as in MuJoCo.
+        The order of the actuators in an MJCF; otherwise depth first in the tree, as in MuJoCo.
     """
     ours = robot.required_spec.joint_order
     order, elements = robot.actuator_order, "actuators"
@@ -253,7 +253,7 @@ def spec_pose(robot: Facts) -> Violations:
 
 @rule("XRF016", "spec-motor-limits", "warning", needs=("spec",))
 def spec_motor_limits(robot: Facts) -> Violations:
-    """An effort or velocity limit of the spec exceeds that of the description.
+    """An effort or velocity limit of the spec exceeds the limit in the description.
 
     The policy learns with torques or velocities that the motor does not have, and fails on the real
     robot.
