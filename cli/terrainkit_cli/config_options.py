@@ -71,8 +71,8 @@ class ConfigCommand(Command):
     def split(cls, words: Sequence[str]) -> tuple[dict[str, str], list[str]]:
         """Return the last word of each option that is given, and the other words.
 
-        The options are those for the default config. If the config has others, they and their
-        values are among the other words.
+        The options are the options of the default config. If the config has other options, they and
+        their values are among the other words.
         """
         options = [*options_of(cls), *options_of(cls.default_config(), cls.ALIASES)]
         given, rest = split_words(options, words)

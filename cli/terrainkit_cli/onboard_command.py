@@ -61,11 +61,11 @@ class Onboard(Command):
     says so, or if the robot has legs or wheels."""
 
     spec: InputPath | None = None
-    """A robot.toml whose values override the derived ones, such as one that you have edited."""
+    """A robot.toml, such as an edited one, whose values override the derived values."""
 
     gains: Literal["stand", "train"] = "stand"
-    """PD gains to suggest: those that hold the default pose without a policy; or softer ones for
-    training, as in published configurations, with action scales of about 0.25 rad."""
+    """PD gains to suggest: stand holds the default pose without a policy; train has softer gains,
+    as in published configurations, with action scales of about 0.25 rad."""
 
     unsafe_fixes: bool = False
     """Also apply fixes that change a number, a shape or a mesh. The input file is not changed."""

@@ -73,7 +73,7 @@ def report_limits(spec: "PolicySpec", config: "EvaluationConfig", repetitions: i
 
 
 def targets(output: Path, *, is_card: bool) -> list[Path]:
-    """Return the files to write: `output`, or for a card one with each of its suffixes."""
+    """Return the files to write: `output`, or one file per suffix for a card."""
     if not is_card:
         return [output]
     stem = str(output.with_suffix("")) if output.suffix in CARD_SUFFIXES else str(output)

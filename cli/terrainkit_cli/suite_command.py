@@ -93,7 +93,7 @@ def _title(sub_terrain: SubTerrain) -> str:
 
 
 def _dimensions(sub_terrain: SubTerrain) -> list[str]:
-    """Return the parameters at the first and the last level, those that change first."""
+    """Return the parameters at the first and the last level; parameters that change come first."""
     first, last = sub_terrain.at(0.0), sub_terrain.at(1.0)
     ranges: list[str] = []
     values: list[str] = []

@@ -31,7 +31,7 @@ _NON_NEGATIVE = {"_var", "_std", "step", "exp_avg_sq", "lr"}
 
 
 class Checkpoint(TypedDict):
-    """The part of a checkpoint that describes a policy; one of training also has its state."""
+    """The part of a checkpoint that describes a policy; training checkpoints also have a state."""
 
     format: Literal["terrainkit checkpoint"]
     version: Literal[1]

@@ -46,7 +46,7 @@ def to_indices(name: str, values: Any, size: int, number: int | None = None) -> 
 
 
 def to_numbers(name: str, values: Any, number: int) -> NDArray[np.float64]:
-    """Return one number for each of `number` episodes, or the one of all of them."""
+    """Return one number for each of `number` episodes; a single value applies to all of them."""
     given = to_numpy(name, values)
     if given.dtype.kind not in "fiub":
         raise ConfigError(f"{name}: got values of {given.dtype}; expected numbers")

@@ -26,8 +26,8 @@ def update_levels(
 
     Args:
         levels: Levels before, shape (n,).
-        progress: Progress of each episode, 0 to 1, or NaN if it says nothing about its patch, shape
-            (n,). See :class:`CommandProgress`, and for robots with goals
+        progress: Progress of each episode, 0 to 1, or NaN to ignore the episode, shape (n,). See
+            :class:`CommandProgress`, and for robots with goals
             :meth:`terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
         rows: Rows of the map.
         seed: Seed of the random rows. Pass a new one at each call, such as (seed, iteration).

@@ -20,14 +20,14 @@ STALENESS = 0.1
 
 
 class PrioritizedReplaySampler(UniformSampler):
-    """Sample patches by the rank of their score, and those that were not visited for long.
+    """Sample patches by the rank of their score and by the time since their last episode.
 
     As in M. Jiang et al., Prioritized Level Replay, 2021 (arXiv:2010.03934): patches without an
     episode are sampled uniformly, with their share of the map as the probability; the others with a
     probability of (1 - s) P_score + s P_staleness, where P_score is proportional to (1 / rank)^(1 /
-    temperature). There, the score is the magnitude of the error of the value function. A sampler
-    does not know that function: its score is the error of the running mean of the success on the
-    patch, |success - mean|. It is 0 on patches that always or never succeed.
+    temperature). The paper scores a level by the magnitude of the error of the value function.
+    Samplers have no value function. This one uses the error of the running mean of the success on
+    the patch, |success - mean|, which is 0 on patches that always or never succeed.
     """
 
     def __init__(self, rows: int, cols: int, num_envs: int, **options: Any) -> None:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 PROMOTION = 0.8
-"""Share of the goals from which an episode is a success, and below half of which it is a failure.
-Extreme Parkour has 0.8 and 0.4 as shares of the commanded distance, in its
+"""Share of the goals that makes an episode a success. Below half of it, the episode is a failure.
+Extreme Parkour uses 0.8 and 0.4 as shares of the commanded distance in
 `_update_terrain_curriculum`."""
 
 
@@ -30,8 +30,8 @@ def route_lengths(start: NDArray[np.floating], goals: NDArray[np.floating]) -> N
 class Waypoints:
     """The goals of n robots, and the goal that each robot walks to.
 
-    As in Extreme Parkour, a robot walks to its goals in their order, and to the next one as soon as
-    it is within a radius of one.
+    As in Extreme Parkour, a robot walks to its goals in order, and goes on to the next goal as soon
+    as it is within a radius of the current one.
     """
 
     goals: NDArray[np.floating]

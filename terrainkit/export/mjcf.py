@@ -88,8 +88,8 @@ SITE_DEFAULTS = {
 """The attributes of all sites."""
 
 MAX_BOXES = 100
-"""Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, on which a
-step of the bundled quadruped takes about 1.8 times that on a plane. Three runs of
+"""Number of boxes up to which they cost no more than a heightfield with cells of 0.1 m, where a
+step of the bundled quadruped takes about 1.8 times as long as on a plane. Three runs of
 benchmarks/collision.py gave 91 to 103."""
 
 

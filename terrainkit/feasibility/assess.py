@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.export.requirements import require_finite
-from terrainkit.feasibility.bottleneck import Leg, shortest_path
+from terrainkit.feasibility.bottleneck import Segment, shortest_path
 from terrainkit.feasibility.columns import Columns, IntArray, columns_per_cell, sample_columns
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.limits import RobotLimits
@@ -119,9 +119,9 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
     check_memory(number * _BYTES_PER_COLUMN, f"the footholds of a patch of {number} columns")
     _check_goals(patch, threshold)
     columns = sample_columns(patch, threshold)
-    legs = _legs(patch, columns)
-    graph = FootholdGraph.build(columns, limits, _rim(patch, columns, legs))
-    path = _Path(graph, legs)
+    segments = _segments(patch, columns)
+    graph = FootholdGraph.build(columns, limits, _rim(patch, columns, segments))
+    path = _Path(graph, segments)
     return PatchFeasibility(
         row=0,
         col=0,
@@ -135,8 +135,8 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
     )
 
 
-def _legs(patch: Patch, columns: Columns) -> list[Leg]:
-    """Return the legs of the path: to each goal in turn, or else to the far edge."""
+def _segments(patch: Patch, columns: Columns) -> list[Segment]:
+    """Return the segments of the path: to each goal in turn, or else to the far edge."""
     start = columns.node_at(patch.origin.astype(np.float64))
     if not len(patch.goals):
         return [(start, _far_edge(patch, columns))]
@@ -156,14 +156,14 @@ def _far_edge(patch: Patch, columns: Columns) -> IntArray:
     return np.unique(found[~np.isnan(columns.floor.reshape(-1)[found])])
 
 
-def _rim(patch: Patch, columns: Columns, legs: list[Leg]) -> NDArray[np.bool_]:
+def _rim(patch: Patch, columns: Columns, segments: list[Segment]) -> NDArray[np.bool_]:
     """Return which nodes are in the outermost cells of the patch, shape (nx, ny, m).
 
     Many terrains are level there, to meet the next patch without a cliff; a path on this rim would
     avoid the terrain. A side on which the path starts or ends is not part of the rim.
     """
     n = round(patch.grid.cell / columns.spacing)
-    node = np.concatenate([np.append(targets, start) for start, targets in legs])
+    node = np.concatenate([np.append(targets, start) for start, targets in segments])
     i, j = columns.column(node)
     (nx, ny), is_rim = columns.shape, np.zeros(columns.floor.shape, dtype=bool)
     is_rim[:n] |= not (i < n).any()
@@ -176,15 +176,15 @@ def _rim(patch: Patch, columns: Columns, legs: list[Leg]) -> NDArray[np.bool_]:
 
 
 class _Path:
-    """The path through all legs, and its blocking place."""
+    """The path through all segments, and its blocking place."""
 
-    def __init__(self, graph: FootholdGraph, legs: list[Leg]) -> None:
+    def __init__(self, graph: FootholdGraph, segments: list[Segment]) -> None:
         self.demand, self.limit, self.value = 0.0, "", float("nan")
         self.place = np.full(3, np.nan)
         size, position = graph.columns.floor.size, graph.columns.positions
-        nodes = [legs[0][0]]
+        nodes = [segments[0][0]]
         step_demand = graph.demand(graph.steps)
-        for start, targets in legs:
+        for start, targets in segments:
             if nodes[-1] != start:
                 break
             usable = path_edges(graph, step_demand, (start, targets))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from terrainkit.feasibility.columns import FloatArray, IntArray
 from terrainkit.feasibility.edges import Edges
 
-Leg = tuple[int, IntArray]
-"""A node, and the nodes of which the path from there reaches one."""
+Segment = tuple[int, IntArray]
+"""A piece of the path: a start node, and target nodes. The path ends at any of the targets."""
 
 
 def find_components(edges: Edges, usable: NDArray[np.bool_], num_nodes: int) -> IntArray:
@@ -33,19 +33,19 @@ def find_components(edges: Edges, usable: NDArray[np.bool_], num_nodes: int) -> 
     return np.asarray(labels, dtype=np.int64)
 
 
-def bottleneck(edges: Edges, demand: FloatArray, leg: Leg, num_nodes: int) -> float:
-    """Return the smallest demand at which a path leads from the start of a leg to its targets.
+def bottleneck(edges: Edges, demand: FloatArray, segment: Segment, num_nodes: int) -> float:
+    """Return the smallest demand at which a path leads from the start of a segment to its targets.
 
     Args:
         edges: The edges.
         demand: Demand of each edge, shape (n,).
-        leg: Node where the path starts, and nodes of which it reaches one, shape (t,).
+        segment: Start node, and target nodes of shape (t,). The path ends at any of the targets.
         num_nodes: Number of nodes.
 
     Returns:
         The largest demand of an edge of the path; 0 if its start is a target, inf without a path.
     """
-    start, targets = leg
+    start, targets = segment
     if (targets == start).any():
         return 0.0
     order = np.argsort(edges.start, kind="stable")
@@ -67,8 +67,11 @@ def shortest_path(
         edges: The edges.
         length: Length of each edge, shape (n,).
         start: The first node.
-        targets: Nodes of which the path reaches one, shape (t,).
+        targets: Nodes at which the path may end, shape (t,).
         num_nodes: Number of nodes.
+
+    Returns:
+        Indices of the edges along the path, shape (k,).
     """
     from scipy.sparse.csgraph import dijkstra
 
@@ -99,12 +102,12 @@ def _reaches(
         ends: Second node of each edge, in the order of the first nodes.
         usable: Which edges the path may use.
         start: The first node.
-        targets: Nodes of which the path reaches one.
+        targets: Nodes at which the path may end.
     """
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import breadth_first_order
 
-    # Built without sorting: the edges are in the order of the rows, whatever is left out.
+    # No sorting is needed: the edges stay in the order of the rows when some are left out.
     before = np.concatenate([[0], np.cumsum(usable)])[rows].astype(np.int32)
     values, size = np.ones(int(before[-1])), len(rows) - 1
     graph = csr_matrix((values, ends[usable].astype(np.int32), before), shape=(size, size))

@@ -38,8 +38,8 @@ class FootholdGraph:
     """The free width between walls."""
 
     quantities: dict[str, FloatArray]
-    """Quantity of each node by the name of its limit, shape (nodes,): slope, foothold, body_width
-    and clearance."""
+    """Quantity of each node by the name of its limit, shape (nodes,): slope (rise over run),
+    foothold (diameter [m]), body_width (free width [m]) and crouched_height (clearance [m])."""
 
     node_demand: FloatArray
     """Demand of each node, shape (nodes,)."""

@@ -137,7 +137,7 @@ def _moves(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
 
 
 def _easiest(graph: FootholdGraph, pairs: Edges, number: int, *keys: IntArray) -> IntArray:
-    """Return the pairs with the smallest demands of those with the same keys."""
+    """Return, for each combination of keys, the pairs with the `number` smallest demands."""
     order = np.lexsort((graph.demand(pairs), *keys))
     same = [key[order[number:]] == key[order[:-number]] for key in keys]
     is_first = np.ones(len(order), dtype=bool)
@@ -146,7 +146,7 @@ def _easiest(graph: FootholdGraph, pairs: Edges, number: int, *keys: IntArray) -
 
 
 def _evaluate(graph: FootholdGraph, pairs: Edges, max_demand: float) -> Edges:
-    """Return the pairs with what is in between, if their demand is below `max_demand`."""
+    """Return the pairs with rise, drop, clearance and width, if their demand is below the limit."""
     if not len(pairs.start):
         return pairs
     floor = graph.columns.floor.reshape(-1)
@@ -174,8 +174,8 @@ def _passed(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the height at which the body passes each column, and the clearance there [m].
 
-    Of several intervals, the body takes the one with the least demand. The clearance is -inf if it
-    passes through none.
+    The body takes the free interval with the smallest demand. The clearance is -inf if there is no
+    free interval.
 
     Args:
         graph: The graph.

@@ -1,8 +1,8 @@
-"""The edges that the least demanding path of a leg may use: steps, and gaps that make it easier."""
+"""The edges of the least demanding path of a segment: steps, and gaps that make it easier."""
 
 import numpy as np
 
-from terrainkit.feasibility.bottleneck import Leg, bottleneck
+from terrainkit.feasibility.bottleneck import Segment, bottleneck
 from terrainkit.feasibility.columns import FloatArray
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
@@ -17,8 +17,8 @@ _REACHES = (0.5, 1.0, float(np.nextafter(MAX_DEMAND, np.inf)))
 patches need the widest ones."""
 
 
-def path_edges(graph: FootholdGraph, step_demand: FloatArray, leg: Leg) -> Edges:
-    """Return the edges that demand no more than the least demanding path of a leg.
+def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) -> Edges:
+    """Return the edges that demand no more than the least demanding path of a segment.
 
     Gaps are only searched while they may make the best known path easier: below its demand, and
     from the nodes that are reached below it to the others.
@@ -26,23 +26,23 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, leg: Leg) -> Edges
     Args:
         graph: The graph.
         step_demand: Demand of each step of the graph.
-        leg: The leg. Without a path, all steps are returned.
+        segment: The segment. Without a path, all steps are returned.
     """
     steps, num_nodes = graph.steps, graph.columns.floor.size
     gaps = steps.select(slice(0))
     # A lower bound of the demand of all gaps: the demand of cells that touch at a corner.
     searched = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap
-    without_gaps = least = bottleneck(steps, step_demand, leg, num_nodes)
+    without_gaps = least = bottleneck(steps, step_demand, segment, num_nodes)
     while min(least, MAX_DEMAND) > searched:
         reach = least
         if least > MAX_DEMAND:
             reach = next(each for each in _REACHES if each > searched)
         is_usable = step_demand < reach
         regions = Regions.build(steps, is_usable, num_nodes)
-        found, is_path = _crossed(graph, regions, _below(graph, gaps, reach), leg, reach)
+        found, is_path = _crossed(graph, regions, _below(graph, gaps, reach), segment, reach)
         if is_path:
             gaps, edges = found, Edges.concatenate([steps.select(is_usable), found])
-            least = bottleneck(edges, graph.demand(edges), leg, num_nodes)
+            least = bottleneck(edges, graph.demand(edges), segment, num_nodes)
         else:
             searched = reach
     is_usable = step_demand <= least
@@ -52,16 +52,16 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, leg: Leg) -> Edges
     # One gap into each region is enough to find the demand; a path may need to go far to it.
     above = np.nextafter(least, np.inf)
     gaps, regions = _below(graph, gaps, above), Regions.build(steps, is_usable, num_nodes)
-    is_reached = regions.reached(leg[0], gaps)
+    is_reached = regions.reached(segment[0], gaps)
     more = gap_edges(graph, regions.labels, is_reached, is_reached, above)
     return Edges.concatenate([usable, gaps, more])
 
 
 def _crossed(
-    graph: FootholdGraph, regions: Regions, gaps: Edges, leg: Leg, max_demand: float
+    graph: FootholdGraph, regions: Regions, gaps: Edges, segment: Segment, max_demand: float
 ) -> tuple[Edges, bool]:
-    """Return the gaps with those that lead on from them, and whether a path reaches a target."""
-    start, targets = leg
+    """Add the gaps that lead on from `gaps`; return them and whether a path reaches a target."""
+    start, targets = segment
     is_searched = np.zeros(len(regions.labels), dtype=bool)
     while True:
         is_reached = regions.reached(start, gaps)

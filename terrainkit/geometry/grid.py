@@ -121,7 +121,7 @@ def _centered(cells: float, odd: int) -> int:
 
 @lru_cache(maxsize=8)
 def _rings(shape: tuple[int, int], inner: tuple[int, int]) -> NDArray[np.int32]:
-    # Most patches of a map have one of few platforms.
+    # Few sizes of platforms occur in a map, so the result is cached.
     rings: NDArray[np.int32] = np.maximum.outer(*map(_distance_to_block, shape, inner))
     rings.flags.writeable = False
     return rings

@@ -43,8 +43,9 @@ class Columns:
 def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) -> Columns:
     """Return the columns of a mesh.
 
-    Going down, a face that points up begins a solid, and one that points down ends it. Solids may
-    overlap. If most of the highest faces point down, the faces are inside out, and are flipped.
+    From top to bottom, a face that points up begins a solid, and a face that points down ends it.
+    Solids may overlap. If most of the highest faces point down, the mesh is inside out, and all
+    faces are flipped.
 
     Args:
         vertices: Vertices [m], shape (nv, 3).

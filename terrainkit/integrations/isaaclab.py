@@ -124,7 +124,7 @@ def use_terrain_curriculum(
         cfg: Configuration of the environment, which is changed.
         command_name: Name of the velocity command.
         sampler: Name of the sampler: levels, uniform, learning_progress or prioritized_replay; None
-            to keep every robot on its patch. Its seed is the one of `cfg`.
+            to keep every robot on its patch. Its seed is `cfg.seed`.
     """
     progress = TerminationTermCfg(func=TerrainProgress, params={"command_name": command_name})
     levels = CurriculumTermCfg(func=TerrainLevels, params={"sampler": sampler})

@@ -19,7 +19,7 @@ PROGRESS = "terrain_progress"
 """Name of the termination term."""
 
 LEVELS = "terrain_levels"
-"""Name of the curriculum term, which replaces the one of the framework."""
+"""Name of the curriculum term, which replaces the framework's own term."""
 
 
 class TerrainProgress:
@@ -46,7 +46,7 @@ class TerrainProgress:
         return torch.zeros(env.num_envs, dtype=torch.bool, device=env.device)
 
     def _yaw_rate(self, term: Any, command: FloatArray) -> FloatArray:
-        """Return the commanded yaw rates [rad/s], with those that follow a heading."""
+        """Return the commanded yaw rates [rad/s], computed where a heading is commanded."""
         if not term.cfg.heading_command:
             return command[:, 2]
         error = _numpy(term.heading_target) - self.progress.yaw

@@ -174,7 +174,7 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
 
 
 def _problems(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
-    """Yield what the user of a map should know about it."""
+    """Yield the warnings about a generated map."""
     config = terrain_map.config
     if builder.deviations:
         yield (

@@ -133,7 +133,7 @@ def _to_python(value: Any) -> Any:
 
 
 def _is_valid(value: Any, constraints: Mapping[str, Any]) -> bool:
-    """Return whether numbers are in range, and the constraints that msgspec does not know hold."""
+    """Return whether numbers are in range, and constraints hold that msgspec does not check."""
     items = value if isinstance(value, tuple) else (value,)
     numbers = [item for item in items if isinstance(item, int | float)]
     return (

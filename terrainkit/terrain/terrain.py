@@ -136,8 +136,8 @@ class Terrain(Parameterized, ABC):
         Args:
             grid: Grid of the patch; solids must not extend beyond it.
             heights: Heights of the ground [m], shape `grid.shape`.
-            rng: Generator in the same state as the one of :meth:`goals`, so that both can start
-                by sampling the same layout.
+            rng: Generator in the same state as in :meth:`goals`, so that both can start by sampling
+                the same layout.
         """
         return Solids.empty()
 

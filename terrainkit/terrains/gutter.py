@@ -15,7 +15,7 @@ from terrainkit.terrain import FlatTerrain, parameter
 
 @dataclass(frozen=True, kw_only=True)
 class Gutter(FlatTerrain, Lane):
-    """A gutter along x between two slopes, in the manner of NIST.
+    """A gutter along x between two slopes, modeled on a NIST test.
 
     The robot walks with its feet on both slopes. It is spawned at low x, and there is a goal behind
     the gutter. The slopes are solids; the ground is flat.

@@ -17,7 +17,7 @@ from terrainkit.terrain.parameter import MAX_COUNT
 
 @dataclass(frozen=True, kw_only=True)
 class KRails(Lane):
-    """A field of rails at 45 degrees to a lane along x, in the manner of NIST.
+    """A field of rails at 45 degrees to a lane along x, modeled on a NIST test.
 
     Two square panels side by side have rails in opposite directions, and the second half of the
     field mirrors the first. The field may rise to a ridge in the middle. The robot is spawned at

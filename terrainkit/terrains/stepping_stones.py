@@ -44,7 +44,7 @@ class SteppingStones(Terrain):
         pitch, (nx, ny) = stone + distance, grid.shape
         draws = rng.random(nx)
         tops = (2 * rng.random(grid.shape) - 1) * self.variation
-        # Of each row of cells along x, the platform covers those in `across`.
+        # In each row along x, the platform covers the cells in `across`.
         along, across = grid.centered_slices(grid.centered(self.platform))
         is_covered = np.zeros(nx, dtype=bool)
         is_covered[along] = True

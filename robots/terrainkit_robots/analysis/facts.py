@@ -208,7 +208,7 @@ class Facts:
 
     @cached_property
     def robot_joints(self) -> list[Joint]:
-        """The moving joints without those that move the base of a planar model."""
+        """The moving joints, except the joints that move the base of a planar model."""
         return robot_joints(self.bodies)
 
     @cached_property
@@ -277,7 +277,7 @@ class Facts:
     def outlier_first(
         self, pair: MirrorPair, value: Callable[[Body], Matrix | None]
     ) -> tuple[MirrorSide, MirrorSide]:
-        """Return the joints of a pair; the one that deviates more from the other legs is first."""
+        """Return the joints of a pair; first the joint that deviates more from the other legs."""
         return outlier_first(pair, value, self.bodies, self.legs, self.mirror)
 
     # Simulators

@@ -373,7 +373,7 @@ class Actuator:
     """Maximum torque [N m] or force [N] on the joint; None if unlimited."""
 
     gear: float = 1.0
-    """Factor from the force of the actuator to that on the joint."""
+    """Force on the joint divided by the force of the actuator."""
 
     stiffness: float | None = None
     """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""

@@ -206,7 +206,7 @@ def resolve_in(folders: Iterable[Path], filename: str) -> tuple[Path, FoundBy]:
     """Resolve a file name in a list of folders.
 
     Args:
-        folders: Folders, the first of which is the expected one.
+        folders: Folders, starting with the expected folder.
         filename: Name of a file, as written in the robot file.
 
     Returns:

@@ -77,7 +77,7 @@ def lint_selected(
 def _apply_suppressions(
     report: Report, comments: Sequence[SuppressionComment]
 ) -> tuple[list[Finding], list[Suppressed]]:
-    """Split the findings of a report into those that remain and those that are suppressed."""
+    """Split the findings of a report into remaining and suppressed findings."""
     by_rule: dict[tuple[Path, str], list[SuppressionComment]] = {}
     for each in comments:
         if each.error is None:

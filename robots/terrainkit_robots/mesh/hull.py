@@ -37,7 +37,7 @@ def convex_hull(points: Points, max_vertices: int | None = None) -> Surface:
 
 
 def _mujoco_hull(points: Points) -> Surface:
-    """Return the hull that MuJoCo computes, which is the one that is simulated."""
+    """Return the hull that MuJoCo computes, and therefore simulates."""
     import mujoco
 
     lower, sides = points.min(axis=0), np.ptp(points, axis=0)

@@ -45,7 +45,7 @@ class Verification:
     """Whether the joints were locked in the standing test, as for bipeds, which need balance."""
 
     stand_gains: bool = False
-    """Whether the standing test used the gain set `stand` instead of the softer one of the spec."""
+    """Whether the standing test used the gain set `stand` instead of the spec's softer gains."""
 
     free_standing: "StandResult | None" = None
     """Result with the gains of the spec and without locked joints, if the standing test used other

@@ -74,16 +74,30 @@ class EvaluationConfig(Config):
 class RolloutMetrics:
     """Metrics of all robots, or of a group with the same command, terrain or level.
 
-    Errors are means over robots of the mean over the robot's measured steps: the norm of the
-    horizontal velocity error [m/s] and the absolute yaw velocity error [rad/s]. Those ending in
-    `_1s` are of velocities averaged over 1 s, without the sway of a gait. They are None if no robot
-    was measured, and `success`, the fraction of successful robots, is None on a plane.
+    Errors are averaged over the measured steps of each robot, then over robots. They are None if no
+    robot was measured. The gait (:mod:`.gait`) is measured on robots that are commanded to move,
+    and None if there are none.
 
-    The gait is measured on robots that are commanded to move, and None without any; see
-    :mod:`.gait`. Tuples have one value per foot. The pitch is positive when the nose is down.
-    `asymmetry` is the larger of the asymmetries of swing height and duty factor, `followed` the
-    fraction of robots that reach half of their command's linear and yaw velocity,
-    `cost_of_transport` power / (weight * speed).
+    Attributes:
+        command: Command of the group: forward and left velocity [m/s], yaw velocity [rad/s].
+        direction: Direction of the group's commands on a map.
+        terrain: Terrain of the group.
+        level: Level of the group.
+        robots: Number of robots.
+        falls: Number of robots that fell.
+        success: Fraction of successful robots; None on a plane.
+        lin_vel_error: Norm of the horizontal velocity error [m/s].
+        lin_vel_error_1s: The same with velocities averaged over 1 s, without the sway of a gait.
+        ang_vel_error: Absolute yaw velocity error [rad/s].
+        ang_vel_error_1s: The same with velocities averaged over 1 s.
+        swing_height: Mean peak height of the swings of each foot [m].
+        duty_factor: Share of the time that each foot is in contact.
+        step_frequency: Complete swings per foot and second [Hz].
+        foot_slip: Mean horizontal speed of feet in contact [m/s].
+        asymmetry: The larger of the asymmetries of swing height and duty factor.
+        base_pitch: Mean pitch of the base [rad], positive when the nose is down.
+        followed: Fraction of robots that reach half of their command's linear and yaw velocity.
+        cost_of_transport: Power / (weight * speed).
     """
 
     command: tuple[float, ...] | None = None
@@ -116,9 +130,16 @@ class RolloutMetrics:
 class EvaluationResult:
     """Result of an evaluation; `config` names the terrain of the training if none was given.
 
-    Groups are `by_command` on a plane, and `by_direction`, `by_terrain`, `by_level` and
-    `by_terrain_and_level` on a map. `contacts` has the last 2 s of the robot that is commanded to
-    walk ahead fastest: by foot, one character per step, 1 in contact.
+    Attributes:
+        robot: Name of the robot in its spec.
+        checkpoint: File name of the checkpoint, or name of the policy function.
+        config: Settings of the evaluation.
+        metrics: Metrics of all robots.
+        groups: Metrics of groups of robots: `by_command` on a plane; `by_direction`,
+            `by_direction_and_level`, `by_terrain`, `by_level` and `by_terrain_and_level` on a map.
+        contacts: Contacts of each foot in the last 2 s of the robot that is commanded to walk ahead
+            fastest: one character per step, 1 in contact.
+        dt: Time between two steps [s].
     """
 
     robot: str
@@ -149,8 +170,8 @@ def evaluate(
     The same seed gives the same result, bit for bit.
 
     Raises:
-        ConfigError: If the run has no policy, or one of another robot; if the terrain cannot be
-            read, or changed after the training; if the device does not exist.
+        ConfigError: If the run has no policy, or its policy is for another robot; if the terrain
+            cannot be read, or changed after the training; if the device does not exist.
     """
     config = config or EvaluationConfig()
     env, commands = make_eval_env(spec, config)

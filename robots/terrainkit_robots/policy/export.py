@@ -32,7 +32,7 @@ from terrainkit_robots.transforms import FloatArray
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
 
 FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
-"""Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots know."""
+"""Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots have."""
 
 TOLERANCE = 1e-5
 """Largest difference between exported and live actions; relative for actions beyond 1."""

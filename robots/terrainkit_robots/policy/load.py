@@ -34,7 +34,7 @@ def load_actor(run: Run, env: LeggedEnv) -> MLPModel:
         TerrainkitWarning: If the robot's model changed after training.
 
     Raises:
-        ConfigError: If the run has no checkpoint, or one of another robot or task.
+        ConfigError: If the run has no checkpoint, or its checkpoint is for another robot or task.
     """
     # The run has its own copy of the spec, so only a change of the model matters.
     if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:

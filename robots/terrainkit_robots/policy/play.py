@@ -55,7 +55,8 @@ def play(
     map there is one robot per patch, and the video follows some `robots` in turn.
 
     Raises:
-        ConfigError: If a run has no policy, or one of another robot; if an option is invalid.
+        ConfigError: If a run has no policy, or its policy is for another robot; if an option is
+            invalid.
     """
     if robots < 1:
         raise ConfigError(f"robots: got {robots}; expected 1 or more")
@@ -79,7 +80,8 @@ def view(spec: PolicySpec, config: EvaluationConfig | None = None) -> None:
     """Show one robot in MuJoCo's viewer in real time, until its window is closed.
 
     Raises:
-        ConfigError: If there is no display, or a run has no policy, or one of another robot.
+        ConfigError: If there is no display, or a run has no policy, or its policy is for another
+            robot.
     """
     if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))):
         raise ConfigError("viewer: got no DISPLAY or WAYLAND_DISPLAY; expected a display")

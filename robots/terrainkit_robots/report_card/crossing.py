@@ -58,8 +58,8 @@ class Crossing:
         """Load a policy onto a map.
 
         Raises:
-            ConfigError: if a run has no policy, or one of another robot, or its task does not
-                command to walk ahead.
+            ConfigError: if a run has no policy, or its policy is for another robot, or its task
+                does not command to walk ahead.
             MemoryLimitError: if the simulations would not fit in memory.
         """
         commands = spec.task.commands

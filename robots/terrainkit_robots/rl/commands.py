@@ -70,9 +70,11 @@ class VelocityCommand:
         return np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
 
     def update(self, yaw: FloatArray, position: FloatArray) -> None:
-        """Apply the fixed commands, or compute those that depend on headings and waypoints.
+        """Apply the fixed commands, or update commands that depend on headings and waypoints.
 
-        Yaw [rad] has the shape (n,), the position, x and y [m], (n, 2).
+        Args:
+            yaw: Yaw of each robot [rad], shape (n,).
+            position: Position of each robot, x and y [m], shape (n, 2).
         """
         if self.fixed is not None:
             self.commands[:] = self.fixed

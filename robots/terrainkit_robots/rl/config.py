@@ -196,9 +196,9 @@ class Rewards(Config):
     tracking_ang_vel: float = 0.75
     """Tracking of the yaw velocity command."""
     progress: float = 0.5
-    """Velocity along the command, which is also worth something far from it."""
+    """Velocity along the command, rewarded also far from the command."""
     feet_gait: float = 0.5
-    """Feet that are in contact when the gait says so."""
+    """Feet whose contact agrees with the gait."""
     upright: float = 0.25
     """A level base."""
     lin_vel_z: float = -9.0

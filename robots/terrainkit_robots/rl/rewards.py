@@ -22,7 +22,7 @@ MIN_YAW_RATE = 0.1
 """Yaw rate from which a command counts as moving [rad/s]: heading control never reaches 0."""
 
 STANDING_TRACKING = 0.25
-"""Share of the tracking rewards that a robot earns by standing, whatever the command."""
+"""Share of the tracking rewards that a robot earns by standing, at any command."""
 
 SWING_HEIGHT = 0.18
 """Default height of a swinging foot, as a fraction of the leg length."""
@@ -87,7 +87,7 @@ def _sum_squares(values: FloatArray) -> FloatArray:
 
 
 def is_moving(commands: FloatArray) -> NDArray[np.bool_]:
-    """Return which commands ask to move, shape (n,)."""
+    """Return which commands are not a command to stand still, shape (n,)."""
     return (commands[:, :2] != 0).any(axis=1) | (np.abs(commands[:, 2]) >= MIN_YAW_RATE)
 
 
@@ -95,8 +95,9 @@ def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     """Return how well linear and yaw velocity are tracked, 0 to 1.
 
     On two legs, velocities are averaged over the gait: the sway is larger than small commands.
-    The width of each kernel is proportional to the command. Where one of the two is not commanded,
-    it counts only as far as the other one is tracked: standing is never worth more.
+    The width of each kernel is proportional to the command. Where only one of the two velocities is
+    commanded, the reward of the other one is multiplied by the tracking of the commanded velocity,
+    so that standing still does not earn it.
     """
     commands = state.commands
     squared = np.square(commands - state.mean_vel)

@@ -55,7 +55,7 @@ class RunInfo(Config):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PolicySpec:
-    """A policy, and what it is for: a run, or a policy from outside with a `policy`."""
+    """A policy with its task, robot and terrain: a run, or a function `policy` from outside."""
 
     task: Task  # the configuration of its environment
     robot: Robot  # the robot, with the spec it was trained with
@@ -137,8 +137,8 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
 
     Args:
         name: Its folder, one of its checkpoints, or a robot with a shipped policy.
-        checkpoint: Iteration of the checkpoint to select; by default the one that `name` is, or
-            the last.
+        checkpoint: Iteration of the checkpoint to select; by default the checkpoint `name`, or the
+            last one.
 
     Raises:
         ConfigError: If there is no such run or checkpoint, or its robot is missing.

@@ -251,7 +251,7 @@ class LeggedRunner(OnPolicyRunner):
             self.current_learning_iteration = state["iteration"]
             self.env.load_state_dict(process["env"])
             self.logger.load_state_dict(state["logger"])
-            if len(processes) != self.gpu_world_size:  # those that share a state sample differently
+            if len(processes) != self.gpu_world_size:  # no two processes may sample alike
                 seed = [self.env.cfg.runner.seed, state["iteration"]]
                 self.env.rng = np.random.default_rng(seed)
             else:

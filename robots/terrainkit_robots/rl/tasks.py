@@ -31,7 +31,7 @@ _registered: dict[str, "RegisteredTask"] = {}
 class RegisteredTask:
     """A robot, and the configuration of its training."""
 
-    name: str  # of the task; for a folder, that in its robot.toml, which a task may have too
+    name: str  # of the task; for a folder, the name in its robot.toml, which a task may share
     folder: Path  # with robot.toml
     task: Task  # configuration of training
 

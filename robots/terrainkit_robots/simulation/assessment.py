@@ -8,9 +8,9 @@ from terrainkit_robots.simulation.standing import StandResult
 from terrainkit_robots.text import contrast, names
 
 _MAX_TILT, _MAX_LEANING_TILT, _MAX_RECOVERABLE_TILT = map(math.radians, (3, 9, 29))
-"""Tilt of a standing robot, of a leaning one, and of one that may recover, at most [rad]. More than
-3 degrees changes the observations of a policy, from 9 on a robot sits or hangs over, and from 29 on
-none recovers."""
+"""Largest tilt of a standing robot, of a leaning robot, and of a robot that may recover [rad]. More
+than 3 degrees changes the observations of a policy. From 9 degrees on, a robot sits or hangs over;
+from 29 degrees on, none recovers."""
 
 _MAX_HEIGHT_LOSS, _MAX_RECOVERABLE_HEIGHT_LOSS = 0.25, 0.5
 """Loss of height over leg length: from a quarter on a robot squats, from a half on it lies or has

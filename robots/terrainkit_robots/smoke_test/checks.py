@@ -189,7 +189,7 @@ def check_standing(env: LeggedEnv) -> Check:
         earned += scale * function(env.state, env.robot, env.cfg.rewards)
     most = sum(scale for _, scale in terms) or 1.0
     share = float(np.max(earned[is_moving(env.commands)], initial=0)) / most
-    expected = f"at most {MAX_STANDING:.0%} of the tracking rewards, whatever the command"
+    expected = f"at most {MAX_STANDING:.0%} of the tracking rewards at any command"
     return Check("standing is not tracking", share <= MAX_STANDING, f"{share:.0%}", expected)
 
 

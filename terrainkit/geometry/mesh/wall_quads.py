@@ -6,7 +6,7 @@ its center. They are listed once for each of these cases, in the quad's own vert
 - 0 to 3: the corners, as in :mod:`terrainkit.geometry.walls`;
 - 4 + 2 k and 5 + 2 k: the midpoint of wall k, on the side of its first and its second corner;
 - 12 to 15: the vertices on a vertical line at the center, from the lowest to the highest;
-- 16 to 19: those on a second line, where four walls meet between two high corners.
+- 16 to 19: the vertices on a second line, where four walls meet between two high corners.
 """
 
 import itertools
@@ -211,7 +211,7 @@ class _VerticalLine:
     """Positions of all vertices [m], by quad in ascending order, shape (V, 3)."""
 
     vertices: NDArray[np.int32]
-    """Four consecutive numbers, of which the first ones are the quad's vertices, shape (4, K)."""
+    """Four consecutive vertex numbers, starting with the quad's own vertices, shape (4, K)."""
 
     rank: NDArray[np.uint8]
     """Index of the vertex of each of the h heights, counted from the lowest, shape (h, K)."""

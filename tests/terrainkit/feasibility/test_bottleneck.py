@@ -15,9 +15,9 @@ def edges(pairs):
 
 def test_bottleneck_takes_the_longer_easier_way():
     graph, demand = edges([(0, 1), (1, 3), (0, 2), (2, 3)]), np.array([0.1, 0.9, 0.4, 0.3])
-    legs = [(0, np.array([3])), (3, np.array([0])), (3, np.array([3, 0]))]
+    segments = [(0, np.array([3])), (3, np.array([0])), (3, np.array([3, 0]))]
     # Edges have a direction.
-    assert [bottleneck(graph, demand, leg, 4) for leg in legs] == [0.4, np.inf, 0.0]
+    assert [bottleneck(graph, demand, segment, 4) for segment in segments] == [0.4, np.inf, 0.0]
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -32,8 +32,8 @@ def test_bottleneck_is_that_of_floyd_and_warshall(seed):
     for k in range(n):
         best = np.minimum(best, np.maximum(best[:, k : k + 1], best[k : k + 1]))
     for target in range(n):
-        leg = (0, np.array([target]))
-        assert bottleneck(edges(pairs), demand, leg, n) == best[0, target]
+        segment = (0, np.array([target]))
+        assert bottleneck(edges(pairs), demand, segment, n) == best[0, target]
 
 
 def test_shortest_path_uses_the_shortest_of_parallel_edges():

@@ -31,12 +31,12 @@ def test_demand_is_that_of_all_steps_and_gaps(seed):
     """Pits and stones at random: no other gap makes the path easier."""
     rng = np.random.default_rng(seed)
     graph = graph_of(rng.choice(LEVELS, (14, 9), p=(0.5, 0.2, 0.1, 0.1, 0.1)))
-    leg, number = (4, np.arange(13 * 9, 14 * 9)), 14 * 9
-    found = path_edges(graph, graph.demand(graph.steps), leg)
+    segment, number = (4, np.arange(13 * 9, 14 * 9)), 14 * 9
+    found = path_edges(graph, graph.demand(graph.steps), segment)
     nodes = np.ones(number, dtype=bool)
     gaps = gap_edges(graph, np.arange(number), nodes, nodes, np.nextafter(MAX_DEMAND, np.inf))
     edges = Edges.concatenate([graph.steps, gaps])
-    found, every = (bottleneck(e, graph.demand(e), leg, number) for e in (found, edges))
+    found, every = (bottleneck(e, graph.demand(e), segment, number) for e in (found, edges))
     assert found == every or min(found, every) > MAX_DEMAND
 
 

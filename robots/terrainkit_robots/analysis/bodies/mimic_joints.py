@@ -8,7 +8,7 @@ from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
 _MAX_POSITION = 1e30
-"""Bound of the position of a mimic joint [rad] or [m], whatever the product of the multipliers."""
+"""Bound of the position of a mimic joint [rad] or [m], for any product of multipliers."""
 
 
 def mimic_joints(joints: Iterable[Joint]) -> tuple[Joint, ...]:

@@ -45,7 +45,7 @@ def is_wheel(body: Body, parents: Collection[int | None]) -> bool:
 
 
 def robot_joints(bodies: Sequence[Body]) -> list[Joint]:
-    """Return the moving joints without those that move the base of a planar model."""
+    """Return the moving joints, except the joints that move the base of a planar model."""
     base = {0} if bodies and bodies[0].virtual else set()
     found = []
     for body in bodies[1:]:

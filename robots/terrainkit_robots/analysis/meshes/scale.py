@@ -18,16 +18,16 @@ from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.transforms import Matrix
 
 MAX_RATIO, MAX_PLAUSIBLE_RATIO = 15.0, 50.0
-"""Size of a mesh over the distance to the next joints: limit of a valid mesh, and of one that may
-be valid. Shells are a few times larger. Millimeters read as meters are 1000 times too large, and
-inches 39 times."""
+"""Size of a mesh over the distance to the next joints: largest ratio of a valid mesh, and of a mesh
+that may be valid. Shells are a few times larger than the distance. Millimeters read as meters are
+1000 times too large, and inches 39 times."""
 
 MIN_RATIO = 0.02
 """The same ratio for a part that is too small. Meters read as millimeters are 1/1000."""
 
 _MIN_LARGE_SIZE = 3.0
-"""Smaller meshes are never too large [m], whatever the distances between the joints: a camera on a
-small vehicle is many times smaller than the vehicle."""
+"""Smaller meshes are never too large [m], even if the joints are close to each other: the body of a
+small vehicle is many times larger than its camera."""
 
 _MAX_SMALL_SIZE = 0.005
 """Larger meshes are never too small [m]: they may be a marker or a sensor."""

@@ -31,7 +31,7 @@ class ActuatorData:
     """Inertia that it adds to the armature of the joint [kg m2] or [kg]."""
 
     gear: float
-    """Factor from the force of the actuator to that on the joint."""
+    """Force on the joint divided by the force of the actuator."""
 
     stiffness: float | None
     """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""

@@ -430,10 +430,10 @@ _REPAIRS: tuple[tuple[str, _Repair], ...] = (
 @cache
 def _schema() -> Mapping[str, frozenset[str]]:
     """Return the attributes of each element, wherever it occurs."""
-    suggestion: dict[str, frozenset[str]] = {}
+    schema: dict[str, frozenset[str]] = {}
     for _, tag, attributes in _schema_rows():
-        suggestion[tag] = suggestion.get(tag, frozenset()) | attributes
-    return suggestion
+        schema[tag] = schema.get(tag, frozenset()) | attributes
+    return schema
 
 
 @cache

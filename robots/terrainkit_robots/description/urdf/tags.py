@@ -81,7 +81,7 @@ def unexpanded_xacro(root: "etree._Element") -> Iterator[tuple["etree._Element",
 
 
 def repeated_children(root: "etree._Element") -> Iterator["etree._Element"]:
-    """Yield elements of links and joints of which the parent already has one."""
+    """Yield elements that may occur once in a link or joint, but are repeated."""
     for parent in root.iter(*_SINGLE_CHILDREN):
         if _is_described(parent):
             seen: set[str] = set()

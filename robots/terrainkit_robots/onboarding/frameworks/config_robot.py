@@ -26,7 +26,7 @@ class ConfigRobot:
     spec: RobotSpec
 
     bodies: Sequence[str] = ()
-    """Names of all bodies after fixed joints are merged; if empty, those in the spec."""
+    """Names of all bodies after fixed joints are merged; if empty, the bodies in the spec."""
 
     limits: Mapping[str, tuple[float, float]] | None = None
     """Lower and upper limit of each joint in the URDF; None if unknown."""

@@ -25,7 +25,8 @@ class Keys:
 def common_key(targets: Sequence[str], names: Iterable[str]) -> str | None:
     """Return a substring of all targets and of no other name, or None if there is none.
 
-    The shortest one of whole words is preferred, such as `foot` in `FL_foot`, then the longest.
+    The shortest substring of whole words is preferred, such as `foot` in `FL_foot`. Otherwise, the
+    longest substring is returned.
 
     Args:
         targets: The names to match.

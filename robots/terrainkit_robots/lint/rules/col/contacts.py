@@ -11,8 +11,8 @@ from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.text import count
 
 _MIN_FOOT_DEPTH = 0.005
-"""How much lower a shape without contacts may be than those with contacts [m], such as a rubber
-skin."""
+"""How much lower a shape without contacts, such as a rubber skin, may be than the shapes with
+contacts [m]."""
 
 
 def _disabled_shapes(body: Body) -> list[BodyShape]:

@@ -39,8 +39,9 @@ def displaced_collision_mesh(robot: Facts) -> Violations:
     """A mesh has another pose or scale as collision shape than as visual shape of the same link.
 
     The origin or the scale was changed in one of the two elements only. The robot collides where
-    it cannot be seen, for example with its own thighs. A primitive that is larger than the one that
-    is drawn at the same place is reported as well, such as a sphere with its diameter as radius.
+    it cannot be seen, for example with its own thighs. A collision primitive that is larger than
+    the visual primitive at the same place is reported as well, such as a sphere whose radius is
+    the diameter.
 
     Fix:
         Copy <origin> and scale from the correct element to the other one.
@@ -129,7 +130,7 @@ def collision_outside_visual(robot: Facts) -> Violations:
     """Most of a collision shape is outside of the visible robot.
 
     The shape is turned, or on the wrong side of the joint: an origin was lost, has a wrong sign, or
-    is in degrees. The visible part passes through obstacles and invisible air hits them.
+    is in degrees. The visible part passes through obstacles, and empty space collides with them.
 
     Fix:
         Correct the <origin> of the <collision>. Show collision shapes in a viewer.

@@ -93,7 +93,7 @@ def _describe(result: SweepResult) -> str:
 
 
 def _has_limb_collision(robot: Facts, result: SweepResult) -> bool:
-    """Return whether both directions are blocked by two bodies of which one carries the other."""
+    """Return whether both directions are blocked by a body and a body that it carries."""
     if result.share >= _MIN_RANGE_SHARE:
         return False
     for pair in result.blocked:

@@ -66,7 +66,7 @@ def weak_position_gain(robot: Facts) -> Violations:
     """The gain of a position actuator is too low for the robot to stand.
 
     A position actuator without `kp` has a gain of 1: the joint bends by a radian for each N m, and
-    the robot collapses whatever it is commanded.
+    the robot collapses at any command.
 
     Fix:
         Give the actuator a `kp`, or set the gain in the training framework.

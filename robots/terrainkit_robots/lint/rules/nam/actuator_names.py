@@ -16,7 +16,7 @@ _FILLERS = frozenset(
 
 @rule("NAM005", "actuator-of-another-joint", "warning", certainty="likely")
 def actuator_of_another_joint(robot: Facts) -> Violations:
-    """An actuator has the name of another joint than the one that it drives.
+    """An actuator has the name of a joint that it does not drive.
 
     Its joint was not changed after copying, or two joints were exchanged. Commands are assigned by
     the name or the order of the actuators, so that two legs get each other's torques.

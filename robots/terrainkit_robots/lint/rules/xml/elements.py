@@ -77,7 +77,7 @@ def repeated_element(robot: Facts) -> Violations:
     was merged. MuJoCo rejects most of them; other readers silently take the first or the last.
 
     Fix:
-        Remove the one that is wrong. The safe fix removes an exact copy.
+        Remove the wrong element. The safe fix removes an exact copy.
 
     Source:
         wiki.ros.org/urdf/XML; MuJoCo 4.0: "repeated element".

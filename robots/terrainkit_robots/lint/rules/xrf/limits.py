@@ -29,8 +29,8 @@ _Difference = TypeVar("_Difference")
 def compare_limits(robot: Facts) -> Violations:
     """The limits of a joint differ between the files.
 
-    Limits clip targets, end episodes, and define penalties. A policy trained with one file reaches
-    limits in the other file that it does not know.
+    Limits clip targets, end episodes, and define penalties. A policy trained with one file runs
+    into the limits of the other file, which it never met in training.
 
     Fix:
         Find out the limits of the real robot, and write them into both files.

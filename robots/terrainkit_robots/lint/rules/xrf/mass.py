@@ -45,7 +45,7 @@ def compare_total_mass(robot: Facts) -> Violations:
         by the density of water during a conversion.
 
     Source:
-        Declared masses; in MJCF also those that MuJoCo computes from shapes. MuJoCo 4.0 drops the
+        Declared masses; in MJCF also masses that MuJoCo computes from shapes. MuJoCo 4.0 drops the
         mass of the trunk of a URDF without a floating joint, since it welds the trunk to the world.
     """
     pairs, other, there = robot_pairs(robot), other_robot(robot), other_name(robot)
