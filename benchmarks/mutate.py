@@ -1,0 +1,241 @@
+"""Plant single changes in the code, and print which of them the tests notice.
+
+python benchmarks/mutate.py [--package FOLDER ...] [--changes N] [--seed N] [--hours H] [--retry]
+
+Each change is planted in a copy of the working tree. The tests that mirror the changed file run
+first, then the tests of its package and at last those of the whole suite, where coverage says that
+they execute the changed line. The results are kept in .mutate/, and the same command goes on where
+it stopped. Changes that alter nothing are listed in mutation/equivalent.toml and not counted.
+"""
+
+import argparse
+import hashlib
+import json
+import random
+import signal
+import sys
+import tempfile
+import time
+import tomllib
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from mutation.changes import Change, find_changes
+from mutation.runner import IMPORT_ROOTS, ROOT, Tree
+
+KEPT = ROOT / ".mutate"
+"""Folder of the results, the baselines and the coverage."""
+
+EQUIVALENT = Path(__file__).parent / "mutation/equivalent.toml"
+
+STAGES = ("mirrored tests", "package", "suite")
+"""Tests that run, in this order, until a change is noticed."""
+
+RULE_CASES = Path("tests/terrainkit_robots/lint/test_every_rule.py")
+"""Runs the cases of all rules, so it mirrors each rule."""
+
+_SPLIT = {"lint"}
+"""Packages that are counted by their subpackages."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Planted:
+    """A planted change and what the tests say.
+
+    `before` and `after` are whole lines. `stage` is the last of `STAGES` that ran.
+    """
+
+    path: str
+    line: int
+    kind: str
+    before: str
+    after: str
+    digest: str
+    noticed_by: str = ""
+    stage: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, int, str]:
+        """Return what identifies the change in a version of a file."""
+        return self.path, self.digest, self.line, self.after
+
+    @property
+    def package(self) -> str:
+        """Return the package in which it is counted."""
+        parts = Path(self.path).parts
+        first = next(k for k, part in enumerate(parts) if part in IMPORT_ROOTS)
+        depth = 3 if parts[first + 1] in _SPLIT else 2
+        return "/".join(parts[first : max(min(first + depth, len(parts) - 1), first + 1)])
+
+
+def main() -> int:
+    """Plant changes and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--package", nargs="*", default=["."], help="folders or files")
+    parser.add_argument("--changes", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--hours", type=float, default=3.0, help="no change is planted later")
+    parser.add_argument("--stages", type=int, default=3, choices=(1, 2, 3))
+    parser.add_argument("--retry", action="store_true", help="run the tests on survivors again")
+    parser.add_argument("--report", action="store_true", help="only print the table")
+    arguments = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    KEPT.mkdir(exist_ok=True)
+    results = KEPT / f"{arguments.seed}.jsonl"
+    if not arguments.report:
+        with tempfile.TemporaryDirectory(prefix="mutate-tree-") as folder:
+            _plant_all(Tree(Path(folder) / "tree", KEPT), arguments, results)
+    _print_table(list(_read(results).values()))
+    return 0
+
+
+def _plant_all(tree: Tree, arguments: argparse.Namespace, results: Path) -> None:
+    end = time.monotonic() + 3600 * arguments.hours
+    plan = list(make_plan(tree, arguments.package, arguments.changes, arguments.seed))
+    known = _read(results)
+    stages = STAGES[: arguments.stages]
+    for k, (planted, source, change) in enumerate(plan):
+        if time.monotonic() > end:
+            print(f"{len(plan) - k} changes are left; the same command goes on")
+            break
+        last = known.get(planted.key, planted)
+        done = stages.index(last.stage) + 1 if last.stage in stages else len(STAGES) * bool(last.stage)
+        if last.noticed_by or (done >= len(stages) and not arguments.retry):
+            continue
+        begin = time.monotonic()
+        found = try_change(tree, planted, source, change, stages[0 if arguments.retry else done :])
+        with results.open("a") as file:
+            file.write(json.dumps(asdict(found)) + "\n")
+        where = f"{found.path}:{found.line}: {found.before} -> {found.after}"
+        outcome = f"noticed by {found.noticed_by}" if found.noticed_by else "SURVIVED"
+        print(f"{k + 1}/{len(plan)} {time.monotonic() - begin:.0f} s {where}: {outcome}", flush=True)
+
+
+def make_plan(
+    tree: Tree, packages: list[str], number: int, seed: int
+) -> Iterator[tuple[Planted, bytes, Change]]:
+    """Yield changes, so that any number of the first ones is spread evenly over the packages.
+
+    A package gets changes in proportion to its lines that can be changed. Lines are drawn first,
+    then a kind of change, so that the many constants do not outweigh the other kinds.
+    """
+    generator = random.Random(seed)
+    lines: dict[str, list[tuple[Path, bytes, list[Change]]]] = defaultdict(list)
+    for path in tree.product_files():
+        if not any((ROOT / path).is_relative_to((ROOT / each).resolve()) for each in packages):
+            continue
+        source = (tree.folder / path).read_bytes()
+        by_line: dict[int, list[Change]] = defaultdict(list)
+        for change in find_changes(source):
+            by_line[change.line].append(change)
+        package = Planted(path=str(path), line=0, kind="", before="", after="", digest="").package
+        lines[package] += [(path, source, changes) for changes in by_line.values()]
+    total = sum(map(len, lines.values()))
+    places: list[tuple[float, str]] = []
+    for package, each in lines.items():
+        generator.shuffle(each)
+        share = number * len(each) / total
+        places += [((k + generator.random()) / share, package) for k in range(len(each))]
+    for _, package in sorted(places)[:number]:
+        yield _draw(generator, *lines[package].pop())
+
+
+def _draw(
+    generator: random.Random, path: Path, source: bytes, changes: list[Change]
+) -> tuple[Planted, bytes, Change]:
+    """Return one of the changes of a line."""
+    changes = [change for change in changes if change.is_valid(source)]
+    kind = generator.choice(sorted({change.kind for change in changes}))
+    change = generator.choice([change for change in changes if change.kind == kind])
+    before, after = _changed_lines(source, change)
+    planted = Planted(
+        path=str(path),
+        line=change.line,
+        kind=kind,
+        before=before,
+        after=after,
+        digest=hashlib.sha1(source).hexdigest()[:12],
+    )
+    return planted, source, change
+
+
+def _changed_lines(source: bytes, change: Change) -> tuple[str, str]:
+    """Return the lines of a change before and after it, each in one line."""
+    start = source.rfind(b"\n", 0, change.start) + 1
+    stop = source.find(b"\n", change.end) % (len(source) + 1)
+    before = source[start:stop]
+    after = source[start : change.start] + change.text.encode() + source[change.end : stop]
+    return " ".join(before.decode().split()), " ".join(after.decode().split())
+
+
+def try_change(
+    tree: Tree, planted: Planted, source: bytes, change: Change, stages: tuple[str, ...]
+) -> Planted:
+    """Run the tests on a change, stage by stage."""
+    path, noticed = Path(planted.path), ""
+    seen = [file for stage in STAGES[: STAGES.index(stages[0])] for file in _tests(tree, path)[stage]]
+    for stage in stages:
+        for test_file in _tests(tree, path)[stage]:
+            if test_file not in seen and not noticed:
+                seen.append(test_file)
+                noticed = _run(tree, path, change, source, test_file)
+        if noticed:
+            break
+    return Planted(**{**asdict(planted), "noticed_by": noticed, "stage": stage})
+
+
+def _run(tree: Tree, path: Path, change: Change, source: bytes, test_file: Path) -> str:
+    """Return what notices a change in a test file, or nothing."""
+    baseline = tree.baseline(test_file)
+    only = tree.covering(test_file, path, change.line if change.in_function else None)
+    if only is not None and not only:
+        return ""
+    with tree.changed(path, change.apply(source)):
+        return tree.run(test_file, only, limit=baseline).noticed
+
+
+def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
+    """Return the test files of each stage."""
+    root = next(name for name in IMPORT_ROOTS if name in path.parts)
+    parts = path.parts[path.parts.index(root) : -1]
+    folders = [Path("tests", *parts[:k]) for k in range(len(parts), 0, -1)]
+    nearest = next(each for each in folders if (tree.folder / each).is_dir())
+    names = [nearest / f"test_{name}.py" for name in (path.stem, path.parent.name)]
+    mirrored = [name for name in names if (tree.folder / name).exists()][:1]
+    if "rules" in parts:
+        mirrored.append(RULE_CASES)
+    files = (mirrored, tree.test_files(nearest), tree.test_files(Path(*nearest.parts[:3])))
+    return dict(zip(STAGES, (files[0], files[1] + files[2], tree.test_files(Path("tests")))))
+
+
+def _read(results: Path) -> dict[tuple[str, str, int, str], Planted]:
+    """Return the last result of each change."""
+    lines = results.read_text().splitlines() if results.exists() else []
+    return {each.key: each for each in (Planted(**json.loads(line)) for line in lines)}
+
+
+def _print_table(found: list[Planted]) -> None:
+    listed = tomllib.loads(EQUIVALENT.read_text()).get("change", [])
+    equivalent = {(each["file"], each["before"], each["after"]) for each in listed}
+    counts: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0, 0])
+    survivors = []
+    for each in found:
+        is_equivalent = (each.path, each.before, each.after) in equivalent
+        outcome = 1 if each.noticed_by else 3 if is_equivalent else 2
+        survivors += [each] * (outcome == 2)
+        for package in (each.package, "all"):
+            counts[package][0] += 1
+            counts[package][outcome] += 1
+    print(f"{'package':40} planted noticed survived equivalent  noticed")
+    for package in sorted(counts, key=lambda name: (name == "all", name)):
+        planted, noticed, survived, equal = counts[package]
+        share = noticed / (planted - equal) if planted > equal else 1.0
+        print(f"{package:40} {planted:7} {noticed:7} {survived:8} {equal:10} {share:8.0%}")
+    for each in sorted(survivors, key=lambda each: (each.path, each.line)):
+        print(f"{each.path}:{each.line}: {each.before} -> {each.after}  [{each.stage}]")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

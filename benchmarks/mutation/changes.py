@@ -1,0 +1,224 @@
+"""Find the single changes that can be planted in a Python file."""
+
+import ast
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from typing import NamedTuple
+
+_COMPARISONS: dict[type[ast.cmpop], tuple[str, tuple[str, ...]]] = {
+    ast.Lt: ("<", ("<=", ">=")),
+    ast.LtE: ("<=", ("<", ">")),
+    ast.Gt: (">", (">=", "<=")),
+    ast.GtE: (">=", (">", "<")),
+    ast.Eq: ("==", ("!=",)),
+    ast.NotEq: ("!=", ("==",)),
+    ast.Is: (r"is(?!\s+not\b)", ("is not",)),
+    ast.IsNot: (r"is\s+not", ("is",)),
+    ast.In: ("in", ("not in",)),
+    ast.NotIn: (r"not\s+in", ("in",)),
+}
+"""Pattern of each comparison, and what it is changed to."""
+
+_OPERATORS: dict[type[ast.operator], tuple[str, str]] = {
+    ast.Add: (r"\+", "-"),
+    ast.Sub: ("-", "+"),
+    ast.Mult: (r"\*", "/"),
+    ast.Div: ("/", "*"),
+    ast.FloorDiv: ("//", "*"),
+    ast.Mod: ("%", "*"),
+    ast.Pow: (r"\*\*", "*"),
+    ast.BitAnd: ("&", "|"),
+    ast.BitOr: (r"\|", "&"),
+}
+
+_PAIRS = (
+    ("min", "max"),
+    ("minimum", "maximum"),
+    ("argmin", "argmax"),
+    ("any", "all"),
+    ("floor", "ceil"),
+    ("sin", "cos"),
+)
+_OTHER_NAME = {a: b for pair in _PAIRS for a, b in (pair, pair[::-1])}
+
+_REMOVABLE = (ast.AugAssign, ast.Continue, ast.Break, ast.Raise)
+_ANNOTATIONS = {"annotation", "returns", "decorator_list", "type_params"}
+
+
+class Change(NamedTuple):
+    """A replacement of one span of a file.
+
+    `start` and `end` are offsets [bytes]; `line` counts from 1.
+    """
+
+    start: int
+    end: int
+    line: int
+    kind: str
+    text: str
+    in_function: bool
+
+    def apply(self, source: bytes) -> bytes:
+        """Return the file with the change."""
+        return source[: self.start] + self.text.encode() + source[self.end :]
+
+    def is_valid(self, source: bytes) -> bool:
+        """Return whether the changed file compiles and differs from the file."""
+        try:
+            return ast.dump(ast.parse(self.apply(source))) != ast.dump(ast.parse(source))
+        except SyntaxError:
+            return False
+
+
+def find_changes(source: bytes) -> list[Change]:
+    """Return the changes of a file; a few do not compile or do not alter it.
+
+    Annotations, decorators, docstrings, f-strings and imports are left alone.
+    """
+    finder = _Finder(source)
+    finder.visit_children(ast.parse(source), in_function=False)
+    return finder.changes
+
+
+class _Finder:
+    def __init__(self, source: bytes) -> None:
+        self.source = source
+        self.lines = [0]
+        for line in source.splitlines(keepends=True):
+            self.lines.append(self.lines[-1] + len(line))
+        self.changes: list[Change] = []
+
+    def visit_children(self, node: ast.AST, *, in_function: bool) -> None:
+        in_function |= isinstance(node, ast.FunctionDef | ast.Lambda)
+        for name, value in ast.iter_fields(node):
+            children = value if isinstance(value, list) else [value]
+            for child in children:
+                if name not in _ANNOTATIONS and isinstance(child, ast.AST):
+                    self.visit(child, in_function=in_function)
+
+    def visit(self, node: ast.AST, *, in_function: bool) -> None:
+        is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if is_docstring or isinstance(node, ast.JoinedStr | ast.Import | ast.ImportFrom):
+            return
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            return
+        for start, end, kind, text in self._changes_of(node):
+            line = bisect_right(self.lines, start)
+            self.changes.append(Change(start, end, line, kind, text, in_function))
+        self.visit_children(node, in_function=in_function)
+
+    def _changes_of(self, node: ast.AST) -> Iterator[tuple[int, int, str, str]]:
+        match node:
+            case ast.Compare():
+                yield from self._comparisons(node)
+                for each in (node.left, *node.comparators):
+                    yield from self._string(each)
+            case ast.BoolOp():
+                old, new = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
+                for a, b in zip(node.values, node.values[1:], strict=False):
+                    yield from self._between(a, b, rf"\b{old}\b", "and/or", new)
+            case ast.BinOp() if type(node.op) in _OPERATORS:
+                if not any(map(_is_text, (node.left, node.right))):
+                    old, new = _OPERATORS[type(node.op)]
+                    yield from self._between(node.left, node.right, old, "operator", new)
+            case ast.Constant(value=bool() | int() | float()):
+                for value in _other_numbers(node.value):
+                    yield *self._span(node), "constant", repr(value)
+            case ast.UnaryOp(op=ast.USub() | ast.Not()):
+                kind = "not" if isinstance(node.op, ast.Not) else "sign"
+                yield self._span(node)[0], self._span(node.operand)[0], kind, ""
+            case ast.Call():
+                yield from self._swapped(node.args)
+            case ast.Name(id=name) if name in _OTHER_NAME:
+                yield *self._span(node), "name", _OTHER_NAME[name]
+            case ast.Attribute(attr=name) if name in _OTHER_NAME:
+                end = self._span(node)[1]
+                yield end - len(name), end, "name", _OTHER_NAME[name]
+            case ast.Subscript():
+                yield from self._string(node.slice)
+            case ast.Dict():
+                for key in node.keys:
+                    yield from self._string(key)
+            case ast.MatchValue():
+                yield from self._string(node.value)
+            case ast.comprehension():
+                for each in node.ifs:
+                    yield *self._span(each), "condition", "True"
+            case ast.Return(value=ast.expr() as value) if not isinstance(value, ast.Constant):
+                yield *self._span(value), "return", "None"
+            case ast.stmt():
+                yield from self._statement(node)
+        if isinstance(node, ast.If | ast.IfExp):
+            for text in ("True", "False"):
+                yield *self._span(node.test), "condition", text
+
+    def _statement(self, node: ast.stmt) -> Iterator[tuple[int, int, str, str]]:
+        is_call = isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
+        if is_call or isinstance(node, _REMOVABLE) or _stores_into(node):
+            yield *self._span(node), "removed", "pass"
+
+    def _comparisons(self, node: ast.Compare) -> Iterator[tuple[int, int, str, str]]:
+        operands = [node.left, *node.comparators]
+        for a, b, operator in zip(operands, operands[1:], node.ops, strict=False):
+            old, others = _COMPARISONS[type(operator)]
+            for new in others:
+                yield from self._between(a, b, old, "comparison", new)
+
+    def _swapped(self, arguments: list[ast.expr]) -> Iterator[tuple[int, int, str, str]]:
+        for a, b in zip(arguments, arguments[1:], strict=False):
+            if not isinstance(a, ast.Starred) and not isinstance(b, ast.Starred):
+                (start, a_end), (b_start, end) = self._span(a), self._span(b)
+                first, gap, last = (
+                    self.source[i:j].decode()
+                    for i, j in ((start, a_end), (a_end, b_start), (b_start, end))
+                )
+                yield start, end, "swapped", last + gap + first
+
+    def _string(self, node: ast.AST | None) -> Iterator[tuple[int, int, str, str]]:
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield *self._span(node), "string", repr(node.value + "_")
+
+    def _between(
+        self, a: ast.expr, b: ast.expr, old: str, kind: str, new: str
+    ) -> Iterator[tuple[int, int, str, str]]:
+        start, end = self._span(a)[1], self._span(b)[0]
+        found = re.search(old, self.source[start:end].decode())
+        if found:
+            yield start + found.start(), start + found.end(), kind, new
+
+    def _span(self, node: ast.expr | ast.stmt) -> tuple[int, int]:
+        """Return the offsets of the start and the end of a node [bytes]."""
+        assert node.end_lineno is not None
+        assert node.end_col_offset is not None
+        return (
+            self.lines[node.lineno - 1] + node.col_offset,
+            self.lines[node.end_lineno - 1] + node.end_col_offset,
+        )
+
+
+def _stores_into(node: ast.stmt) -> bool:
+    """Return whether a statement assigns to items or attributes only.
+
+    Without any other assignment, the next use of the name would be an error.
+    """
+    return isinstance(node, ast.Assign) and all(
+        isinstance(target, ast.Attribute | ast.Subscript) for target in node.targets
+    )
+
+
+def _is_text(node: ast.expr) -> bool:
+    is_string = isinstance(node, ast.Constant) and isinstance(node.value, str)
+    return is_string or isinstance(node, ast.JoinedStr)
+
+
+def _other_numbers(value: bool | int | float) -> Iterator[float]:
+    if isinstance(value, bool):
+        yield not value
+        return
+    if isinstance(value, int):
+        yield value + 1
+    if value != 0:
+        yield type(value)(0)
+    if value not in (0, 1):
+        yield value * 2
