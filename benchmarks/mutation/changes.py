@@ -130,11 +130,7 @@ class _Finder:
                 yield self._span(node)[0], self._span(node.operand)[0], kind, ""
             case ast.Call():
                 yield from self._swapped(node.args)
-            case ast.Name(id=name) if name in _OTHER_NAME:
-                yield *self._span(node), "name", _OTHER_NAME[name]
-            case ast.Attribute(attr=name) if name in _OTHER_NAME:
-                end = self._span(node)[1]
-                yield end - len(name), end, "name", _OTHER_NAME[name]
+                yield from self._other_function(node.func)
             case ast.Subscript():
                 yield from self._string(node.slice)
             case ast.Dict():
@@ -174,6 +170,12 @@ class _Finder:
                     for i, j in ((start, a_end), (a_end, b_start), (b_start, end))
                 )
                 yield start, end, "swapped", last + gap + first
+
+    def _other_function(self, node: ast.expr) -> Iterator[tuple[int, int, str, str]]:
+        name = getattr(node, "attr", getattr(node, "id", ""))
+        if name in _OTHER_NAME:
+            end = self._span(node)[1]
+            yield end - len(name), end, "function", _OTHER_NAME[name]
 
     def _string(self, node: ast.AST | None) -> Iterator[tuple[int, int, str, str]]:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):

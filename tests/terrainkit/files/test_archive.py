@@ -69,6 +69,37 @@ def test_archive_rejects_unexpected_array(archive, key, kind, shape, message):
         archive.array(key, kind, shape)
 
 
+def test_archive_rejects_foreign_byte_order(tmp_path):
+    np.savez(tmp_path / "big.npz", heights=np.zeros(2, dtype=">f4"))
+    with (
+        open_archive(tmp_path / "big.npz") as archive,
+        pytest.raises(MapFileError, match="heights: got dtype >f4; expected float32"),
+    ):
+        archive.array("heights", "f4", (2,))
+
+
+@pytest.mark.parametrize(
+    ("code", "is_valid"),
+    [
+        (0xD7FF, True),
+        (0xD800, False),
+        (0xDFFF, False),
+        (0xE000, True),
+        (0x10FFFF, True),
+        (0x110000, False),
+    ],
+)
+def test_archive_rejects_code_points_that_are_not_unicode(tmp_path, code, is_valid):
+    note = np.frombuffer(np.uint32(code).tobytes(), dtype="<U1").reshape(())
+    np.savez(tmp_path / "note.npz", note=note)
+    with open_archive(tmp_path / "note.npz") as archive:
+        if is_valid:
+            assert archive.text("note") == chr(code)
+        else:
+            with pytest.raises(MapFileError, match="note"):
+                archive.text("note")
+
+
 def test_archive_limit_is_inclusive(archive):
     assert archive.array("heights", "f4", (2, 3), limit=24).nbytes == 24
     with pytest.raises(MapFileError, match="heights: got 24 bytes; expected at most 23"):

@@ -46,3 +46,10 @@ def test_noise_realizes_whole_intervals(geometry):
     grid = geometry().grid
     assert Noise(amplitude=0.1, spacing=0.3).realized(grid)["spacing"] == pytest.approx(4.0 / 13)
     assert Noise(pattern="perlin", spacing=0.3).realized(grid)["spacing"] == 0.3
+
+
+def test_noise_realizes_its_own_parameters_only(geometry):
+    """Heights are not rounded to steps, and the pattern has no parameters of its own."""
+    noise = Noise(amplitude=(0.0, 0.2), spacing=0.5, platform=1.0).at(0.5)
+    expected = {"amplitude": 0.1, "pattern": "uniform", "spacing": 0.5, "platform": 1.0}
+    assert noise.realized(geometry().grid) == expected

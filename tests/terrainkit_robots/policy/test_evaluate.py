@@ -8,6 +8,7 @@ import torch
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
+    ErrorMean,
     EvaluationConfig,
     EvaluationRollout,
     command_grid,
@@ -177,6 +178,27 @@ def test_summary_groups_by_command(make_run):
     assert document["all"]["followed"] == 0
     assert document["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     assert "by_terrain" not in document
+
+
+def test_error_mean_weights_robots_equally():
+    mean = ErrorMean(3)
+    mean.add(np.array([1.0, 5.0, 9.0]), np.array([True, True, False]))
+    mean.add(np.array([4.0, 7.0, 9.0]), np.array([True, False, False]))
+    assert mean.over(np.array([True, False, True])) == 2.5  # (1 + 4) / 2
+    assert mean.over(np.array([True, True, True])) == 3.75  # (2.5 + 5) / 2
+    assert mean.over(np.array([False, False, True])) is None
+
+
+def test_summary_has_the_velocity_errors_of_each_command(make_run, make_sliding):
+    env = make_sliding([[0.7, -0.4, 0.25], [0.0, 0.5, -1.0]])
+    rollout, commands = EvaluationRollout(env), np.array([[1, 0, 0], [0, 0, -0.5]], np.float32)
+    rollout.run(lambda _: torch.zeros(2, env.num_actions), 3.5, commands)
+    result = summarize(make_run(), EvaluationConfig(), rollout, commands)
+    for suffix in ("", "_1s"):
+        linear, yaw = (f"{name}_vel_error{suffix}" for name in ("lin", "ang"))
+        found = [[getattr(g, linear), getattr(g, yaw)] for g in result.groups["by_command"]]
+        assert found == [pytest.approx([0.5, 0.25]), pytest.approx([0.5, 0.5])]
+        assert getattr(result.metrics, yaw) == pytest.approx(0.375)
 
 
 def test_summary_groups_by_terrain_and_level(make_run, map_file):

@@ -41,6 +41,7 @@ def measure(monkeypatch):
                 for each, test in zip(parameters, limit_tests(limits), strict=True):
                     (easy, hard), value = test.values, each.requested[test.parameter]
                     self.levels.append(round((value - easy) / (hard - easy) * (LEVELS - 1)))
+                assert 0 <= min(self.levels) <= max(self.levels) < LEVELS
 
             def attempt(self, levels, columns):
                 assert len(levels) == len(columns) == self.num_envs
