@@ -14,7 +14,11 @@ _GIMBAL_LOCK = 1e-13
 
 
 def invert_poses(poses: Matrix) -> Matrix:
-    """Return the inverses of rigid transforms, shape (..., 4, 4)."""
+    """Return the inverses of rigid transforms.
+
+    Args:
+        poses: Homogeneous matrices, shape (..., 4, 4).
+    """
     result = np.zeros_like(poses)
     transposed = np.swapaxes(poses[..., :3, :3], -1, -2)
     result[..., :3, :3] = transposed
@@ -181,12 +185,23 @@ def projected_gravity(quat: FloatArray) -> FloatArray:
 
 
 def quat_to_yaw(quat: FloatArray) -> FloatArray:
-    """Return the yaw of unit quaternions of shape (n, 4) [rad], shape (n,)."""
+    """Return the yaw of unit quaternions.
+
+    Args:
+        quat: Quaternions (w, x, y, z), shape (n, 4).
+
+    Returns:
+        Yaw [rad], shape (n,).
+    """
     w, x, y, z = quat.T
     yaw: FloatArray = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return yaw
 
 
 def wrap_to_pi(angle: FloatArray) -> FloatArray:
-    """Wrap angles to the range from -pi to pi [rad]."""
+    """Wrap angles to the range from -pi to pi.
+
+    Args:
+        angle: Angles [rad], any shape.
+    """
     return (angle + np.float32(np.pi)) % np.float32(2 * np.pi) - np.float32(np.pi)

@@ -14,7 +14,15 @@ Seed = int | Sequence[int]
 
 
 def to_numpy(name: str, values: Any) -> NDArray[Any]:
-    """Return an array, a list or a tensor as a numpy array; torch is not imported."""
+    """Return an array, a list or a tensor as a numpy array; torch is not imported.
+
+    Args:
+        name: What the values are, for the error.
+        values: An array, list or tensor of torch, on any device.
+
+    Raises:
+        ConfigError: if lists have different lengths.
+    """
     if hasattr(values, "detach"):
         values = values.detach().cpu()
     try:
@@ -24,7 +32,12 @@ def to_numpy(name: str, values: Any) -> NDArray[Any]:
 
 
 def like(array: NDArray[Any], given: Any) -> Any:
-    """Return an array as a tensor on the device of `given` if that is a tensor of torch."""
+    """Return an array as a tensor on the device of `given` if that is a tensor of torch.
+
+    Args:
+        array: The result as an array.
+        given: An argument of the caller, which decides the type of the result.
+    """
     if not hasattr(given, "new_tensor"):
         return array
     import torch
@@ -33,7 +46,20 @@ def like(array: NDArray[Any], given: Any) -> Any:
 
 
 def to_indices(name: str, values: Any, size: int, number: int | None = None) -> NDArray[np.int64]:
-    """Return integers from 0 to `size` - 1, such as rows of a map, shape (n,) or (number,)."""
+    """Return integers from 0 to `size` - 1, such as rows of a map.
+
+    Args:
+        name: What the values are, for the errors.
+        values: An array, list or tensor of torch.
+        size: Number of valid indices.
+        number: Expected length; None for any.
+
+    Returns:
+        Indices, shape (n,) or (number,).
+
+    Raises:
+        ConfigError: if the shape is wrong, or a value is not an integer from 0 to `size` - 1.
+    """
     given = to_numpy(name, values)
     if given.ndim != 1 or len(given) != (len(given) if number is None else number):
         expected = "(n,)" if number is None else f"({number},)"
@@ -46,7 +72,19 @@ def to_indices(name: str, values: Any, size: int, number: int | None = None) -> 
 
 
 def to_numbers(name: str, values: Any, number: int) -> NDArray[np.float64]:
-    """Return one number for each of `number` episodes; a single value applies to all of them."""
+    """Return one number for each episode.
+
+    Args:
+        name: What the values are, for the errors.
+        values: Shape (number,), or a single value, which applies to all episodes.
+        number: Number of episodes.
+
+    Returns:
+        Numbers, shape (number,), read-only.
+
+    Raises:
+        ConfigError: if the values are not numbers, or have another shape.
+    """
     given = to_numpy(name, values)
     if given.dtype.kind not in "fiub":
         raise ConfigError(f"{name}: got values of {given.dtype}; expected numbers")
@@ -56,7 +94,18 @@ def to_numbers(name: str, values: Any, number: int) -> NDArray[np.float64]:
 
 
 def to_progress(values: Any, number: int) -> NDArray[np.float64]:
-    """Return the progress of each of `number` episodes, 0 to 1, or NaN."""
+    """Return the progress of each episode.
+
+    Args:
+        values: Progress, 0 to 1 or NaN, shape (number,) or a single value.
+        number: Number of episodes.
+
+    Returns:
+        Progress, shape (number,), read-only.
+
+    Raises:
+        ConfigError: if a value is not from 0 to 1 or NaN, or the shape is wrong.
+    """
     progress = to_numbers("progress", values, number)
     outside = progress[(progress < 0) | (progress > 1)]
     if outside.size:
@@ -65,7 +114,16 @@ def to_progress(values: Any, number: int) -> NDArray[np.float64]:
 
 
 def make_rng(seed: Seed) -> np.random.Generator:
-    """Return the generator of a seed; numpy would accept None, and warn of nothing."""
+    """Return the generator of a seed.
+
+    numpy itself would accept None.
+
+    Args:
+        seed: A nonnegative integer, or a sequence of nonnegative integers.
+
+    Raises:
+        ConfigError: if the seed is anything else.
+    """
     try:
         values = np.asarray(seed)
         is_valid = (

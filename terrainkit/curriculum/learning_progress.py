@@ -38,12 +38,21 @@ class LearningProgressSampler(UniformSampler):
         return {**super().arrays(), "fast": self.fast, "slow": self.slow}
 
     def record(self, patches: IntArray, success: FloatArray) -> None:
-        """Add the success of episodes to both means."""
+        """Add the success of episodes to both means.
+
+        Args:
+            patches: Patch of each episode, row times columns plus column, shape (k,).
+            success: 1 for a success, otherwise 0, shape (k,).
+        """
         for means, decay in ((self.fast, FAST_DECAY), (self.slow, SLOW_DECAY)):
             add_to_means(means, patches, success, decay)
 
     def probs(self) -> FloatArray:
-        """Return the probability of each patch, shape (rows, cols)."""
+        """Return the probability of each patch.
+
+        Returns:
+            Probabilities with a sum of 1, shape (rows, cols).
+        """
         change, uniform = np.abs(self.fast - self.slow), super().probs()
         if not change.any():
             return uniform

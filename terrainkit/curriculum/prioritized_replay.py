@@ -43,14 +43,23 @@ class PrioritizedReplaySampler(UniformSampler):
         return {**super().arrays(), **own}
 
     def record(self, patches: IntArray, success: FloatArray) -> None:
-        """Update the scores with the success of episodes."""
+        """Update the scores with the success of episodes.
+
+        Args:
+            patches: Patch of each episode, row times columns plus column, shape (k,).
+            success: 1 for a success, otherwise 0, shape (k,).
+        """
         error = np.abs(success - self.value.ravel()[patches])
         add_to_means(self.score, patches, error, DECAY)
         add_to_means(self.value, patches, success, DECAY)
         self.last_visit.ravel()[patches] = self._updates
 
     def probs(self) -> FloatArray:
-        """Return the probability of each patch, shape (rows, cols)."""
+        """Return the probability of each patch.
+
+        Returns:
+            Probabilities with a sum of 1, shape (rows, cols).
+        """
         seen = ~np.isnan(self.score)
         probs: FloatArray = (~seen) / seen.size
         score, order = self.score[seen], np.sort(-self.score[seen])

@@ -147,6 +147,9 @@ class CommandProgress:
     def load_state_dict(self, state: Any) -> None:
         """Restore the arrays of :meth:`state_dict`.
 
+        Args:
+            state: Arrays or tensors by name.
+
         Raises:
             ConfigError: if an array is missing, or for another number of robots.
         """

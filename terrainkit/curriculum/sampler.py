@@ -118,6 +118,9 @@ class PatchSampler:
         If the number of environments differs, the saved levels of each column are repeated or cut
         to its new number of environments.
 
+        Args:
+            state: The arrays and the number of updates of :meth:`state_dict`.
+
         Raises:
             ConfigError: if the state belongs to another map, or to another sampler.
         """

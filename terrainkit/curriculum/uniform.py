@@ -10,12 +10,21 @@ class UniformSampler(PatchSampler):
     """Sample every patch with the same probability, as domain randomization does."""
 
     def probs(self) -> FloatArray:
-        """Return the probability of each patch, shape (rows, cols)."""
+        """Return the probability of each patch.
+
+        Returns:
+            Probabilities with a sum of 1, shape (rows, cols).
+        """
         visits = self.statistics.visits
         return np.full(visits.shape, 1 / visits.size)
 
     def record(self, patches: IntArray, success: FloatArray) -> None:
-        """Update what the probabilities depend on; success is 0 or 1, shape (k,)."""
+        """Update what the probabilities depend on.
+
+        Args:
+            patches: Patch of each episode, row times columns plus column, shape (k,).
+            success: 1 for a success, otherwise 0, shape (k,).
+        """
 
     def next_patches(
         self, levels: IntArray, columns: IntArray, progress: FloatArray, seed: tuple[int, int]

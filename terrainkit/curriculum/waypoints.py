@@ -61,9 +61,13 @@ class Waypoints:
         return np.where(numbers > 0, self.index / np.maximum(numbers, 1), np.nan)
 
     def update(self, position: NDArray[np.floating]) -> NDArray[np.bool_]:
-        """Advance the robots that are at their goal; return which have reached their last one.
+        """Advance the robots that are at their goal.
 
-        `position` is x and y [m], shape (n, 2).
+        Args:
+            position: Positions, x and y [m], shape (n, 2).
+
+        Returns:
+            Whether each robot has reached its last goal, shape (n,).
         """
         reached = np.linalg.norm(self._current() - position, axis=1) <= self.radius
         self.index += reached & (self.index < self.numbers)
@@ -99,7 +103,12 @@ class Waypoints:
         return np.where(too_slow & (progress < 1), np.nan, progress)
 
     def reset(self, env_ids: NDArray[np.int64], goals: NDArray[np.floating]) -> None:
-        """Start new episodes of some robots, with their goals, shape (m, k, 2)."""
+        """Start new episodes of some robots.
+
+        Args:
+            env_ids: Robots, shape (m,).
+            goals: Their goals, x and y [m], shape (m, k, 2), padded with NaN.
+        """
         self.goals[env_ids], self.index[env_ids] = goals, 0
 
     def commands(

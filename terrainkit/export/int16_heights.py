@@ -7,7 +7,14 @@ from terrainkit.errors import ConfigError, ExportError
 
 
 def int16_heights(heights: NDArray[np.floating], vertical_scale: float) -> NDArray[np.int16]:
-    """Return `heights` in units of `vertical_scale` [m].
+    """Return heights as 16-bit integers.
+
+    Args:
+        heights: Heights [m].
+        vertical_scale: Height of one unit [m].
+
+    Returns:
+        Heights in units of `vertical_scale`, of the same shape.
 
     Raises:
         ConfigError: if `vertical_scale` is not above 0.

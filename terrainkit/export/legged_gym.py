@@ -78,6 +78,9 @@ def corner_heights(heights: NDArray[np.float64]) -> NDArray[np.float64]:
 
     LeggedRobot reads the smallest of three corners of a cell. With the largest heights there, it
     reads the height of the cell beside a wall as well.
+
+    Args:
+        heights: Height of each cell [m], shape (nx, ny).
     """
     padded = np.pad(heights, 1, mode="edge")
     along_x = np.maximum(padded[:-1], padded[1:])
@@ -85,7 +88,15 @@ def corner_heights(heights: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def x_edges(heights: NDArray[np.float64], threshold: float) -> NDArray[np.bool_]:
-    """Return whether each corner is at a wall that faces along x, shape (nx + 1, ny + 1)."""
+    """Return which corners are at a wall that faces along x.
+
+    Args:
+        heights: Height of each cell [m], shape (nx, ny).
+        threshold: Difference of height above which there is a wall [m].
+
+    Returns:
+        Mask of the corners, shape (nx + 1, ny + 1).
+    """
     padded = np.pad(heights, 1, mode="edge")
     wall = np.abs(np.diff(padded, axis=0)) > threshold
     return np.asarray(wall[:, :-1] | wall[:, 1:])

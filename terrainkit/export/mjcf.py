@@ -392,7 +392,16 @@ def _write_hfield(
 def hfield_size(
     heights: NDArray[np.float32], part: _Part, cell: float
 ) -> tuple[float, float, float, float]:
-    """Return the half sizes along x and y, the range and the depth of a heightfield [m]."""
+    """Return the size of the heightfield of a part.
+
+    Args:
+        heights: Heights of the map [m], shape (nx, ny).
+        part: Samples of the part along x and y.
+        cell: Distance between two samples [m].
+
+    Returns:
+        Half sizes along x and y, range of the heights, and depth below them [m], as in MJCF.
+    """
     samples = heights[_on_map(part, heights.shape)]
     units = max(int(_elevation_units(samples.max(), float(samples.min()))), 1)  # MuJoCo needs > 0
     x, y = ((each.stop - each.start - 1) * cell / 2 for each in part)
@@ -400,7 +409,16 @@ def hfield_size(
 
 
 def hfield_elevation(heights: NDArray[np.float32], part: _Part) -> NDArray[np.int64]:
-    """Return the elevation data of a heightfield, shape (ny, nx), from the smallest x and y."""
+    """Return the elevation data of the heightfield of a part.
+
+    Args:
+        heights: Heights of the map [m], shape (nx, ny).
+        part: Samples of the part along x and y.
+
+    Returns:
+        Heights above the lowest sample in elevation units, shape (ny, nx) of the part, from the
+        smallest x and y.
+    """
     samples = heights[_on_map(part, heights.shape)]
     beyond = [
         (max(_MARGIN - each.start, 0), max(each.stop - _MARGIN - size, 0))
@@ -465,6 +483,11 @@ def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> Height
 def without_boxes(
     heights: NDArray[np.float32], decomposition: BoxDecomposition
 ) -> NDArray[np.float32]:
-    """Return the heights, lowered at samples that only affect cells covered by boxes."""
+    """Return the heights, lowered at samples that only affect cells covered by boxes.
+
+    Args:
+        heights: Heights of the map [m], shape (nx, ny).
+        decomposition: The boxes, and the cells that they cover.
+    """
     lowered = np.logical_and.reduce(neighborhood(decomposition.covered))
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)

@@ -93,6 +93,10 @@ def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
 def read_map(cls: type[_Map], path: str | Path) -> _Map:
     """Return the map in the .npz file `path` as an instance of `cls`.
 
+    Args:
+        cls: Class of the map.
+        path: The .npz file.
+
     Raises:
         MapFileError: if the file is missing, truncated, or not a map.
         MemoryLimitError: if its arrays would not fit in memory.

@@ -53,7 +53,10 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
 
 
 def scale_and_offset(terrain_map: "TerrainMap") -> tuple[float, float]:
-    """Return the height of a gray level, and the height of level 0 [m].
+    """Return the scale of the gray levels of a map.
+
+    Returns:
+        Height difference between two levels, and height of level 0 [m].
 
     Raises:
         ExportError: if the height range is too large for millimeter accuracy in 16 bits.

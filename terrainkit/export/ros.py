@@ -78,7 +78,15 @@ def export(terrain_map: "TerrainMap", path: Path, *, max_step: float = MAX_STEP)
 
 
 def occupied_cells(heights: NDArray[np.float32], max_step: float) -> NDArray[np.bool_]:
-    """Return the cells that are higher than a neighbor by more than `max_step` [m]."""
+    """Return which cells are higher than a neighbor by more than a step.
+
+    Args:
+        heights: Heights [m], shape (nx, ny).
+        max_step: Height of the step [m].
+
+    Returns:
+        Mask of the cells, shape (nx, ny).
+    """
     from scipy.ndimage import minimum_filter
 
     return np.asarray(heights - minimum_filter(heights, 3, mode="nearest") > max_step)

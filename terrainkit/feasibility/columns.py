@@ -48,7 +48,14 @@ class Columns:
         return self.floor.shape[0], self.floor.shape[1]
 
     def column(self, node: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the index of the column of each node along x and y."""
+        """Return the column of each node.
+
+        Args:
+            node: Nodes, shape (n,).
+
+        Returns:
+            Index of the column along x and along y, each of shape (n,).
+        """
         column = node // self.floor.shape[2]
         return column // self.shape[1], column % self.shape[1]
 
@@ -64,6 +71,9 @@ class Columns:
 
         It is the floor with the smallest sum of horizontal distance and difference of height, of
         the columns within `STANCE`: between two rows of stones, feet are on the stones.
+
+        Args:
+            position: Position of the robot, x, y and z [m], shape (3,).
         """
         index = (position[:2] - self.lower) / self.spacing
         i, j = np.clip(np.rint(index), 0, np.array(self.shape) - 1).astype(int)

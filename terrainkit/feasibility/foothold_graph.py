@@ -78,7 +78,14 @@ class FootholdGraph:
         )
 
     def demand(self, edges: Edges) -> FloatArray:
-        """Return the demand of each edge and its two nodes, shape (n,)."""
+        """Return the demand of each edge and its two nodes, shape (n,).
+
+        Args:
+            edges: The edges, of which there are n.
+
+        Returns:
+            Demand, shape (n,): 0 on level ground, 1 at the limit.
+        """
         nodes = np.maximum(self.node_demand[edges.start], self.node_demand[edges.end])
         ratios = [ratio(name, values, self.limits) for name, values in _quantities(edges)]
         return largest([nodes, *ratios])
@@ -111,6 +118,11 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
 
     A foothold or a passage demands something if it is less than twice as wide as the limit, and a
     clearance if it is less than the standing height; in between, the ratio is linear.
+
+    Args:
+        name: Name of the limit.
+        value: Quantity, in the unit of the limit.
+        limits: The limits of the robot.
     """
     limit = getattr(limits, name)
     result: FloatArray
@@ -125,5 +137,9 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
 
 
 def largest(ratios: list[FloatArray]) -> FloatArray:
-    """Return the largest of several ratios of each node or edge, rounded."""
+    """Return the largest ratio of each node or edge, rounded to `DIGITS`.
+
+    Args:
+        ratios: Ratios of the same nodes or edges, each of shape (n,).
+    """
     return np.asarray(np.round(np.stack(ratios).max(axis=0), DIGITS))

@@ -59,6 +59,9 @@ class RobotLimits(Config):
 def limit_overrides(values: Mapping[str, object]) -> dict[str, float]:
     """Return limits by name, converted to numbers.
 
+    Args:
+        values: Values by name of the limit, as numbers or text.
+
     Raises:
         ConfigError: if a name is no limit, or a value is not above 0.
     """

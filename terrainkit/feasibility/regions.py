@@ -38,7 +38,15 @@ class Regions:
         return cls(labels=labels, links=ends[:, ends[0] != ends[1]].astype(np.int32))
 
     def reached(self, start: int, gaps: Edges) -> NDArray[np.bool_]:
-        """Return which nodes a path over steps and gaps from `start` reaches, shape (nodes,)."""
+        """Return which nodes can be reached.
+
+        Args:
+            start: Node where the path starts.
+            gaps: Gaps that the path may use, in addition to all steps.
+
+        Returns:
+            Mask of the nodes, shape (nodes,).
+        """
         from scipy.sparse import csr_matrix
         from scipy.sparse.csgraph import breadth_first_order
 

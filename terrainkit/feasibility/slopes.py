@@ -27,12 +27,24 @@ class Slopes:
     the ridge of a pyramid, only a diagonal continues on both sides."""
 
     def grade(self, spacing: float) -> FloatArray:
-        """Return the slope at each node as rise over run, shape (nx, ny, m)."""
+        """Return the slope at each node.
+
+        Args:
+            spacing: Distance between two columns [m].
+
+        Returns:
+            Rise over run, shape (nx, ny, m).
+        """
         return np.maximum(np.hypot(self.x, self.y), self.diagonal / 2**0.5) / spacing
 
 
 def slopes_of(floor: FloatArray, spacing: float) -> Slopes:
-    """Return the slopes of floors [m], shape (nx, ny, m), whose columns are `spacing` [m] apart."""
+    """Return the slopes of floors.
+
+    Args:
+        floor: Heights of the floors [m], shape (nx, ny, m), NaN where there are fewer than m.
+        spacing: Distance between two columns [m].
+    """
     lag = max(1, round(SLOPE_LENGTH / spacing))
     diagonals = (_slope(floor, (lag, lag)), _slope(floor, (lag, -lag)))
     return Slopes(

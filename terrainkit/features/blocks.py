@@ -65,7 +65,12 @@ def make_standing_boxes(
 
 
 def make_blocks(lower: ArrayLike, upper: ArrayLike) -> Solids:
-    """Return axis-aligned boxes between two corners [m], shapes (n, 3)."""
+    """Return axis-aligned boxes.
+
+    Args:
+        lower: Corners with the lowest x, y and z [m], shape (n, 3).
+        upper: Corners with the highest x, y and z [m], shape (n, 3).
+    """
     low, high = np.asarray(lower, float), np.asarray(upper, float)
     return make_boxes((low + high) / 2, high - low)
 

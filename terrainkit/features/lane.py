@@ -80,9 +80,16 @@ def slot_centers(
 
 
 def lane_goals(grid: Grid, x: ArrayLike) -> NDArray[np.float64]:
-    """Return goals on the ground at `x` [m], in the middle of the lane and along x, (k, 4).
+    """Return goals on the ground in the middle of a lane, with headings along x.
 
     A goal at the end of the patch is moved into its last cell.
+
+    Args:
+        grid: Grid of the patch.
+        x: Positions along x [m], shape (k,) or a number.
+
+    Returns:
+        Goals, shape (k, 4): x, y [m], NaN for the height of the ground, and a heading of 0.
     """
     inside = np.minimum(np.atleast_1d(np.asarray(x, dtype=float)), grid.upper[0] - grid.cell / 2)
     y, z = np.full(len(inside), grid.center[1]), np.full(len(inside), np.nan)

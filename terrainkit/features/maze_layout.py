@@ -17,9 +17,13 @@ class MazeLayout:
     """Whether there is a wall on the low-y side of cell (i, j), shape (nx, ny + 1)."""
 
     def path(self, start: tuple[int, int]) -> NDArray[np.int64]:
-        """Return the cells on the shortest path from `start` to the exit at high x, shape (k, 2).
+        """Return the cells on the shortest path to the exit at high x.
 
-        The last cell is outside of the maze. Without an exit, there are no cells.
+        Args:
+            start: First cell.
+
+        Returns:
+            Cells (i, j), shape (k, 2). The last one is outside of the maze. Empty without an exit.
         """
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import breadth_first_order

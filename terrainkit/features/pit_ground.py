@@ -11,7 +11,16 @@ from terrainkit.geometry.grid import Grid
 
 
 def pit_around(grid: Grid, depth: float, platform: float) -> NDArray[np.float64]:
-    """Return the heights of a pit around a platform of side `platform` [m], shape `grid.shape`."""
+    """Return the heights of a pit around a platform.
+
+    Args:
+        grid: Grid of the patch.
+        depth: Depth of the pit [m].
+        platform: Side of the platform [m].
+
+    Returns:
+        Heights [m], shape `grid.shape`. The outermost cells are at height 0.
+    """
     ground = np.zeros(grid.shape)
     ground[1:-1, 1:-1] = -depth
     ground[grid.centered_slices(grid.centered(platform))] = 0.0
@@ -19,7 +28,17 @@ def pit_around(grid: Grid, depth: float, platform: float) -> NDArray[np.float64]
 
 
 def pit_between(grid: Grid, depth: float, first: float, last: float) -> NDArray[np.float64]:
-    """Return the heights of a pit from x = `first` to `last` [m], shape `grid.shape`."""
+    """Return the heights of a pit across a lane.
+
+    Args:
+        grid: Grid of the patch.
+        depth: Depth of the pit [m].
+        first: Position along x where the pit begins [m].
+        last: Position along x where the pit ends [m].
+
+    Returns:
+        Heights [m], shape `grid.shape`. The outermost cells along y are at height 0.
+    """
     ground = np.zeros(grid.shape)
     ground[grid.slice_along_x((first + last) / 2, grid.cells(last - first)), 1:-1] = -depth
     return ground

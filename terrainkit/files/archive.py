@@ -154,7 +154,15 @@ class Archive:
         check_memory(needed, f"{key} in {self.path}")
 
     def check_value(self, key: str, expected: float | tuple[float, ...]) -> None:
-        """Raise MapFileError if the values of `key` differ from the values in the config."""
+        """Check that the values of a key agree with the config.
+
+        Args:
+            key: Name of the array in the archive.
+            expected: The value in the config, a number or a tuple.
+
+        Raises:
+            MapFileError: if the values differ.
+        """
         found = self.array(key, "f8", np.shape(expected))
         if not np.allclose(found, expected, rtol=1e-9, atol=1e-9):
             raise MapFileError(

@@ -18,6 +18,10 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     Files that the block writes beside the temporary path, such as a sidecar, are moved as well. If
     the block raises, nothing changes.
 
+    Args:
+        path: File to write.
+        overwrite: Whether an existing file may be replaced.
+
     Raises:
         ExportError: if a target exists and `overwrite` is not set, or cannot be written.
     """
@@ -72,7 +76,15 @@ def atomic_folder(path: Path) -> Iterator[Path]:
 
 
 def check_target(path: Path, *, overwrite: bool) -> None:
-    """Raise ExportError if `path` cannot be written, or exists and may not be replaced."""
+    """Check that a file can be written.
+
+    Args:
+        path: File to write.
+        overwrite: Whether an existing file may be replaced.
+
+    Raises:
+        ExportError: if `path` cannot be written, or exists and may not be replaced.
+    """
     try:
         if path.is_dir():
             raise ExportError(f"cannot write {path}: it is a folder")

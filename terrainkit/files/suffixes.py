@@ -20,6 +20,12 @@ def modules_by_suffix(package: str) -> dict[str, ModuleType]:
 def find_module(path: Path, package: str, noun: str, error: type[TerrainkitError]) -> ModuleType:
     """Return the module of a package for the suffix of `path`.
 
+    Args:
+        path: File whose suffix selects the module.
+        package: Name of the package with one module per suffix.
+        noun: What a module is, for the error.
+        error: Class of the error.
+
     Raises:
         TerrainkitError: of class `error`, with `noun` for what is missing, if there is none.
     """

@@ -159,7 +159,14 @@ def _drop_patches_without_walls(
 
 
 def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
-    """Return the values shifted to each of the 3 x 3 neighbors, nine arrays of the same shape."""
+    """Return the values shifted to each of the 3 x 3 neighbors.
+
+    Args:
+        values: Values, shape (nx, ny). They continue beyond the edges.
+
+    Returns:
+        Nine arrays of shape (nx, ny).
+    """
     padded = np.pad(values, 1, mode="edge")
     nx, ny = values.shape
     return [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
@@ -201,7 +208,14 @@ def _first_cells(start: int, stop: int, differ: NDArray[np.bool_]) -> NDArray[np
 
 
 def changes(values: NDArray[Any]) -> NDArray[np.int64]:
-    """Return the rows that differ from the previous one, including both ends."""
+    """Return the rows that differ from the previous row.
+
+    Args:
+        values: Rows, shape (n, k).
+
+    Returns:
+        Increasing indices of rows, from 0 to n, both included.
+    """
     if values.strides[0] == 0:  # a view that repeats one row
         return np.array([0, len(values)])
     differ = (values[1:] != values[:-1]).any(axis=1)

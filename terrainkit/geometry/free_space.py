@@ -65,10 +65,14 @@ def free_intervals(
 
 
 def clearance(heights: NDArray[np.float64], bounds: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the free height above the ground on each vertical line [m], shape (n,).
+    """Return the free height above the ground on vertical lines.
 
-    It is inf under the open sky, and 0 where a solid covers the ground. The arguments are the same
-    as in :func:`free_intervals`.
+    Args:
+        heights: Height of the ground on each line [m], shape (n,).
+        bounds: Bottom and top of the solids on each line [m], shape (n, k, 2), padded with NaN.
+
+    Returns:
+        Free height [m], shape (n,): inf under the open sky, 0 where a solid covers the ground.
     """
     bottom, top = bounds[..., 0], bounds[..., 1]
     above = top > heights[:, None] + CONTACT  # solids within the ground do not count; NaN is False

@@ -81,6 +81,9 @@ class Grid:
         """Return the ring around the centered block `inner` of each cell, shape `shape`, read-only.
 
         Ring 0 is the block itself, ring 1 the cells that touch its sides or corners, and so on.
+
+        Args:
+            inner: Number of cells of the block along x and y.
         """
         return _rings(self.shape, inner)
 
@@ -110,7 +113,15 @@ class Grid:
         return slice(max(0, first), max(0, first) + count)
 
     def fade(self, inner: tuple[int, int], distance: float) -> NDArray[np.float64]:
-        """Return weights that rise from 0 on the centered block `inner` to 1 at `distance` [m]."""
+        """Return weights that rise from 0 on a centered block to 1 away from it.
+
+        Args:
+            inner: Number of cells of the block along x and y.
+            distance: Distance from the block at which the weight is 1 [m].
+
+        Returns:
+            Weights, shape `shape`.
+        """
         rise = self.rings(inner) * (self.cell / max(distance, self.cell))
         return np.asarray(np.minimum(rise, 1.0), dtype=np.float64)
 
@@ -135,7 +146,13 @@ def _distance_to_block(n: int, block: int) -> NDArray[np.int32]:
 
 
 def whole_cells(name: str, length: float, cell: float, *, minimum: int = 1) -> int:
-    """Return `length` [m] in cells.
+    """Return a length as a number of cells.
+
+    Args:
+        name: What the length is, for the errors.
+        length: The length [m].
+        cell: Size of a cell [m].
+        minimum: Smallest number of cells.
 
     Raises:
         ConfigError: if it is not a whole number of cells; the message lists the nearest lengths.

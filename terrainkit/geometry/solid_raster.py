@@ -19,7 +19,10 @@ class SolidRaster:
     """
 
     def __init__(self, solids: Solids) -> None:
-        """Sample `solids` every `PIXEL` [m].
+        """Sample solids on a grid of pixels of side `PIXEL`.
+
+        Args:
+            solids: The solids.
 
         Raises:
             MemoryLimitError: if the samples would not fit in memory.

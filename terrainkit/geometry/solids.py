@@ -88,7 +88,11 @@ class Solids:
         return cls(**joined | {name: joined[name][order] for name in _PER_SOLID})
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
-        """Return the solids where `mask` is True, shape (n,)."""
+        """Return some of the solids.
+
+        Args:
+            mask: Which solids to keep, shape (n,).
+        """
         if mask.all():
             return self
         ends = np.cumsum([len(self.boxes), len(self.cylinders)])
@@ -146,7 +150,11 @@ class Solids:
         return np.split(self.hull_vertices, np.cumsum(self.hull_counts))[:-1]
 
     def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the lower and upper corners of the axis-aligned bounding boxes [m], (n, 3)."""
+        """Return the axis-aligned bounding boxes of the solids.
+
+        Returns:
+            Lower and upper corners [m], each of shape (n, 3).
+        """
         shapes = np.concatenate([self.boxes, self.cylinders]).astype(float)
         axes = rotation_matrices(shapes[:, 6:])
         half = np.einsum("nij,nj->ni", np.abs(axes), shapes[:, 3:6])
@@ -285,7 +293,10 @@ def make_hulls(
 
 
 def convex_hull(vertices: NDArray[np.float32]) -> "ConvexHull":
-    """Return the convex hull of `vertices` [m], shape (k, 3).
+    """Return the convex hull of points.
+
+    Args:
+        vertices: Points [m], shape (k, 3).
 
     Raises:
         ConfigError: if its volume is too small.
@@ -304,7 +315,14 @@ def convex_hull(vertices: NDArray[np.float32]) -> "ConvexHull":
 
 
 def rotation_matrices(quaternion: ArrayLike) -> NDArray[np.float64]:
-    """Return the rotation matrices (n, 3, 3) of unit quaternions (w, x, y, z), shape (n, 4)."""
+    """Return the rotation matrices of unit quaternions.
+
+    Args:
+        quaternion: Quaternions (w, x, y, z), shape (n, 4).
+
+    Returns:
+        Rotation matrices, shape (n, 3, 3).
+    """
     w, x, y, z = np.asarray(quaternion, float).T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -315,7 +333,14 @@ def rotation_matrices(quaternion: ArrayLike) -> NDArray[np.float64]:
 
 
 def quaternions(rotation: ArrayLike) -> NDArray[np.float64]:
-    """Return the unit quaternions (w, x, y, z), shape (n, 4), of rotation matrices (n, 3, 3)."""
+    """Return the unit quaternions of rotation matrices.
+
+    Args:
+        rotation: Rotation matrices, shape (n, 3, 3).
+
+    Returns:
+        Quaternions (w, x, y, z), shape (n, 4).
+    """
     matrices = np.asarray(rotation, float)
     if not len(matrices):
         return np.empty((0, 4))

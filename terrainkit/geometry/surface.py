@@ -20,7 +20,14 @@ class SurfacePoints:
     """Height difference per cell along x and y [m], shape (n, 2)."""
 
     def normals(self, cell: float) -> NDArray[np.float64]:
-        """Return the upward unit normals for cells of `cell` [m], shape (n, 3)."""
+        """Return the normals of the surface at the points.
+
+        Args:
+            cell: Distance between two samples [m].
+
+        Returns:
+            Unit vectors with a positive z, shape (n, 3).
+        """
         downhill = 0.0 - self.gradient / cell
         normals = np.column_stack([downhill, np.ones(len(downhill))])
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)

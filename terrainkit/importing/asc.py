@@ -35,6 +35,10 @@ _SPACES = bytes.maketrans(b"\n\r\t\v\f", b"     ")
 def read(path: Path, options: ReadOptions) -> Raster:
     """Return the heights of a grid, whose first row has the highest y.
 
+    Args:
+        path: The .asc file.
+        options: How to read the file.
+
     Raises:
         HeightFileError: if the header or the number of heights is wrong.
     """

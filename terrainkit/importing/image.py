@@ -29,6 +29,10 @@ def read(path: Path, options: ReadOptions) -> Raster:
     (x, y) [m], as written by the .png exporter. The tags of a GeoTIFF state the cell, the position
     and the value of missing heights.
 
+    Args:
+        path: The image.
+        options: How to read the file.
+
     Raises:
         HeightFileError: if the file cannot be read.
         ConfigError: if an option is missing, or the cells of a GeoTIFF are not squares in meters.

@@ -42,13 +42,25 @@ class MeshSource:
         return x, y
 
     def heights(self, x: Array, y: Array) -> Array:
-        """Return the height of the highest surface at all x and y [m], shape (nx, ny)."""
+        """Return the height of the highest surface at a grid of positions.
+
+        Args:
+            x: Positions along x [m], shape (nx,).
+            y: Positions along y [m], shape (ny,).
+
+        Returns:
+            Heights [m], shape (nx, ny), NaN where there is no face.
+        """
         return self.columns(x, y).top
 
     def columns(self, x: Array, y: Array) -> Columns:
-        """Return the surfaces at all x and y, increasing and evenly spaced; see :class:`Columns`.
+        """Return the surfaces at a grid of positions; see :class:`Columns`.
 
         Positions beyond the corners are moved half a step inside.
+
+        Args:
+            x: Positions along x [m], increasing and evenly spaced, shape (nx,).
+            y: Positions along y [m], increasing and evenly spaced, shape (ny,).
         """
         inner, number = [], []
         for position, low, high in zip((x, y), self.lower, self.upper, strict=True):

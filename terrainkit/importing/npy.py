@@ -12,7 +12,15 @@ SUFFIXES = (".npy",)
 
 
 def read(path: Path, options: ReadOptions) -> Raster:
-    """Return the heights of an array whose first index is along x and second along y."""
+    """Return the heights of an array whose first index is along x and second along y.
+
+    Args:
+        path: The .npy file.
+        options: How to read the file.
+
+    Raises:
+        HeightFileError: if the file is not an .npy file, or is truncated.
+    """
     try:
         # Mapped: a file that claims a larger array than it holds is an error, not an allocation.
         values = np.load(path, mmap_mode="r", allow_pickle=False)

@@ -43,7 +43,17 @@ class Raster:
         return self.lower[0] + nx * self.cell, self.lower[1] + ny * self.cell
 
     def heights(self, x: Array, y: Array) -> Array:
-        """Return the heights at all x and y [m], interpolated linearly, shape (nx, ny)."""
+        """Return the heights at a grid of positions, interpolated linearly.
+
+        Positions beyond the corners get the heights of the edge.
+
+        Args:
+            x: Positions along x [m], shape (nx,).
+            y: Positions along y [m], shape (ny,).
+
+        Returns:
+            Heights [m], shape (nx, ny), NaN where they are missing.
+        """
         from scipy.ndimage import map_coordinates
 
         index = [

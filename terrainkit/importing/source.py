@@ -37,9 +37,16 @@ class Source(Protocol):
         """Corner with the largest x and y [m]."""
 
     def heights(self, x: Array, y: Array) -> Array:
-        """Return the heights at all x and y [m], shape (nx, ny), NaN where they are missing.
+        """Return the heights at a grid of positions.
 
         Positions beyond the corners get the heights of the edge.
+
+        Args:
+            x: Positions along x [m], shape (nx,).
+            y: Positions along y [m], shape (ny,).
+
+        Returns:
+            Heights [m], shape (nx, ny), NaN where they are missing.
         """
 
 
@@ -57,7 +64,14 @@ def open_source(path: Path, options: ReadOptions) -> Source:
 
 
 def check_file(path: Path) -> None:
-    """Raise HeightFileError if `path` is no regular file, or is empty or too large."""
+    """Check that a file can be read.
+
+    Args:
+        path: The file.
+
+    Raises:
+        HeightFileError: if `path` is no regular file, or is empty or larger than `MAX_FILE_BYTES`.
+    """
     try:
         if not path.exists():
             raise HeightFileError(f"no file {path}")
@@ -73,7 +87,11 @@ def check_file(path: Path) -> None:
 
 
 def decode(function: Callable[[Path], Mapping[str, Any]], path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays that a decoder reads from `path` in a child process.
+    """Return the arrays that a decoder reads in a child process.
+
+    Args:
+        function: The decoder, a function of a module.
+        path: The file.
 
     Raises:
         HeightFileError: if the file cannot be decoded within the limits.

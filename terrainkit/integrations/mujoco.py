@@ -91,6 +91,9 @@ def add_map(
 def static_mesh(model: "mujoco.MjModel") -> "trimesh.Trimesh":
     """Return the static geoms of a model as one mesh, in world coordinates [m].
 
+    Args:
+        model: The compiled model.
+
     Raises:
         ExportError: if a static geom is a plane or an SDF.
     """

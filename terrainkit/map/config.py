@@ -175,7 +175,15 @@ class MapConfig(Config):
         return Grid(shape=shape, cell=self.cell, lower=lower)
 
     def check_patch(self, row: int, col: int) -> None:
-        """Raise IndexError if the map has no patch (row, col)."""
+        """Check that the map has a patch.
+
+        Args:
+            row: Row of the patch.
+            col: Column of the patch.
+
+        Raises:
+            IndexError: if there is no such patch.
+        """
         if not (0 <= row < self.rows and 0 <= col < self.cols):
             raise IndexError(
                 f"no patch ({row}, {col}) in a map of {self.rows} rows and {self.cols} columns"

@@ -19,7 +19,16 @@ _Map = TypeVar("_Map", bound=TerrainMap)
 
 
 def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None) -> _Map:
-    """Return a map with other heights or solids; see :meth:`TerrainMap.edited`."""
+    """Return a map with other heights or solids; see :meth:`TerrainMap.edited`.
+
+    Args:
+        terrain_map: The map, which is not changed.
+        heights: New heights [m], shape `grid.shape`; None to keep them.
+        solids: All solids of the new map; None to keep them.
+
+    Raises:
+        ConfigError: if the heights or solids are invalid, or a patch has no place to spawn.
+    """
     config = replace(terrain_map.config, mode="custom")
     new = terrain_map.heights
     if heights is not None:

@@ -162,7 +162,14 @@ def _build_task(
 
 
 def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
-    """Return the poses (k, 4) of all patches, shape (rows, cols, k, 4), padded with NaN."""
+    """Return the poses of all patches as one array.
+
+    Args:
+        poses: Poses of each patch, shape (k, 4), as an object array of shape (rows, cols).
+
+    Returns:
+        Poses, shape (rows, cols, max k, 4), padded with NaN.
+    """
     lengths = {len(each) for each in poses.ravel().tolist()}
     number = max(lengths)
     if len(lengths) == 1:

@@ -126,6 +126,11 @@ class Patch:
 def make_patch(config: MapConfig, row: int, col: int) -> Patch:
     """Build patch (row, col) of the map of `config` without generating the rest.
 
+    Args:
+        config: The config of the map.
+        row: Row of the patch.
+        col: Column of the patch.
+
     Raises:
         IndexError: if there is no such patch.
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
@@ -142,6 +147,13 @@ def build_patch(
 
     The random numbers depend only on the seed, the row and the column. The patch therefore has the
     same bytes in any order and in any process.
+
+    Args:
+        config: The config of the map.
+        sub_terrain: The sub-terrain to build.
+        difficulty: Difficulty, 0 to 1.
+        row: Row of the patch.
+        col: Column of the patch.
 
     Raises:
         ConfigError: if the terrain does not fit in the patch, or has no place to spawn.
@@ -278,6 +290,17 @@ def find_origin(
 ) -> tuple[float, float, float]:
     """Return the spawn origin of a patch [m]; see :func:`.find_spawn`.
 
+    Args:
+        config: The config of the map.
+        name: Name of the patch, for the error.
+        grid: Grid of the patch.
+        heights: Heights of the ground [m], shape `grid.shape`.
+        solids: Solids of the patch.
+        position: Preferred position, x and y [m].
+
+    Returns:
+        Position on the ground, x, y and z [m].
+
     Raises:
         ConfigError: if patch `name` has no place to spawn.
     """
@@ -336,7 +359,16 @@ _NO_GOALS = np.empty((0, 4))
 def with_headings(
     positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
 ) -> NDArray[np.float32]:
-    """Return spawn positions with headings, shape (k, 4): toward the first goal, else `default`."""
+    """Return spawn positions with headings toward the first goal.
+
+    Args:
+        positions: Positions [m], shape (k, 3).
+        goals: Goals, x, y, z [m] and heading [rad], shape (g, 4).
+        default: Heading where there are no goals [rad].
+
+    Returns:
+        Positions [m] and headings [rad], shape (k, 4).
+    """
     spawns = np.empty((len(positions), 4), dtype=np.float32)
     spawns[:, :3], spawns[:, 3] = positions, default
     if len(goals):

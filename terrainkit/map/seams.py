@@ -125,7 +125,12 @@ def seam_text(seam: Seam, names: NDArray[np.str_]) -> str:
 
 
 def cliffs_text(cliffs: list[Seam], names: NDArray[np.str_]) -> str:
-    """Return the number of cliffs and the highest of each pair of sub-terrains as text."""
+    """Return the number of cliffs, and the highest cliff of each pair of sub-terrains, as text.
+
+    Args:
+        cliffs: The cliffs, highest first.
+        names: Name of the sub-terrain of each patch, shape (rows, cols).
+    """
     highest: dict[frozenset[str], Seam] = {}
     for seam in cliffs:
         pair = frozenset(str(names[p]) if p is not None else "" for p in seam.patches)

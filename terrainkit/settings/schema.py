@@ -86,7 +86,15 @@ class Config:
 
     @classmethod
     def from_toml(cls, text: str, default: Self | None = None) -> Self:
-        """Return the config that TOML text describes, as :meth:`from_table` does."""
+        """Return the config that TOML text describes, as :meth:`from_table` does.
+
+        Args:
+            text: The TOML text.
+            default: Config whose values missing keys take; None for the defaults of the class.
+
+        Raises:
+            ConfigError: if the text is not TOML, or a key or value is invalid.
+        """
         try:
             return cls.from_table(parse_toml(text), default)
         except ConfigError as error:
@@ -96,6 +104,10 @@ class Config:
     @classmethod
     def load(cls, path: "str | Path", default: Self | None = None) -> Self:
         """Return the config in the TOML file `path`, as :meth:`from_table` does.
+
+        Args:
+            path: The TOML file.
+            default: Config whose values missing keys take; None for the defaults of the class.
 
         Raises:
             ConfigError: if the file cannot be read, is larger than a megabyte, or is invalid.

@@ -46,6 +46,10 @@ class Overlay(Parameterized, Config, ABC):
         Keep the ground level around `patch.spawn`, and all solids and goals within the patch. Take
         random numbers only from `rng`, and the same number of them at every difficulty.
 
+        Args:
+            patch: Heights, friction, solids, goals and spawn position; do not change its arrays.
+            rng: Generator of the overlay's random numbers.
+
         Raises:
             ConfigError: if the overlay does not fit the patch.
         """

@@ -223,7 +223,14 @@ def _field(easy: Value, hard: Value | None = None, **options: Any) -> Any:
 
 @cache
 def parameters_of(owner: type[Any]) -> Mapping[str, Parameter]:
-    """Return the parameters of a class by name, in the order of its fields."""
+    """Return the parameters of a class by name, in the order of its fields.
+
+    Args:
+        owner: A class of terrains or overlays.
+
+    Raises:
+        ConfigError: if a field of the class is not declared as a parameter.
+    """
     for field in dataclasses.fields(owner):
         if "parameter" not in field.metadata:
             raise ConfigError(
@@ -276,7 +283,16 @@ def convert_range(
 
 
 def check_names(owner: str, names: Iterable[str], known: Iterable[str]) -> None:
-    """Raise ConfigError if one of `names` is not among the `known` parameters of `owner`."""
+    """Check the names of parameters.
+
+    Args:
+        owner: Name of the terrain or overlay, for the error.
+        names: Names to check.
+        known: Names of the parameters that it has.
+
+    Raises:
+        ConfigError: if one of `names` is not known.
+    """
     for name in names:
         if name not in known:
             expected = expected_names(name, known, "it has")

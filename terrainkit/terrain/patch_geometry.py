@@ -78,6 +78,10 @@ class PatchGeometry:
 def checked_geometry(geometry: object, grid: Grid) -> PatchGeometry:
     """Return the geometry that a plugin made on `grid`, with arrays of the documented types.
 
+    Args:
+        geometry: What a plugin returned.
+        grid: Grid of the patch.
+
     Raises:
         ConfigError: if it is no `PatchGeometry`, or a value has another shape or is out of range.
         TypeError: if values are not real numbers.
@@ -124,13 +128,29 @@ def checked_heights(heights: ArrayLike, grid: Grid, got: str) -> NDArray[np.floa
 
 
 def real_array(values: Any, dtype: type[Any] = np.float64) -> NDArray[Any]:
-    """Return real numbers as an array of `dtype`; others are a TypeError."""
+    """Return real numbers as an array.
+
+    Args:
+        values: The numbers.
+        dtype: Type of the elements.
+
+    Raises:
+        TypeError: if the values are not real numbers.
+    """
     return np.asarray(values).astype(dtype, casting="same_kind", copy=False)
 
 
 @lru_cache(maxsize=16)
 def uniform_friction(friction: float, shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Return the same friction in all cells: a read-only view of one number."""
+    """Return the same friction in all cells.
+
+    Args:
+        friction: The friction coefficient.
+        shape: Number of cells along x and y.
+
+    Returns:
+        A read-only view of one number, shape `shape`.
+    """
     return np.broadcast_to(np.float32(friction), shape)
 
 

@@ -221,7 +221,11 @@ def _unknown_name(group: _Group, name: str, plugins: Mapping[str, Any]) -> Confi
 
 
 def make_overlay(name: str, parameters: Mapping[str, Any]) -> Overlay:
-    """Return the overlay `name` with these parameters: values, or ranges (easy, hard).
+    """Return an overlay with some parameters.
+
+    Args:
+        name: Name of the overlay.
+        parameters: Values or ranges (easy, hard) by name; the others have their defaults.
 
     Raises:
         ConfigError: if there is no such overlay, or a parameter is unknown or invalid.

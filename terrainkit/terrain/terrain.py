@@ -83,9 +83,16 @@ class Terrain(Parameterized, ABC):
         return cls(**fixed)
 
     def build(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.float32]:
-        """Return the heights of the patch on `grid` [m], float32, shape `grid.shape`.
+        """Return the heights of a patch.
 
         The same terrain, grid and state of `rng` give the same bytes on every machine.
+
+        Args:
+            grid: Grid of the patch.
+            rng: Generator of the patch's random numbers.
+
+        Returns:
+            Heights [m], float32, shape `grid.shape`.
 
         Raises:
             ConfigError: if the grid is too small or its cells are too large for the terrain.
@@ -121,11 +128,18 @@ class Terrain(Parameterized, ABC):
 
     @abstractmethod
     def heights(self, grid: Grid, rng: "np.random.Generator") -> NDArray[np.floating]:
-        """Return the heights on `grid` [m], shape `grid.shape`.
+        """Return the heights of the ground.
 
         Take random numbers only from `rng`. Sample first and scale afterward, so that the pattern
         stays the same at every difficulty. Leave a flat disk where a robot can be spawned; see
         :mod:`terrainkit.map.spawn`.
+
+        Args:
+            grid: Grid of the patch.
+            rng: Generator of the patch's random numbers; None if `has_random_heights` is False.
+
+        Returns:
+            Heights [m], shape `grid.shape`.
         """
 
     def solids(
@@ -144,10 +158,12 @@ class Terrain(Parameterized, ABC):
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator"
     ) -> NDArray[np.floating]:
-        """Return the goals in their order, x, y, z [m] and heading [rad], shape (k, 4).
+        """Return the goals in their order; by default none.
 
-        A z of NaN stands for the height of the ground. By default there are none. The arguments
-        are the same as in :meth:`solids`.
+        The arguments are the same as in :meth:`solids`.
+
+        Returns:
+            x, y, z [m] and heading [rad], shape (k, 4). A z of NaN is the height of the ground.
         """
         return np.empty((0, 4))
 

@@ -29,5 +29,10 @@ class ContinuousRamps(RampField):
         return self.length, self.width
 
     def raised_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
-        """Return the corners at low or high x, in turn along both axes."""
+        """Return the raised corners of each ramp: alternately the corners at low and at high x.
+
+        Args:
+            i: Index of each ramp along x, shape (n,).
+            j: Index of each ramp along y, shape (n,).
+        """
         return np.asarray((i + j)[:, None] % 2 == [[1, 0, 0, 1]], dtype=np.int64)

@@ -28,5 +28,10 @@ class CrossingRamps(RampField):
         return self.side, self.side
 
     def raised_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
-        """Return the corners; the direction of each ramp is a quarter turn from its neighbors."""
+        """Return the raised corners of each ramp, a quarter turn from its neighbors.
+
+        Args:
+            i: Index of each ramp along x, shape (n,).
+            j: Index of each ramp along y, shape (n,).
+        """
         return _RAISED[(i + j) % 2 + 2 * ((i // 2 + j // 2) % 2)]

@@ -160,7 +160,14 @@ def shaded_relief(heights: NDArray[np.float32], cell: float) -> Picture:
 
 
 def height_colors(heights: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return the color (red, green, blue, 0 to 255) of heights [m], shape (..., 3)."""
+    """Return the colors of heights.
+
+    Args:
+        heights: Heights [m], any shape (...).
+
+    Returns:
+        Red, green and blue, 0 to 255, shape (..., 3).
+    """
     levels = [level for level, _ in _COLORS]
     channels = zip(*(color for _, color in _COLORS), strict=True)
     return np.stack([np.interp(heights, levels, channel) for channel in channels], axis=-1)
@@ -193,6 +200,10 @@ def color_levels(low: float, high: float) -> NDArray[np.float64]:
 
     They are both ends, and the levels in between at which the color scale changes its slope. The
     intervals have the same length on the bar, so that a deep hole does not fill it.
+
+    Args:
+        low: Lowest height [m].
+        high: Highest height [m].
     """
     inner = [level for level, _ in _COLORS if low < level < high]
     return np.unique([low, *inner, high])

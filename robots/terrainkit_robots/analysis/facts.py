@@ -277,7 +277,12 @@ class Facts:
     def outlier_first(
         self, pair: MirrorPair, value: Callable[[Body], Matrix | None]
     ) -> tuple[MirrorSide, MirrorSide]:
-        """Return the joints of a pair; first the joint that deviates more from the other legs."""
+        """Return the joints of a pair; first the joint that deviates more from the other legs.
+
+        Args:
+            pair: The mirrored joints.
+            value: Function of a body that returns the quantity to compare, or None if it has none.
+        """
         return outlier_first(pair, value, self.bodies, self.legs, self.mirror)
 
     # Simulators

@@ -280,6 +280,9 @@ def rules() -> tuple[Rule, ...]:
 def get_rule(code_or_name: str) -> Rule:
     """Return the rule with this code or name.
 
+    Args:
+        code_or_name: Code such as `JNT007`, or name such as `inverted-limits`, in any case.
+
     Raises:
         ConfigError: if there is no such rule.
     """

@@ -24,7 +24,10 @@ class Suppressed(Skipped):
 
 
 def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
-    """Return the rules that the settings select, and the ignored ones with their reasons.
+    """Return the rules that the settings select.
+
+    Returns:
+        Selected rules, and ignored rules with the reasons.
 
     Raises:
         ConfigError: if the settings name an unknown rule.

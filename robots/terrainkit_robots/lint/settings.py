@@ -84,6 +84,9 @@ class Settings(Config):
 def matching(word: str) -> tuple[Rule, ...]:
     """Return the rules with a code, a prefix of a code, or a name.
 
+    Args:
+        word: Code such as `JNT007`, prefix such as `JNT`, or name such as `inverted-limits`.
+
     Raises:
         ConfigError: if there is none.
     """

@@ -116,7 +116,13 @@ class Meshes:
         return self._cached(("surface", path), lambda: self._read(path))
 
     def vertices(self, mesh: MeshFile) -> Matrix:
-        """Return the scaled vertices, which may repeat, shape (n, 3) [m].
+        """Return the scaled vertices of a mesh.
+
+        Args:
+            mesh: The file with its scale.
+
+        Returns:
+            Vertices [m], which may repeat, shape (n, 3).
 
         Raises:
             MeshError: If the file cannot be read, or a coordinate is too large.

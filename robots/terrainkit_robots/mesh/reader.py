@@ -24,6 +24,10 @@ from terrainkit_robots.mesh.surface import (
 def read_mesh(mesh_format: Format, data: bytes) -> Surface:
     """Return the triangles of a mesh file, without unused vertices.
 
+    Args:
+        mesh_format: Format of the file.
+        data: Content of the file.
+
     Raises:
         MeshError: If the file is malformed or has no triangles.
     """
@@ -85,7 +89,17 @@ def _obj(data: bytes) -> Surface:
 
 
 def obj_points(lines: list[bytes]) -> Points:
-    """Return the vertices of the `v` lines of an OBJ, without weights and colors."""
+    """Return the vertices of an OBJ file.
+
+    Args:
+        lines: The lines that start with `v`, which may have weights and colors.
+
+    Returns:
+        Vertices, shape (n, 3).
+
+    Raises:
+        MeshError: if there are no vertices, or a vertex is not three numbers.
+    """
     if not lines:
         raise MeshError("has no vertices")
     values = parse_float_list(b" ".join(line[2:] for line in lines))

@@ -84,9 +84,15 @@ def triangulate_fan(indices: Faces, counts: Faces) -> Faces:
 
 
 def unique_points(points: Points) -> tuple[Points, NDArray[np.intp]]:
-    """Return the unique points, shape (k, 3), and the index of each point in them, shape (n,).
+    """Return points without repetitions.
 
     Points are equal if their coordinates in single precision are equal.
+
+    Args:
+        points: Points, shape (n, 3).
+
+    Returns:
+        Unique points, shape (k, 3), and the index of each point in them, shape (n,).
     """
     single = np.ascontiguousarray(points, np.float32) + np.float32(0)  # turns -0 into 0
     bits = single.view(np.uint32).astype(np.uint64)

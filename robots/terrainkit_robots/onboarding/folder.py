@@ -23,6 +23,10 @@ _GENERATED = frozenset(
 def check_folder(target: Path, *, overwrite: bool) -> None:
     """Check that an onboarded robot can be written to a folder.
 
+    Args:
+        target: The folder.
+        overwrite: Whether a folder that onboarding wrote may be replaced.
+
     Raises:
         ExportError: if the folder must not be overwritten, or its parent does not exist.
     """

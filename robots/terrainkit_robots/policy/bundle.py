@@ -21,6 +21,13 @@ from terrainkit_robots.spec.robot import SPEC_FILE
 def bundle_policy(run: Run, folder: Path) -> Run:
     """Write a run without its training state and without paths of this machine.
 
+    Args:
+        run: The run.
+        folder: New folder.
+
+    Returns:
+        The run in the new folder.
+
     Raises:
         ConfigError: If the run has no checkpoint, or its robot cannot be shipped.
         ExportError: If the folder is not empty, or cannot be written.

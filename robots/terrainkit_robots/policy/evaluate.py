@@ -169,6 +169,11 @@ def evaluate(
 
     The same seed gives the same result, bit for bit.
 
+    Args:
+        spec: The policy with its task and robot.
+        config: Settings; None for the defaults.
+        progress: Called after each step with the completed fraction, 0 to 1.
+
     Raises:
         ConfigError: If the run has no policy, or its policy is for another robot; if the terrain
             cannot be read, or changed after the training; if the device does not exist.
@@ -184,10 +189,15 @@ def evaluate(
 def make_eval_env(
     spec: PolicySpec, config: EvaluationConfig, *, max_patch_envs: int = MAX_MAP_ENVS
 ) -> tuple[LeggedEnv, FloatArray | None]:
-    """Return an environment to evaluate a policy in, and commands of shape (n, 3).
+    """Return an environment to evaluate a policy in, and the commands of its robots.
 
-    Commands are None for the task's random ones. By default there are at most `max_patch_envs`
-    robots on a patch of a map.
+    Args:
+        spec: The policy with its task and robot.
+        config: Settings of the evaluation.
+        max_patch_envs: Maximum number of robots on a patch if `config.num_envs` is None.
+
+    Returns:
+        The environment, and commands of shape (n, 3); None for the task's random commands.
     """
     task = spec.task
     is_run_terrain = config.terrain is None and not is_plane(spec)
@@ -264,10 +274,13 @@ def eval_task(task: Task, num_envs: int, *, seconds: float = 20.0, seed: int = 1
 
 
 def command_grid(commands: Commands) -> FloatArray:
-    """Return a grid of commands over the ranges of a task, shape (k, 3); usually 75.
+    """Return a grid of commands over the ranges of a task.
 
     Forward and yaw velocities are the full and half limits and zero, lateral velocities the full
     limits and zero. Commands below `min_norm` are zero.
+
+    Returns:
+        Forward and left velocity [m/s] and yaw velocity [rad/s], shape (k, 3). Usually, k is 75.
     """
     ranges = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
     fractions = ((1.0, 0.5), (1.0,), (1.0, 0.5))
@@ -296,7 +309,12 @@ def direction_commands(commands: Commands) -> dict[str, FloatArray]:
 def rollout(
     env: LeggedEnv, policy: Policy, schedule: Iterable[FloatArray | None]
 ) -> Iterator[tuple[FloatArray, BoolArray]]:
-    """Step the environment with a policy; None in the schedule is for the task's random commands.
+    """Step the environment with a policy.
+
+    Args:
+        env: The environment.
+        policy: Function from observations to actions.
+        schedule: Commands of each step, shape (n, 3), or None for the task's random commands.
 
     Yields:
         After each step, the commands during it, shape (n, 3), and which robots fell, shape (n,).
@@ -316,7 +334,10 @@ def rollout(
 def command_schedule(commands: FloatArray | None, num_steps: int) -> list[FloatArray | None]:
     """Return the commands of each step.
 
-    Commands of shape (k, n, 3) are k parts of equal length; None is for the task's random commands.
+    Args:
+        commands: Commands of shape (n, 3), or of shape (k, n, 3) for k parts of equal length; None
+            for the task's random commands.
+        num_steps: Number of steps.
     """
     if commands is None:
         return [None] * num_steps
@@ -331,12 +352,24 @@ class ErrorMean:
         self.total, self.count = np.zeros(num_envs), np.zeros(num_envs, np.int64)
 
     def add(self, errors: FloatArray, measured: BoolArray) -> None:
-        """Add the errors of a step, shape (n,), of the measured robots."""
+        """Add the errors of a step.
+
+        Args:
+            errors: Error of each robot, shape (n,).
+            measured: Which robots are measured in this step, shape (n,).
+        """
         self.total[measured] += errors[measured]
         self.count[measured] += 1
 
     def over(self, robots: BoolArray) -> float | None:
-        """Return the mean over some robots, each with the same weight; None without measurement."""
+        """Return the mean error of some robots, each with the same weight.
+
+        Args:
+            robots: Mask of the robots, shape (n,).
+
+        Returns:
+            The mean, or None if none of the robots was measured.
+        """
         measured = robots & (self.count > 0)
         means = self.total[measured] / self.count[measured]
         return float(means.mean()) if means.size else None
@@ -412,9 +445,14 @@ class EvaluationRollout:
         *,
         stop_early: bool = True,
     ) -> None:
-        """Run for some time [s]; see :func:`command_schedule` for `commands`.
+        """Run the policy and measure it.
 
-        With `stop_early`, it ends once every robot has fallen or crossed half a patch.
+        Args:
+            policy: Function from observations to actions.
+            seconds: Duration [s].
+            commands: Commands; see :func:`command_schedule`.
+            progress: Called after each step with the completed fraction, 0 to 1.
+            stop_early: Whether to stop once every robot has fallen or crossed half a patch.
         """
         steps = max(1, round(seconds / self.env.cfg.dt))
         schedule = command_schedule(commands, steps)
@@ -479,7 +517,12 @@ class EvaluationRollout:
         return settled
 
     def metrics(self, mask: BoolArray, **key: Any) -> RolloutMetrics:
-        """Return the metrics of the robots in a mask; each robot has the same weight."""
+        """Return the metrics of some robots, each with the same weight.
+
+        Args:
+            mask: Mask of the robots, shape (n,).
+            **key: Fields of :class:`RolloutMetrics` that define the group.
+        """
         success = self.crossed | (~self.falls & (self.distance >= self.commanded_distance / 2))
         errors: dict[str, Any] = {name: each.over(mask) for name, each in self.errors.items()}
         return RolloutMetrics(
@@ -539,7 +582,14 @@ def summarize(
     rollout: EvaluationRollout,
     commands: FloatArray | None = None,
 ) -> EvaluationResult:
-    """Return the metrics of a rollout: by commands (n, 3), or on a map by terrain and level."""
+    """Return the metrics of a rollout: by command, or on a map by terrain and level.
+
+    Args:
+        spec: The evaluated policy.
+        config: Settings of the evaluation.
+        rollout: The finished rollout.
+        commands: Command of each robot, shape (n, 3), to group by; None for no such groups.
+    """
     env = rollout.env
     groups: dict[str, list[RolloutMetrics]] = {}
     levels, names = env.curriculum.levels, env.terrain.terrain_names

@@ -67,8 +67,13 @@ def export_policy(
 ) -> ExportResult:
     """Export the policy of a run to a folder, which is created if it does not exist.
 
-    The exported policies are verified against the live one before anything is written. With
-    `example`, a program that runs the policy in MuJoCo is written as well.
+    The exported policies are verified against the live policy before anything is written.
+
+    Args:
+        run: The run.
+        folder: The folder.
+        example: Whether to write a program that runs the policy in MuJoCo.
+        overwrite: Whether existing files may be replaced.
 
     Raises:
         ConfigError: If the run has no checkpoint.
@@ -125,7 +130,13 @@ def _write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> bytes:
-    """Return a policy as an ONNX file with metadata, traced with observations of shape (n, k)."""
+    """Return a policy as an ONNX file.
+
+    Args:
+        policy: The network.
+        obs: Observations to trace it with, shape (n, k).
+        metadata: Text of the metadata `METADATA_KEY`.
+    """
     file, axes = io.BytesIO(), {"obs": {0: "batch"}, "actions": {0: "batch"}}
     names: dict[str, Any] = {"input_names": ["obs"], "output_names": ["actions"]}
     # With `dynamo`, the export takes 5 s instead of 0.1 s.
@@ -139,7 +150,19 @@ def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> by
 
 
 def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
-    """Return the largest difference from live actions; raise ExportError if it is too large."""
+    """Compare exported with live actions.
+
+    Args:
+        exported: Actions of the exported policy, shape (n, a).
+        live: Actions of the live policy, shape (n, a).
+        name: Name of the exported file, for the error.
+
+    Returns:
+        Largest difference, relative for actions beyond 1.
+
+    Raises:
+        ExportError: if the difference is above `TOLERANCE`.
+    """
     error = float(np.max(np.abs(exported - live) / np.maximum(1, np.abs(live))))
     if not error <= TOLERANCE:
         expected = f"expected at most {TOLERANCE:g}"

@@ -14,9 +14,17 @@ MIN_SWING_STEPS = 2
 
 
 def find_swings(contact: BoolArray, measured: BoolArray) -> tuple[NDArray[np.int64], ...]:
-    """Return column (f * robot + foot), takeoff step and touchdown step of every complete swing.
+    """Return all complete swings.
 
-    A swing is complete if its steps and those before and after it are measured.
+    A swing is complete if its steps, the step before and the step after are measured.
+
+    Args:
+        contact: Contacts, shape (t, n, f).
+        measured: Which steps count, shape (t, n).
+
+    Returns:
+        Column (f * robot + foot), takeoff step and touchdown step of each swing, each of shape
+        (k,).
     """
     steps, _, feet = contact.shape
     known = np.repeat(measured, feet, axis=1).T
@@ -30,7 +38,16 @@ def find_swings(contact: BoolArray, measured: BoolArray) -> tuple[NDArray[np.int
 
 
 def swing_heights(contact: BoolArray, height: FloatArray, measured: BoolArray) -> FloatArray:
-    """Return the mean peak height of the swings of each foot [m], shape (f,); NaN without any."""
+    """Return the mean peak height of the swings of each foot.
+
+    Args:
+        contact: Contacts, shape (t, n, f).
+        height: Heights of the feet [m], shape (t, n, f).
+        measured: Which steps count, shape (t, n).
+
+    Returns:
+        Heights [m], shape (f,); NaN for a foot without a complete swing.
+    """
     steps, _, feet = contact.shape
     column, start, stop = find_swings(contact, measured)
     bounds = steps * column[:, None] + np.column_stack([start, stop])
@@ -41,19 +58,45 @@ def swing_heights(contact: BoolArray, height: FloatArray, measured: BoolArray) -
 
 
 def step_frequency(contact: BoolArray, measured: BoolArray, dt: float) -> float:
-    """Return the number of complete swings per foot and second [Hz]; steps are `dt` apart [s]."""
+    """Return the number of complete swings per foot and second.
+
+    Args:
+        contact: Contacts, shape (t, n, f).
+        measured: Which steps count, shape (t, n).
+        dt: Time between two steps [s].
+
+    Returns:
+        Frequency [Hz]; NaN if no step counts.
+    """
     seconds = dt * measured.sum() * contact.shape[2]
     return len(find_swings(contact, measured)[0]) / seconds if seconds else np.nan
 
 
 def duty_factors(contact: BoolArray, measured: BoolArray) -> FloatArray:
-    """Return the share of the measured time that each foot is in contact, shape (f,)."""
+    """Return the share of the measured time that each foot is in contact.
+
+    Args:
+        contact: Contacts, shape (t, n, f).
+        measured: Which steps count, shape (t, n).
+
+    Returns:
+        Shares, 0 to 1, shape (f,); NaN if no step counts.
+    """
     share: FloatArray = contact[measured].mean(axis=0) if measured.any() else np.nan * contact[0, 0]
     return share
 
 
 def foot_slip(contact: BoolArray, speed: FloatArray, measured: BoolArray) -> float:
-    """Return the mean of the horizontal speed of feet in contact [m/s]; NaN without contact."""
+    """Return the mean horizontal speed of feet in contact.
+
+    Args:
+        contact: Contacts, shape (t, n, f).
+        speed: Horizontal speeds of the feet [m/s], shape (t, n, f).
+        measured: Which steps count, shape (t, n).
+
+    Returns:
+        Speed [m/s]; NaN without contact.
+    """
     selected = speed[contact & measured[..., None]]
     return float(selected.mean()) if len(selected) else np.nan
 

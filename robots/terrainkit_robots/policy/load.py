@@ -19,7 +19,15 @@ Policy = Callable[[TensorDict], torch.Tensor]
 
 
 def load_policy(spec: PolicySpec, env: LeggedEnv) -> Policy:
-    """Return a policy for `env`; see :func:`load_actor` for the policy of a run."""
+    """Return a policy for `env`; see :func:`load_actor` for the policy of a run.
+
+    Args:
+        spec: The policy: a run, or a function of the observations.
+        env: The environment.
+
+    Raises:
+        ConfigError: If the spec has no policy, or its policy is for another robot or task.
+    """
     if (policy := spec.policy) is not None:
         return lambda obs: torch.as_tensor(policy(obs["policy"]))
     if not isinstance(spec, Run):

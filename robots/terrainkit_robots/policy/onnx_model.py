@@ -77,7 +77,15 @@ def make_session(model: bytes) -> onnxruntime.InferenceSession:
 
 
 def call_model(session: onnxruntime.InferenceSession, obs: Any, options: Any = None) -> Any:
-    """Return the first output for observations (n, k), row by row if the batch size is 1.
+    """Return the first output of a model.
+
+    Args:
+        session: The loaded model.
+        obs: Observations, shape (n, k). They are passed row by row if the model takes a batch of 1.
+        options: onnxruntime's `RunOptions`; None for the defaults.
+
+    Returns:
+        Actions, shape (n, a).
 
     Raises:
         ConfigError: If the model fails, or needs too much memory.

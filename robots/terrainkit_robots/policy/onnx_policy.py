@@ -50,7 +50,14 @@ class OnnxPolicy:
     """A policy without memory in an ONNX file, from observations (n, k) to actions (n, a)."""
 
     def __init__(self, path: Path) -> None:
-        """Load the file and call it once; raise ConfigError if it is not such a policy."""
+        """Load a file, and call it once.
+
+        Args:
+            path: The ONNX file.
+
+        Raises:
+            ConfigError: If the file is not a policy.
+        """
         self.__name__ = path.name
         try:
             loaded = run_isolated(load_model, _read(path), path.parent, METADATA_KEY, limits=LIMITS)

@@ -54,6 +54,15 @@ def play(
     On a plane the robots walk in formation; :func:`demo_commands` are the default commands. On a
     map there is one robot per patch, and the video follows some `robots` in turn.
 
+    Args:
+        spec: The policy with its task and robot.
+        config: Settings of the rollout; None for the defaults.
+        video: Whether to record a video. Without one, the rollout stops once every
+            robot has fallen or crossed half a patch.
+        robots: Number of robots that the video follows on a map.
+        size: Width and height of the video [pixels].
+        progress: Called after each step with the completed fraction, 0 to 1.
+
     Raises:
         ConfigError: If a run has no policy, or its policy is for another robot; if an option is
             invalid.
@@ -112,7 +121,15 @@ def view(spec: PolicySpec, config: EvaluationConfig | None = None) -> None:
 def make_play_env(
     spec: PolicySpec, config: EvaluationConfig
 ) -> tuple[LeggedEnv, FloatArray | None]:
-    """Return the environment, and the commands of its robots for :func:`command_schedule`."""
+    """Return the environment, and the commands of its robots.
+
+    Args:
+        spec: The policy with its task and robot.
+        config: Settings of the rollout.
+
+    Returns:
+        The environment, and commands for :func:`command_schedule`.
+    """
     if not is_plane(spec, config.terrain):
         return make_eval_env(spec, config, max_patch_envs=1)
     start = replace(spec.task.init_state, position=0.0, yaw=0.0)  # the formation sets them
@@ -125,7 +142,11 @@ def make_play_env(
 
 
 def demo_commands(commands: Commands) -> FloatArray:
-    """Return forward, curve, sideways and turn commands at 75 % of the task's limits, (4, 3)."""
+    """Return commands to walk forward, in a curve and sideways, and to turn, at 75 % of the limits.
+
+    Returns:
+        Forward and left velocity [m/s] and yaw velocity [rad/s], shape (4, 3).
+    """
     limits = (commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw)
     x, y, yaw = (0.75 * high for _, high in limits)
     return np.array([[x, 0, 0], [x, 0, yaw], [0, y, 0], [0, 0, -yaw]], np.float32)

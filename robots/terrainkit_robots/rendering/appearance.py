@@ -50,9 +50,18 @@ def make_renderer(model: Any, size: tuple[int, int], extent: float) -> Any:
 def update_scene(
     renderer: Any, data: Any, target: ArrayLike, distance: float, azimuth: float, elevation: float
 ) -> Any:
-    """Update the scene of a renderer, and return the `mujoco.MjvOption`.
+    """Update the scene of a renderer.
 
-    The camera looks at the target from a distance [m]; the angles of its direction are in [deg].
+    Args:
+        renderer: The `mujoco.Renderer`.
+        data: The state to show.
+        target: Point that the camera looks at [m], shape (3,).
+        distance: Distance of the camera from the target [m].
+        azimuth: Azimuth of the viewing direction [deg].
+        elevation: Elevation of the viewing direction [deg].
+
+    Returns:
+        The `mujoco.MjvOption`.
     """
     import mujoco
 

@@ -35,7 +35,18 @@ def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, 
 
 
 def render_views(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
-    """Yield the bytes of a PNG of each view; raise a RenderError if the robot is invalid."""
+    """Yield a PNG of each view of a robot.
+
+    Args:
+        file: MJCF file of the robot.
+        size: Width and height [pixels].
+
+    Yields:
+        Bytes of each PNG, in the order of `VIEWS`.
+
+    Raises:
+        RenderError: if MuJoCo cannot load the robot.
+    """
     import cv2
     import mujoco
 
@@ -110,9 +121,16 @@ def show_robot_geoms(model: Any) -> NDArray[np.int64]:
 def fit_camera(
     points: NDArray[np.float64], azimuth: float, elevation: float, aspect_ratio: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Return the target and the distance of a camera that shows all points [m].
+    """Return a camera that shows all points.
 
-    The angles of the viewing direction are in [deg]; the aspect ratio is width over height.
+    Args:
+        points: Points [m], shape (n, 3).
+        azimuth: Azimuth of the viewing direction [deg].
+        elevation: Elevation of the viewing direction [deg].
+        aspect_ratio: Width over height of the image.
+
+    Returns:
+        Target, shape (3,), and distance of the camera [m].
     """
     a, e = np.radians([azimuth, elevation])
     forward = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])

@@ -53,14 +53,30 @@ class VideoSpec:
 
 
 def check_video_size(size: tuple[int, int]) -> None:
-    """Raise a ConfigError unless both sides are even numbers in the supported range."""
+    """Check the size of a video.
+
+    Args:
+        size: Width and height [pixels].
+
+    Raises:
+        ConfigError: if a side is odd or out of range.
+    """
     if any(n % 2 or not MIN_SIZE <= n <= MAX_SIZE for n in size):
         expected = f"two even numbers from {MIN_SIZE} to {MAX_SIZE}"
         raise ConfigError(f"size of the video: got {size}; expected {expected}")
 
 
 def check_video_path(path: Path, *, overwrite: bool = False) -> None:
-    """Raise a ConfigError or an ExportError unless a video can be written to a path."""
+    """Check that a video can be written to a path.
+
+    Args:
+        path: The file.
+        overwrite: Whether an existing file may be replaced.
+
+    Raises:
+        ConfigError: if the suffix is not .mp4.
+        ExportError: if the file cannot be written.
+    """
     from terrainkit.files.atomic_write import check_target
 
     if path.suffix != ".mp4":
@@ -153,7 +169,15 @@ def _shot_frames(spec: VideoSpec, shot: Shot, distance: float) -> Iterator[Frame
 
 
 def smooth_path(path: FloatArray, sigma: float) -> FloatArray:
-    """Return a path after a Gaussian filter of `sigma` frames, shape (frames, 3) [m]."""
+    """Return a path after a Gaussian filter.
+
+    Args:
+        path: Positions [m], shape (frames, 3).
+        sigma: Standard deviation of the filter [frames].
+
+    Returns:
+        Positions [m], shape (frames, 3).
+    """
     from scipy.ndimage import gaussian_filter1d
 
     # The deviation from a straight line is filtered, so that the camera has no lag at the ends.

@@ -78,7 +78,12 @@ class Crossing:
 
     @single_torch_thread()
     def attempt(self, levels: NDArray[np.int64], columns: NDArray[np.int64]) -> Attempts:
-        """Return the attempts on the patches (levels, columns), each of shape (num_envs,)."""
+        """Let robots cross patches.
+
+        Args:
+            levels: Row of the patch of each robot, shape (num_envs,).
+            columns: Column of the patch of each robot, shape (num_envs,).
+        """
         env = self._env
         env.curriculum.levels[:], env.curriculum.columns[:] = levels, columns
         env.set_commands(None)

@@ -16,10 +16,17 @@ HEADING_STIFFNESS = 1.0
 
 
 def patch_routes(patch: Patch) -> list[NDArray[np.float64]]:
-    """Return the routes across a patch: goals in their order, x and y [m], each of shape (k, 2).
+    """Return the routes across a patch.
 
-    Without goals, a route leads straight to the side that is farthest from the spawn origin; there
-    are several routes if several sides are. Feasibility assesses paths to the same sides.
+    A route leads through the goals of the patch. Without goals, it leads straight to the side that
+    is farthest from the spawn origin; there are several routes if several sides are equally far.
+    Feasibility assesses paths to the same sides.
+
+    Args:
+        patch: The patch.
+
+    Returns:
+        Waypoints of each route, x and y in the world frame [m], each of shape (k, 2).
     """
     if len(patch.goals):
         return [patch.goals[:, :2].astype(np.float64)]

@@ -20,9 +20,16 @@ for two legs of 0.7 m, as in unitree_rl_gym."""
 def sample_commands(
     rng: np.random.Generator, count: int, cfg: Commands
 ) -> tuple[FloatArray, FloatArray]:
-    """Sample commands, shape (count, 3), and headings [rad], shape (count,).
+    """Sample velocity commands and headings.
 
-    The heading of a command to stand is NaN.
+    Args:
+        rng: Generator of the random numbers.
+        count: Number of commands.
+        cfg: Ranges of the commands.
+
+    Returns:
+        Commands, forward and left [m/s] and yaw rate [rad/s], shape (count, 3), and headings [rad],
+        shape (count,). The heading of a command to stand is NaN.
     """
     low, high = np.array([cfg.lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_yaw], np.float32).T
     commands = low + (high - low) * rng.random((count, 3), dtype=np.float32)
@@ -52,18 +59,35 @@ class VelocityCommand:
         self._interval = max(1, round(cfg.resampling_time / dt))
 
     def resample(self, rng: np.random.Generator, env_ids: Ids) -> None:
-        """Sample new commands for some environments."""
+        """Sample new commands for some environments.
+
+        Args:
+            rng: Generator of the random numbers.
+            env_ids: Environments, shape (k,).
+        """
         sample = sample_commands(rng, len(env_ids), self._cfg)
         self.commands[env_ids], self.heading[env_ids] = sample
         forward = np.abs(self.commands[env_ids, 0])
         self.speed[env_ids] = np.where(np.isnan(self.heading[env_ids]), np.nan, forward)
 
     def resample_due(self, rng: np.random.Generator, steps: NDArray[np.int64]) -> None:
-        """Resample where the resampling time has passed; `steps` since reset, shape (n,)."""
+        """Sample new commands where the resampling time has passed.
+
+        Args:
+            rng: Generator of the random numbers.
+            steps: Steps of each environment since its reset, shape (n,).
+        """
         self.resample(rng, np.flatnonzero((steps % self._interval == 0) & (steps > 0)))
 
     def yaw_rate(self, yaw: FloatArray) -> FloatArray:
-        """Return the commanded yaw rate of robots with the heading `yaw` [rad], shape (n,)."""
+        """Return the commanded yaw rates.
+
+        Args:
+            yaw: Heading of each robot [rad], shape (n,).
+
+        Returns:
+            Yaw rates [rad/s], shape (n,), toward the commanded heading if there is one.
+        """
         if self.fixed is not None or not self.heading_command:
             return self.commands[:, 2]
         rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
@@ -102,7 +126,15 @@ class Gait:
         self.averaging_time = self.period if is_biped else 0.0
 
     def phases(self, time: FloatArray, moving: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
-        """Return the `gait_phase` and `swing_phase` of a state, from times (n,) [s]."""
+        """Return the phases of the gait.
+
+        Args:
+            time: Time since the start of each episode [s], shape (n,).
+            moving: Which robots are commanded to move, shape (n,).
+
+        Returns:
+            `gait_phase`, shape (n, 2), and `swing_phase`, shape (n, f), of a :class:`State`.
+        """
         phase = np.outer(time, [1 / self.period]) if self.period else np.zeros((len(time), 1))
         angle, foot_phase = 2 * np.pi * phase, (phase + self.offset) % 1
         walks = moving[:, None] & (self.period > 0)

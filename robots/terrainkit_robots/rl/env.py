@@ -153,7 +153,12 @@ class LeggedEnv(VecEnv):
         self._compute_observations()
 
     def set_commands(self, commands: FloatArray | None) -> None:
-        """Set fixed commands, shape (n, 3); None restores random commands."""
+        """Set fixed commands.
+
+        Args:
+            commands: Forward and left velocity [m/s] and yaw velocity [rad/s], shape (n, 3); None
+                restores the task's random commands.
+        """
         if commands is None and self.velocity_command.fixed is None:
             return
         self.velocity_command.fixed = commands
@@ -164,7 +169,14 @@ class LeggedEnv(VecEnv):
         self._compute_observations()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
-        """Return the actuator controls (n, j) for actions of shape (n, a)."""
+        """Return the actuator controls for actions.
+
+        Args:
+            actions: Actions of the policy, shape (n, a).
+
+        Returns:
+            Controls of all actuators, shape (n, j).
+        """
         target = np.tile(self.action_offset, (len(actions), 1))
         target[:, self.action_joints] += self.action_scale[self.action_joints] * actions
         return target - self.joint_offset * self.is_position_controlled

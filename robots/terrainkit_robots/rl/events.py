@@ -57,7 +57,15 @@ def sample_params(
 
 
 def apply_params(sim: Simulation, params: RandomizedParams) -> None:
-    """Write the parameters of each robot to its simulation."""
+    """Write the parameters of each robot to its simulation.
+
+    Args:
+        sim: The simulation.
+        params: Parameters of each robot.
+
+    Raises:
+        ConfigError: If the base of a robot would have no mass.
+    """
     batch, scene, model, base = sim.batch, sim.scene, sim.scene.model, sim.scene.base
     nominal = model.body_mass[base]
     mass = nominal + params.added_mass
@@ -91,13 +99,23 @@ class Pushes:
         self._max_vel = cfg.max_push_vel_xy if cfg.push_interval_s else 0.0
 
     def reset(self, rng: np.random.Generator, env_ids: Ids) -> None:
-        """Sample when the first push of new episodes happens."""
+        """Sample when the first push of new episodes happens.
+
+        Args:
+            rng: Generator of the random numbers.
+            env_ids: Environments, shape (k,).
+        """
         self.velocity[env_ids] = 0
         if self._max_vel:
             self.steps_until_push[env_ids] = rng.integers(1, self._interval + 1, len(env_ids))
 
     def apply(self, rng: np.random.Generator, qvel: NDArray[np.float64]) -> None:
-        """Push the robots that are due, by adding to `qvel`, shape (n, nv)."""
+        """Push the robots that are due.
+
+        Args:
+            rng: Generator of the random numbers.
+            qvel: Velocities of all robots, shape (n, nv), to which the pushes are added.
+        """
         self.velocity[:] = 0
         if not self._max_vel:
             return
@@ -116,10 +134,20 @@ def sample_reset_state(
     terrain: Ground,
     cfg: InitState,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sample positions and velocities at reset, shapes (k, nq) and (k, nv).
+    """Sample the state of robots at a reset.
 
-    `env_origins` has shape (k, 3) [m]. Where the ground beside an origin is uneven, the sampled
-    offset is halved, and then dropped.
+    Where the ground beside an origin is uneven, the sampled offset is halved, and then dropped.
+
+    Args:
+        rng: Generator of the random numbers.
+        env_origins: Spawn origin of each robot [m], shape (k, 3).
+        scene: The scene.
+        robot: The robot.
+        terrain: The ground.
+        cfg: Ranges of the state.
+
+    Returns:
+        Positions `qpos`, shape (k, nq), and velocities `qvel`, shape (k, nv).
     """
     count, limit = len(env_origins), cfg.position
     qpos = np.tile(scene.default_qpos, (count, 1))

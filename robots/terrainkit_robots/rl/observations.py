@@ -140,7 +140,17 @@ def compute_observations(
     clip: float,
     rng: np.random.Generator | None = None,
 ) -> FloatArray:
-    """Return the observations of a group, shape (n, width), with noise from `rng` if given."""
+    """Return the observations of a group.
+
+    Args:
+        group: Terms of the group.
+        state: State of n robots.
+        clip: Largest magnitude of an observation.
+        rng: Generator of the noise; None for no noise.
+
+    Returns:
+        Observations, shape (n, width).
+    """
     values = [term.function(state) for term in group]
     widths = [value.shape[1] for value in values]
     observations = np.concatenate(values, axis=1, dtype=np.float32)

@@ -58,6 +58,11 @@ def reward(function: Reward) -> Reward:
 def active_rewards(cfg: Rewards, mass: float, leg_length: float) -> dict[str, tuple[Reward, float]]:
     """Return each term with a scale other than 0, and that scale in SI units.
 
+    Args:
+        cfg: Scales and parameters of the rewards.
+        mass: Mass of the robot [kg].
+        leg_length: Length of a leg [m].
+
     Raises:
         PluginError: if the scale of a term of another package is not a number.
     """
@@ -87,7 +92,14 @@ def _sum_squares(values: FloatArray) -> FloatArray:
 
 
 def is_moving(commands: FloatArray) -> NDArray[np.bool_]:
-    """Return which commands are not a command to stand still, shape (n,)."""
+    """Return which commands are not a command to stand still.
+
+    Args:
+        commands: Forward and left velocity [m/s] and yaw rate [rad/s], shape (n, 3).
+
+    Returns:
+        Mask, shape (n,).
+    """
     return (commands[:, :2] != 0).any(axis=1) | (np.abs(commands[:, 2]) >= MIN_YAW_RATE)
 
 

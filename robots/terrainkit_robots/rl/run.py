@@ -122,7 +122,15 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
 
 
 def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write a new folder with some files, completely or not at all."""
+    """Write a new folder with some files, completely or not at all.
+
+    Args:
+        folder: The folder.
+        files: Content of each file by name.
+
+    Raises:
+        ExportError: If the folder is not empty, or cannot be written.
+    """
     require_utf8(folder)
     with atomic_folder(folder) as new:
         if folder.is_dir() and any(folder.iterdir()):
@@ -246,7 +254,11 @@ def parts_to_load(
 
 
 def last_checkpoint(run: Run) -> Path:
-    """Return the selected checkpoint of a run; raise ConfigError if there is none."""
+    """Return the selected checkpoint of a run.
+
+    Raises:
+        ConfigError: If the run has no checkpoint.
+    """
     if run.checkpoint is None:
         raise ConfigError(f"run {run.folder}: got no checkpoint; expected a trained run")
     return run.checkpoint

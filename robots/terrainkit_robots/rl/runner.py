@@ -385,7 +385,17 @@ def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
 
 
 def resolve_device(name: str) -> str:
-    """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU."""
+    """Return the device `name`: `cpu`, `cuda` or `cuda:1`; under torchrun, this process's GPU.
+
+    Args:
+        name: `cpu`, `cuda`, or a GPU such as `cuda:1`.
+
+    Returns:
+        Name of the device. Under torchrun, the GPU of this process.
+
+    Raises:
+        ConfigError: If there is no such device.
+    """
     gpus = [f"cuda:{k}" for k in range(torch.cuda.device_count())]
     if name in ("cpu", "cpu:0"):
         return "cpu"
@@ -395,7 +405,11 @@ def resolve_device(name: str) -> str:
 
 
 def process_share(task: Task) -> Task:
-    """Return the task of this process: under torchrun, its share of the environments."""
+    """Return the task of this process: under torchrun, its share of the environments.
+
+    Raises:
+        ConfigError: If there are fewer environments than processes.
+    """
     rank, count = int(os.environ.get("RANK", "0")), int(os.environ.get("WORLD_SIZE", "1"))
     num_envs, local_count = task.env.num_envs, int(os.environ.get("LOCAL_WORLD_SIZE", "1"))
     if num_envs < count:

@@ -42,7 +42,13 @@ class Simulation:
         return (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
 
     def reset(self, env_ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:
-        """Reset the simulations `env_ids` (sorted) to positions (k, nq) and velocities (k, nv)."""
+        """Reset some simulations.
+
+        Args:
+            env_ids: Simulations, sorted, shape (k,).
+            qpos: Positions, shape (k, nq).
+            qvel: Velocities, shape (k, nv).
+        """
         self.batch.reset(env_ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
         self.qpos[env_ids] = qpos
         self.qvel[env_ids] = qvel
@@ -54,7 +60,13 @@ class Simulation:
             self.batch.forward(env_ids, stage=self._stage)
 
     def reset_action_delay(self, env_ids: Ids, delay: NDArray[Any], ctrl: NDArray[Any]) -> None:
-        """Set the delays (k,) [s] of simulations whose motors received the controls (k, j)."""
+        """Set the action delays of some simulations.
+
+        Args:
+            env_ids: Simulations, shape (k,).
+            delay: Delays [s], shape (k,).
+            ctrl: Controls that the motors received until now, shape (k, j).
+        """
         dt, samples = self.scene.model.opt.timestep, self.scene.model.actuator_history[0, 0]
         # MuJoCo applies the last control that is old enough. With half a step less than the delay,
         # the rounding errors of the time do not matter.
@@ -65,7 +77,15 @@ class Simulation:
         history[env_ids, :, 2 + samples :] = ctrl[:, :, None]
 
     def sensor(self, name: str, env_ids: Any = slice(None)) -> NDArray[np.float32]:
-        """Return a copy of the data of the sensors `name`, shape (n, bodies, 3)."""
+        """Return a copy of the data of sensors.
+
+        Args:
+            name: Name of the group of sensors.
+            env_ids: Simulations; by default all.
+
+        Returns:
+            Data, shape (n, bodies, 3).
+        """
         values = self._sensordata[env_ids, self.scene.sensors[name]].astype(np.float32)
         return values.reshape(len(values), -1, 3)
 

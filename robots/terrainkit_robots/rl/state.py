@@ -59,7 +59,12 @@ class State:
         return self.foot_force[..., 2] > CONTACT_FORCE
 
     def update(self, env_ids: NDArray[np.int64], other: "State") -> None:
-        """Replace the rows `env_ids` with the state `other` of these robots."""
+        """Replace the rows of some robots.
+
+        Args:
+            env_ids: Rows, shape (k,).
+            other: State of these k robots.
+        """
         for field in fields(self):
             getattr(self, field.name)[env_ids] = getattr(other, field.name)
 

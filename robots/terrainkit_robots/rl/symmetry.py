@@ -120,6 +120,14 @@ def augment(
     """Return observations and actions followed by their mirror images.
 
     This is rsl-rl's `data_augmentation_func`; either argument may be None.
+
+    Args:
+        env: The environment, which has the mirror maps.
+        obs: Observations of n samples by group, or None.
+        actions: Actions, shape (n, a), or None.
+
+    Returns:
+        Observations and actions of 2 n samples: the given ones, then their mirror images.
     """
     maps = env.mirror_maps
 
@@ -157,7 +165,14 @@ def _check_sides(robot: Robot, scene: Scene, scale: FloatArray, joints: SignedPe
 
 
 def mirror_feet(position: FloatArray) -> NDArray[np.int64]:
-    """Return the foot nearest to the mirror image of each foot; positions [m], shape (f, 3)."""
+    """Return the foot on the other side of each foot.
+
+    Args:
+        position: Positions of the feet in the frame of the base [m], shape (f, 3).
+
+    Returns:
+        Index of the foot nearest to the mirror image of each foot, shape (f,).
+    """
     return np.linalg.norm(position[:, None] - position * [1, -1, 1], axis=2).argmin(axis=1)
 
 

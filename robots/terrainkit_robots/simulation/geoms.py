@@ -13,7 +13,16 @@ def collides(model: Any) -> NDArray[np.bool_]:
 
 
 def box_corners(model: Any, data: Any, geoms: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return the corners of the bounding boxes of geoms in the world frame, shape (n, 3) [m]."""
+    """Return the corners of the bounding boxes of geoms.
+
+    Args:
+        model: The MuJoCo model.
+        data: Its state, with computed kinematics.
+        geoms: Ids of the geoms, shape (k,).
+
+    Returns:
+        Corners in the world frame [m], shape (8 k, 3).
+    """
     corners, boxes = np.array(list(product((-1.0, 1.0), repeat=3))), model.geom_aabb[geoms, None]
     local = boxes[..., :3] + corners * boxes[..., 3:]
     axes = data.geom_xmat[geoms].reshape(-1, 3, 3).transpose(0, 2, 1)

@@ -63,7 +63,15 @@ class Robot:
 
     @classmethod
     def from_spec(cls, spec: RobotSpec, folder: Path) -> "Robot":
-        """Return the robot that a spec in `folder` describes; raise ConfigError if incomplete."""
+        """Return the robot that a spec describes.
+
+        Args:
+            spec: The spec.
+            folder: Folder that its files are relative to.
+
+        Raises:
+            ConfigError: If the base is fixed, or the spec lacks a value that training needs.
+        """
         if not spec.floating:
             raise ConfigError(f"base of {spec.name}: got a fixed base; expected a floating base")
         if not spec.feet:

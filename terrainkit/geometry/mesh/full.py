@@ -30,7 +30,15 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
 
 
 def quad_faces(node_grid: NodeGrid, quads: NDArray[np.bool_]) -> tuple[RowBuffer, RowBuffer]:
-    """Return the triangles of the quads in the mask `quads`, and the vertices that they add."""
+    """Return the triangles of some quads, and the vertices that they add.
+
+    Args:
+        node_grid: The nodes.
+        quads: Mask of the quads.
+
+    Returns:
+        Triangles, shape (nf, 3), and positions of the added vertices [m], shape (nv, 3).
+    """
     triangles, centers = RowBuffer(np.int32), RowBuffer(np.float32)
     _append_pairs(triangles, node_grid, quads & ~node_grid.has_wall)
     walled = np.flatnonzero(quads & node_grid.has_wall)

@@ -50,7 +50,16 @@ class NodeGrid:
 
     @classmethod
     def from_heights(cls, heights: NDArray[np.float32], grid: Grid, threshold: float) -> "NodeGrid":
-        """Return the nodes of a heightfield; a difference above `threshold` [m] is a wall."""
+        """Return the nodes of a heightfield.
+
+        Args:
+            heights: Heights [m], shape `grid.shape`.
+            grid: The grid.
+            threshold: Difference between neighboring samples above which there is a wall [m].
+
+        Raises:
+            MemoryLimitError: if the mesh would not fit in memory.
+        """
         check_memory(heights.size * _BYTES_PER_NODE, f"a mesh of {heights.size} samples")
         z = np.pad(heights, 1, mode="edge")
         walls_x, walls_y = wall_edges(z, threshold)
@@ -91,13 +100,29 @@ class NodeGrid:
         return np.asarray(same[:-1] & same[1:])
 
     def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the numbers of the four corners of each quad (i, j), counterclockwise, (4, n)."""
+        """Return the vertices at the corners of quads.
+
+        Args:
+            i: Index of each quad along x, shape (n,).
+            j: Index of each quad along y, shape (n,).
+
+        Returns:
+            Numbers of the four corners, counterclockwise, shape (4, n).
+        """
         ny = self.z.shape[1]
         first = i * ny + j
         return np.stack([first, first + ny, first + ny + 1, first + 1])
 
     def walls(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Return whether each of the four edges of each quad (i, j) is a wall, (4, n)."""
+        """Return which edges of quads are walls.
+
+        Args:
+            i: Index of each quad along x, shape (n,).
+            j: Index of each quad along y, shape (n,).
+
+        Returns:
+            Whether each of the four edges is a wall, shape (4, n).
+        """
         x, y = self.walls_x, self.walls_y
         return np.stack([x[i, j], y[i + 1, j], x[i, j + 1], y[i, j]])
 

@@ -53,7 +53,14 @@ class Polygons:
 
 
 def runs(mask: Mask) -> tuple[Ids, Ids, Ids]:
-    """Return row, start and end of each run of True along the second axis, in order."""
+    """Return the runs of True along the second axis of a mask, in order.
+
+    Args:
+        mask: The mask, shape (n, m).
+
+    Returns:
+        Row, start and end (exclusive) of each run, each of shape (k,).
+    """
     padded = np.zeros((mask.shape[0], mask.shape[1] + 2), dtype=bool)
     padded[:, 1:-1] = mask
     flat = padded.ravel()

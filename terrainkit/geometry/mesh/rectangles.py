@@ -24,7 +24,11 @@ class Rectangles:
 
     @classmethod
     def flat(cls, flat: Mask) -> Self:
-        """Return rectangles of flat quads; the mask is cleared where there is none."""
+        """Return rectangles of flat quads.
+
+        Args:
+            flat: Mask of the flat quads. It is cleared where a rectangle would be too small.
+        """
         row, start, stop = runs(flat)
         # Runs over the same columns in consecutive rows are one rectangle.
         order = np.lexsort((row, stop, start))
@@ -39,7 +43,11 @@ class Rectangles:
 
     @classmethod
     def along_y(cls, tilted: Mask) -> Self:
-        """Return rows of quads that slope along x only; the mask is cleared where there is none."""
+        """Return rows of quads that slope along x only.
+
+        Args:
+            tilted: Mask of such quads. It is cleared where a row would be too short.
+        """
         row, start, stop = runs(tilted)
         small = stop - start < 3
         tilted[row[small], start[small]] = tilted[row[small], stop[small] - 1] = False

@@ -23,7 +23,12 @@ class RowBuffer:
         return self._length
 
     def append(self, rows: NDArray[Any], offset: int = 0) -> None:
-        """Append rows of shape (n, 3), to whose values `offset` is added."""
+        """Append rows.
+
+        Args:
+            rows: Rows, shape (n, 3).
+            offset: Number to add to all values.
+        """
         start, self._length = self._length, self._length + len(rows)
         if self._length > len(self._rows):
             size = len(self._rows) + min(len(self._rows), _MAX_GROWTH)

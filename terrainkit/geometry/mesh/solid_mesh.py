@@ -51,6 +51,9 @@ def concatenate_meshes(meshes: Iterable[TriMesh]) -> TriMesh:
 def united(meshes: list[TriMesh]) -> TriMesh:
     """Return the union of closed meshes as one watertight mesh, computed by manifold3d.
 
+    Args:
+        meshes: Closed meshes, at least one.
+
     Raises:
         ExportError: if the union fails.
     """
@@ -67,7 +70,12 @@ def united(meshes: list[TriMesh]) -> TriMesh:
 
 
 def manifold(vertices: NDArray[np.floating], faces: NDArray[np.integer]) -> Any:
-    """Return a closed mesh as a `manifold3d.Manifold`."""
+    """Return a closed mesh as a `manifold3d.Manifold`.
+
+    Args:
+        vertices: Vertices [m], shape (nv, 3).
+        faces: Triangles, shape (nf, 3).
+    """
     import manifold3d
 
     return manifold3d.Manifold(manifold3d.Mesh64(vertices.astype(float), faces.astype(np.uint64)))

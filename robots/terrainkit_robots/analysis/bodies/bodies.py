@@ -183,7 +183,15 @@ def physical_parent(bodies: Sequence[Body], body: Body) -> Body | None:
 
 
 def center_of_mass(bodies: Sequence[Body], poses: Sequence[Matrix]) -> Matrix:
-    """Return the center of mass in the frame of the poses, shape (3,) [m]."""
+    """Return the common center of mass of bodies.
+
+    Args:
+        bodies: The bodies.
+        poses: Pose of each body in one frame, each of shape (4, 4) [m].
+
+    Returns:
+        Center of mass in this frame [m], shape (3,). Without mass, the origin of the first body.
+    """
     total = sum(body.mass for body in bodies)
     if total <= 0:
         return poses[0][:3, 3]

@@ -49,6 +49,12 @@ def flat_foot_angle(body: Body, pose: Matrix, axis: Matrix, meshes: Meshes) -> f
     """Return the rotation about a horizontal axis that sets a foot flat on the ground [rad].
 
     Zero for a foot that is equally flat at most angles, such as a ball.
+
+    Args:
+        body: The foot.
+        pose: Pose of the foot in the world, shape (4, 4) [m].
+        axis: Horizontal unit vector, shape (3,).
+        meshes: Cache of the meshes.
     """
     forward = np.cross(axis, [0.0, 0.0, 1.0])
     lengths = []
@@ -105,9 +111,14 @@ def _extreme_points(shape: BodyShape, pose: Matrix, meshes: Meshes) -> Matrix:
 
 
 def convex_hull(points: Matrix) -> Matrix:
-    """Return the convex hull of points in the plane, shape (n, 2).
+    """Return the convex hull of points in the plane.
 
-    It is counter-clockwise from the lowest x. Collinear points have their two ends as hull.
+    Args:
+        points: Points, shape (k, 2).
+
+    Returns:
+        Vertices, counter-clockwise from the lowest x, shape (n, 2). The hull of collinear points is
+        their two ends.
     """
     # Andrew's monotone chain. Importing scipy.spatial would take longer than the whole lint pass.
     points = np.unique(points.round(9), axis=0)
@@ -131,9 +142,15 @@ def _cross(a: Matrix, b: Matrix) -> float:
 
 
 def margin(point: Matrix, polygon: Matrix) -> float:
-    """Return the distance of a point to the edge of a convex polygon [m]; negative outside.
+    """Return the distance of a point to the edge of a convex polygon.
 
-    A polygon of two points is a segment and one of one point is that point; both have no inside.
+    Args:
+        point: The point [m], shape (2,).
+        polygon: Vertices, counter-clockwise [m], shape (n, 2). With one or two vertices, it is a
+            point or a line segment, which has no inside.
+
+    Returns:
+        Distance [m], negative outside; -inf without vertices.
     """
     if len(polygon) < 2:
         return -float(np.linalg.norm(polygon - point, axis=1).min()) if len(polygon) else -np.inf

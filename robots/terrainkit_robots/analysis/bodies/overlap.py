@@ -88,7 +88,12 @@ class OverlapScene:
         return next(self.sweep({name: np.array([q]) for name, q in positions.items()}, 1))
 
     def sweep(self, positions: Mapping[str, Matrix], count: int) -> Iterator[list[Overlap]]:
-        """Yield the result of `detect` for each of `count` positions, given as shape (count,)."""
+        """Yield the result of `detect` for several joint positions.
+
+        Args:
+            positions: Positions by joint [rad] or [m], each of shape (count,).
+            count: Number of positions.
+        """
         if not len(self._pairs):
             yield from ([] for _ in range(count))
             return

@@ -66,9 +66,14 @@ def has_bounds(geometry: Geometry, meshes: "Meshes") -> bool:
 
 
 def bounds(shapes: Iterable[BodyShape], meshes: "Meshes") -> Matrix | None:
-    """Return the bounding box of shapes along the axes of their body, shape (2, 3) [m].
+    """Return the bounding box of shapes along the axes of their body.
 
-    None if no shape has bounds.
+    Args:
+        shapes: Shapes of one body.
+        meshes: Cache of the meshes.
+
+    Returns:
+        Lower and upper corner [m], shape (2, 3); None if no shape has bounds.
     """
     boxes = []
     for shape in shapes:
@@ -85,7 +90,16 @@ def bounds(shapes: Iterable[BodyShape], meshes: "Meshes") -> Matrix | None:
 
 
 def min_height(shape: BodyShape, pose: Matrix, meshes: "Meshes") -> float:
-    """Return the lowest z of a shape whose body is at `pose` [m]; of its origin without bounds."""
+    """Return the lowest z of a shape.
+
+    Args:
+        shape: The shape.
+        pose: Pose of its body in the world, shape (4, 4) [m].
+        meshes: Cache of the meshes.
+
+    Returns:
+        Lowest z [m]; without bounds, z of the shape's origin.
+    """
     world = pose @ shape.pose
     if not has_bounds(shape.geometry, meshes):
         return float(world[2, 3])
@@ -94,6 +108,10 @@ def min_height(shape: BodyShape, pose: Matrix, meshes: "Meshes") -> float:
 
 def volume(geometry: Geometry, meshes: "Meshes") -> float:
     """Return the volume of a shape [m3]; for a mesh that is not closed, of its convex hull.
+
+    Args:
+        geometry: The shape.
+        meshes: Cache of the meshes.
 
     Raises:
         MeshError: if the shape is a mesh that cannot be read.

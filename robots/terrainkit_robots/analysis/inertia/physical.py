@@ -31,22 +31,36 @@ def is_in_range(inertia: Matrix) -> bool:
 
 
 def principal_moments(inertia: Matrix) -> Matrix:
-    """Return the principal moments of an inertia, ascending, shape (3,) [kg m2]."""
+    """Return the principal moments of an inertia.
+
+    Args:
+        inertia: Inertia [kg m2], shape (3, 3).
+
+    Returns:
+        Principal moments [kg m2], ascending, shape (3,).
+    """
     return np.asarray(np.linalg.eigvalsh(inertia))
 
 
 def triangle_ratio(principal: Matrix) -> float:
-    """Return (e0 + e1) / e2 of principal moments in ascending order.
+    """Return the ratio (e0 + e1) / e2 of principal moments.
 
     It is 1 for a flat plate or a thin rod, 2 for a ball, and less than 1 for no physical body.
+
+    Args:
+        principal: Principal moments e0, e1 and e2 [kg m2], ascending, shape (3,).
     """
     return float((principal[0] + principal[1]) / principal[2])
 
 
 def nearest_physical(inertia: Matrix) -> Matrix | None:
-    """Return the physical inertia with the nearest second moments, shape (3, 3) [kg m2].
+    """Return the physical inertia with the nearest second moments and the same principal axes.
 
-    The principal axes are kept. None if no second moment is positive.
+    Args:
+        inertia: Symmetric matrix [kg m2], shape (3, 3).
+
+    Returns:
+        Inertia [kg m2], shape (3, 3); None if no second moment is positive.
     """
     if principal_moments(inertia)[2] <= 0:
         inertia = -inertia  # every sign is wrong
@@ -71,7 +85,15 @@ def box_inertia(mass: float, size: Matrix) -> Matrix:
 
 
 def gyration_radius(principal: Matrix, mass: float) -> float:
-    """Return the largest radius of gyration of a body [m], or 0 if it is undefined."""
+    """Return the largest radius of gyration of a body.
+
+    Args:
+        principal: Principal moments [kg m2], ascending, shape (3,).
+        mass: Mass [kg].
+
+    Returns:
+        Radius [m], or 0 if it is undefined.
+    """
     with np.errstate(over="ignore", invalid="ignore"):
         radius = float(np.sqrt(max(float(principal[2]), 0.0) / mass)) if mass > 0 else 0.0
     return radius if np.isfinite(radius) else 0.0

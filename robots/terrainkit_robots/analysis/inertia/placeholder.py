@@ -13,7 +13,14 @@ from terrainkit_robots.transforms import Matrix
 
 
 def placeholder_inertias(bodies: Sequence[Body]) -> list[tuple[Matrix, list[Link]]]:
-    """Return the placeholders, shape (3, 3) [kg m2], and their links, at most one per body."""
+    """Return the placeholders, shape (3, 3) [kg m2], and their links, at most one per body.
+
+    Args:
+        bodies: All bodies of the robot.
+
+    Returns:
+        Each placeholder [kg m2], shape (3, 3), with the links that have it.
+    """
     links = {body.index: body.main_link for body in bodies if body.mass > MIN_INERTIA}
     groups: dict[tuple[float, ...], list[int]] = {}
     for index, link in links.items():

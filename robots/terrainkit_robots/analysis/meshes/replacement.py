@@ -61,7 +61,11 @@ def count_faces(used: UsedMesh) -> int | None:
 
 
 def simplified_stl(used: UsedMesh) -> bytes:
-    """Return the mesh with fewer faces, as binary STL."""
+    """Return the mesh with fewer faces, as binary STL.
+
+    Raises:
+        MeshError: if no faces are left.
+    """
     surface = used.meshes.surface(used.mesh.path)
     cells = _INITIAL_CELLS
     while True:

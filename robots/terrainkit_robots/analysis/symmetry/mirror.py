@@ -75,7 +75,11 @@ class Mirror:
     the trunk is at one side, such as at an IMU."""
 
     def image(self, vectors: Matrix) -> Matrix:
-        """Return mirrored vectors, shape (..., 3)."""
+        """Return mirrored vectors.
+
+        Args:
+            vectors: Directions, or positions relative to the plane, shape (..., 3).
+        """
         return np.asarray(vectors - 2 * (vectors @ self.normal)[..., None] * self.normal)
 
     @property

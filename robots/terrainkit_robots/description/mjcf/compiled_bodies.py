@@ -115,7 +115,12 @@ class CompiledBodies:
         return float(self._model.geom_size[self._copies[geom].id, 0])
 
     def inertial(self, body: Any) -> tuple[float, Matrix, Matrix]:
-        """Return the mass [kg], the pose of the inertial, and the moments of inertia [kg m2]."""
+        """Return the compiled inertial of a body.
+
+        Returns:
+            Mass [kg], pose of the inertial in the body, shape (4, 4) [m], and principal moments
+            [kg m2], shape (3,).
+        """
         model, index = self._model, self._copies[body].id
         pose = _pose(model.body_ipos[index], model.body_iquat[index])
         return float(model.body_mass[index]), pose, model.body_inertia[index]

@@ -20,6 +20,10 @@ def number_text(values: float | Sequence[float] | Matrix) -> str:
 
 
 def place_text(values: Sequence[float] | Matrix) -> str:
-    """Return lengths [m] or angles [rad] separated by spaces, with rounding errors removed."""
+    """Return lengths or angles separated by spaces, with rounding errors removed.
+
+    Args:
+        values: Lengths [m] or angles [rad].
+    """
     flat = np.asarray(values, dtype=float)
     return number_text(np.where(np.abs(flat) < _NOTHING, 0.0, flat))

@@ -18,7 +18,15 @@ _LARGEST = 1e30
 
 
 def parse_numbers(text: str, count: int) -> Matrix | None:
-    """Return the numbers in `text`, shape (count,); None if the text is not `count` numbers."""
+    """Return the numbers in a text.
+
+    Args:
+        text: Numbers separated by white space.
+        count: Expected number of numbers.
+
+    Returns:
+        Numbers, shape (count,); None if the text has anything else, or a number is too large.
+    """
     words = [word for word in re.split(_SPACES, text) if word]
     if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
         return None

@@ -7,9 +7,13 @@ _MAX_CELLS = 1024
 
 
 def decimate(surface: Surface, max_faces: int) -> Surface:
-    """Return a surface with at most `max_faces` faces, the same surface if it has no more.
+    """Return a surface with fewer faces.
 
     Vertices in the same grid cell are merged; the cells grow until there are few enough faces.
+
+    Args:
+        surface: The surface, which is returned itself if it is small enough.
+        max_faces: Maximum number of faces.
 
     Raises:
         MeshError: If no triangles are left.

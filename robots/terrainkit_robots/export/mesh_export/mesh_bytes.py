@@ -37,6 +37,10 @@ def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
     COLLADA, simulators differ in the OBJ files that they accept (MuJoCo 4.0 rejects some with
     normals), and in which side of a mirrored mesh is outside.
 
+    Args:
+        meshes: Cache of the meshes.
+        mesh: The file with its scale.
+
     Raises:
         MeshError: If the mesh cannot be read, or has no volume.
     """
@@ -62,6 +66,10 @@ def mesh_bytes(meshes: Meshes, mesh: MeshFile) -> MeshBytes:
 
 def has_no_volume(meshes: Meshes, mesh: MeshFile) -> bool:
     """Return whether the scaled mesh is flat, or its volume is too small for MuJoCo.
+
+    Args:
+        meshes: Cache of the meshes.
+        mesh: The file with its scale.
 
     Raises:
         MeshError: If the mesh cannot be read.

@@ -162,6 +162,10 @@ class ConfigRobot:
     def check_bodies(self, bodies: Iterable[str], field: str) -> tuple[str, ...]:
         """Return names of bodies without duplicates.
 
+        Args:
+            bodies: Names of bodies.
+            field: Field of the spec that has them, for the error.
+
         Raises:
             ConfigError: if a name is not a body.
         """

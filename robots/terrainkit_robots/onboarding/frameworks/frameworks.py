@@ -35,16 +35,29 @@ def framework_names() -> tuple[str, ...]:
 
 
 def check_framework(name: str) -> None:
-    """Raise ConfigError if the framework is unknown."""
+    """Check the name of a framework.
+
+    Args:
+        name: Name such as `isaaclab`.
+
+    Raises:
+        ConfigError: if the framework is unknown.
+    """
     if name not in framework_names():
         expected = expected_names(name, framework_names(), "expected")
         raise ConfigError(f"framework: got {name!r}; {expected}")
 
 
 def config_files(name: str, robot: ConfigRobot) -> dict[str, str]:
-    """Return the files for a framework by name, for the folder of robot.toml.
+    """Return the files for a framework.
 
-    The first one is the configuration, a Python file.
+    Args:
+        name: Name of the framework.
+        robot: The robot.
+
+    Returns:
+        Text of each file by its name in the folder of robot.toml. The first file is the
+        configuration.
 
     Raises:
         ConfigError: if the framework is unknown, or does not support the robot.

@@ -20,6 +20,9 @@ def usd_patterns(names: Sequence[str]) -> dict[str, str]:
     USD allows letters, digits and underscores. The importer replaces other characters and a leading
     digit by underscores, and then puts an `a` before a leading underscore.
 
+    Args:
+        names: Names of joints or bodies in the robot file.
+
     Raises:
         ConfigError: if two names are the same in USD.
     """
@@ -31,6 +34,9 @@ def mjlab_patterns(names: Sequence[str]) -> dict[str, str]:
 
     mjlab matches some patterns at the start of a name only, so the patterns of names that are
     prefixes of other names end in `$`.
+
+    Args:
+        names: Names of joints or bodies in the robot file.
 
     Raises:
         ConfigError: if two names are the same in mjlab.
