@@ -12,6 +12,8 @@ from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 if TYPE_CHECKING:
     from terrainkit.curriculum.waypoints import Waypoints
 
+# Without the observed velocity, a biped followed 60 % of its commands after 3.1 M samples with 2.3,
+# and 84 % after 3.7 M samples with 3.
 GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
 """Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m, and 0.8 s
 for two legs of 0.7 m, as in unitree_rl_gym."""

@@ -21,15 +21,18 @@ from terrainkit_robots.transforms import FloatArray
 MIN_YAW_RATE = 0.1
 """Yaw rate from which a command counts as moving [rad/s]: heading control never reaches 0."""
 
+# With a constant kernel width of 0.25 m2/s2, it was 64 % for the biped's commands.
 STANDING_TRACKING = 0.25
 """Share of the tracking rewards that a robot earns by standing, at any command."""
 
 SWING_HEIGHT = 0.18
 """Default height of a swinging foot, as a fraction of the leg length."""
 
+# The bundled quadruped, with legs of 0.448 m, gets 8 cm from `SWING_HEIGHT`.
 MAX_SWING_HEIGHT = 0.09
 """Largest default height of a swinging foot on four legs [m]: flat ground needs no more."""
 
+# 0.01 is a tilt of 5.7 degrees.
 LEVEL_SIN2 = 0.01
 """Squared sine of the tilt at which `upright` is exp(-1)."""
 
@@ -66,6 +69,7 @@ def active_rewards(cfg: Rewards, mass: float, leg_length: float) -> dict[str, tu
     Raises:
         PluginError: if the scale of a term of another package is not a number.
     """
+    # Froude scaling: robots of different sizes that move alike have equal rewards in these units.
     time = np.sqrt(leg_length / 9.81)
     units = {k: mass**a * leg_length**b * time**c for k, (a, b, c) in UNITS.items()}
     terms = {}
@@ -115,6 +119,8 @@ def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     squared = np.square(commands - state.mean_vel)
     errors = squared[:, :2].sum(axis=1), squared[:, 2]
     squares = _sum_squares(commands[:, :2]), np.square(commands[:, 2])
+    # A robot that stands still has the squared error s, the squared command. With a width of
+    # -s / log(0.25), its reward exp(-s / width) is 0.25 for any command.
     log_standing = np.float32(np.log(STANDING_TRACKING))
     width_at_rest = np.float32(cfg.tracking_sigma)
     widths = (np.where(s > 0, -s / log_standing, width_at_rest) for s in squares)
@@ -168,6 +174,7 @@ def ang_vel_xy(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
 def base_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     """Penalize a base off its target height, squared; bounded over a pit [m2]."""
     target = np.float32(robot.base_height_target)
+    # Over a deep hole, an unbounded penalty outweighed all rewards of the episode.
     return np.square(np.minimum(state.base_height, 2 * target) - target)
 
 
@@ -220,6 +227,7 @@ def foot_swing_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
     if cfg.swing_height is None and state.foot_height.shape[1] == 4:
         target = min(target, MAX_SWING_HEIGHT)
     arc, height = np.sin(np.pi * state.swing_phase), state.foot_height / np.float32(target)
+    # Clipped for the same reason as the base height: the foot may be above a deep hole.
     return (np.square(np.clip(height, 0, 2) - arc) * (state.swing_phase > 0)).mean(axis=1)
 
 

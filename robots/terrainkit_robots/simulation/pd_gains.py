@@ -88,6 +88,7 @@ def _compute_gains(facts: Facts, gain_set: GainSet) -> Mapping[str, Gain]:
 
 def _make_gain(target: GainTarget, inertia: float, min_ratio: float = _MIN_STIFFNESS_RATIO) -> Gain:
     stiffness = _round(target.stiffness)
+    # The roots of inertia s^2 + d s + k coincide at d = 2 sqrt(k inertia).
     critical = 2 * math.sqrt(target.stiffness * inertia)
     limit = target.stiffness / min_ratio
     reason = f"kp {target.reason}; kd " + (
@@ -110,6 +111,7 @@ def _round(value: float) -> float:
     if not 0 < value < math.inf:
         return 0.0
     scale = 10.0 ** math.floor(math.log10(value))
+    # Closest by ratio, since gains span several orders of magnitude.
     best = min(_MANTISSAS, key=lambda m: abs(math.log(m * scale / value)))
     return float(f"{best * scale:.2g}")
 
@@ -212,6 +214,7 @@ def _wheel_gain(
     effort = sim.effort_limit(name)
     velocity = joint.limit.velocity if joint.limit else None
     free = inertia[name].free
+    # Explicit damping multiplies the velocity by 1 - d h / inertia in each step.
     limit = _MAX_WHEEL_DAMPING * free / TIME_STEP
     if math.isfinite(effort) and velocity is not None and 0 < velocity < math.inf:
         damping = effort / velocity

@@ -136,6 +136,7 @@ def other_gain_target(
     """Return the target of a joint that is not part of a leg, and of its mirror image."""
     units = sim.units(joints[0])
     sag = _MAX_SAG * _length_scale(units)
+    # A spring k deflects by load / k, and oscillates at sqrt(k / inertia).
     load = max(_max_gravity_load(sim, name) for name in joints)
     dynamic = _MIN_FREQUENCY**2 * max(inertia[name].locked for name in joints)
     required = [
@@ -175,6 +176,8 @@ def _make_target(
     stable = max_stable_stiffness(free)
     extra_armature = stable < _MIN_STIFFNESS_SHARE * stiffness
     if extra_armature:
+        # Armature adds to the inertia of its own joint, so the missing inertia is the missing
+        # armature. It is rounded up to one digit; the 0.1 % absorb rounding errors.
         required_armature = armature + min_stable_inertia(stiffness) - free
         scale = 10.0 ** math.floor(math.log10(required_armature))
         rounded_up = (s * scale for s in (1, 2, 3, 5, 10) if s * scale >= 0.999 * required_armature)
@@ -224,6 +227,7 @@ def _max_gravity_load(sim: SimModel, name: str) -> float:
             continue
         if index != body:
             distance[index] = distance[parent] + float(np.linalg.norm(model.body_pos[index]))
+        # By the triangle inequality, no pose moves the mass further from the axis than this.
         lever = distance[index] + float(np.linalg.norm(model.body_ipos[index]))
         total += float(model.body_mass[index]) * lever
     return total * GRAVITY

@@ -21,6 +21,7 @@ with other legs."""
 
 _WAIST: Role = "waist"
 
+# Two of three criteria: near the ground, a mirror image, names of legs.
 _MIN_LEG_SCORE = 1.5
 """Score from which a limb counts as a leg."""
 

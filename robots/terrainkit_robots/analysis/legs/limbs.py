@@ -19,6 +19,8 @@ from terrainkit_robots.description.model import WORLD, Joint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
 
+# Chosen on 39 robots, together with the scores below and `_MIN_LEG_SCORE` in legs.py: a foot near
+# the ground scores 1, or 0.5 if it is only low, a mirror image 0.5, names of legs 0.5.
 _NEAR_GROUND, _LOW = 0.12, 0.25
 """Height of a foot above the ground over the height of the robot at zero."""
 
@@ -198,6 +200,7 @@ def _is_continuous_wheel(body: Body, meshes: Meshes) -> bool:
     )
     if shape and shape[0] > _MAX_SHAPE_OFFSET * half_size:
         return False
+    # Half of the trace is the polar second moment m r^2 of the body's mass about its center.
     moment = float(np.clip(np.trace(body.inertia) / 2, 0, None))
     return body.mass <= 0 or center <= _MAX_WHEEL_OFFSET * float(np.sqrt(moment / body.mass))
 
@@ -245,5 +248,6 @@ def _is_mirror_image(one: Chain, other: Chain, size: float) -> bool:
         return False
     return any(
         float(np.linalg.norm(one.tip * flip - other.tip)) < _MAX_MIRROR_ERROR * size
+        # Left and right, or front and rear; which of them is y depends on how the robot faces.
         for flip in (np.array([1, -1, 1]), np.array([-1, 1, 1]))
     )

@@ -19,6 +19,7 @@ from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix
 
+# This ratio and the next one were chosen in trials on 39 robots.
 _HEIGHT_RATIO = {2: 0.965}
 """Distance from hip to ground over leg length, by number of legs. Bipeds stand almost straight."""
 
@@ -32,6 +33,7 @@ _PRECISION = np.array([0.02, 0.02, 0.1])
 """Distance of the foot from its target that costs 1, along x, y and z, over the leg length. The
 foot must be below the mass; the height is only a preference."""
 
+# 20 intervals and 4 refinements by 5 end at 1/12,500 of the range, 0.5 mrad on a whole turn.
 _GRID_SIZE = 21
 """Number of positions of a joint in each round of the search."""
 
@@ -63,6 +65,7 @@ _OUTWARD_COST = 0.05
 _STEPS = (0.05, 0.01)
 """Hip and knee are multiples of the first step [rad] at which the cost is close to the lowest."""
 
+# An offset d of the foot along x costs (d / (0.02 l))^2, which is 0.25 at d = 0.01 l.
 _MAX_ROUNDING_COST = 0.25
 """Increase of the cost by rounding, at most: the foot moves by 1 % of the leg length."""
 
@@ -90,6 +93,7 @@ def solve_standing_pose(robot: LegModel) -> Mapping[str, float]:
     }
     # The center of mass moves with the legs, hence a second pass.
     for _ in range(2 if robot.legs else 0):
+        # The feet go below the center of mass, since the hips are not always placed around it.
         shift = _foot_shift(robot, positions)
         for leg, mirror_leg, signs in _leg_pairs(robot):
             solution = _solve_leg(leg, robot, positions, shift)
@@ -221,14 +225,18 @@ class _LegObjective:
         """Return the cost of positions, broadcast to a common shape."""
         positions = self.positions(hip, knee)
         contact, knee_point = self._forward(positions)
+        # Hip and knee turn about the same axis, so they cannot move the foot along it.
         lateral = self.pitch * [1, 1, 0]
         error = contact - self.hip_point - self.target
         error = error - (error @ lateral)[..., None] * lateral  # the leg cannot move sideways
         total = ((error / (self.length * _PRECISION)) ** 2).sum(-1)
+        # A joint at its limit costs as much as a foot that is 6 % of the leg length off. The small
+        # term selects the position nearest to zero where the foot does not determine it.
         for joint in (self.hip, self.knee):
             position = positions[joint.name]
             total = total + 10 * _limit_cost(position, joint) + 1e-3 * np.abs(position)
         if self.ankle is not None:
+            # Not zero only where the limits of the ankle prevent a level sole.
             total = total + 10 * (positions[self.ankle.name] - self._level_ankle(hip, knee)) ** 2
         outward = np.clip((knee_point - self.hip_point) @ self.penalty_axis, 0, None)
         total = total + _OUTWARD_COST * outward
@@ -299,6 +307,7 @@ def _minimize(objective: _LegObjective, starts: Matrix, limits: Matrix) -> Matri
     """Return the best position of hip and knee near any of the starts, shape (2,)."""
     best, width, rows = starts, np.ptp(limits, axis=1), np.arange(len(starts))
     for _ in range(_ROUNDS):
+        # Two grid steps to either side of the best point.
         width = width / 5
         lower, upper = (np.clip(best + side * width / 2, *limits.T) for side in (-1, 1))
         axes = np.linspace(lower, upper, _GRID_SIZE, axis=-1)
