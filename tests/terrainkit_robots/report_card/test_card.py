@@ -74,6 +74,33 @@ def test_level_is_passed_with_every_easier_one(make_card):
     assert pit.levels[0].seconds is None
 
 
+def test_hardest_level_is_passed_and_times_are_means(make_card):
+    ok, fell = CROSSED, FELL
+    card = make_card([[ok, ok]] * 3, [[ok, ok], [ok, ok], [ok, fell]])
+    slope, pit = card.tests
+    assert (slope.passed, slope.success, pit.passed) == (2, 1.0, 1)
+    assert [each.seconds for each in slope.levels] == [4.0, 5.0, 6.0]
+    assert pit.levels[2].seconds == 6.0  # of the robot that crossed
+    assert (card.repetitions, card.seed, card.speed) == (2, 3, 0.75)
+
+
+def test_columns_of_the_same_terrain_have_numbers(monkeypatch, quadruped_run):
+    class Fallen(Crossing):
+        def __init__(self, *_):
+            self.speed = 0.75
+
+        def attempt(self, levels, _):
+            return Attempts(outcomes=np.full(levels.size, FELL), seconds=np.full(levels.size, np.nan))
+
+    monkeypatch.setattr(card_module, "Crossing", Fallen)
+    pit = SubTerrain(terrain="pit", parameters={"depth": (0.0, 0.1234), "side": 2.0})
+    terrain_map = make_map(pit, SubTerrain(terrain="flat"), pit, rows=2)
+    card = measure(quadruped_run, terrain_map, "m", 1, EvaluationConfig())
+    assert [test.name for test in card.tests] == ["pit 0", "flat", "pit 2"]
+    passed = replace(card.tests[0], passed=1)
+    assert passed.passed_text == "1: depth 0.123"
+
+
 def test_intervals_are_those_of_wilson(make_card):
     """10 of 10: 1 / (1 + 1.96^2 / 10) to 1."""
     card = make_card([[CROSSED] * 10] * 3, [[FELL] * 10] * 3)

@@ -78,3 +78,23 @@ def test_a_fall_at_the_goal_is_a_fall(make_progress):
     env.state.base_pos[:, :2] = progress._waypoints.goals[0, 0]
     progress.update(np.ones(1, bool))
     assert outcomes(progress) == ["fell"]
+
+
+def test_commands_turn_to_the_goal_at_the_speed(make_progress):
+    """The second robot has to turn left by a quarter turn, at most at 1 rad/s."""
+    progress, env = make_progress(3)
+    env.state.base_quat[2] = [np.cos(0.1), 0, 0, np.sin(0.1)]
+    env.state.base_pos[2, :2] = [2.5, 2.5]
+    progress._waypoints.goals[2, 0] = [5.0, 2.5]
+    commands = next(progress.schedule())
+    assert commands[0] == pytest.approx([0.75, 0, 0], abs=1e-6)
+    assert commands[1, 2] == pytest.approx(1.0)
+    assert commands[2, 2] == pytest.approx(-0.2, abs=1e-6)
+
+
+@pytest.mark.parametrize(("x", "is_inside"), [(4.99, True), (5.01, False), (0.01, True)])
+def test_robot_leaves_the_patch_at_its_border(make_progress, x, is_inside):
+    progress, env = make_progress(4)
+    env.state.base_pos[3, 0] = x
+    progress.update(np.zeros(4, bool))
+    assert outcomes(progress)[3] == ("timed out" if is_inside else "left")

@@ -10,7 +10,12 @@ from terrainkit.feasibility import RobotLimits
 from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.report_card import limits as limits_module
 from terrainkit_robots.report_card.crossing import CROSSED, FELL, Attempts
-from terrainkit_robots.report_card.limits import LEVELS, limit_tests, measure_limits
+from terrainkit_robots.report_card.limits import (
+    LEVELS,
+    limit_tests,
+    limits_config,
+    measure_limits,
+)
 from terrainkit_robots.rl.run import open_run
 
 LIMITS = RobotLimits(
@@ -95,3 +100,45 @@ def test_slopes_across_are_as_steep_as_slopes_up(measure):
     steepest = math.degrees(math.atan(2 * 0.577))
     assert results["slope across"].passed == pytest.approx(steepest)
     assert results["slope up and down"].passed == pytest.approx(steepest)
+
+
+def test_values_of_the_tests_follow_the_limits_of_the_robot():
+    tests = {each.name: each for each in limit_tests(LIMITS)}
+    expected = {
+        "step up": (0.02, 0.4),
+        "step down": (0.025, 0.5),
+        "stairs": (0.02, 0.4),
+        "gap": (0.04, 0.8),
+        "slope up and down": (0.0577, 1.154),
+        "slope across": (math.atan(0.0577), math.atan(1.154)),
+        "clearance": (0.72, 0.29),  # 1.2 * 0.6 to 0.35 - 0.1 * 0.6
+        "stone": (0.8, 0.05),
+        "corridor": (1.2, 0.2),
+    }
+    assert {name: each.values for name, each in tests.items()} == {
+        name: pytest.approx(values) for name, values in expected.items()
+    }
+    assert tests["stone"].fixed["gap"] == pytest.approx(0.2)
+    assert [name for name, each in tests.items() if each.unit == "degrees"] == [
+        "slope up and down",
+        "slope across",
+    ]
+
+
+def test_values_of_small_and_wide_robots_are_bounded():
+    odd = dataclasses.replace(LIMITS, body_width=0.6, foothold=0.01, crouched_height=0.07)
+    tests = {each.name: each.values for each in limit_tests(odd)}
+    assert tests["corridor"] == pytest.approx((1.5, 0.3))
+    assert tests["stone"] == pytest.approx((0.1, 0.005))
+    assert tests["clearance"][1] == pytest.approx(0.02)
+
+
+def test_map_of_limits_has_a_patch_for_each_test():
+    levels = [0, 19, 1, 2, 3, 4, 5, 6, 7]
+    config = limits_config(limit_tests(LIMITS), levels, 5)
+    assert (config.rows, config.cols, config.seed) == (1, 9, 5)
+    assert (config.patch_size, config.cell) == ((8.0, 4.0), 0.05)
+    parameters = [each.parameters for each in config.terrains]
+    assert parameters[0]["depth"] == pytest.approx(0.02)
+    assert parameters[1] == {"platform": 2.0, "step_width": 1.0, "step_height": pytest.approx(0.5)}
+    assert parameters[2]["step_height"] == pytest.approx(0.04)  # level 1 of 19: 0.02 + 0.38 / 19
