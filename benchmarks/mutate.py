@@ -101,7 +101,9 @@ def _plant_all(tree: Tree, arguments: argparse.Namespace, results: Path) -> None
             print(f"{len(plan) - k} changes are left; the same command goes on")
             break
         last = known.get(planted.key, planted)
-        done = stages.index(last.stage) + 1 if last.stage in stages else len(STAGES) * bool(last.stage)
+        done = (
+            stages.index(last.stage) + 1 if last.stage in stages else len(STAGES) * bool(last.stage)
+        )
         if last.noticed_by or (done >= len(stages) and not arguments.retry):
             continue
         begin = time.monotonic()
@@ -110,7 +112,9 @@ def _plant_all(tree: Tree, arguments: argparse.Namespace, results: Path) -> None
             file.write(json.dumps(asdict(found)) + "\n")
         where = f"{found.path}:{found.line}: {found.before} -> {found.after}"
         outcome = f"noticed by {found.noticed_by}" if found.noticed_by else "SURVIVED"
-        print(f"{k + 1}/{len(plan)} {time.monotonic() - begin:.0f} s {where}: {outcome}", flush=True)
+        print(
+            f"{k + 1}/{len(plan)} {time.monotonic() - begin:.0f} s {where}: {outcome}", flush=True
+        )
 
 
 def make_plan(
@@ -175,7 +179,9 @@ def try_change(
 ) -> Planted:
     """Run the tests on a change, stage by stage."""
     path, noticed = Path(planted.path), ""
-    seen = [file for stage in STAGES[: STAGES.index(stages[0])] for file in _tests(tree, path)[stage]]
+    seen = [
+        file for stage in STAGES[: STAGES.index(stages[0])] for file in _tests(tree, path)[stage]
+    ]
     for stage in stages:
         for test_file in _tests(tree, path)[stage]:
             if test_file not in seen and not noticed:
@@ -197,7 +203,7 @@ def _run(tree: Tree, path: Path, change: Change, source: bytes, test_file: Path)
 
 
 def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
-    """Return the test files of each stage."""
+    """Return the test files of each stage. Those that import the changed module come first."""
     root = next(name for name in IMPORT_ROOTS if name in path.parts)
     parts = path.parts[path.parts.index(root) : -1]
     folders = [Path("tests", *parts[:k]) for k in range(len(parts), 0, -1)]
@@ -206,8 +212,15 @@ def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
     mirrored = [name for name in names if (tree.folder / name).exists()][:1]
     if "rules" in parts:
         mirrored.append(RULE_CASES)
-    files = (mirrored, tree.test_files(nearest), tree.test_files(Path(*nearest.parts[:3])))
-    return dict(zip(STAGES, (files[0], files[1] + files[2], tree.test_files(Path("tests")))))
+    module = ".".join((*parts, path.stem))
+
+    def rank(file: Path) -> tuple[bool, bool, Path]:
+        imports = module in (tree.folder / file).read_text()
+        return not imports, not file.is_relative_to(nearest), file
+
+    package = sorted(tree.test_files(Path(*nearest.parts[:3])), key=rank)
+    suite = sorted(tree.test_files(Path("tests")), key=rank)
+    return dict(zip(STAGES, (mirrored, package, suite), strict=True))
 
 
 def _read(results: Path) -> dict[tuple[str, str, int, str], Planted]:

@@ -178,7 +178,9 @@ class Tree:
             with plugin.measured(coverage_file, self.folder):
                 options = [*_OPTIONS, *["-x"] * bool(limit), str(path)]
                 code = pytest.main(options, [plugin])
-            times = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+            times = (
+                resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+            )
             cpu = sum(each.ru_utime + each.ru_stime for each in times)
             done = {"code": int(code), "failed": plugin.failed, "cpu_seconds": round(cpu, 2)}
             result.write_text(json.dumps(done))

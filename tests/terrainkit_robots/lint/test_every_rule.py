@@ -264,14 +264,14 @@ def check_text(case, finding):
     assert finding.message.isascii() or not (case.text + (case.other_text or "")).isascii()
 
 
-@every_rule
-def test_every_rule_has_cases(code):
-    cases = cases_of(code)
-    assert cases, f"there is no {code}.toml in {CASES}"
-    assert any(case.fails for case in cases), f"{code}.toml has no [[fails]]"
-    assert any(not case.fails for case in cases), f"{code}.toml has no [[passes]]"
-    titles = [str(case) for case in cases]
-    assert len(set(titles)) == len(titles), f"{code}.toml has two cases of the same title"
+def test_every_rule_has_cases():
+    for code in (rule.code for rule in rules()):
+        cases = cases_of(code)
+        assert cases, f"there is no {code}.toml in {CASES}"
+        assert any(case.fails for case in cases), f"{code}.toml has no [[fails]]"
+        assert any(not case.fails for case in cases), f"{code}.toml has no [[passes]]"
+        titles = [str(case) for case in cases]
+        assert len(set(titles)) == len(titles), f"{code}.toml has two cases of the same title"
 
 
 @every_rule
@@ -295,9 +295,18 @@ def test_every_case_belongs_to_a_rule():
 # Fixes.
 
 
-@every_case([case for case in ALL_CASES if case.fails and get_rule(case.code).fixes != "no"])
-def test_fix_removes_the_finding(case, tmp_path):
-    path = case.write(tmp_path)
+@pytest.mark.parametrize("code", [rule.code for rule in rules() if rule.fixes != "no"])
+def test_fixes_remove_the_findings(code, tmp_path):
+    safeties = set()
+    for number, case in enumerate(case for case in cases_of(code) if case.fails):
+        (tmp_path / str(number)).mkdir()
+        safeties |= safeties_of_fixes(case, tmp_path / str(number))
+    assert get_rule(code).fixes in safeties, "no case can be fixed"
+
+
+def safeties_of_fixes(case, folder):
+    """Fix the robot of a case; return which kinds of fixes the rule offered."""
+    path = case.write(folder)
     unsafe = get_rule(case.code).fixes == "unsafe"
     reports = []
 
@@ -307,16 +316,18 @@ def test_fix_removes_the_finding(case, tmp_path):
 
     result = fix_robot(path, look, unsafe=unsafe)
     own = [f for f in reports[0].findings if f.code == case.code]
-    if not any(f.fix and (unsafe or f.fix.safety == "safe") for f in own):
-        assert {f.message for f in own} <= {f.message for f in result.report.findings}
-        return
-    assert case.code in {f.code for f in result.fixed}, result.unfixed
-    assert len([f for f in result.report.findings if f.code == case.code]) < len(own)
-    assert problems(result.report) <= problems(reports[0])
+    safeties = {f.fix.safety for f in own if f.fix}
+    if not (safeties if unsafe else "safe" in safeties):
+        assert {f.message for f in own} <= {f.message for f in result.report.findings}, case
+        return safeties
+    assert case.code in {f.code for f in result.fixed}, (case, result.unfixed)
+    assert len([f for f in result.report.findings if f.code == case.code]) < len(own), case
+    assert problems(result.report) <= problems(reports[0]), case
     write_fixes(result)
     again = fix_robot(path, look, unsafe=unsafe)
-    assert again.after == again.new == {}
-    assert problems(again.report) == problems(result.report)
+    assert again.after == again.new == {}, case
+    assert problems(again.report) == problems(result.report), case
+    return safeties
 
 
 def problems(report):
@@ -325,13 +336,3 @@ def problems(report):
     Notes may appear only after a robot is fixed.
     """
     return {(f.code, f.subject) for f in report.findings if f.severity != "note"}
-
-
-@pytest.mark.parametrize("code", [rule.code for rule in rules() if rule.fixes != "no"])
-def test_every_fixing_rule_has_a_fixable_case(code, tmp_path):
-    safeties = set()
-    for number, case in enumerate(case for case in cases_of(code) if case.fails):
-        (tmp_path / str(number)).mkdir()
-        report = lint_case(case, case.write(tmp_path / str(number)), selected=[get_rule(code)])
-        safeties |= {finding.fix.safety for finding in report.findings if finding.fix}
-    assert get_rule(code).fixes in safeties

@@ -165,14 +165,13 @@ def project(points, view, aspect):
     return offset @ right / (depth * half * aspect), offset @ up / (depth * half), depth
 
 
-@pytest.mark.parametrize("size", [0.01, 0.05, 3.0, 100.0])
 @pytest.mark.parametrize("sides", [(1, 1, 1), (1, 0.1, 0.1), (0.1, 0.1, 1), (1, 1, 0)])
 @pytest.mark.parametrize("view", VIEWS.values(), ids=VIEWS)
-@pytest.mark.parametrize("aspect", [0.5, 1, 2])
-def test_fit_camera_fills_picture(size, sides, view, aspect):
-    x, y, depth = project(CORNERS * size * sides + [5, -3, 0.5], view, aspect)
-    assert depth.min() > 0
-    assert max(abs(x).max(), abs(y).max()) == pytest.approx(FILL_RATIO, rel=0.05)
+def test_fit_camera_fills_picture(sides, view):
+    for size, aspect in product((0.01, 0.05, 3.0, 100.0), (0.5, 1, 2)):
+        x, y, depth = project(CORNERS * size * sides + [5, -3, 0.5], view, aspect)
+        assert depth.min() > 0
+        assert max(abs(x).max(), abs(y).max()) == pytest.approx(FILL_RATIO, rel=0.05)
 
 
 def test_fit_camera_of_point_keeps_distance():

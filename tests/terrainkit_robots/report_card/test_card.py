@@ -90,13 +90,17 @@ def test_columns_of_the_same_terrain_have_numbers(monkeypatch, quadruped_run):
             self.speed = 0.75
 
         def attempt(self, levels, _):
-            return Attempts(outcomes=np.full(levels.size, FELL), seconds=np.full(levels.size, np.nan))
+            return Attempts(
+                outcomes=np.full(levels.size, FELL), seconds=np.full(levels.size, np.nan)
+            )
 
     monkeypatch.setattr(card_module, "Crossing", Fallen)
-    pit = SubTerrain(terrain="pit", parameters={"depth": (0.0, 0.1234), "side": 2.0})
-    terrain_map = make_map(pit, SubTerrain(terrain="flat"), pit, rows=2)
+    depth = {"depth": (0.0, 0.1234), "side": 2.0}
+    pit = SubTerrain(terrain="pit", parameters=depth, proportion=2.0)
+    config = make_map(pit, SubTerrain(terrain="flat"), rows=2).config
+    terrain_map = generate(replace(config, cols=3))
     card = measure(quadruped_run, terrain_map, "m", 1, EvaluationConfig())
-    assert [test.name for test in card.tests] == ["pit 0", "flat", "pit 2"]
+    assert [test.name for test in card.tests] == ["pit 0", "pit 1", "flat"]
     passed = replace(card.tests[0], passed=1)
     assert passed.passed_text == "1: depth 0.123"
 

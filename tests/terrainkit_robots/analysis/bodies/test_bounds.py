@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -53,6 +55,13 @@ def test_box_if_includes_joints_on_the_body(robot):
     facts = robot(BALL.format("collision"))
     box = facts.body_bounds.box_if(facts.bodies[0], always)
     assert box == pytest.approx(np.array([[-0.1, -0.1, -0.1], [0.1, 0.1, 0.5]]))
+
+
+def test_robot_size_is_the_diagonal_of_all_frames():
+    file = Path("robot.urdf")
+    text = ARM.format(shapes="").replace("0 0 0.5", "0.3 -0.4 1.2")
+    facts = Facts(load_robot(file, contents={file: text.encode()}))
+    assert facts.body_bounds.robot_size == pytest.approx(1.3)
 
 
 def test_box_if_skips_unneeded_meshes(robot):
