@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit.settings.text import closest, expected_names, format_numbers, truncate
+from terrainkit.settings.text import closest, closest_names, expected_names, format_numbers, truncate
 
 
 def test_shorten_cuts_long_text():
@@ -56,3 +56,11 @@ def test_known_names_suggests_the_nearest():
 
 def test_format_numbers_keeps_micrometers_of_kilometers():
     assert format_numbers(1234.567891, 0.1, 20.0, -3) == "1234.567891 0.1 20 -3"
+
+
+def test_closest_names_are_at_most_three_and_the_closest_first():
+    names = ["leg_a", "leg_b", "leg_c", "leg_d", "arm"]
+    assert closest_names("LEG_C", names)[0] == "leg_c"
+    assert len(closest_names("leg_e", names)) == 3
+    assert closest_names("wheel", names) == []
+    assert closest_names("x" * 201, ["x" * 200]) == []

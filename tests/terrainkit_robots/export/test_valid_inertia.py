@@ -116,3 +116,19 @@ def test_single_mass_without_inertia(tmp_path):
     for model in compiled(form):
         assert model.body_mass.sum() == pytest.approx(65)
         assert not model.body("base").inertia.any()
+
+
+@pytest.mark.parametrize(
+    ("iyy", "expected"),
+    [
+        # (ixx + iyy) / izz is 0.9933, 0.9867 and 1.0033; the limit is 0.99.
+        (0.0198, (0.0101, 0.0199, 0.03)),
+        (0.0196, (0.01, 0.0196, 0.03)),
+        (0.0201, (0.01, 0.0201, 0.03)),
+    ],
+)
+def test_only_small_violations_are_rounding(tmp_path, iyy, expected):
+    inertia = f'<inertia ixx="0.01" iyy="{iyy}" izz="0.03" ixy="0" ixz="0" iyz="0"/>'
+    robot = facts(tmp_path, {"plate": f'<mass value="2"/>{inertia}'})
+    (plate,) = to_canonical(robot, floating=True).model.links
+    assert np.diag(plate.inertial.inertia) == pytest.approx(expected, abs=1e-7)

@@ -90,9 +90,12 @@ def test_box_if_allows_for_unreadable_shapes(robot, shapes):
     assert facts.body_bounds.box_if(facts.bodies[1], longer_than(5.0)) is not None
 
 
-def test_box_if_ignores_marker_shapes(robot):
-    facts = robot("<collision><geometry><box size='0.002 0.002 0.002'/></geometry></collision>")
-    assert facts.body_bounds.box_if(facts.bodies[1], longer_than(1.2)) is None
+@pytest.mark.parametrize(("size", "is_marker"), [(0.0049, True), (0.0051, False)])
+def test_box_if_ignores_marker_shapes(robot, size, is_marker):
+    box = f"<box size='{size} 0.001 0.001'/>"
+    facts = robot(f"<collision><geometry>{box}</geometry></collision>")
+    found = facts.body_bounds.box_if(facts.bodies[1], longer_than(1.2))
+    assert (found is None) == is_marker
 
 
 def test_shape_box_prefers_collision_shapes(robot):
