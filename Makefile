@@ -1,4 +1,4 @@
-.PHONY: test check format bench fuzz docs wheel site browser integrations
+.PHONY: test check format bench fuzz mutate docs wheel site browser integrations
 
 test:          ## all tests
 	python -m pytest
@@ -15,6 +15,9 @@ bench:         ## print the ratios of speed and memory
 
 fuzz:          ## read damaged and hostile files for 10 minutes
 	python benchmarks/fuzz.py
+
+mutate:        ## plant changes and print which of them the tests notice; ARGS="--package FOLDER"
+	python benchmarks/mutate.py $(ARGS)
 
 docs:          ## rewrite the generated docs and pictures
 	python docs/build.py

@@ -56,6 +56,9 @@ class Planted:
     noticed_by: str = ""
     stage: str = ""
 
+    def __str__(self) -> str:
+        return f"{self.path}:{self.line}: {self.before} -> {self.after}"
+
     @property
     def key(self) -> tuple[str, str, int, str]:
         """Return what identifies the change in a version of a file."""
@@ -95,25 +98,21 @@ def _plant_all(tree: Tree, arguments: argparse.Namespace, results: Path) -> None
     end = time.monotonic() + 3600 * arguments.hours
     plan = list(make_plan(tree, arguments.package, arguments.changes, arguments.seed))
     known = _read(results)
-    stages = STAGES[: arguments.stages]
     for k, (planted, source, change) in enumerate(plan):
         if time.monotonic() > end:
             print(f"{len(plan) - k} changes are left; the same command goes on")
             break
         last = known.get(planted.key, planted)
-        done = (
-            stages.index(last.stage) + 1 if last.stage in stages else len(STAGES) * bool(last.stage)
-        )
-        if last.noticed_by or (done >= len(stages) and not arguments.retry):
+        done = STAGES.index(last.stage) + 1 if last.stage and not arguments.retry else 0
+        if last.noticed_by or done >= arguments.stages:
             continue
         begin = time.monotonic()
-        found = try_change(tree, planted, source, change, stages[0 if arguments.retry else done :])
+        found = try_change(tree, planted, source, change, STAGES[done : arguments.stages])
         with results.open("a") as file:
             file.write(json.dumps(asdict(found)) + "\n")
-        where = f"{found.path}:{found.line}: {found.before} -> {found.after}"
         outcome = f"noticed by {found.noticed_by}" if found.noticed_by else "SURVIVED"
         print(
-            f"{k + 1}/{len(plan)} {time.monotonic() - begin:.0f} s {where}: {outcome}", flush=True
+            f"{k + 1}/{len(plan)} {time.monotonic() - begin:.0f} s {found}: {outcome}", flush=True
         )
 
 
@@ -247,7 +246,7 @@ def _print_table(found: list[Planted]) -> None:
         share = noticed / (planted - equal) if planted > equal else 1.0
         print(f"{package:40} {planted:7} {noticed:7} {survived:8} {equal:10} {share:8.0%}")
     for each in sorted(survivors, key=lambda each: (each.path, each.line)):
-        print(f"{each.path}:{each.line}: {each.before} -> {each.after}  [{each.stage}]")
+        print(f"{each}  [{each.stage}]")
 
 
 if __name__ == "__main__":

@@ -3,8 +3,9 @@
 import ast
 import re
 from bisect import bisect_right
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 _COMPARISONS: dict[type[ast.cmpop], tuple[str, tuple[str, ...]]] = {
     ast.Lt: ("<", ("<=", ">=")),
@@ -44,6 +45,10 @@ _OTHER_NAME = {a: b for pair in _PAIRS for a, b in (pair, pair[::-1])}
 
 _REMOVABLE = (ast.AugAssign, ast.Continue, ast.Break, ast.Raise)
 _ANNOTATIONS = {"annotation", "returns", "decorator_list", "type_params"}
+
+
+Span = tuple[int, int, str, str]
+"""Start and end of a change [bytes], its kind, and the new text."""
 
 
 class Change(NamedTuple):
@@ -108,61 +113,70 @@ class _Finder:
             self.changes.append(Change(start, end, line, kind, text, in_function))
         self.visit_children(node, in_function=in_function)
 
-    def _changes_of(self, node: ast.AST) -> Iterator[tuple[int, int, str, str]]:
-        match node:
-            case ast.Compare():
-                yield from self._comparisons(node)
-                for each in (node.left, *node.comparators):
-                    yield from self._string(each)
-            case ast.BoolOp():
-                old, new = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
-                for a, b in zip(node.values, node.values[1:], strict=False):
-                    yield from self._between(a, b, rf"\b{old}\b", "and/or", new)
-            case ast.BinOp() if type(node.op) in _OPERATORS:
-                if not any(map(_is_text, (node.left, node.right))):
-                    old, new = _OPERATORS[type(node.op)]
-                    yield from self._between(node.left, node.right, old, "operator", new)
-            case ast.Constant(value=bool() | int() | float()):
-                for value in _other_numbers(node.value):
-                    yield *self._span(node), "constant", repr(value)
-            case ast.UnaryOp(op=ast.USub() | ast.Not()):
-                kind = "not" if isinstance(node.op, ast.Not) else "sign"
-                yield self._span(node)[0], self._span(node.operand)[0], kind, ""
-            case ast.Call():
-                yield from self._swapped(node.args)
-                yield from self._other_function(node.func)
-            case ast.Subscript():
-                yield from self._string(node.slice)
-            case ast.Dict():
-                for key in node.keys:
-                    yield from self._string(key)
-            case ast.MatchValue():
-                yield from self._string(node.value)
-            case ast.comprehension():
-                for each in node.ifs:
-                    yield *self._span(each), "condition", "True"
-            case ast.Return(value=ast.expr() as value) if not isinstance(value, ast.Constant):
-                yield *self._span(value), "return", "None"
-            case ast.stmt():
-                yield from self._statement(node)
+    def _changes_of(self, node: ast.AST) -> Iterator[Span]:
+        for kind, find in _FINDERS.items():
+            if isinstance(node, kind):
+                yield from find(self, node)
         if isinstance(node, ast.If | ast.IfExp):
             for text in ("True", "False"):
                 yield *self._span(node.test), "condition", text
 
-    def _statement(self, node: ast.stmt) -> Iterator[tuple[int, int, str, str]]:
+    def _and_or(self, node: ast.BoolOp) -> Iterator[Span]:
+        old, new = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
+        for a, b in pairwise(node.values):
+            yield from self._between(a, b, rf"\b{old}\b", "and/or", new)
+
+    def _operator(self, node: ast.BinOp) -> Iterator[Span]:
+        is_text = _is_text(node.left) or _is_text(node.right)
+        if type(node.op) in _OPERATORS and not is_text:
+            old, new = _OPERATORS[type(node.op)]
+            yield from self._between(node.left, node.right, old, "operator", new)
+
+    def _number(self, node: ast.Constant) -> Iterator[Span]:
+        if isinstance(node.value, int | float):
+            for value in _other_numbers(node.value):
+                yield *self._span(node), "constant", repr(value)
+
+    def _unary(self, node: ast.UnaryOp) -> Iterator[Span]:
+        if isinstance(node.op, ast.USub | ast.Not):
+            kind = "not" if isinstance(node.op, ast.Not) else "sign"
+            yield self._span(node)[0], self._span(node.operand)[0], kind, ""
+
+    def _call(self, node: ast.Call) -> Iterator[Span]:
+        yield from self._swapped(node.args)
+        name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        if name in _OTHER_NAME:
+            end = self._span(node.func)[1]
+            yield end - len(name), end, "function", _OTHER_NAME[name]
+
+    def _dict(self, node: ast.Dict) -> Iterator[Span]:
+        for key in node.keys:
+            yield from self._string(key)
+
+    def _filter(self, node: ast.comprehension) -> Iterator[Span]:
+        for each in node.ifs:
+            yield *self._span(each), "condition", "True"
+
+    def _return(self, node: ast.Return) -> Iterator[Span]:
+        if node.value is not None and not isinstance(node.value, ast.Constant):
+            yield *self._span(node.value), "return", "None"
+
+    def _statement(self, node: ast.stmt) -> Iterator[Span]:
         is_call = isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)
         if is_call or isinstance(node, _REMOVABLE) or _stores_into(node):
             yield *self._span(node), "removed", "pass"
 
-    def _comparisons(self, node: ast.Compare) -> Iterator[tuple[int, int, str, str]]:
+    def _comparison(self, node: ast.Compare) -> Iterator[Span]:
         operands = [node.left, *node.comparators]
-        for a, b, operator in zip(operands, operands[1:], node.ops, strict=False):
+        for each in operands:
+            yield from self._string(each)
+        for (a, b), operator in zip(pairwise(operands), node.ops, strict=True):
             old, others = _COMPARISONS[type(operator)]
             for new in others:
                 yield from self._between(a, b, old, "comparison", new)
 
-    def _swapped(self, arguments: list[ast.expr]) -> Iterator[tuple[int, int, str, str]]:
-        for a, b in zip(arguments, arguments[1:], strict=False):
+    def _swapped(self, arguments: list[ast.expr]) -> Iterator[Span]:
+        for a, b in pairwise(arguments):
             if not isinstance(a, ast.Starred) and not isinstance(b, ast.Starred):
                 (start, a_end), (b_start, end) = self._span(a), self._span(b)
                 first, gap, last = (
@@ -171,19 +185,11 @@ class _Finder:
                 )
                 yield start, end, "swapped", last + gap + first
 
-    def _other_function(self, node: ast.expr) -> Iterator[tuple[int, int, str, str]]:
-        name = getattr(node, "attr", getattr(node, "id", ""))
-        if name in _OTHER_NAME:
-            end = self._span(node)[1]
-            yield end - len(name), end, "function", _OTHER_NAME[name]
-
-    def _string(self, node: ast.AST | None) -> Iterator[tuple[int, int, str, str]]:
+    def _string(self, node: ast.AST | None) -> Iterator[Span]:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield *self._span(node), "string", repr(node.value + "_")
 
-    def _between(
-        self, a: ast.expr, b: ast.expr, old: str, kind: str, new: str
-    ) -> Iterator[tuple[int, int, str, str]]:
+    def _between(self, a: ast.expr, b: ast.expr, old: str, kind: str, new: str) -> Iterator[Span]:
         start, end = self._span(a)[1], self._span(b)[0]
         found = re.search(old, self.source[start:end].decode())
         if found:
@@ -197,6 +203,23 @@ class _Finder:
             self.lines[node.lineno - 1] + node.col_offset,
             self.lines[node.end_lineno - 1] + node.end_col_offset,
         )
+
+
+_FINDERS: dict[type[ast.AST], Callable[[_Finder, Any], Iterator[Span]]] = {
+    ast.Compare: _Finder._comparison,
+    ast.BoolOp: _Finder._and_or,
+    ast.BinOp: _Finder._operator,
+    ast.Constant: _Finder._number,
+    ast.UnaryOp: _Finder._unary,
+    ast.Call: _Finder._call,
+    ast.Subscript: lambda finder, node: finder._string(node.slice),
+    ast.Dict: _Finder._dict,
+    ast.MatchValue: lambda finder, node: finder._string(node.value),
+    ast.comprehension: _Finder._filter,
+    ast.Return: _Finder._return,
+    ast.stmt: _Finder._statement,
+}
+"""What finds the changes of each kind of node."""
 
 
 def _stores_into(node: ast.stmt) -> bool:

@@ -121,8 +121,8 @@ class Tree:
         data = CoverageData(str(self._kept(test_file)))
         data.read()
         by_line = data.contexts_by_lineno(str(path))
-        tests = set(by_line.get(line, ()) if line else sum(by_line.values(), []))
-        tests.discard("")
+        lines = [line] if line else by_line
+        tests = {name for each in lines for name in by_line.get(each, ()) if name}
         if any(name.endswith("|setup") for name in tests):
             return None
         return tests
@@ -147,7 +147,7 @@ class Tree:
                 os.environ["TMPDIR"] = tempfile.tempdir = temporary
                 resource.setrlimit(resource.RLIMIT_CPU, (int(cpu) + 1, int(cpu) + 5))
                 self._run_and_exit(path, only, limit, coverage_file, result)
-            ended = _wait(child, begin + wall)
+            ended = wait(child, begin + wall)
             done = {"code": -1, "failed": [], "cpu_seconds": cpu}
             done |= json.loads(result.read_text()) if result.exists() else {}
             if limit is None and done["code"] not in (0, 1, 5):
@@ -273,7 +273,7 @@ class _Plugin:
             self.coverage.switch_context(context)
 
 
-def _wait(child: int, end: float) -> str:
+def wait(child: int, end: float) -> str:
     """Wait for a process and end what it left; return why it was ended before its time."""
     process, ended, looked = psutil.Process(child), "", 0.0
     descendants: set[psutil.Process] = set()
@@ -293,6 +293,7 @@ def _wait(child: int, end: float) -> str:
     for each in descendants:
         with suppress(psutil.NoSuchProcess):
             each.kill()
+    psutil.wait_procs(descendants, timeout=10)
     return ended
 
 

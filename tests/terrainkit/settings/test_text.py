@@ -1,6 +1,12 @@
 import pytest
 
-from terrainkit.settings.text import closest, closest_names, expected_names, format_numbers, truncate
+from terrainkit.settings.text import (
+    closest,
+    closest_names,
+    expected_names,
+    format_numbers,
+    truncate,
+)
 
 
 def test_shorten_cuts_long_text():

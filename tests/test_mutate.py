@@ -1,0 +1,85 @@
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def changed_lines(monkeypatch):
+    """Return a function that returns the changed versions of one line."""
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from mutation.changes import find_changes
+
+    def run(line):
+        source = line.encode()
+        changes = [each for each in find_changes(source) if each.is_valid(source)]
+        return {each.apply(source).decode() for each in changes}
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("a < b", {"a <= b", "a >= b"}),
+        ("a is not b", {"a is b"}),
+        ("(a) not in (b)", {"(a) in (b)"}),
+        ("a and (b) and c", {"a or (b) and c", "a and (b) or c"}),
+        ("x = -n", {"x = n"}),
+        ("x = not n", {"x = n"}),
+        ("x = 3", {"x = 4", "x = 0", "x = 6"}),
+        ("x = 0.5", {"x = 0.0", "x = 1.0"}),
+        ("x = True", {"x = False"}),
+        ("x = a // b", {"x = a * b"}),
+        ("x = 'a' + b", set()),
+        ("x = f(a, b)", {"x = f(b, a)"}),
+        ("x = np.max(a)", {"x = np.min(a)"}),
+        ("x = d['k']", {"x = d['k_']"}),
+        ("x = [a for a in b if a]", {"x = [a for a in b if True]"}),
+        ("f()", {"pass"}),
+        ("x.y = z", {"pass"}),
+        ("x += n", {"pass"}),
+        ("if a: b", {"if True: b", "if False: b"}),
+        ("def f(): return a", {"def f(): return None"}),
+        ("def f(a: Literal[2]) -> T[1]: '''1 < 2'''", set()),
+        ("x = 'ä', a < b", {"x = 'ä', a <= b", "x = 'ä', a >= b"}),
+        ("from a import b", set()),
+    ],
+)
+def test_changes_of_a_line(changed_lines, line, expected):
+    assert changed_lines(line) == expected
+
+
+def test_lines_of_changes_count_from_one(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from mutation.changes import find_changes
+
+    changes = find_changes(b"x = y\ndef f():\n    g()\n")
+    assert [(each.line, each.kind, each.in_function) for each in changes] == [(3, "removed", True)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
+def test_endless_runs_are_ended_with_their_children(monkeypatch, tmp_path):
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    from mutation import runner
+
+    child = os.fork()
+    if not child:
+        os.setsid()
+        other = os.fork()
+        if other:
+            (tmp_path / "other").write_text(str(other))
+        else:
+            os.setsid()
+        while True:
+            time.sleep(1)
+    assert runner.wait(child, time.monotonic() + 2) == "time"
+    with pytest.raises(ProcessLookupError):
+        os.kill(child, 0)
+    other = int((tmp_path / "other").read_text())
+    status = Path(f"/proc/{other}/status")
+    assert not status.exists() or "zombie" in status.read_text()
