@@ -202,7 +202,10 @@ def _run(tree: Tree, path: Path, change: Change, source: bytes, test_file: Path)
 
 
 def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
-    """Return the test files of each stage. Those that import the changed module come first."""
+    """Return the test files of each stage. Those that import the changed module come first.
+
+    They also stand for a missing mirrored file.
+    """
     root = next(name for name in IMPORT_ROOTS if name in path.parts)
     parts = path.parts[path.parts.index(root) : -1]
     folders = [Path("tests", *parts[:k]) for k in range(len(parts), 0, -1)]
@@ -214,11 +217,14 @@ def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
     module = ".".join((*parts, path.stem))
 
     def rank(file: Path) -> tuple[bool, bool, Path]:
-        imports = module in (tree.folder / file).read_text()
-        return not imports, not file.is_relative_to(nearest), file
+        return not imports(file), not file.is_relative_to(nearest), file
+
+    def imports(file: Path) -> bool:
+        return module in (tree.folder / file).read_text()
 
     package = sorted(tree.test_files(Path(*nearest.parts[:3])), key=rank)
     suite = sorted(tree.test_files(Path("tests")), key=rank)
+    mirrored = mirrored or list(filter(imports, package))
     return dict(zip(STAGES, (mirrored, package, suite), strict=True))
 
 
