@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 from msgspec import Meta
 
 from terrainkit.errors import ConfigError
-from terrainkit.settings.text import expected_names
 from terrainkit_cli.parse import option, positional
 
 if TYPE_CHECKING:
@@ -39,27 +38,6 @@ OptionalFlag = Annotated[bool, option("")]
 def is_map(path: str | Path) -> bool:
     """Return whether a path is that of a map: its suffix is .npz in any case."""
     return Path(path).suffix.lower() == ".npz"
-
-
-def find_robot(name: str) -> Path:
-    """Return the path of a robot file, or of a bundled robot.
-
-    Raises:
-        ConfigError: if neither exists, or the file cannot be accessed.
-    """
-    from terrainkit_robots.description import bundled
-
-    path = Path(name)
-    try:
-        if path.is_file():
-            return path
-        bundled_path = bundled.urdf_path(name)
-        if bundled_path is None and not path.exists():
-            expected = expected_names(name, bundled.robot_names(), "bundled robots are")
-            raise ConfigError(f"robot file: got {name}, which does not exist; {expected}")
-    except OSError as error:
-        raise ConfigError(f"cannot read {name}: {error.strerror or error}") from error
-    return bundled_path or path
 
 
 def split_commas(text: str) -> list[str]:

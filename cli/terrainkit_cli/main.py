@@ -44,6 +44,7 @@ COMMAND_GROUPS = {
 """Module of each command, so that only the one in use is imported."""
 
 COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module in group.items()}
+COMMANDS["completion"] = "completion_command"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -61,6 +62,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.environ["MUJOCO_GL"] = "disable"
     if arguments[:1] != ["train"]:  # only training multiplies large matrices
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # idle threads of OpenBLAS spin
+    if "_ARGCOMPLETE" in os.environ:
+        from terrainkit_cli.completion_command import complete
+
+        complete(COMMANDS, command)
     warnings.showwarning = render.show_warning
     signals.raise_on_signals()
     from terrainkit.errors import TerrainkitError
@@ -137,7 +142,7 @@ def _print_overview() -> None:
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
         rows += [(f"{group}:", ""), *zip((f"  {name}" for name in names), summaries, strict=True)]
     render.table(rows)
-    render.result("terrainkit COMMAND --help lists its options; --version prints the version.")
+    render.result("terrainkit COMMAND --help lists its options; see also --version, completion.")
 
 
 def command(name: str) -> "type[Command]":

@@ -14,7 +14,6 @@ from terrainkit_cli.argument_types import (
     OutputPath,
     Packages,
     XacroArguments,
-    find_robot,
     parse_settings,
     split_commas,
 )
@@ -39,7 +38,8 @@ class Onboard(Command):
     """
 
     file: Annotated[str, positional("FILE")] = ""
-    """The robot file, or the name of a bundled robot: quadruped, biped."""
+    """The robot file, or the name of a robot: quadruped, biped, or one of the package
+    robot_descriptions, such as go2_description."""
 
     output: OutputPath | None = None
     """Folder to write; by default, a folder with the name of the robot."""
@@ -101,7 +101,7 @@ class Onboard(Command):
         if not self.file:
             raise ConfigError("FILE: missing; expected a robot file, quadruped, or biped")
         with render.steps() as steps:
-            result = onboard(find_robot(self.file), self.output, self._options(steps))
+            result = onboard(self.file, self.output, self._options(steps))
         if result.folder is None:
             render.report(_blocking_errors(result))
             render.error(f"{self.file}: errors remain{self._advice(result)}; nothing was written")

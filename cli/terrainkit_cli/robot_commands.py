@@ -15,7 +15,6 @@ from terrainkit_cli.argument_types import (
     OutputPath,
     Packages,
     XacroArguments,
-    find_robot,
     parse_settings,
     split_commas,
 )
@@ -35,6 +34,10 @@ class CheckRobot(Command):
     The rules find errors that break training or simulation, from XML syntax to the behavior in
     simulation; `terrainkit rule` lists them.
 
+    In a folder and the folders below it, all robot files are checked, without scenes, and without
+    files that others include. Links to folders, hidden folders, and those with a COLCON_IGNORE are
+    skipped.
+
     Exit code 0: no errors, and no warnings with --strict. 1: errors were found. 2: a file cannot
     be read, or an option is invalid; the other files are still checked.
 
@@ -47,7 +50,9 @@ class CheckRobot(Command):
     """
 
     files: Annotated[tuple[str, ...], positional("FILE [FILE ...]")] = ()
-    """Files to check, or names of bundled robots: quadruped, biped."""
+    """Files to check; folders, whose robot files are all checked, with one line for each in the
+    text report; or names of robots: quadruped, biped, or those of the package robot_descriptions,
+    such as go2_description."""
 
     format: Literal["text", "json", "sarif", "github", "markdown"] = "text"
     """Format of the report. For several files, json prints one document per line."""
@@ -67,7 +72,7 @@ class CheckRobot(Command):
     xacro_arg: XacroArguments = ()
     """Value of a xacro argument of the file."""
 
-    against: Annotated[str, option("PATH")] = ""
+    against: Annotated[str, option("FILE")] = ""
     """Compare with another file of the same robot: URDF, xacro or MJCF."""
 
     spec: InputPath | None = None
@@ -81,7 +86,8 @@ class CheckRobot(Command):
     """Exit with code 1 if there are warnings."""
 
     notes: bool = False
-    """Print notes in full; the text report has one line for each."""
+    """Print notes in full; the text report has one line for each. For a folder, print the reports
+    in full."""
 
     fix: bool = False
     """Apply the safe fixes: they do not change the robot for any parser that reads the file."""
@@ -98,17 +104,18 @@ class CheckRobot(Command):
             raise ConfigError("FILE: missing; expected robot files, quadruped, or biped")
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
-        if len(self.files) > 1 and (self.against or self.spec):
-            raise ConfigError(f"--against and --spec: got {len(self.files)} files; expected one")
+        files = [each for name in self.files for each in _files(name)]
+        if len(files) > 1 and (self.against or self.spec):
+            raise ConfigError(f"--against and --spec: got {len(files)} files; expected one")
         settings = self._settings()
         if self.output:
-            _check_output(self.output, [Path(name) for name in self.files])
-        results = [result for name in self.files if (result := self._check_file(name, settings))]
+            _check_output(self.output, [Path(name) for name in files])
+        results = [result for name in files if (result := self._check_file(name, settings))]
         self._print([result.report for result in results], "".join(r.diff for r in results))
         crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
             render.error(f"{rule.code}: {rule.reason}")
-        if crashed or len(results) < len(self.files):
+        if crashed or len(results) < len(files):
             return 2
         return int(any(result.failed for result in results))
 
@@ -149,20 +156,22 @@ class CheckRobot(Command):
         from terrainkit_robots.lint.check import check_robot
         from terrainkit_robots.lint.settings import read_settings
 
-        path = find_robot(name)
-        is_name = path == bundled.urdf_path(name)
-        settings = settings.over(read_settings(Path() if is_name else path.parent))
-        against = find_robot(self.against) if self.against else None
+        settings = settings.over(read_settings(Path(name).parent))
 
         def lint_contents(contents: Mapping[Path, bytes]) -> "Report":
-            return check_robot(path, settings, against=against, spec=self.spec, contents=contents)
+            against, spec = self.against or None, self.spec
+            return check_robot(name, settings, against=against, spec=spec, contents=contents)
 
-        report, diff = lint_contents({}), ""
+        with render.steps() as steps:
+            steps.update(f"checking {name}")
+            report, diff = lint_contents({}), ""
+        path = report.facts.model.file
         if self.fix or self.unsafe_fixes or self.diff:
             from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff
 
-            if bundled.is_bundled(path):
-                raise ConfigError(f"{name} is a bundled robot and cannot be changed; copy it first")
+            if bundled.is_bundled(path) or path != Path(name):
+                kind = "bundled" if bundled.is_bundled(path) else "downloaded"
+                raise ConfigError(f"{name} is a {kind} robot and cannot be changed; copy it first")
             if report.facts.model.kind == "xacro":
                 raise ConfigError(f"{name}: xacro files cannot be fixed; edit the reported lines")
             result = fix_robot(path, lint_contents, report=report, unsafe=self.unsafe_fixes)
@@ -184,11 +193,14 @@ class CheckRobot(Command):
         elif self.format == "text":
             from terrainkit_robots.lint.report import text as text_report
 
+            brief = any(map(_is_folder, self.files)) and not self.notes
             if self.output is None and render.has_colors():
-                width = render.width()
-                render.styled(text_report.format_lines(reports, width=width, verbose=self.notes))
+                lines = text_report.format_lines(
+                    reports, width=render.width(), verbose=self.notes, brief=brief
+                )
+                render.styled(lines)
                 return
-            text = text_report.to_text(reports, verbose=self.notes)
+            text = text_report.to_text(reports, verbose=self.notes, brief=brief)
         else:
             text = to_text(reports, self.format)
         if self.output is None:
@@ -212,6 +224,21 @@ class _FileResult:
 
     diff: str = ""
     """The changes of the fixes, with --diff."""
+
+
+def _is_folder(name: str) -> bool:
+    """Return whether a name is a folder, and not a bundled robot."""
+    from terrainkit_robots.description import bundled
+    from terrainkit_robots.description.package_resolver import is_folder
+
+    return name not in bundled.robot_names() and is_folder(Path(name))
+
+
+def _files(name: str) -> list[str]:
+    """Return the robot files in a folder, or the name of something else."""
+    from terrainkit_robots.description.robot_folder import robot_files
+
+    return [str(file) for file in robot_files(Path(name))] if _is_folder(name) else [name]
 
 
 def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":

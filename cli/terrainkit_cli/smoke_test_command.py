@@ -42,7 +42,8 @@ class SmokeTest(Command):
     """
 
     robots: Annotated[tuple[str, ...], positional("ROBOT [ROBOT ...]")] = ()
-    """Names of robots, folders written by terrainkit onboard, or URDF, xacro or MJCF files."""
+    """Names of robots, folders written by terrainkit onboard, or URDF, xacro or MJCF files; names
+    of the package robot_descriptions, such as go2_description, count as files."""
 
     samples: Annotated[int, Meta(ge=0)] = 100_000
     """Samples of the short training; 0 for none. With fewer than 50,000, only its losses are
@@ -95,13 +96,15 @@ class SmokeTest(Command):
         return int(not all(result.passed for result in results.values()))
 
     def _check_options(self) -> None:
+        from terrainkit_robots.description.robot_file import is_description
+
         if not self.robots:
             raise ConfigError("ROBOT: missing; expected a name, a folder, or a robot file")
         if self.spec and len(self.robots) > 1:
             raise ConfigError(f"--spec: got {len(self.robots)} robots; expected one")
         names = "package", "xacro-arg", "ignore", "spec"
         given = [name for name in names if getattr(self, name.replace("-", "_"))]
-        if given and not any(Path(name).is_file() for name in self.robots):
+        if given and not any(Path(name).is_file() or is_description(name) for name in self.robots):
             robots = listing(self.robots)
             raise ConfigError(f"--{given[0]}: got no robot file among {robots}; expected one")
         if self.output:

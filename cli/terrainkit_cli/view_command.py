@@ -52,8 +52,9 @@ class View(Command):
     """
 
     source: Annotated[str, positional("MAP.npz|ROBOT|RUN")] = ""
-    """A map; a URDF, xacro or MJCF file, an onboarded folder, or a bundled robot; or a run of
-    terrainkit train, a checkpoint in one, or a bundled policy."""
+    """A map; a URDF, xacro or MJCF file, an onboarded folder, a bundled robot, or a name of the
+    package robot_descriptions, such as go2_description; or a run of terrainkit train, a checkpoint
+    in one, or a bundled policy."""
 
     policy: bool = False
     """Show the bundled policy of a robot instead of the robot."""
@@ -129,17 +130,14 @@ class View(Command):
         return show
 
     def _check_robot(self) -> "Show":
-        from terrainkit_robots.description import bundled
         from terrainkit_robots.lint.check import check_robot
         from terrainkit_robots.lint.settings import read_settings
         from terrainkit_robots.spec.robot import SPEC_FILE
         from terrainkit_robots.spec.robot_spec import RobotSpec
         from terrainkit_robots.viewer.show_robot import show_robot
 
-        path, spec = bundled.urdf_path(self.source) or Path(self.source), None
-        if Path(self.source).exists():
-            path = Path(self.source)
-        if path.is_dir():
+        path, spec = Path(self.source), None
+        if (path / SPEC_FILE).is_file():
             spec = path / SPEC_FILE
             path = path / RobotSpec.load(spec).urdf
         given = parse_settings([], self.package, self.xacro_arg)
@@ -177,12 +175,13 @@ def wait() -> None:
 
 
 def source_kind(source: str, *, policy: bool = False) -> Kind:
-    """Return what a source is: an existing file or folder, or a bundled robot or policy.
+    """Return what a source is: an existing file or folder, or the name of a robot or policy.
 
     Raises:
         ConfigError: if it is none of these.
     """
     from terrainkit_robots.description import bundled
+    from terrainkit_robots.description.robot_file import is_description
     from terrainkit_robots.rl.run import RUN_FILE
     from terrainkit_robots.rl.tasks import task_names
     from terrainkit_robots.spec.robot import SPEC_FILE
@@ -200,7 +199,7 @@ def source_kind(source: str, *, policy: bool = False) -> Kind:
         raise ConfigError(f"cannot read {truncate(source)}: {error.strerror}") from error
     if is_folder:
         raise ConfigError(f"{source}: got no {SPEC_FILE} or {RUN_FILE} in it; expected either")
-    if source in bundled.robot_names():
+    if source in bundled.robot_names() or is_description(source):
         return "robot"
     if source in task_names():
         return "run"

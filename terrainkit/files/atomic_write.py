@@ -5,7 +5,7 @@ import secrets
 import shutil
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from terrainkit.errors import ExportError
@@ -15,8 +15,8 @@ from terrainkit.errors import ExportError
 def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Yield a temporary path to write to, and move it to `path` when the block ends.
 
-    Files that the block writes beside the temporary path, such as a sidecar, are moved as well. If
-    the block raises, nothing changes.
+    The folder of `path` is created. Files that the block writes beside the temporary path, such as
+    a sidecar, are moved as well. If the block raises, nothing changes.
 
     Args:
         path: File to write.
@@ -36,7 +36,7 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         raise ExportError(f"cannot write {path}: the link points to itself")
     try:
         # On the same file system as the target, so that moving is a rename.
-        with temporary_folder(path.parent) as folder:
+        with _new_parents(path), temporary_folder(path.parent) as folder:
             yield folder / name  # the suffix may select the format
             if name != path.name:
                 (folder / name).rename(folder / path.name)
@@ -59,8 +59,7 @@ def atomic_folder(path: Path) -> Iterator[Path]:
         ExportError: if the folder cannot be written.
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with temporary_folder(path.parent) as work:
+        with _new_parents(path), temporary_folder(path.parent) as work:
             folder, old = work / path.name, work / f"{path.name}.old"
             folder.mkdir()
             yield folder
@@ -92,10 +91,32 @@ def check_target(path: Path, *, overwrite: bool) -> None:
             raise ExportError(f"cannot write {path}: it exists and is not a regular file")
         if path.exists() and not overwrite:
             raise ExportError(f"{path} exists; use another name, or --overwrite")
-        if not path.parent.is_dir():
-            raise ExportError(f"cannot write {path}: the folder {path.parent} does not exist")
     except OSError as error:
         raise ExportError(f"cannot write {path}: {error.strerror or error}") from error
+    check_parents(path)
+
+
+def check_parents(path: Path) -> None:
+    """Raise ExportError if the folder of `path` does not exist and cannot be created."""
+    existing = next((each for each in path.parents if os.path.lexists(each)), path.parent)
+    if not existing.is_dir():
+        raise ExportError(f"cannot write {path}: {existing} is not a folder")
+    if existing != path.parent and not os.access(existing, os.W_OK):
+        raise ExportError(f"cannot write {path}: cannot create a folder in {existing}")
+
+
+@contextmanager
+def _new_parents(path: Path) -> Iterator[None]:
+    """Create the folders above `path`; if the block raises, remove those that were missing."""
+    missing = [each for each in path.parents if not each.exists()]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield
+    except BaseException:
+        for folder in missing:
+            with suppress(OSError):  # not created, or in use by another process
+                folder.rmdir()
+        raise
 
 
 @contextmanager

@@ -129,6 +129,8 @@ def test_export_map(here, tmp_path):
     assert run.returncode == 0, run.stderr
     assert run.stdout.startswith("wrote map.stl: 1 x 1 patches")
     assert (tmp_path / "map.stl").stat().st_size > 1000
+    assert here("export", "map.npz", "-o", "e/f/map.xml").returncode == 0
+    assert (tmp_path / "e" / "f" / "map.xml").is_file()
     run = here("export", "map.npz", "-o", "ros.yaml", "--max-step", 0.1)
     assert run.stdout.startswith("wrote ros.yaml, with ros.json, ros.pgm, ros.png beside it: 1 x 1")
     run = here("export", "map.npz", "-o", "model.sdf")
@@ -154,7 +156,7 @@ def test_export_map(here, tmp_path):
         (("run", "--y-up"), "--y-up: got the run run; expected a map"),
         (("run", "--checkpoint", 7), "run: got checkpoint 7; expected one of: 1, 2"),
         (("run", "--checkpoint", -7), "run: got checkpoint -7"),
-        (("run", "-o", "nowhere/policy"), "the folder nowhere does not exist"),
+        (("run", "-o", "text.txt/policy"), "text.txt is not a folder"),
         (("run", "-o", "text.txt"), "text.txt exists"),
         (("x" * 5000,), "cannot read"),
     ],

@@ -78,7 +78,6 @@ def folder_with(tmp_path, old, new):
         (("--robot", "quadruped", "--limit", "gap"), "--limit: got 'gap'; expected NAME=VALUE"),
         (("--robot", "quadruped", "--limit", "gaps=1"), "'gaps'; did you mean 'gap'?"),
         (("--robot", "quadruped", "--limit", "crouched_height=1"), "expected less than the"),
-        (("--robot", "quadruped", "-o", "no/report"), "the folder no does not exist"),
         (("--robot", "quadruped", "--jobs", "0"), "jobs"),
     ],
 )

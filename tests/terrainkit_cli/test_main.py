@@ -12,7 +12,7 @@ def test_no_command_lists_all_commands(terrainkit_process):
     run = terrainkit_process()
     assert run.returncode == 0
     for name in COMMANDS:
-        assert f"  {name} " in run.stdout
+        assert f" {name}" in run.stdout
     lines = run.stdout.splitlines()
     assert len(lines) <= 24  # a terminal
     assert max(map(len, lines)) <= 80
@@ -99,7 +99,6 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
         (("generate", "-o", "a.npz", "--config", "none.toml"), "cannot read none.toml"),
         (("generate", "-o", "a.abc"), "no format for '.abc' (a.abc); there are: "),
         (("generate", "-o", "a"), "no format for a name without suffix (a); there are: "),
-        (("generate", "-o", "nowhere/a.npz"), "the folder nowhere does not exist"),
         (("generate", "-o", "/proc/a.npz"), "cannot write /proc/a.npz"),
         (("list", "moon"), "no terrain 'moon' is built in, installed, or registered"),
         (("info", "none.npz"), "no file none.npz"),

@@ -154,7 +154,7 @@ def test_onboard_does_not_suggest_force_without_robot(here, tmp_path):
     [
         ([], "FILE: missing"),
         (["nothing.urdf"], "robot file: got nothing.urdf"),
-        (["arm.urdf", "-o", "no/where"], "the folder no does not exist"),
+        (["arm.urdf", "-o", "arm.urdf/where"], "arm.urdf is not a folder"),
         (["arm.urdf", "-o", "arm.urdf"], "is not a folder"),
         (["arm.urdf", "--config", "gym"], "framework: got 'gym'; expected: "),
         (["arm.urdf", "--spec", "arm.urdf"], "arm.urdf: not a TOML file"),

@@ -98,6 +98,18 @@ def test_check_robot_prefers_file_to_bundled_robot(here, tmp_path):
     assert "robot     box (URDF)" in here("check-robot", "biped").stdout
 
 
+def test_check_robot_download_fails(here, tmp_path, monkeypatch):
+    pytest.importorskip("robot_descriptions")
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("GIT_CONFIG_COUNT", "1")
+    monkeypatch.setenv("GIT_CONFIG_KEY_0", f"url.{tmp_path}/none/.insteadOf")
+    monkeypatch.setenv("GIT_CONFIG_VALUE_0", "https://github.com/")
+    run = here("check-robot", "cassie_description")
+    assert (run.returncode, run.stdout, run.stderr.count("\n")) == (2, "", 1)
+    error = "terrainkit: error: cassie_description: robot_descriptions cannot download it: "
+    assert run.stderr.startswith(error)
+
+
 @pytest.mark.usefixtures("folder")
 def test_check_robot_formats_several_files(here):
     words = ("good.urdf", "bad.urdf", "--select", "INR002")
@@ -105,6 +117,19 @@ def test_check_robot_formats_several_files(here):
     assert [json.loads(line)["verdict"] for line in lines] == ["pass", "fail"]
     document = json.loads(here("check-robot", *words, "--format", "sarif").stdout)
     assert [result["ruleId"] for result in document["runs"][0]["results"]] == ["INR002"]
+
+
+@pytest.mark.usefixtures("folder")
+def test_check_robot_checks_folder(here):
+    run = here("check-robot", ".", "--select", "INR002")
+    assert run.returncode == 1
+    assert run.stdout == (
+        "bad.urdf: 1 error [INR002]\ngood.urdf: no problems found\n"
+        "unnamed.urdf: no problems found\n\n3 files: 1 error\n"
+    )
+    assert "line 4: mass" in here("check-robot", ".", "--select", "INR002", "--notes").stdout
+    lines = here("check-robot", ".", "--select", "INR002", "--format", "json").stdout.splitlines()
+    assert [json.loads(line)["verdict"] for line in lines] == ["fail", "pass", "pass"]
 
 
 # Options.
@@ -118,7 +143,8 @@ def test_check_robot_formats_several_files(here):
             ("none.urdf",),
             "robot file: got none.urdf, which does not exist; bundled robots are: ",
         ),
-        ((".",), "cannot read .: it is a folder, not a file"),
+        (("empty",), "empty: got no robot file in it; expected URDF, xacro or MJCF"),
+        ((".", "--spec", "robot.toml"), "--against and --spec: got 3 files; expected one"),
         (("fifo",), "cannot read fifo: it is a pipe"),
         (("good.urdf", "--select", "XYZ1"), "no rule 'XYZ1'; expected a code"),
         (("good.urdf", "--ignore", "INR002"), "--ignore: got 'INR002'; expected CODES=REASON"),
@@ -132,7 +158,7 @@ def test_check_robot_formats_several_files(here):
         ),
         (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
-        (("good.urdf", "-o", "nowhere/a.txt"), "the folder nowhere does not exist"),
+        (("good.urdf", "-o", "good.urdf/a.txt"), "good.urdf is not a folder"),
         (("good.urdf", "-o", "."), "it is a folder"),
         (("good.urdf", "-o", "/proc/report.txt"), "cannot write /proc/report.txt"),
         (("good.urdf", "-o", "good.urdf"), "would replace the checked file good.urdf"),
@@ -141,6 +167,7 @@ def test_check_robot_formats_several_files(here):
 )
 def test_check_robot_rejects_input(here, folder, words, message):
     os.mkfifo(folder / "fifo")
+    (folder / "empty").mkdir()
     before = sorted(folder.iterdir())
     run = here("check-robot", *words)
     assert run.returncode == 2

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from terrainkit_robots.description.model import Problem, RobotModel, Source
+from terrainkit_robots.description.robot_file import RobotFile, find_robot
 from terrainkit_robots.description.xml.document import XmlDocument, parse_xml, read_bytes
 
 XACRO = "xacro"
@@ -21,7 +22,7 @@ def load_robot(
     A malformed file is not an error: what could not be read is listed in `problems` of the model.
 
     Args:
-        path: Robot file.
+        path: Robot file, or a name: a bundled robot, or one of the package robot_descriptions.
         packages: Folders of ROS packages by name, which take precedence over a search.
         xacro_arguments: Values of xacro arguments by name.
         contents: File contents by path, which are used instead of the files on disk.
@@ -30,9 +31,11 @@ def load_robot(
         The robot model. It has no links if the file could not be parsed.
 
     Raises:
-        RobotFileError: If the file cannot be opened.
+        RobotFileError: If the file cannot be found, downloaded or opened.
     """
-    path, packages, contents = Path(path), packages or {}, contents or {}
+    contents = contents or {}
+    robot = RobotFile(path=Path(path)) if Path(path) in contents else find_robot(path)
+    path, packages = robot.path, {**robot.packages, **(packages or {})}
     data = contents[path] if path in contents else read_bytes(path)
     doc = parse_xml(path, data)
     if doc.root is None:
@@ -51,7 +54,8 @@ def load_robot(
     if path.suffix == f".{XACRO}":
         from terrainkit_robots.description.xacro.reader import read_xacro
 
-        return read_xacro(doc, arguments=xacro_arguments or {}, packages=packages)
+        arguments = {**robot.xacro_arguments, **(xacro_arguments or {})}
+        return read_xacro(doc, arguments=arguments, packages=packages)
     return read_urdf(doc, packages=packages)
 
 

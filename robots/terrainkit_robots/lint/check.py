@@ -23,9 +23,10 @@ def check_robot(
     """Return what the lint rules find in a robot file.
 
     Args:
-        path: A URDF, xacro or MJCF file.
+        path: A URDF, xacro or MJCF file, or the name of a robot; see :func:`find_robot`.
         settings: Selected rules, ROS packages and xacro arguments. By default they are read from
-            the nearest terrainkit.toml or pyproject.toml in the folder of the file or above it.
+            the nearest terrainkit.toml or pyproject.toml in the folder of the file or above it;
+            for a name, in the working directory or above it.
         against: Another file of the same robot, to compare with.
         spec: The robot.toml of the robot, to compare with.
         contents: Bytes to read instead of the files at these paths, such as the result of a fix.
@@ -34,7 +35,7 @@ def check_robot(
         The report, with the facts of the robot, the findings and the rules that were skipped.
 
     Raises:
-        RobotFileError: if a file cannot be opened.
+        RobotFileError: if a file cannot be found, downloaded or opened.
         ConfigError: if the settings name an unknown rule, `against` is not a robot, or the spec is
             invalid.
     """
@@ -46,7 +47,7 @@ def check_robot(
     packages, arguments = settings.packages, settings.xacro_arguments
     other = None
     if against is not None:
-        model = load_robot(Path(against), packages=packages, xacro_arguments=arguments)
+        model = load_robot(against, packages=packages, xacro_arguments=arguments)
         if not model.links:
             reason = f": {model.problems[0].message}" if model.problems else ""
             raise ConfigError(f"{against} does not describe a robot{reason}")

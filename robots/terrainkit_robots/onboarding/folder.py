@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from terrainkit.errors import ExportError
-from terrainkit.files.atomic_write import atomic_folder
+from terrainkit.files.atomic_write import atomic_folder, check_parents
 from terrainkit_robots.files import require_utf8
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
 from terrainkit_robots.spec.robot import SPEC_FILE
@@ -28,12 +28,11 @@ def check_folder(target: Path, *, overwrite: bool) -> None:
         overwrite: Whether a folder that onboarding wrote may be replaced.
 
     Raises:
-        ExportError: if the folder must not be overwritten, or its parent does not exist.
+        ExportError: if the folder must not be overwritten, or cannot be created.
     """
     require_utf8(target)
+    check_parents(target)
     try:
-        if not target.parent.is_dir():
-            raise ExportError(f"cannot write {target}: the folder {target.parent} does not exist")
         if target.is_symlink() or (target.exists() and not target.is_dir()):
             raise ExportError(f"cannot write {target}: it exists and is not a folder")
         if not target.is_dir():

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from terrainkit.errors import TerrainkitError
+from terrainkit_robots.description.robot_file import is_description
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 from terrainkit_robots.policy.evaluate import Progress, eval_task
 from terrainkit_robots.policy.load import single_torch_thread
@@ -77,8 +78,8 @@ def smoke_test(
     """Check whether a robot can be trained for its task on a plane.
 
     Args:
-        name: A registered robot, an onboarded folder, or a URDF, xacro or MJCF file, which is
-            onboarded into a temporary folder.
+        name: A registered robot, an onboarded folder, or a URDF, xacro or MJCF file or a name of
+            robot_descriptions, which are onboarded into a temporary folder.
         options: Options for onboarding a file.
         samples: Samples of the short training; 0 for none. With fewer than `MIN_TREND_SAMPLES`,
             only the losses are checked.
@@ -87,12 +88,12 @@ def smoke_test(
     Raises:
         TerrainkitError: If the robot does not exist or cannot be read.
     """
-    if not Path(name).is_file():
+    if not (Path(name).is_file() or is_description(name)):
         task_spec = get_task(name)
         return run_checks(Robot.load(task_spec.folder), task_spec.task, samples, progress)
     options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
-        onboarded = onboard(Path(name), Path(folder) / "robot", options)
+        onboarded = onboard(name, Path(folder) / "robot", options)
         codes = [finding.code for finding in onboarded.report.findings if is_blocking(finding)]
         measured = f"{len(codes)} errors: {', '.join(dict.fromkeys(codes))}" if codes else "yes"
         passed = onboarded.folder is not None

@@ -125,16 +125,20 @@ def test_atomic_write_rejects_folder(target, overwrite):
     assert names(target.parent) == ["map.npz"]
 
 
-def test_atomic_write_rejects_missing_folder(tmp_path):
-    with pytest.raises(ExportError, match=r"cannot write .*: the folder .*nowhere does not exist"):
-        write(tmp_path / "nowhere" / "map.npz")
-    assert names(tmp_path) == []
+@pytest.mark.parametrize("writer", [atomic_write, atomic_folder])
+def test_atomic_write_creates_folders(target, writer):
+    with pytest.raises(KeyboardInterrupt), writer(target / "new" / "map.npz"):
+        raise KeyboardInterrupt
+    assert names(target.parent) == []
+    with writer(target / "new" / "map.npz"):
+        pass
+    assert names(target) == ["new"]
 
 
 def test_atomic_write_rejects_file_as_folder(target):
     target.write_text("old")
-    with pytest.raises(ExportError, match="cannot write"):
-        write(target / "map.npz")
+    with pytest.raises(ExportError, match=r"cannot write .*: .*map\.npz is not a folder"):
+        write(target / "new" / "map.npz")
     assert target.read_text() == "old"
 
 

@@ -100,9 +100,9 @@ def test_new_folder_keeps_old_folder_if_rename_fails(tmp_path, monkeypatch):
 
 
 def test_check_folder_rejects_invalid_target(tmp_path):
-    with pytest.raises(ExportError, match=r"the folder .* does not exist"):
-        check_folder(tmp_path / "no/robot", overwrite=False)
     (tmp_path / "file").write_text("")
+    with pytest.raises(ExportError, match="file is not a folder"):
+        check_folder(tmp_path / "file/robot", overwrite=False)
     with pytest.raises(ExportError, match="is not a folder"):
         check_folder(tmp_path / "file", overwrite=True)
     (tmp_path / "real").mkdir()

@@ -13,7 +13,7 @@ from terrainkit_robots.lint.report.grouping import FindingGroup, group_findings
 from terrainkit_robots.lint.report.robot_summary import robot_summary
 from terrainkit_robots.lint.rule import Finding, Severity
 from terrainkit_robots.lint.runner import Report
-from terrainkit_robots.text import count, display_path
+from terrainkit_robots.text import count, display_path, names
 
 DEFAULT_WIDTH = 100
 """Width of a line [characters]. Only lines with longer words are wider."""
@@ -39,27 +39,40 @@ class Span:
 Line = tuple[Span, ...]
 
 
-def to_text(reports: Sequence[Report], *, verbose: bool = False) -> str:
+def to_text(reports: Sequence[Report], *, verbose: bool = False, brief: bool = False) -> str:
     """Return the reports without colors."""
-    lines = format_lines(reports, verbose=verbose)
+    lines = format_lines(reports, verbose=verbose, brief=brief)
     return "".join("".join(span.text for span in line) + "\n" for line in lines)
 
 
 def format_lines(
-    reports: Sequence[Report], width: int = DEFAULT_WIDTH, *, verbose: bool = False
+    reports: Sequence[Report],
+    width: int = DEFAULT_WIDTH,
+    *,
+    verbose: bool = False,
+    brief: bool = False,
 ) -> Iterator[Line]:
     """Yield the lines of the reports, wrapped at `width` characters.
 
     A finding that repeats over joints or links is one entry with a list. A note is one line unless
-    `verbose` is set.
+    `verbose` is set. If `brief` is set, a report is one line.
     """
     for index, report in enumerate(reports):
-        if index:
+        if index and not brief:
             yield ()
-        yield from _robot(report, width, verbose=verbose)
+        yield from [_brief(report)] if brief else _robot(report, width, verbose=verbose)
     if len(reports) > 1:
         yield ()
         yield _counts(f"{count(len(reports), 'file')}: ", reports)
+
+
+def _brief(report: Report) -> Line:
+    """Return the counts of a report, and the codes of its errors, on one line."""
+    file = escape_control(display_path(report.facts.model.file))
+    errors = dict.fromkeys(f.code for f in report.findings if f.severity == "error")
+    codes = f" [{names(errors)}]" if errors else ""
+    fixed = f", {count(len(report.fixed), 'finding')} fixed" if report.fixed else ""
+    return *_counts(f"{file}: ", [report]), Span(f"{fixed}{codes}")
 
 
 def _robot(report: Report, width: int, *, verbose: bool) -> Iterator[Line]:

@@ -1,0 +1,107 @@
+"""Find the robot files in a folder."""
+
+import os
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from terrainkit_robots.description.package_resolver import PackageResolver
+from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+MAX_FILES = 100_000
+"""Maximum number of files in a folder, those of all kinds."""
+
+_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
+_IGNORE_FILES = {"COLCON_IGNORE", "CATKIN_IGNORE"}
+"""Files that mark folders without sources, such as those of a build."""
+
+_FRAGMENTS = {"macro", "property", "arg", "material", "transmission", "gazebo"}
+"""Elements of `<robot>` that describe no robot without others."""
+
+_MOVING = ("joint", "freejoint", "include", "attach")
+"""Elements of `<worldbody>` that a robot has at least one of."""
+
+
+def robot_files(folder: Path) -> list[Path]:
+    """Return the robot files in a folder and the folders below it, sorted by path.
+
+    A file with the root `<robot>` is one unless another file includes it, or it only defines
+    macros, materials and the like. A file with the root `<mujoco>` is one if it has a joint, unless
+    it includes another robot, as a scene does. Damaged files count, except those that end in .xml.
+    Links to folders are not followed. Hidden folders, and those of a colcon or catkin build, are
+    skipped.
+
+    Raises:
+        RobotFileError: If there is no robot file, or the folder has too many files.
+    """
+    files = list(islice(_iter_files(folder), MAX_FILES + 1))
+    if len(files) > MAX_FILES:
+        raise RobotFileError(f"{folder}: got more than {MAX_FILES} files; expected a subfolder")
+    # Of a file and links to it, the last one counts.
+    files = sorted(filter(_may_be_robot, files), key=lambda path: (not path.is_symlink(), path))
+    roots = {path: _read_root(path) for path in files}
+    included = {path: _included_files(path, root) for path, root in roots.items()}
+    fragments = {file for files in included.values() for file in files}
+    robots = {os.path.realpath(path): path for path, root in roots.items() if _is_robot(path, root)}
+    found = [
+        path
+        for file, path in robots.items()
+        if (not included[path] & {*robots} if _is_mjcf(roots[path]) else file not in fragments)
+    ]
+    if not found:
+        raise RobotFileError(f"{folder}: got no robot file in it; expected URDF, xacro or MJCF")
+    return sorted(found)
+
+
+def _iter_files(folder: Path) -> Iterator[Path]:
+    for parent, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        if _IGNORE_FILES & {*files}:
+            folders.clear()
+        else:
+            yield from (Path(parent, name) for name in files)
+
+
+def _may_be_robot(path: Path) -> bool:
+    is_srdf = path.name.endswith(".srdf.xacro")
+    return path.suffix.lower() in _SUFFIXES and not is_srdf and path.is_file()
+
+
+def _read_root(path: Path) -> "etree._Element | None":
+    """Return the root element of a file; None if it cannot be read."""
+    try:
+        return parse_xml(path, read_bytes(path)).root
+    except RobotFileError:
+        return None
+
+
+def _is_mjcf(root: "etree._Element | None") -> bool:
+    return root is not None and root.tag == "mujoco"
+
+
+def _is_robot(path: Path, root: "etree._Element | None") -> bool:
+    """Return whether a file describes a robot, or is one by its suffix and is damaged."""
+    children = set() if root is None else {_local_name(child) for child in root.iterchildren("*")}
+    if root is None or root.tag not in ("robot", "mujoco") or not children:
+        return path.suffix.lower() != ".xml"
+    if _is_mjcf(root):
+        return any(root.find(f"worldbody//{tag}") is not None for tag in _MOVING)
+    # Macros include the macros that they use.
+    return not children <= _FRAGMENTS | ({"include"} if "macro" in children else set())
+
+
+def _included_files(path: Path, root: "etree._Element | None") -> set[str]:
+    """Return the real paths of the files that a file includes."""
+    elements = [] if root is None else [e for e in root.iter("*") if _local_name(e) == "include"]
+    names = [element.get("filename") or element.get("file") or "" for element in elements]
+    resolver = PackageResolver(path, {})
+    paths = (resolver.resolve(name.replace("$(dirname)/", ""))[0] for name in names)
+    return {os.path.realpath(path) for path in paths}  # Path.resolve rejects loops of links
+
+
+def _local_name(element: "etree._Element") -> str:
+    return str(element.tag).rpartition("}")[2]

@@ -1,0 +1,81 @@
+"""Tests of the completion in a real bash."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+COMPLETE = """
+complete_line() {
+  COMP_LINE=$1 COMP_POINT=${#1} COMP_TYPE=9 COMPREPLY=()
+  _python_argcomplete terrainkit
+  echo "${COMPREPLY[@]}"
+}
+eval "$(terrainkit completion bash)"
+"""
+
+
+@pytest.fixture
+def completed(tmp_path, monkeypatch):
+    """Return the completions of a line by bash, in an empty folder."""
+    pytest.importorskip("argcomplete")
+    if shutil.which("bash") is None:
+        pytest.skip("no bash on this system")
+    script = tmp_path / "bin" / "terrainkit"
+    script.parent.mkdir()
+    script.write_text(f'#!/bin/sh\nexec {sys.executable} -m terrainkit_cli.main "$@"\n')
+    script.chmod(0o700)
+    monkeypatch.setenv("PATH", f"{script.parent}{os.pathsep}{os.environ['PATH']}")
+    (tmp_path / "empty").mkdir()
+
+    def complete(line):
+        words = ["bash", "-c", f'{COMPLETE}complete_line "$0"', line]
+        run = subprocess.run(
+            words, cwd=tmp_path / "empty", capture_output=True, text=True, check=True
+        )
+        assert run.stderr == ""
+        return run.stdout.split()
+
+    return complete
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("terrainkit ch", ["check-map", "check-robot"]),
+        ("terrainkit check-robot --fo", ["--format"]),
+        ("terrainkit check-robot a.urdf --format s", ["sarif"]),
+        ("terrainkit check-robot ", ["biped", "quadruped"]),
+        ("terrainkit train quadruped --runner.logger ", ["tensorboard", "wandb"]),
+        ("terrainkit generate --terrain stairs", ["stairs", "stairs_turning"]),
+        ("terrainkit rule dyn", []),
+        ("terrainkit rule DYN001", ["DYN001"]),
+        ("terrainkit suite ", ["list", "show", "generate"]),
+        ("terrainkit evaluate --num-envs ", []),
+        ("terrainkit --v", ["--version"]),
+    ],
+)
+def test_completion_in_bash(completed, line, expected):
+    assert completed(line) == expected
+
+
+def test_completion_offers_files(completed, tmp_path):
+    (tmp_path / "empty" / "map.npz").touch()
+    assert completed("terrainkit info ") == ["map.npz"]
+    assert completed("terrainkit export map.npz -o ma") == ["map.npz"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_prints_code(terrainkit, shell):
+    pytest.importorskip("argcomplete")
+    run = terrainkit("completion", shell)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "_ARGCOMPLETE" in run.stdout
+
+
+def test_completion_rejects_other_shells(terrainkit):
+    run = terrainkit("completion", "tcsh")
+    assert run.returncode == 2
+    assert "SHELL: got 'tcsh'; expected one of: bash, zsh, fish" in run.stderr
