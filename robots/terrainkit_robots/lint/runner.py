@@ -13,7 +13,15 @@ Verdict = Literal["pass", "warn", "fail"]
 
 
 SkipKind = Literal[
-    "cannot-check", "no-legs", "no-input", "truncated", "crashed", "ignored", "suppressed", "unused"
+    "cannot-check",
+    "no-legs",
+    "no-input",
+    "truncated",
+    "crashed",
+    "ignored",
+    "suppressed",
+    "accepted",
+    "unused",
 ]
 """Why a rule or a finding is not in the report:
 
@@ -24,7 +32,8 @@ SkipKind = Literal[
 - `crashed`: the rule raised an unexpected exception.
 - `ignored`: the settings ignore the rule.
 - `suppressed`: a comment in the file suppresses the finding.
-- `unused`: a suppression comment has no effect.
+- `accepted`: the baseline file records the finding.
+- `unused`: a suppression comment or an entry of the baseline file has no effect.
 """
 
 INTERNAL_ERROR = "internal error, please report it"
@@ -53,6 +62,9 @@ class Report:
 
     skipped: tuple[Skipped, ...] = ()
     """Rules that could not run or were ignored, and suppressed findings."""
+
+    completed: frozenset[str] = frozenset()
+    """Codes of the rules that ran and reported all that they found."""
 
     may_simulate: bool = False
     """Whether rules were allowed to simulate the robot."""

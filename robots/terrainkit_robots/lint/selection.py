@@ -70,10 +70,13 @@ def lint_selected(
         for comment in read_comments(file, (contents or {}).get(file))
     ]
     kept, suppressed = _apply_suppressions(report, comments)
-    completed = {rule.code for rule in selected} - {skipped.code for skipped in report.skipped}
+    completed = frozenset(r.code for r in selected) - {s.code for s in report.skipped}
     unused = _unused_suppressions(comments, completed, suppressed)
     return replace(
-        report, findings=tuple(kept), skipped=(*report.skipped, *ignored, *suppressed, *unused)
+        report,
+        findings=tuple(kept),
+        skipped=(*report.skipped, *ignored, *suppressed, *unused),
+        completed=completed,
     )
 
 

@@ -1,11 +1,13 @@
 import copy
 import json
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote_to_bytes
 
 import jsonschema
 import pytest
 
+from terrainkit_robots.lint.baseline import Accepted
 from terrainkit_robots.lint.report.sarif import to_text, uri
 from terrainkit_robots.lint.rule import rules
 
@@ -89,6 +91,13 @@ def test_suppressed_finding_is_a_suppressed_result(report):
     last = document(report)["runs"][0]["results"][-1]
     assert last["suppressions"] == [{"kind": "inSource", "justification": "so"}]
     assert place(last)["region"]["startLine"] == 30
+
+
+def test_accepted_finding_is_a_suppressed_result(report, finding):
+    accepted = Accepted(code="INR002", kind="accepted", reason="1 finding", finding=finding())
+    last = document(replace(report, skipped=(accepted,)))["runs"][0]["results"][-1]
+    assert last["ruleId"] == "INR002"
+    assert last["suppressions"] == [{"kind": "external", "justification": "1 finding"}]
 
 
 def test_skipped_rule_is_a_notification(report):

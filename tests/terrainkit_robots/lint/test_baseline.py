@@ -1,0 +1,148 @@
+import json
+
+import pytest
+
+from terrainkit.errors import TerrainkitError
+from terrainkit_robots.lint.baseline import Accepted, Baseline
+from terrainkit_robots.lint.check import check_robot
+from terrainkit_robots.lint.report import FORMATS, to_text
+from terrainkit_robots.lint.settings import Settings
+
+LINK = '<link name="{}"><inertial><mass value="{}"/></inertial></link>'
+
+
+@pytest.fixture
+def robot(tmp_path):
+    """Return a function that writes a robot with a negative mass in each named link."""
+
+    def write(*links, name="arm.urdf", before=""):
+        path = tmp_path / "robots" / name
+        path.parent.mkdir(exist_ok=True)
+        text = "".join(LINK.format(link, -1) for link in links) + LINK.format("good", 1)
+        path.write_text(f'{before}<robot name="arm">{text}</robot>')
+        return path
+
+    return write
+
+
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "robots.baseline.json"
+
+
+def check(path, *codes):
+    return check_robot(path, Settings(select=codes or ("INR002",)))
+
+
+def record(file, *reports):
+    baseline = Baseline.read(file) if file.exists() else Baseline(path=file)
+    baseline.updated(reports).write()
+    return Baseline.read(file)
+
+
+def subjects(report):
+    return [finding.subject for finding in report.findings]
+
+
+def unused(report):
+    return [each.reason for each in report.skipped if each.kind == "unused"]
+
+
+def test_baseline_accepts_recorded_findings_only(robot, file):
+    baseline = record(file, check(robot("a", "b")))
+    report = baseline.accept(check(robot("a", "b", "new", before="<!-- moved -->\n\n")))
+    assert subjects(report) == ["new"]
+    assert [each.finding.subject for each in report.skipped if isinstance(each, Accepted)] == [
+        "a",
+        "b",
+    ]
+    assert report.verdict == "fail"
+    assert baseline.accept(check(robot("a", "b"))).verdict == "pass"
+
+
+def test_baseline_file_is_relative_and_sorted(robot, file):
+    record(file, check(robot("b", "a", name="z.urdf")), check(robot("c", name="a.urdf")))
+    assert json.loads(file.read_text()) == {
+        "version": 1,
+        "robots": {"robots/a.urdf": {"INR002": ["c"]}, "robots/z.urdf": {"INR002": ["a", "b"]}},
+    }
+    assert list(json.loads(file.read_text())["robots"]) == ["robots/a.urdf", "robots/z.urdf"]
+
+
+def test_baseline_does_not_depend_on_working_directory(robot, file, tmp_path, monkeypatch):
+    baseline = record(file, check(robot("a")))
+    monkeypatch.chdir(tmp_path / "robots")
+    report = baseline.accept(check("arm.urdf"))
+    assert subjects(report) == []
+    assert [each.kind for each in report.skipped] == ["accepted"]
+
+
+def test_baseline_reports_recorded_finding_that_was_fixed(robot, file, monkeypatch):
+    baseline = record(file, check(robot("a", "b", "c")))
+    monkeypatch.chdir(file.parent)
+    report = baseline.accept(check(robot("b")))
+    assert unused(report) == ["no longer needed in robots.baseline.json: a, c"]
+    assert unused(baseline.accept(check(robot("b"), "XML"))) == []  # INR002 did not run
+    assert unused(baseline.accept(check(robot("a", "b", "c")))) == []
+
+
+def test_baseline_reports_more_findings_of_a_subject_than_recorded(robot, file):
+    baseline = record(file, check(robot("a")))
+    report = baseline.accept(check(robot("a", "a")))
+    assert subjects(report) == ["a", "a"]
+    assert unused(record(file, report).accept(check(robot("a")))) != []
+
+
+def test_baseline_leaves_notes(file, robot):
+    report = check_robot(robot())
+    assert "note" in {finding.severity for finding in report.findings}
+    accepted = record(file, report).accept(report)
+    assert {finding.severity for finding in accepted.findings} == {"note"}
+    assert accepted.verdict == "pass"
+
+
+def test_baseline_update_keeps_what_was_not_checked(robot, file):
+    first, second = robot("a", name="1.urdf"), robot("b", name="2.urdf")
+    record(file, check(first), check(second))
+    assert record(file, check(robot(name="1.urdf"))).robots == {"robots/2.urdf": {"INR002": ["b"]}}
+    assert record(file, check(second, "XML")).robots == {"robots/2.urdf": {"INR002": ["b"]}}
+    second.unlink()
+    assert record(file).robots == {}
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_every_format_hides_accepted_findings(robot, file, format):  # noqa: A002
+    report = check(robot("a"))
+    text = to_text([record(file, report).accept(report)], format)
+    if format == "sarif":
+        (result,) = json.loads(text)["runs"][0]["results"]
+        assert [each["kind"] for each in result["suppressions"]] == ["external"]
+    else:
+        assert "mass is" not in text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "{}",
+        "\udcff",
+        "[" * 100_000,
+        '{"version": 1}',
+        '{"version": 2, "robots": {}}',
+        '{"version": 1, "robots": {"a": ["INR002"]}}',
+        '{"version": 1, "robots": {"a": {"INR002": "b"}}}',
+        '{"version": 1, "robots": {"a": {"INR002": [1]}}}',
+        '{"version": 1, "robots": {}, "deep": ' + "[" * 100_000,
+    ],
+    ids=lambda text: text[:40],
+)
+def test_malformed_baseline_is_rejected(file, text):
+    file.write_text(text, errors="surrogateescape")
+    with pytest.raises(
+        TerrainkitError, match=r"expected a file written by --write-baseline"
+    ) as error:
+        Baseline.read(file)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 300

@@ -1,0 +1,286 @@
+"""The files that code hosts and pre-commit read, and docs/ci.md."""
+
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from terrainkit_cli.main import main
+from terrainkit_cli.robot_commands import CheckRobot
+
+ROOT = Path(__file__).parent.parent
+WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
+ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
+HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+
+ROBOT = """<robot name="{name}">
+  <link name="trunk">
+    <inertial>
+      <mass value="{mass}"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
+  </link>
+</robot>
+"""
+
+
+def steps(workflow):
+    jobs = yaml.safe_load(workflow.read_text())["jobs"]
+    return [step for job in jobs.values() for step in job["steps"]]
+
+
+# Workflows.
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
+def test_workflow_runs_scripts_that_exist(workflow):
+    commands = "\n".join(step.get("run", "") for step in steps(workflow))
+    scripts = re.findall(r"^\.ci/\S+", commands, re.MULTILINE)
+    assert scripts
+    for script in scripts:
+        assert os.access(ROOT / script, os.X_OK), script
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.name)
+def test_workflow_has_least_permissions(workflow):
+    document = yaml.safe_load(workflow.read_text())
+    assert document["permissions"] == {"contents": "read"}
+    jobs = document["jobs"].items()
+    granted = {name: job["permissions"] for name, job in jobs if "permissions" in job}
+    assert granted in ({}, {"publish": {"id-token": "write"}})
+    for step in steps(workflow):
+        assert re.fullmatch(
+            r"\./|[\w./-]+@(v\d+|release/v\d+|[0-9a-f]{40})", step.get("uses", "./")
+        )
+
+
+def test_workflow_has_declared_python_versions():
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    matrix = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())
+    versions = matrix["jobs"]["tests"]["strategy"]["matrix"]["python-version"]
+    prefix = "Programming Language :: Python :: "
+    declared = {c.removeprefix(prefix) for c in project["classifiers"] if c.startswith(prefix)}
+    assert declared - {"3"} <= set(versions)
+
+
+@pytest.mark.parametrize("script", sorted((ROOT / ".ci").glob("[!.]*")), ids=lambda path: path.name)
+def test_script_is_valid_bash(script):
+    if script.suffix != ".cjs":
+        subprocess.run(["bash", "-n", script], check=True)
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / ".github/ISSUE_TEMPLATE").glob("[!c]*.yml")), ids=lambda path: path.name
+)
+def test_issue_form_has_fields(path):
+    form = yaml.safe_load(path.read_text())
+    assert form["name"]
+    assert form["description"]
+    fields = [field for field in form["body"] if field["type"] != "markdown"]
+    assert len({field["id"] for field in fields}) == len(fields)
+    assert all(field["attributes"]["label"] for field in fields)
+
+
+# The hook of pre-commit.
+
+
+def test_hook_is_a_command_of_this_package():
+    (hook,) = HOOKS
+    assert hook["entry"] == "terrainkit check-robot --changed"
+    assert "changed" in CheckRobot.__dataclass_fields__
+    for name in ("a.urdf", "b/c.urdf.xacro", "scene.xml", "hull.STL"):
+        assert re.search(hook["files"], name), name
+    for name in ("urdf/notes.md", "a.xmlx"):
+        assert not re.search(hook["files"], name), name
+
+
+# The action.
+
+
+@pytest.fixture
+def repository(tmp_path):
+    """Return a repository whose HEAD is the merge of a pull request that changes one robot."""
+    folder = tmp_path / "repository"
+    (folder / "robots").mkdir(parents=True)
+
+    def git(*words):
+        identity = ("-c", "user.name=a", "-c", "user.email=a@localhost")
+        subprocess.run(["git", *identity, *words], cwd=folder, check=True, capture_output=True)
+
+    git("init", "--initial-branch", "main")
+    for name, mass in {"old bad": -1, "new": 1, "good": 1}.items():
+        (folder / "robots" / f"{name}.urdf").write_text(ROBOT.format(name=name[:3], mass=mass))
+    git("add", ".")
+    git("commit", "--message", "first")
+    git("switch", "--create", "feature")
+    (folder / "robots/new.urdf").write_text(ROBOT.format(name="new", mass=-3))
+    git("commit", "--all", "--message", "second")
+    git("switch", "main")
+    git("merge", "--no-ff", "feature")
+    return folder
+
+
+@pytest.fixture
+def act(repository, tmp_path):
+    """Run the step `check` as a runner does; return the process and the outputs of the step."""
+    (step,) = (step for step in ACTION["runs"]["steps"] if step.get("id") == "check")
+    output = tmp_path / "output"
+
+    def run(event="pull_request", **inputs):
+        values = {name: each["default"] for name, each in ACTION["inputs"].items()} | inputs
+        words = {
+            name: re.fullmatch(r"\$\{\{ inputs\.([\w-]+) \}\}", text)[1]
+            for name, text in step["env"].items()
+        }
+        environment = os.environ | {name: values[word] for name, word in words.items()}
+        environment |= {
+            "GITHUB_ACTION_PATH": str(ROOT),
+            "GITHUB_EVENT_NAME": event,
+            "GITHUB_OUTPUT": str(output),
+            "RUNNER_TEMP": str(tmp_path),
+            "PATH": PATH,
+        }
+        output.write_text("")
+        done = subprocess.run(
+            ["bash", "-e", "-o", "pipefail", "-c", step["run"]],
+            cwd=repository,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=120,
+            check=False,
+        )
+        return done, dict(line.split("=", 1) for line in output.read_text().splitlines())
+
+    return run
+
+
+def results(outputs):
+    (run,) = json.loads(Path(outputs["sarif-file"]).read_text())["runs"]
+    return [
+        (result["ruleId"], result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"])
+        for result in run["results"]
+    ]
+
+
+def test_action_checks_changed_robots(act):
+    done, outputs = act(args="--select INR002")
+    assert done.returncode == 1, done.stderr
+    assert "\nerror INR002 negative-mass\n" in done.stdout
+    assert results(outputs) == [("INR002", "robots/new.urdf")]
+
+
+def test_action_checks_all_robots_on_push(act):
+    done, outputs = act("push", args="--select INR002")
+    assert done.returncode == 1
+    assert results(outputs) == [("INR002", "robots/new.urdf"), ("INR002", "robots/old%20bad.urdf")]
+
+
+def test_action_checks_all_robots_of_a_shallow_checkout(act, repository):
+    (repository / ".git/shallow").write_text((repository / ".git/refs/heads/main").read_text())
+    done, outputs = act(args="--select INR002")
+    assert "Checking all robots." in done.stdout
+    assert len(results(outputs)) == 2
+
+
+def test_action_accepts_baseline_and_quoted_options(act, repository):
+    baseline = {"version": 1, "robots": {"robots/new.urdf": {"INR002": ["trunk"]}}}
+    (repository / "robots.baseline.json").write_text(json.dumps(baseline))
+    options = "--select INR002,DYN --ignore 'DYN=too slow'"
+    done, outputs = act(baseline="robots.baseline.json", args=options)
+    assert done.returncode == 0, done.stderr
+    assert "accepted in robots.baseline.json" in done.stdout
+    assert "ignored: too slow" in done.stdout
+    assert results(outputs) == []
+
+
+def test_action_without_upload_prints_annotations(act):
+    done, outputs = act(**{"upload-sarif": "false", "args": "--select INR002"})
+    assert (done.returncode, outputs) == (1, {})
+    assert "::error file=robots/new.urdf,line=3,title=INR002 negative-mass::" in done.stdout
+
+
+def test_action_without_robots_succeeds(act):
+    done, outputs = act("push", paths="'robots/good.urdf' ':!robots'")
+    assert (done.returncode, outputs) == (0, {})
+    assert done.stdout.endswith("No files.\n")
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ({"args": "--selekt INR002"}, "no option --selekt"),
+        ({"args": "--ignore INR002=don't"}, "unmatched single quote"),
+        ({"paths": ":(unknown)"}, "Invalid pathspec magic"),
+        ({"baseline": "none.json"}, "there is no file none.json"),
+    ],
+)
+def test_action_reports_invalid_inputs(act, inputs, message):
+    done, outputs = act(**inputs)
+    assert done.returncode > 0
+    assert outputs == {}
+    assert message in done.stderr
+
+
+# docs/ci.md.
+
+PAGE = (ROOT / "docs/ci.md").read_text()
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+
+
+def test_page_shows_hook_action_and_job():
+    hook, workflow, job = map(yaml.safe_load, blocks("yaml"))
+    assert [each["id"] for each in hook["repos"][0]["hooks"]] == [each["id"] for each in HOOKS]
+    (step,) = (s for s in workflow["jobs"]["check-robot"]["steps"] if "terrainkit" in s["uses"])
+    assert set(step["with"]) <= set(ACTION["inputs"])
+    assert len(job["check-robot"]["script"]) == 2
+
+
+def test_page_lists_inputs_of_action():
+    listed = re.findall(r"^\| `([\w-]+)` \| (?:`(.*?)`)? ?\|", PAGE, re.MULTILINE)
+    assert dict(listed) == {name: each["default"] for name, each in ACTION["inputs"].items()}
+
+
+def test_page_baseline_commands_write_the_example(repository, monkeypatch, capsys):
+    monkeypatch.chdir(repository)
+    for path in Path("robots").iterdir():
+        path.unlink()
+    Path("robots/arm.urdf").write_text(
+        ROBOT.format(name="arm", mass=-1).replace("trunk", "upper_link")
+    )
+    (commands,), (example,) = blocks("sh"), blocks("json")
+    for line in commands.splitlines():
+        words = shlex.split(line.replace("robots/*.urdf", "robots/arm.urdf"))
+        assert main(words[1:]) == 0
+    assert "1 finding accepted in robots.baseline.json" in capsys.readouterr().out
+    assert json.loads(Path("robots.baseline.json").read_text()) == json.loads(example)
+    assert Path("robots.baseline.json").read_text() == example
+
+
+def test_page_job_of_gitlab_checks_changed_robots(repository):
+    job = yaml.safe_load(blocks("yaml")[2])["check-robot"]
+    (repository / "robots.baseline.json").write_text('{"version": 1, "robots": {}}')
+    done = subprocess.run(
+        ["bash", "-ec", "\n".join(job["script"])],
+        cwd=repository,
+        env=os.environ | {"CI_MERGE_REQUEST_DIFF_BASE_SHA": "HEAD^1", "PATH": PATH},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 123, done.stderr  # xargs, of the exit code 1
+    assert done.stdout.startswith("robots/new.urdf\n")
