@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from terrainkit_cli.parse import Command
 
 COMMAND_GROUPS = {
+    "Start here": {
+        "demo": "view_command",
+    },
     "Terrain": {
         "generate": "generate_command",
         "import": "import_command",

@@ -9,19 +9,18 @@ _PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "mujoco.batch")
 """Packages that training imports; MuJoCo has `batch` since version 3.17."""
 
 
-def require_training(*packages: str) -> None:
+def require_training(*packages: str, extra: str = "train") -> None:
     """Check that the packages of training are installed, without importing them.
 
     Args:
         *packages: Further packages of the extra that the command needs.
+        extra: The extra that has all of the packages.
 
     Raises:
         ConfigError: if a package is missing.
     """
     missing = [name for name in (*_PACKAGES, *packages) if importlib.util.find_spec(name) is None]
     if missing:
-        raise ConfigError(
-            f"missing packages: {', '.join(missing)}; run: pip install 'terrainkit[train]'"
-        )
+        raise ConfigError(f"missing packages: {', '.join(missing)}; run: pip install '.[{extra}]'")
     # Busy-waiting threads of torch slow the physics down. torch reads this when it is imported.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -1,7 +1,12 @@
-"""The command that shows maps, robots and policies in the browser."""
+"""The commands that show maps, robots and policies in the browser."""
 
+import importlib.util
+import os
 import socket
+import sys
+import threading
 import time
+import webbrowser
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -24,9 +29,13 @@ from terrainkit_cli.argument_types import (
 )
 from terrainkit_cli.parse import Command, positional
 from terrainkit_cli.signals import Terminated
+from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
     import viser
+
+DEMO_POLICY = "quadruped_map"
+"""The bundled policy that the demo shows."""
 
 Kind = Literal["map", "robot", "run"]
 
@@ -40,7 +49,76 @@ OPTION_KINDS: dict[str, Kind] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class View(Command):
+class ViewerCommand(Command):
+    """A command that serves a scene to browsers."""
+
+    host: str = "localhost"
+    """Name or address that the server listens on; 0.0.0.0 is reachable from other machines, at the
+    name and the addresses of this one."""
+
+    port: Annotated[int, Meta(ge=1, le=65535)] = 8080
+    """Port that the server listens on; the next free one if it is in use."""
+
+    def serve(self, show: "Show", title: str, *, browser: bool = False) -> int:
+        """Serve a scene until the command is interrupted.
+
+        Args:
+            show: The function that fills the scene.
+            title: What the scene shows, for the message with the address.
+            browser: Whether to open the page.
+        """
+        from terrainkit.views.viewer_server import viewer_server
+
+        with viewer_server(self.host, self.port) as server:
+            with render.steps() as steps:
+                steps.update(f"loading {title}")
+                run = show(server)
+            host = f"[{self.host}]" if ":" in self.host else self.host
+            address = f"http://{host}:{server.get_port()}"
+            with suppress(KeyboardInterrupt, Terminated):
+                render.result(f"{address} shows {title}; Ctrl+C ends it")
+                if browser:
+                    open_page(address)
+                run()
+        return 0
+
+    def check_address(self) -> None:
+        """Check that the server can listen on the host: viser would wait forever.
+
+        Raises:
+            ConfigError: if it cannot.
+        """
+        try:
+            family, kind, *_, address = socket.getaddrinfo(self.host, 0, type=socket.SOCK_STREAM)[0]
+            with socket.socket(family, kind) as trial:
+                trial.bind(address)
+        except OSError as error:
+            raise ConfigError(
+                f"--host: got {self.host}, which is not an address of this machine "
+                f"({error.strerror}); expected localhost or 0.0.0.0"
+            ) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demo(ViewerCommand):
+    """Walk the bundled quadruped over a map, live in the browser.
+
+    The policy walks in MuJoCo over the map that it was trained on. Sliders set its commands, the
+    level and the terrain. Without a display, the command prints the address only.
+    """
+
+    browser: bool = True
+    """Open the page in the browser."""
+
+    def run(self) -> int:
+        """Serve the view of the policy until the command is interrupted."""
+        require_training("viser", "websockets", extra="demo")
+        self.check_address()
+        return self.serve(open_policy(DEMO_POLICY), "the walking quadruped", browser=self.browser)
+
+
+@dataclass(frozen=True, kw_only=True)
+class View(ViewerCommand):
     """Show a map, a robot or a policy in the browser, in 3D.
 
     A robot has sliders for its joints and a list of the findings of check-robot. A policy walks
@@ -72,24 +150,13 @@ class View(Command):
     xacro_arg: XacroArguments = ()
     """For a robot: value of a xacro argument of the file."""
 
-    host: str = "localhost"
-    """Name or address that the server listens on; 0.0.0.0 is reachable from other machines, at the
-    name and the addresses of this one."""
-
-    port: Annotated[int, Meta(ge=1, le=65535)] = 8080
-    """Port that the server listens on; the next free one if it is in use."""
-
     def run(self) -> int:
         """Serve the view until the command is interrupted."""
         if not self.source:
             raise ConfigError("MAP.npz, ROBOT or RUN: missing; expected a map, a robot or a run")
-        try:
-            from terrainkit.views.viewer_server import viewer_server
-        except ModuleNotFoundError:
-            raise ConfigError(
-                "view requires viser; install it with: pip install terrainkit[view]"
-            ) from None
-        self._check_address()
+        if importlib.util.find_spec("viser") is None:
+            raise ConfigError("view requires viser; install it with: pip install '.[view]'")
+        self.check_address()
         kind = source_kind(self.source, policy=self.policy)
         for name, expected in OPTION_KINDS.items():
             if getattr(self, name) != getattr(type(self), name) and kind != expected:
@@ -98,25 +165,7 @@ class View(Command):
                     f"--{option}: got the {kind} {self.source}; expected a {expected}"
                 )
         show = {"map": self._load_map, "robot": self._check_robot, "run": self._open_run}[kind]()
-        with viewer_server(self.host, self.port) as server:
-            run = show(server)
-            host = f"[{self.host}]" if ":" in self.host else self.host
-            address = f"http://{host}:{server.get_port()}"
-            with suppress(KeyboardInterrupt, Terminated):
-                render.result(f"{address} shows {self.source}; Ctrl+C ends it")
-                run()
-        return 0
-
-    def _check_address(self) -> None:
-        try:  # viser would wait forever for a server that cannot listen
-            family, kind, *_, address = socket.getaddrinfo(self.host, 0, type=socket.SOCK_STREAM)[0]
-            with socket.socket(family, kind) as trial:
-                trial.bind(address)
-        except OSError as error:
-            raise ConfigError(
-                f"--host: got {self.host}, which is not an address of this machine "
-                f"({error.strerror}); expected localhost or 0.0.0.0"
-            ) from None
+        return self.serve(show, self.source)
 
     def _load_map(self) -> "Show":
         from terrainkit.views.viewer import show_map
@@ -154,18 +203,34 @@ class View(Command):
         return show
 
     def _open_run(self) -> "Show":
-        from terrainkit_cli.training_extra import require_training
-
         require_training()
-        from terrainkit_robots.rl.run import open_run
-        from terrainkit_robots.viewer.show_policy import PolicyView
-
-        run = open_run(self.source, self.checkpoint)
-        return lambda server: PolicyView(server, run, self.terrain or None).run
+        return open_policy(self.source, self.checkpoint, self.terrain or None)
 
 
 Show = Callable[["viser.ViserServer"], Callable[[], None]]
 """A function that fills the scene, and returns a function that runs until a signal ends it."""
+
+
+def open_policy(source: str, checkpoint: int | None = None, terrain: str | None = None) -> "Show":
+    """Return the function that shows a policy; see `View` for the arguments.
+
+    Raises:
+        ConfigError: if there is no such run or checkpoint.
+    """
+    from terrainkit_robots.rl.run import open_run
+    from terrainkit_robots.viewer.show_policy import PolicyView
+
+    run = open_run(source, checkpoint)
+    return lambda server: PolicyView(server, run, terrain).run
+
+
+def open_page(address: str) -> None:
+    """Open a page in the browser of the user, if there is a display."""
+    names = ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY")
+    # Without a display, a browser for the terminal would take the terminal over.
+    if sys.platform != "linux" or any(map(os.environ.get, names)):
+        # Some browsers return only when they are closed.
+        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
 
 
 def wait() -> None:

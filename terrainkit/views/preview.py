@@ -15,6 +15,7 @@ from terrainkit.export.requirements import require_finite
 from terrainkit.files.atomic_write import atomic_write
 
 if TYPE_CHECKING:
+    from terrainkit.map.config import MapConfig
     from terrainkit.map.terrain_map import TerrainMap
 
 Picture = NDArray[np.uint8]
@@ -48,8 +49,11 @@ MAX_PIXELS = 10_000
 _LABEL_HEIGHT, _LABEL_WIDTH = 18, 80
 """Size of a label [px]; where patches are smaller, only some are labeled."""
 
-_LIGHT = np.array([-0.55, 0.45, 0.7])
+LIGHT = np.array([-0.55, 0.45, 0.7])
 """Direction of the light: the upper left, as is usual for shaded maps."""
+
+MIN_SHADE, MAX_SHADE = 0.35, 1.25
+"""Range of the brightness of slopes; level ground has 1."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -150,11 +154,11 @@ def shaded_relief(heights: NDArray[np.float32], cell: float) -> Picture:
     padded = np.pad(heights, 1, mode="edge")
     slope_x = (padded[2:, 1:-1] - padded[:-2, 1:-1]) / (2 * cell)
     slope_y = (padded[1:-1, 2:] - padded[1:-1, :-2]) / (2 * cell)
-    light = _LIGHT / np.linalg.norm(_LIGHT)
+    light = LIGHT / np.linalg.norm(LIGHT)
     steepness = np.sqrt(slope_x**2 + slope_y**2 + 1)
     shade = (light[2] - light[0] * slope_x - light[1] * slope_y) / steepness / light[2]
     relief: Picture = np.clip(
-        height_colors(heights) * np.clip(shade, 0.35, 1.25)[..., None], 0, 255
+        height_colors(heights) * np.clip(shade, MIN_SHADE, MAX_SHADE)[..., None], 0, 255
     ).astype(np.uint8)
     return relief
 
@@ -171,6 +175,13 @@ def height_colors(heights: NDArray[np.floating]) -> NDArray[np.float64]:
     levels = [level for level, _ in _COLORS]
     channels = zip(*(color for _, color in _COLORS), strict=True)
     return np.stack([np.interp(heights, levels, channel) for channel in channels], axis=-1)
+
+
+def map_title(config: "MapConfig") -> str:
+    """Return the title of the pictures of a map."""
+    size_x, size_y = config.patch_size
+    patches = f"{config.rows} x {config.cols} patches of {size_x:g} m x {size_y:g} m"
+    return f"{patches}, seed {config.seed}"
 
 
 def _without_border(
@@ -276,8 +287,7 @@ def _draw_labels(
         write(f"{row}: d {level}", (x - 36, image.shape[0] - _MARGIN[1] + 24))
     write("columns (y): terrain", (10, _MARGIN[3] - 14))
     write("rows (x): difficulty", (10, image.shape[0] - _MARGIN[1] + 24))
-    title = f"{rows} x {cols} patches of {size_x:g} m x {size_y:g} m, seed {config.seed}"
-    write(title, (_MARGIN[0], 40), 0.7)
+    write(map_title(config), (_MARGIN[0], 40), 0.7)
     radius = max(2, round(scale * config.spawn_radius))
     for origin in terrain_map.env_origins.reshape(-1, 3).tolist():
         cv2.circle(image, pixel(*origin[:2]), radius, _BACKGROUND, 3, cv2.LINE_AA)

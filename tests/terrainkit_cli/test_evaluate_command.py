@@ -180,7 +180,7 @@ def test_evaluate_names_the_missing_extra(here, monkeypatch):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
     code, _, err = here("walk")
     assert code == 2
-    assert "pip install 'terrainkit[train]'" in one_line(err)
+    assert "pip install '.[train]'" in one_line(err)
 
 
 def test_evaluate_json_is_clean_in_a_terminal(here, monkeypatch):

@@ -58,7 +58,7 @@ def test_play_names_the_missing_extra(here, monkeypatch):
     )
     code, out, err = here("walk", *QUICK)
     assert (code, out) == (2, "")
-    assert "missing packages: imageio_ffmpeg; run: pip install 'terrainkit[train]'" in err
+    assert "missing packages: imageio_ffmpeg; run: pip install '.[train]'" in err
     assert here("walk", *QUICK, "--no-video")[0] == 0
 
 

@@ -171,7 +171,7 @@ def test_smoke_test_names_missing_extra(here, monkeypatch):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("no_such_package",))
     run = here("quadruped")
     assert run.returncode == 2
-    assert "missing packages: no_such_package; run: pip install 'terrainkit[train]'" in run.stderr
+    assert "missing packages: no_such_package; run: pip install '.[train]'" in run.stderr
 
 
 def test_check_robot_has_no_train_smoke_option(run_main):

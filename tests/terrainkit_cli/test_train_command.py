@@ -207,7 +207,7 @@ def test_train_rejects_invalid_map(train, tmp_path, capsys, make, message):
 def test_train_names_missing_extra(train, capsys, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
     assert train("quadruped") == 2
-    assert "pip install 'terrainkit[train]'" in capsys.readouterr().err
+    assert "pip install '.[train]'" in capsys.readouterr().err
 
 
 def test_train_works_without_video_packages(monkeypatch):

@@ -1,3 +1,5 @@
+import contextlib
+import os
 import re
 import signal
 import socket
@@ -7,10 +9,12 @@ from urllib.request import urlopen
 
 import pytest
 import viser
+from websockets.sync.client import connect
 
 import terrainkit as tk
 from terrainkit_robots.description import bundled
 
+DISPLAYS = "BROWSER", "DISPLAY", "WAYLAND_DISPLAY"
 IPV6 = pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="there is no IPv6")
 
 
@@ -20,29 +24,78 @@ def map_file(tmp_path):
     return tk.generate(config).save(tmp_path / "map.npz")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("host", ["localhost", pytest.param("::1", marks=IPV6)])
-def test_view_serves_until_it_is_ended(map_file, host, number):
+@contextlib.contextmanager
+def started(*words):
+    """Start a command that serves a page, and yield it with the address that it prints."""
     with socket.create_server(("localhost", 0)) as free:  # other tests may start at port 8080
         port = str(free.getsockname()[1])
-    options = "--host", host, "--port", port
     with subprocess.Popen(
-        [sys.executable, "-m", "terrainkit_cli.main", "view", map_file, *options],
+        [sys.executable, "-m", "terrainkit_cli.main", *words, "--port", port],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        env={name: value for name, value in os.environ.items() if name not in DISPLAYS},
     ) as run:
         try:
             line = run.stdout.readline()
-            address = re.match(r"http://(localhost|\[::1\]):\d+(?= shows .*map\.npz)", line)
+            address = re.match(
+                r"http://(localhost|\[::1\]):\d+(?= shows .*; Ctrl\+C ends it\n)", line
+            )
             assert address, line
-            with urlopen(address.group(), timeout=10) as response:
-                assert response.status == 200
-            run.send_signal(number)
-            assert run.communicate(timeout=30) == ("", "")
+            yield run, address.group()
         finally:
             run.kill()
     assert run.returncode == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("host", ["localhost", pytest.param("::1", marks=IPV6)])
+def test_view_serves_until_it_is_ended(map_file, host, number):
+    with started("view", map_file, "--host", host) as (run, address):
+        with urlopen(address, timeout=10) as response:
+            assert response.status == 200
+        run.send_signal(number)
+        assert run.communicate(timeout=30) == ("", "")
+
+
+def test_demo_walks_until_it_is_ended():
+    with started("demo") as (run, address):
+        protocol = f"viser-v{viser.__version__}"
+        page = connect(address.replace("http", "ws"), subprotocols=[protocol], max_size=None)
+        with page as client:
+            for _ in range(50):  # a scene at rest sends fewer messages
+                assert client.recv(timeout=30)
+        run.terminate()
+        assert run.communicate(timeout=30) == ("", "")
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Addresses of the pages that the demo opened; serving ends at once."""
+    pages = []
+    monkeypatch.setattr("webbrowser.open", pages.append)
+    monkeypatch.setattr("terrainkit_robots.viewer.show_policy.PolicyView.run", lambda _: None)
+    for name in DISPLAYS:
+        monkeypatch.delenv(name, raising=False)
+    return pages
+
+
+def test_demo_opens_the_page_only_on_a_display(terrainkit, opened, monkeypatch):
+    monkeypatch.setattr("sys.platform", "linux")
+    assert terrainkit("demo").returncode == 0
+    assert opened == []
+    monkeypatch.setenv("DISPLAY", ":0")
+    assert terrainkit("demo", "--no-browser").returncode == 0
+    assert opened == []
+    run = terrainkit("demo")
+    assert [run.stdout.partition(" shows ")[0]] == opened
+
+
+def test_demo_without_its_packages_names_the_extra(terrainkit, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    run = terrainkit("demo")
+    assert run.returncode == 2
+    assert run.stderr == "terrainkit: error: missing packages: viser; run: pip install '.[demo]'\n"
 
 
 @pytest.mark.parametrize(
@@ -79,7 +132,7 @@ def test_view_without_viser_names_the_extra(terrainkit, monkeypatch):
     monkeypatch.delitem(sys.modules, "terrainkit.views.viewer_server", raising=False)
     run = terrainkit("view", "map.npz")
     assert run.returncode == 2
-    assert "pip install terrainkit[view]" in run.stderr
+    assert "pip install '.[view]'" in run.stderr
 
 
 @pytest.fixture

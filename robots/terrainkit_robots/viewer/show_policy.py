@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.views.viewer import show_map
+from terrainkit.views.viewer import FIELD_OF_VIEW, show_map
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.policy.evaluate import EvaluationConfig, rollout
@@ -24,7 +24,7 @@ _MAX_SECONDS = 3600.0
 _FRAME_TIME = 0.04
 """Least time between two poses that are sent to the browser [s]."""
 
-_CAMERA_OFFSET = np.array([2.0, -2.0, 1.0])
+_CAMERA_OFFSET = np.array([-1.5, -2.5, 1.5])
 """Position of the camera relative to the robot [m]."""
 
 
@@ -51,17 +51,21 @@ class PolicyView:
         self._server = server
         ground = self.env.terrain
         if isinstance(ground, MapGround):
-            show_map(server, ground.terrain_map)
+            self.ground: viser.SceneNodeHandle = show_map(server, ground.terrain_map)
         else:
             server.scene.set_up_direction("+z")
-            server.scene.add_grid("/ground", infinite_grid=True, cell_size=0.5, section_size=5.0)
+            self.ground = server.scene.add_grid(
+                "/map", infinite_grid=True, cell_size=0.5, section_size=5.0
+            )
         self.robot = RobotScene(server, Facts(load_robot(run.robot.mjcf)))
         model = self.env.scene.model
         self._addresses = {
             joint.name: int(model.joint(joint.name).qposadr[0]) for joint in self.robot.facts.joints
         }
         self._add_controls(server.gui)
+        self._anchor = self.env.sim.qpos[0, :3].copy()  # of the robot in the scene, if followed
         self.update_robot()
+        server.initial_camera.fov = FIELD_OF_VIEW
         server.initial_camera.look_at = self.robot.base.position
         server.initial_camera.position = self.robot.base.position + _CAMERA_OFFSET
 
@@ -79,10 +83,14 @@ class PolicyView:
 
         self.paused = gui.add_checkbox("pause", initial_value=False)
         self.follow = gui.add_checkbox("follow the robot", initial_value=True)
+        self.follow.on_update(self._move_to_view)
         levels, columns = terrain.terrain_names.shape
         self.level = gui.add_slider("level", 0, max(levels - 1, 1), 1, 0, visible=levels > 1)
         options = [f"{k}: {name}" for k, name in enumerate(terrain.terrain_names[0].tolist())]
-        self.column = gui.add_dropdown("terrain", options, visible=columns > 1)
+        middle = options[columns // 2]  # far from the sides of the map
+        self.column = gui.add_dropdown(
+            "terrain", options, initial_value=middle, visible=columns > 1
+        )
         self.reset_button = gui.add_button("reset")
         self.falls = gui.add_text("falls", "0", disabled=True)
         # Callbacks run in other threads, so they only leave a request for the next step.
@@ -94,6 +102,11 @@ class PolicyView:
     def request_reset(self) -> None:
         """Reset the robot before its next step, to the selected patch."""
         self._reset_requested = True
+
+    def _move_to_view(self, event: "viser.GuiEvent[Any]") -> None:
+        """Show the robot from now on where the page looks at that requests to follow it."""
+        if event.client is not None:
+            self._anchor = event.client.camera.look_at.copy()
 
     def run(self) -> None:
         """Step in real time, and never return."""
@@ -127,13 +140,14 @@ class PolicyView:
                 self.falls.value = str(int(self.falls.value) + 1)
 
     def update_robot(self) -> None:
-        """Send the pose of the robot to the browser, and move the cameras with it."""
+        """Send the pose of the robot to the browser.
+
+        While pages follow the robot, the ground moves instead of the cameras. A page reports its
+        camera late, so a camera that both the server and the user move would jump back and forth.
+        """
         qpos = self.env.sim.qpos[0]
-        moved = qpos[:3] - self.robot.base.position
         with self._server.atomic():
-            self.robot.set_base(qpos[:3].copy(), qpos[3:7].copy())
+            if self.follow.value:
+                self.ground.position = self._anchor - qpos[:3]
+            self.robot.set_base(qpos[:3] + self.ground.position, qpos[3:7].copy())
             self.robot.set_positions({name: qpos[k] for name, k in self._addresses.items()})
-        if self.follow.value and moved.any():
-            for client in self._server.get_clients().values():
-                # Moving the position moves the point that the camera looks at, too.
-                client.camera.position = client.camera.position + moved

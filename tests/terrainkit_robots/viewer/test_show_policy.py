@@ -1,4 +1,5 @@
 import math
+from collections import deque
 
 import mujoco
 import numpy as np
@@ -32,7 +33,8 @@ def test_robot_of_scene_has_the_pose_of_the_simulation(view):
         view.step()
     view.update_robot()
     model, qpos = view.env.scene.model, view.env.sim.qpos[0]
-    np.testing.assert_allclose(view.robot.base.position, qpos[:3], atol=1e-6)
+    position = view.robot.base.position - view.ground.position
+    np.testing.assert_allclose(position, qpos[:3], atol=1e-6)
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
@@ -57,7 +59,7 @@ def test_pause_and_reset(shown, view):
 
 def test_map_policy_is_reset_to_the_selected_patch(server, shown):
     view = PolicyView(server, open_run("quadruped_map"))
-    assert "/ground" in shown
+    assert "/map/ground" in shown
     terrain = view.env.terrain
     levels, columns = terrain.terrain_names.shape
     shown["level"].value = levels - 1
@@ -89,8 +91,60 @@ def test_invalid_messages_of_a_browser_do_not_end_the_view(server, view):
         for _ in range(5):
             view.step()
             view.update_robot()
-        (browser,) = server.get_clients().values()
-        moved = view.robot.base.position[0]
-        assert browser.camera.position[0] == pytest.approx(CAMERA["position"][0] + moved, abs=0.1)
     assert view.falls.value == "0"
     assert np.isfinite(view.env.sim.qpos).all()
+
+
+def test_robot_stays_in_view_of_a_page_that_reports_its_camera_late(server, view):
+    view.commands[0].value = 1.0
+    with connect_to(server) as client:
+        send(client, CAMERA)
+        wait_for(server.get_clients)
+        (page,) = server.get_clients().values()
+        reports = deque(maxlen=10)
+        for _ in range(100):  # 2 s
+            view.step()
+            view.update_robot()
+            camera = {"position": page.camera.position, "look_at": page.camera.look_at}
+            reports.append(CAMERA | {name: each.tolist() for name, each in camera.items()})
+            send(client, reports[0])
+        assert view.env.sim.qpos[0, 0] > 1.0
+        distance = np.linalg.norm(page.camera.position - view.robot.base.position)
+        assert distance == pytest.approx(math.hypot(3.0, 1.5), abs=0.3)
+
+
+def test_page_keeps_the_camera_that_its_user_chose(server, view):
+    with connect_to(server) as client:
+        send(client, CAMERA)
+        wait_for(server.get_clients)
+        (page,) = server.get_clients().values()
+        for x in (4.0, 5.0, 6.0):
+            send(client, CAMERA | {"position": (x, 1.0, 1.0)})
+            wait_for(lambda x=x: page.camera.position[0] == x)
+            for _ in range(10):
+                view.step()
+                view.update_robot()
+            assert page.camera.position.tolist() == [x, 1.0, 1.0]
+
+
+def test_ground_moves_under_the_robot_only_while_it_is_followed(server, shown, view):
+    view.commands[0].value = 1.0
+
+    def walk():
+        for _ in range(50):
+            view.step()
+        view.update_robot()
+        scene, simulation = view.robot.base.position, view.env.sim.qpos[0, :3]
+        np.testing.assert_allclose(scene - view.ground.position, simulation, atol=1e-5)
+        return scene.copy()
+
+    start = view.robot.base.position.copy()
+    np.testing.assert_allclose(walk(), start, atol=1e-6)
+    shown["follow the robot"].value = False
+    assert walk()[0] > start[0] + 0.5
+    with connect_to(server) as client:
+        send(client, CAMERA)
+        wait_for(server.get_clients)
+        send(client, update(shown["follow the robot"], True))
+        wait_for(lambda: view.follow.value)
+        wait_for(lambda: np.allclose(walk(), CAMERA["look_at"]))
