@@ -30,7 +30,7 @@ def m(tmp_path, monkeypatch):
 
 
 def test_integrations_all_blocks_are_tested():
-    assert len(BLOCKS) == 20
+    assert len(BLOCKS) == 21
 
 
 def test_numpy_block_reads_map(m):
@@ -99,7 +99,15 @@ def test_import_block_restores_map(m):
 
 def test_gymnasium_block_runs_map(m):
     names = {}
-    exec(block("import gymnasium"), names)
+    exec(block("import gymnasium\n"), names)
     assert names["env"].env.terrain.terrain_map.grid == m.grid
     assert names["observations"].shape[0] == 16
     assert np.isfinite(names["observations"]).all()
+
+
+def test_stable_baselines3_block_trains_on_map(m):
+    pytest.importorskip("stable_baselines3")  # `make integrations` installs it
+    names = {}
+    exec(block("import PPO"), names)
+    assert names["env"].env.env.terrain.terrain_map.grid == m.grid
+    assert names["model"].num_timesteps == 64 * 24

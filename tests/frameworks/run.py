@@ -15,6 +15,7 @@ from pathlib import Path
 from pythons import find_python
 
 FOLDER = Path(__file__).parent
+GYMNASIUM = ["-e", f"{FOLDER.parents[1]}[gymnasium]"]
 PACKAGES = {
     "mjlab": [["mjlab==1.6.0"]],
     "pybullet": [["pybullet==3.2.7"]],
@@ -26,6 +27,12 @@ PACKAGES = {
     "playground": [["playground==0.2.0"], ["--no-deps", "mjlab==1.6.0"]],
     "drake": [["drake==1.51.1"]],
     "sdformat": [],
+    "sb3": [
+        GYMNASIUM,
+        ["stable-baselines3==2.9.2", "moviepy==2.2.1"],
+        ["pytest-xdist", "hypothesis"],
+    ],
+    "skrl": [GYMNASIUM, ["skrl==2.1.1"]],
     "leggedgym_ex": [
         ["torch==2.8.0", "genesis-world==0.3.14"],
         ["wandb", "tensorboard", "pandas", "xlsxwriter", "pygame", "warp-lang"],

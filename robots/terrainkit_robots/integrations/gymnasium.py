@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from terrainkit.errors import ConfigError
 from terrainkit.integrations import missing
+from terrainkit_robots.rendering.child_process import Frame
+from terrainkit_robots.rendering.pose_renderer import PoseRenderer
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.env import LeggedEnv
@@ -36,7 +39,7 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
     units for algorithms that scale their actions to the space, such as SAC.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
 
     def __init__(
         self,
@@ -44,7 +47,7 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
         *,
         terrain: str | Path = "plane",
         task: Task | None = None,
-        render_mode: None = None,
+        render_mode: str | None = None,
     ) -> None:
         """Build the simulation.
 
@@ -52,13 +55,14 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
             robot: Name of a registered task, or folder of an onboarded robot.
             terrain: `plane`, a map (.npz), or a map config (.toml).
             task: The task; by default, the registered task of the robot.
-            render_mode: Only None is supported.
+            render_mode: `rgb_array` for images by `render`, or None.
 
         Raises:
             ConfigError: If there is no such robot or terrain, or they do not fit together.
         """
         self.render_mode = render_mode
-        self.env = EpisodeEnv(robot, terrain, task, 1)
+        self.env = EpisodeEnv(robot, terrain, task, 1, render_mode)
+        self.metadata = self.metadata | {"render_fps": round(1 / self.env.cfg.dt)}
         self.observation_space, self.action_space = spaces(self.env)
 
     def reset(
@@ -75,6 +79,19 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
         terminated = bool(done[0] and not truncated[0])
         return self.env.final[0], float(reward[0]), terminated, bool(truncated[0]), {}
 
+    def render(self) -> Frame | None:
+        """Return an image of the robot, shape (360, 640, 3), or None without a render mode.
+
+        Raises:
+            RenderError: If MuJoCo cannot render on this machine.
+        """
+        frames = self.env.render(self.env.final_qpos)
+        return frames[0] if frames else None
+
+    def close(self) -> None:
+        """End the process that renders."""
+        self.env.close()
+
 
 class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArray]):
     """n robots with the task of :class:`TaskEnv`, simulated together.
@@ -84,7 +101,8 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": [],
+        "render_modes": ["rgb_array"],
+        "render_fps": 50,
         "autoreset_mode": AutoresetMode.SAME_STEP,
     }
 
@@ -95,9 +113,12 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
         num_envs: int = 1,
         terrain: str | Path = "plane",
         task: Task | None = None,
+        render_mode: str | None = None,
     ) -> None:
         """Build the simulations; see :class:`TaskEnv`."""
-        self.env, self.num_envs = EpisodeEnv(robot, terrain, task, num_envs), num_envs
+        self.render_mode, self.num_envs = render_mode, num_envs
+        self.env = EpisodeEnv(robot, terrain, task, num_envs, render_mode)
+        self.metadata = self.metadata | {"render_fps": round(1 / self.env.cfg.dt)}
         self.single_observation_space, self.single_action_space = spaces(self.env)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -118,13 +139,29 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
         infos = {"final_obs": self.env.final, "_final_obs": dones} if dones.any() else {}
         return observations, rewards, dones & ~truncated, truncated, infos
 
+    def render(self) -> tuple[Frame, ...] | None:
+        """Return an image of each robot, or None without a render mode; see :class:`TaskEnv`."""
+        return self.env.render(self.env.sim.qpos)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """End the process that renders."""
+        del kwargs
+        self.env.close()
+
 
 class EpisodeEnv(LeggedEnv):
-    """A `LeggedEnv` that keeps the last observations of episodes."""
+    """A `LeggedEnv` that keeps the last observations and poses of episodes."""
 
     def __init__(
-        self, robot: str | Path, terrain: str | Path, task: Task | None, num_envs: int
+        self,
+        robot: str | Path,
+        terrain: str | Path,
+        task: Task | None,
+        num_envs: int,
+        render_mode: str | None,
     ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ConfigError(f"render_mode: got {render_mode!r}; expected 'rgb_array' or None")
         registered = get_task(robot)
         task = task or registered.task
         task = replace(
@@ -134,7 +171,8 @@ class EpisodeEnv(LeggedEnv):
         )
         ground = load_terrain(terrain, task.terrain.collision)
         super().__init__(task, Robot.load(registered.folder), ground)
-        self.final = self.policy_observations()
+        self.final, self.final_qpos = self.policy_observations(), self.sim.qpos
+        self._renderer = PoseRenderer(self.scene.model) if render_mode else None
 
     def start(self, rng: np.random.Generator, seed: int | None) -> FloatArray:
         """Reset every environment, with new random numbers if there is a seed, and observe."""
@@ -143,6 +181,7 @@ class EpisodeEnv(LeggedEnv):
             terrain = self.cfg.terrain
             self.curriculum = TerrainCurriculum(self.terrain, self.num_envs, terrain, seed)
         self.reset()
+        self.final_qpos = self.sim.qpos
         return self.policy_observations()
 
     def policy_observations(self) -> FloatArray:
@@ -155,9 +194,10 @@ class EpisodeEnv(LeggedEnv):
     ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
         """Return observations (n, k), rewards, ended and truncated episodes (n,) of a step.
 
-        Observations are those after resets; `final` has those before.
+        Observations are those after resets; `final` has those before, and `final_qpos` the poses.
         """
         self._before_reset: FloatArray | None = None
+        self.final_qpos = self.sim.qpos
         _, rewards, dones, extras = self.step(torch.as_tensor(actions, dtype=torch.float32))
         observations, ended = self.policy_observations(), dones.numpy()
         self.final = observations.copy()
@@ -165,9 +205,18 @@ class EpisodeEnv(LeggedEnv):
             self.final[ended] = self._before_reset[ended]
         return observations, rewards.numpy(), ended, extras["time_outs"].numpy()
 
+    def render(self, poses: FloatArray) -> tuple[Frame, ...] | None:
+        """Return an image of each pose, shape (n, nq), or None without a render mode."""
+        return tuple(map(self._renderer.render, poses)) if self._renderer else None
+
+    def close(self) -> None:
+        """End the process that renders."""
+        if self._renderer:
+            self._renderer.close()
+
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
         self._compute_observations()
-        self._before_reset = self.policy_observations()
+        self._before_reset, self.final_qpos = self.policy_observations(), self.sim.qpos.copy()
         return super()._end_episodes(env_ids, state, unstable)
 
 

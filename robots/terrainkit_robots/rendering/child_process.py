@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Generator, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,17 +28,23 @@ class RenderError(TerrainkitError):
     """Rendering failed; the message gives the reason in one line."""
 
 
-def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
+def stream_frames(
+    render: Callable[..., Iterator[Frame]], inputs: Iterator[Any] | None = None
+) -> Iterator[Frame]:
     """Yield the frames that a picklable function renders in a child process.
 
     The backends of `gl_backend.backends()` are tried in order until one renders a frame.
+
+    Args:
+        render: Called without arguments, or with an iterator of the inputs.
+        inputs: Endless picklable inputs. Each frame takes the next one, when it is requested.
 
     Raises:
         RenderError: if no backend works, a frame takes too long, or `render` raises this error.
     """
     reasons: list[str] = []
     for backend in gl_backend.backends():
-        reason = yield from _run_child(render, backend)
+        reason = yield from _run_child(render, inputs, backend)
         if not reason:
             return
         reasons.append(f"{backend or 'default backend'}: {truncate(one_line(reason), 160)}")
@@ -45,19 +52,21 @@ def stream_frames(render: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
     raise RenderError(f"MuJoCo cannot render here ({'; '.join(reasons)}); {advice}")
 
 
-def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Generator[Frame, None, str]:
+def _run_child(
+    render: Callable[..., Iterator[Frame]], inputs: Iterator[Any] | None, backend: str
+) -> Generator[Frame, None, str]:
     """Yield frames, and return why the backend failed, or an empty string."""
     command = [sys.executable, "-P", "-c", f"from {__name__} import main; main({FRAME_TIMEOUT})"]
     environment, count = gl_backend.child_environment(backend), 0
     # MuJoCo may write a log into its working directory, which is therefore a temporary one.
     with tempfile.TemporaryDirectory(prefix="terrainkit-", ignore_cleanup_errors=True) as folder:
-        Path(folder, "request").write_bytes(pickle.dumps(render))
-        process = subprocess.Popen(
-            command, env=environment, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-        )
-        assert process.stdout is not None
+        Path(folder, "request").write_bytes(pickle.dumps((render, inputs is not None)))
+        pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+        if inputs is not None:
+            pipes["stdin"] = subprocess.PIPE
+        process = subprocess.Popen(command, env=environment, cwd=folder, **pipes)
         try:
-            while isinstance(message := pickle.load(process.stdout), np.ndarray):
+            while isinstance(message := _next_message(process, inputs), np.ndarray):
                 yield message
                 count += 1
         except (EOFError, pickle.UnpicklingError):
@@ -72,6 +81,25 @@ def _run_child(render: Callable[[], Iterator[Frame]], backend: str) -> Generator
     return str(message)
 
 
+def _next_message(process: Any, inputs: Iterator[Any] | None) -> Any:
+    """Send the next input, if any, and return what the child process answers."""
+    if inputs is not None:
+        with suppress(BrokenPipeError):  # a child that ended has written why
+            pickle.dump(next(inputs), process.stdin)
+            process.stdin.flush()
+    return pickle.load(process.stdout)
+
+
+def _received_inputs(timeout: float) -> Iterator[Any]:
+    """Yield the inputs from stdin, without a limit of the time until they arrive."""
+    with suppress(EOFError):
+        while True:
+            faulthandler.cancel_dump_traceback_later()
+            received = pickle.load(sys.stdin.buffer)
+            faulthandler.dump_traceback_later(timeout, exit=True)
+            yield received
+
+
 def main(timeout: float) -> None:
     """Call the pickled function, and write its frames and then an error or "" to stdout."""
     message: Any = ""
@@ -79,9 +107,9 @@ def main(timeout: float) -> None:
         os.dup2(2, 1)  # OpenGL libraries print to stdout
         faulthandler.dump_traceback_later(timeout, exit=True)
         try:
-            render = pickle.loads(Path("request").read_bytes())
+            render, has_inputs = pickle.loads(Path("request").read_bytes())
             with quiet_mujoco():
-                for frame in render():
+                for frame in render(_received_inputs(timeout)) if has_inputs else render():
                     faulthandler.cancel_dump_traceback_later()  # the reader may take its time
                     pickle.dump(frame, output)
                     output.flush()

@@ -120,9 +120,16 @@ def write_video(spec: VideoSpec, path: Path, *, overwrite: bool = False) -> Iter
 
 def video_frames(spec: VideoSpec) -> Iterator[Frame]:
     """Yield the frames of all shots of a video."""
+    distance = prepare_model(spec.model)
+    for shot in spec.shots:
+        yield from _shot_frames(spec, shot, distance)
+
+
+def prepare_model(model: Any) -> float:
+    """Adjust what a model shows, and return the distance of a camera from its robot [m]."""
     import mujoco
 
-    model, data = spec.model, mujoco.MjData(spec.model)
+    data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     is_robot = model.body_weldid[model.geom_bodyid] != 0
     away = np.linalg.norm(data.geom_xpos - data.qpos[:3], axis=1) + model.geom_rbound
@@ -132,21 +139,33 @@ def video_frames(spec: VideoSpec) -> Iterator[Frame]:
     # OpenGL adds the light of coplanar surfaces, such as the overlapping boxes of stairs.
     boxes = np.flatnonzero(~is_robot & (model.geom_type == mujoco.mjtGeom.mjGEOM_BOX))
     model.geom_pos[boxes, 2] -= 1e-4 * (np.arange(len(boxes)) % 31)
-    for shot in spec.shots:
-        yield from _shot_frames(spec, shot, distance)
+    return distance
+
+
+def visible_area(
+    targets: FloatArray, distance: float, size: tuple[int, int]
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper corner of the ground that cameras see, shape (2,) each [m].
+
+    Args:
+        targets: Points that the cameras look at [m], shape (frames, 3).
+        distance: Distance of the cameras [m].
+        size: Width and height of the frames [pixels].
+    """
+    slope = math.tan(math.radians(appearance.FIELD_OF_VIEW / 2))
+    half_width = AZIMUTH_SWING + math.degrees(math.atan(size[0] / size[1] * slope))
+    angles = np.radians(AZIMUTH + half_width * np.linspace(-1, 1, 5))
+    rays = distance * np.column_stack([np.cos(angles), np.sin(angles)])
+    view = targets[:, None, :2] + np.concatenate([-1.2 * rays, appearance.FOG_END * rays])
+    return view.min(axis=(0, 1)), view.max(axis=(0, 1))
 
 
 def _shot_frames(spec: VideoSpec, shot: Shot, distance: float) -> Iterator[Frame]:
     import mujoco
 
-    poses, (width, height) = spec.poses[: len(shot.captions)], spec.size
+    poses = spec.poses[: len(shot.captions)]
     targets = smooth_path(poses[:, shot.robot, :3], 0.4 * spec.fps)
-    slope = math.tan(math.radians(appearance.FIELD_OF_VIEW / 2))
-    half_width = AZIMUTH_SWING + math.degrees(math.atan(width / height * slope))
-    angles = np.radians(AZIMUTH + half_width * np.linspace(-1, 1, 5))
-    rays = distance * np.column_stack([np.cos(angles), np.sin(angles)])
-    view = targets[:, None, :2] + np.concatenate([-1.2 * rays, appearance.FOG_END * rays])
-    model = cut_heightfields(spec.model, view.min(axis=(0, 1)), view.max(axis=(0, 1)))
+    model = cut_heightfields(spec.model, *visible_area(targets, distance, spec.size))
     data, other_data, unchanged = mujoco.MjData(model), mujoco.MjData(model), mujoco.MjvPerturb()
     moving = mujoco.mjtCatBit.mjCAT_DYNAMIC
     with appearance.make_renderer(model, spec.size, distance) as renderer:
@@ -164,7 +183,7 @@ def _shot_frames(spec: VideoSpec, shot: Shot, distance: float) -> Iterator[Frame
                 mujoco.mj_kinematics(model, other_data)
                 mujoco.mjv_addGeoms(model, other_data, options, unchanged, moving, renderer.scene)
             frame = renderer.render()
-            appearance.add_caption(frame, caption, height / 750)
+            appearance.add_caption(frame, caption, spec.size[1] / 750)
             yield frame
 
 

@@ -11,6 +11,7 @@ from gymnasium.utils.env_checker import check_env
 import terrainkit as tk
 from terrainkit.errors import ConfigError
 from terrainkit_robots.integrations.gymnasium import TaskEnv, TaskVectorEnv
+from terrainkit_robots.rendering.child_process import RenderError
 from terrainkit_robots.rl.tasks import get_task
 
 MODULE = "terrainkit_robots.integrations.gymnasium"
@@ -34,7 +35,7 @@ def test_registered_env_passes_check(robot):
     env = gymnasium.make(f"{MODULE}:terrainkit/{robot}-v0")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        check_env(env.unwrapped)
+        check_env(env.unwrapped, skip_render_check=True)
     # The actions are those of the training, which are not normalized.
     others = [str(each.message) for each in caught if "normalized space" not in str(each.message)]
     assert not others
@@ -44,7 +45,7 @@ def test_env_on_map_passes_check(map_file):
     env = gymnasium.make(f"{MODULE}:terrainkit/quadruped-v0", terrain=map_file).unwrapped
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        check_env(env)
+        check_env(env, skip_render_check=True)
     env.reset(seed=4)
     level = env.env.curriculum.levels.copy()
     env.env.curriculum.levels[:] = 2 - level
@@ -128,6 +129,65 @@ def test_make_vec_makes_vector_env():
     vector = gymnasium.make_vec(f"{MODULE}:terrainkit/biped-v0", num_envs=2)
     assert isinstance(vector.unwrapped, TaskVectorEnv)
     assert vector.reset(seed=0)[0].shape[0] == 2
+
+
+def render(env):
+    try:
+        return env.render()
+    except RenderError as error:
+        pytest.skip(str(error))
+
+
+def test_env_renders_without_warnings():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(f"{MODULE}:terrainkit/quadruped-v0", render_mode="rgb_array")
+        assert env.metadata["render_fps"] == 50
+        env.reset(seed=0)
+        first = render(env)
+        assert first.shape == (360, 640, 3)
+        assert first.dtype == np.uint8
+        for _ in range(5):
+            env.step(np.full(12, 0.5, np.float32))
+        assert (render(env) != first).any()
+        env.close()
+        env.close()
+
+
+def test_env_renders_last_pose_of_episode(short_task):
+    env = TaskEnv("quadruped", task=short_task, render_mode="rgb_array")
+    env.reset(seed=0)
+    for _ in range(4):
+        env.step(np.zeros(12))
+    before = render(env).astype(int)
+    assert env.step(np.zeros(12))[3]
+    last = render(env).astype(int)
+    env.reset()
+    first = render(env).astype(int)
+    assert np.abs(last - before).mean() < np.abs(last - first).mean() / 2
+    env.close()
+
+
+def test_vector_env_renders_each_robot():
+    vector = gymnasium.make_vec(
+        f"{MODULE}:terrainkit/quadruped-v0", num_envs=2, render_mode="rgb_array"
+    )
+    vector.reset(seed=0)
+    frames = render(vector)
+    assert [frame.shape for frame in frames] == [(360, 640, 3)] * 2
+    assert (frames[0] != frames[1]).any()
+    vector.close()
+
+
+def test_env_without_render_mode_renders_nothing():
+    env = TaskEnv("quadruped")
+    assert env.render() is None
+    env.close()
+
+
+def test_env_rejects_unknown_render_mode():
+    with pytest.raises(ConfigError, match="render_mode: got 'human'; expected 'rgb_array' or None"):
+        TaskEnv("quadruped", render_mode="human")
 
 
 def test_vector_env_is_deterministic():

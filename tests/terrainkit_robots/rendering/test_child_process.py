@@ -1,6 +1,7 @@
 import os
 import time
 from functools import partial
+from itertools import repeat
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from terrainkit_robots.rendering.child_process import RenderError, stream_frames
 
 # Pickled by reference: the child process imports numpy and calls these.
 TWO_FRAMES = partial(np.zeros, (2, 4, 6, 3), np.uint8)
+FILLED = partial(map, partial(np.full, (4, 6, 3), dtype=np.uint8))  # a frame for each input
 
 
 @pytest.fixture(autouse=True)
@@ -75,3 +77,22 @@ def test_stream_frames_closed_early_ends_child(monkeypatch):
     next(frames)
     frames.close()
     assert processes[0].returncode is not None
+
+
+def test_stream_frames_sends_input_of_each_frame():
+    values, shown = np.zeros(3, np.uint8), []
+    frames = stream_frames(FILLED, repeat(values))
+    for value in (1, 2, 3):
+        values[:] = value
+        shown.append(next(frames).max())
+    frames.close()
+    assert shown == [1, 2, 3]
+
+
+def test_stream_frames_waits_for_inputs_without_limit(monkeypatch):
+    monkeypatch.setattr(child_process, "FRAME_TIMEOUT", 2.0)
+    frames = stream_frames(FILLED, repeat(7))
+    next(frames)
+    time.sleep(2.5)
+    assert next(frames).max() == 7
+    frames.close()
