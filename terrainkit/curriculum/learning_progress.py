@@ -9,6 +9,7 @@ from terrainkit.curriculum.sampler import FloatArray, IntArray
 from terrainkit.curriculum.statistics import add_to_means
 from terrainkit.curriculum.uniform import UniformSampler
 
+# Chosen on the simulated learners with independent columns of benchmarks/run.py curriculum.
 FAST_DECAY, SLOW_DECAY = 0.5, 0.8
 """Weights of the previous means when an episode ends."""
 
@@ -56,6 +57,7 @@ class LearningProgressSampler(UniformSampler):
         change, uniform = np.abs(self.fast - self.slow), super().probs()
         if not change.any():
             return uniform
+        # At both ends of a column, the missing neighbor's share goes to the patch itself.
         padded = np.pad(change, ((1, 1), (0, 0)), mode="edge")
         change = change / 2 + (padded[:-2] + padded[2:]) / 4
         return np.asarray(EXPLORATION * uniform + (1 - EXPLORATION) * change / change.sum())

@@ -12,6 +12,7 @@ from terrainkit.curriculum.uniform import UniformSampler
 DECAY = 0.8
 """Weight of the previous means when an episode ends."""
 
+# Chosen, with `DECAY`, on the simulated learners of benchmarks/run.py curriculum.
 TEMPERATURE = 0.5
 """Exponent: the weight of a patch is (1 / rank)^(1 / temperature)."""
 

@@ -91,9 +91,12 @@ class CommandProgress:
         velocity = np.stack([c * new[:, 0] - s * new[:, 1], s * new[:, 0] + c * new[:, 1]], axis=1)
         speed = np.linalg.norm(new, axis=1)
         moved = to_numpy("position", position)[:, :2] - self.position
+        # The displacement projected onto the direction of the reference's velocity.
         along = (moved * velocity).sum(axis=1) / np.maximum(speed, 1e-9)
         self.position[:] += moved
         self.commanded[:] += speed * dt
+        # Limited at every step, not only at the end: a robot cannot save up progress by sliding
+        # ahead.
         self.along[:] = np.minimum(self.along + along, self.commanded)
         self.target[:] += velocity * dt
         self.target_max_distance[:] = np.maximum(

@@ -6,6 +6,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+# A mean over about 1 / (1 - 0.95) = 20 episodes.
 DECAY = 0.95
 """Weight of the previous mean when an episode ends."""
 

@@ -210,6 +210,7 @@ class Model:
         goals = self.terrain_map.goals
         for row, col, k in np.argwhere(~np.isnan(goals[..., 0])).tolist():
             *pos, heading = goals[row, col, k].tolist()
+            # A rotation by the heading about z.
             quat = (np.cos(heading / 2), 0.0, 0.0, np.sin(heading / 2))
             yield {"name": f"goal_{row}_{col}_{k}", "pos": pos, "quat": quat}
 
@@ -489,5 +490,6 @@ def without_boxes(
         heights: Heights of the map [m], shape (nx, ny).
         decomposition: The boxes, and the cells that they cover.
     """
+    # A sample influences the cells around it, so it is lowered only if boxes cover all of them.
     lowered = np.logical_and.reduce(neighborhood(decomposition.covered))
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 SUFFIXES = (".png",)
 BYTES_PER_SAMPLE = 9
 
+# Rounding to the nearest level is off by at most half of a level.
 MAX_HEIGHT_PER_LEVEL = 0.002
 """Largest height of a gray level at which heights are accurate to a millimeter [m]."""
 

@@ -70,6 +70,7 @@ def _add_mesh(usd_stage: Any, path: str, mesh: TriMesh) -> Any:
     prim.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(mesh.triangles.ravel()))
     counts = np.full(len(mesh.triangles), 3, dtype=np.int32)
     prim.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(counts))
+    # USD's default, Catmull-Clark, would round the edges.
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     prim.CreateExtentAttr(UsdGeom.PointBased.ComputeExtent(prim.GetPointsAttr().Get()))
     return prim

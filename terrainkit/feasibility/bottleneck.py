@@ -51,6 +51,7 @@ def bottleneck(edges: Edges, demand: FloatArray, segment: Segment, num_nodes: in
     order = np.argsort(edges.start, kind="stable")
     rows = np.searchsorted(edges.start[order], np.arange(num_nodes + 1))
     ends, demand = edges.end[order], demand[order]
+    # A path is possible at every demand above the smallest one, so bisection finds it.
     levels = np.unique(demand[np.isfinite(demand)])
     number = bisect_left(
         levels, True, key=lambda level: _reaches(rows, ends, demand <= level, start, targets)

@@ -127,6 +127,7 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
     limit = getattr(limits, name)
     result: FloatArray
     if name in ("foothold", "body_width"):
+        # 1 at the limit, and 0 from twice the limit on.
         result = np.maximum(2.0 - value / limit, 0.0)
     elif name == "crouched_height":
         clearance = np.minimum(value, limits.standing_height)

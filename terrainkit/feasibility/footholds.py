@@ -30,6 +30,7 @@ def foothold_sizes(columns: Columns, steps: Edges, limits: RobotLimits) -> Float
     """
     edge = EDGE_FRACTION * min(limits.step_up, limits.step_down)
     max_size = math.ceil(2 * limits.foothold / columns.spacing - 1e-9)
+    # The second half of the steps has the same edges in the opposite direction.
     half = len(steps.start) // 2
     flat = np.maximum(steps.rise[:half], steps.drop[:half]) <= edge
     start, end = steps.start[:half][flat], steps.end[:half][flat]

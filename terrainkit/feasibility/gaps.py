@@ -94,6 +94,7 @@ def _pairs(
     n = int(moves.max(initial=0))
     is_usable = graph.node_demand < max_demand
     is_end = (ends & is_usable).reshape(shape)
+    # Nodes without an end within the longest gap are skipped at once.
     near = cv2.dilate(is_end.any(axis=2).astype(np.uint8), np.ones((2 * n + 1,) * 2, np.uint8))
     start = np.flatnonzero((starts & is_usable).reshape(shape) & (near[..., None] > 0))
     # The nodes where an edge may end, in a frame of columns without any.

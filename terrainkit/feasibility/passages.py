@@ -101,6 +101,7 @@ class Passages:
         *place, height, part = np.unravel_index(unique, shape)
         z, need = heights[height] * _TOLERANCE, needs[part] * _TOLERANCE
         found = np.full(len(unique), max_width)
+        # A line has two opposite directions, so half a turn covers all lines.
         for angle in np.arange(NUM_DIRECTIONS) * (math.pi / NUM_DIRECTIONS):
             ahead = self._free_length((place[0], place[1]), z, need, angle)
             # A line with no wall within `max_width` on one side is long enough.

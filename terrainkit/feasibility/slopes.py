@@ -35,6 +35,7 @@ class Slopes:
         Returns:
             Rise over run, shape (nx, ny, m).
         """
+        # Diagonal neighbors are sqrt(2) columns apart.
         return np.maximum(np.hypot(self.x, self.y), self.diagonal / 2**0.5) / spacing
 
 

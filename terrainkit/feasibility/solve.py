@@ -128,6 +128,7 @@ def _solved(
         for element, (ranges, demand) in zip(_value(sub_terrain, name), solutions, strict=True)
     )
     course = _with(sub_terrain, {name: tuple(each.sub_terrain for each in elements)})
+    # A course demands as much as the hardest of its elements.
     low, high = np.max([each.demand for each in elements], axis=0).tolist()
     return SolvedTerrain(sub_terrain=course, demand=(low, high), elements=elements)
 
@@ -155,6 +156,8 @@ def _solve(
             except ConfigError:
                 if 0 <= difficulty <= 1:
                     raise
+                # An invalid value counts as too easy below the range and as too hard above it,
+                # so that the bisection returns into the range.
                 demand = np.copysign(np.inf, difficulty)
             known[end, difficulty] = demand
         return known[end, difficulty]

@@ -38,6 +38,7 @@ def erode(heights: NDArray[np.float64], cell: float, iterations: int) -> NDArray
     water, sediment = np.zeros_like(ground), np.zeros_like(ground)
     for _ in range(iterations):
         drops = [np.maximum(drop - TALUS * cell, 0.0) for drop in _drops(ground)]
+        # Four neighbors exchange at once. A share of 1/4 could overshoot; half of it does not.
         ground += _exchange(0.125 * drop for drop in drops)
         water += RAIN
         drops = [np.maximum(drop, 0.0) for drop in _drops(ground + water)]

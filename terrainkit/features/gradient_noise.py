@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from terrainkit.geometry.grid import Grid
 
 _DIAGONAL = math.sqrt(0.5)
+# Eight directions of equal length suffice in the plane, as in "Improving Noise", which uses the
+# edges of a cube in space.
 _GRADIENTS = np.array(
     [
         [1.0, 0.0],
@@ -34,6 +36,8 @@ def perlin_noise(grid: Grid, wavelength: float, rng: np.random.Generator) -> NDA
         rng: Generator of the random numbers.
     """
     wavelength = max(wavelength, grid.cell)
+    # Noise is 0 at its nodes. A random offset keeps them from being at the same place in all
+    # patches.
     offset = rng.random(2)
     x, y = (
         (np.arange(n) + 0.5) * (grid.cell / wavelength) + start
@@ -68,6 +72,7 @@ def fractal_noise(
     """
     total = perlin_noise(grid, wavelength, rng)
     for k in range(1, octaves):
+        # Shorter waves than two cells cannot be sampled.
         if wavelength * 0.5**k < 2 * grid.cell:
             break
         total += gain**k * perlin_noise(grid, wavelength * 0.5**k, rng)

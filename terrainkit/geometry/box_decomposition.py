@@ -85,6 +85,8 @@ def decompose_boxes(
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
     flat = flat_cells(node_grid)
     # A lower bound of the ground in each cell.
+    # The surface of a cell depends on the 3 x 3 samples around it, and is nowhere below their
+    # minimum.
     low = cv2.erode(heights, np.ones((3, 3), dtype=np.uint8))
     np.copyto(low, heights, where=flat)
     _drop_patches_without_walls(flat, node_grid, patch_edges)
@@ -112,6 +114,7 @@ def decompose_boxes(
     table = np.column_stack([number.reshape(-1), table[:, 1:5]])
     max_length = MAX_LENGTHS[0] // grid.cell, MAX_LENGTHS[1] // grid.cell
     short, long = merge_boxes(table, max_length), merge_boxes(table)
+    # Short boxes are faster in MuJoCo's bounding volume hierarchy, unless there are twice as many.
     merged = long if 2 * len(long) <= len(short) else short
     number, i0, i1, j0, j1 = merged.T
     merged = merged[np.lexsort([i0, number, j0 + j1, i0 + i1])]
@@ -251,6 +254,7 @@ def _merge_along_x(boxes: NDArray[np.float64], max_length: float) -> NDArray[np.
     other = np.ones(len(top), dtype=bool)
     other[1:] = (np.diff(top) != 0) | (np.diff(j0) != 0) | (np.diff(j1) != 0)
     # The largest i1 so far, which starts again in every group of the same top, j0 and j1.
+    # An offset that is larger than all i1 restarts the running maximum in each group.
     group = np.cumsum(other) * (i1.max(initial=0) + 1)
     reach = np.maximum.accumulate(i1 + group) - group
     first = other.copy()

@@ -125,11 +125,13 @@ class SolidIndex:
             return np.empty(0), np.empty(0)
         pair, place = segment_indices(self._num_planes[solid])
         normal, distance = np.split(self._planes[self._first_plane[solid][pair] + place], [3], 1)
+        # A half-space n . p <= d that is widened horizontally by r has the distance d + r |n_xy|.
         left = distance[:, 0] + self._radius * np.hypot(normal[:, 0], normal[:, 1])
         left -= (normal[:, :2] * xy[pair]).sum(axis=1)
         nz = normal[:, 2]
         steep = np.abs(nz) <= _VERTICAL
         z = left / np.where(steep, 1.0, nz)
+        # A vertical face does not bound z: the line is on one side of it.
         outside = steep & (left < -1e-9)
         bottom = np.where(outside, np.inf, np.where(~steep & (nz < 0), z, -np.inf))
         top = np.where(outside, -np.inf, np.where(~steep & (nz > 0), z, np.inf))
@@ -149,6 +151,7 @@ class SolidIndex:
         a, b = (e * e).sum(axis=1), (q * e).sum(axis=1)
         c = (q * q).sum(axis=1) - radius**2
         upright = a < _VERTICAL**2
+        # The line is inside where a t^2 + 2 b t + c <= 0. Along an upright axis, a and b are 0.
         root = np.sqrt(np.clip(b**2 - a * c, 0, None))
         scale = np.where(upright, 1.0, a)
         miss = np.where(upright, c > 0, b**2 < a * c)

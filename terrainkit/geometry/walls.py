@@ -77,6 +77,7 @@ def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
 
 def _connected(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
     joined = np.eye(4, dtype=bool)
+    # Corners are at most three edges apart, and a pass may join only one of them.
     for _ in range(3):
         for k in range(4):
             if not walls[k]:

@@ -40,6 +40,7 @@ def allocate_columns(proportions: list[float], num_columns: int) -> list[int]:
         The number of columns of each proportion: its exact share, rounded up or down. They sum to
         `num_columns`. Ties go to the earlier proportion.
     """
+    # The largest-remainder method: no allocation is more than one column off its exact share.
     shares = np.array(proportions) / sum(proportions) * num_columns
     counts = np.floor(shares).astype(int)
     # Rounded, so that mathematically equal remainders tie regardless of the last bit.

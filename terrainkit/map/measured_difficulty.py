@@ -37,4 +37,5 @@ def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float)
 
 
 def _clipped_sum(change: NDArray[np.float32]) -> float:
+    # Summed in double precision, since a map has millions of differences.
     return float(np.minimum(np.abs(change), MAX_STEP_HEIGHT).sum(dtype=np.float64))

@@ -99,6 +99,7 @@ class Seams:
         x = config.grid.axis(0)[slice(i - 1, i + 1) if across_x else slice(i, i + nx)]
         y = config.grid.axis(1)[slice(j, j + ny) if across_x else slice(j - 1, j + 1)]
         xy = np.stack(np.meshgrid(x, y), axis=-1)
+        # The clearance is 0 where a solid covers the ground.
         return not self.terrain_map.clearance(xy).any()
 
 

@@ -25,6 +25,7 @@ class Beams(Lane):
 
     has_column_seed: ClassVar[bool] = True
 
+    # Width, gap and yaw (15 degrees) are in the range of Isaac Lab's and BeamDojo's beams.
     width: float = parameter.size(0.5, 0.2)
     """Width of a beam [m]."""
 

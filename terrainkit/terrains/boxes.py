@@ -24,6 +24,7 @@ class Boxes(FlatTerrain):
 
     has_column_seed: ClassVar[bool] = True
 
+    # ANYmal Parkour climbs 1 m; Isaac Lab and Robot Parkour Learning have 1 to 3 boxes per patch.
     height: float = parameter.height(0.05, 1.0)
     """Height of a box or a pyramid [m]."""
 

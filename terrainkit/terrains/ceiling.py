@@ -18,6 +18,7 @@ class Ceiling(FlatTerrain):
     The ground is flat, and there is no ceiling over the platform.
     """
 
+    # The same range as for `crawl`.
     clearance: float = parameter.height(0.5, 0.2)
     """Height of the lower side of the ceiling above the ground [m]."""
 

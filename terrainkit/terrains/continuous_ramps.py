@@ -18,6 +18,7 @@ class ContinuousRamps(RampField):
     the ground is flat.
     """
 
+    # The elements of the tests for response robots are 0.6 m x 1.2 m.
     length: float = parameter.size(0.6)
     """Length of a ramp along x [m]."""
 

@@ -20,6 +20,8 @@ class Crawl(FlatTerrain, Lane):
     The ground is flat, and the robot is spawned at low x. There is a goal behind each bar.
     """
 
+    # Robot Parkour Learning crawls under 0.2 m; its bars and ANYmal Parkour's are 0.1 to 0.6 m
+    # deep.
     clearance: float = parameter.height(0.5, 0.2)
     """Height of the lower side of the bars above the ground [m]."""
 

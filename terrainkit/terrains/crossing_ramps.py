@@ -20,6 +20,7 @@ class CrossingRamps(RampField):
     is behind the ramps. The ramps are solids; the ground is flat.
     """
 
+    # The elements of the tests for response robots are squares of 0.6 m.
     side: float = parameter.size(0.6)
     """Side of a ramp [m]."""
 

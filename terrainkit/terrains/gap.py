@@ -17,6 +17,7 @@ class Gap(Terrain):
 
     has_random_heights: ClassVar[bool] = False
 
+    # legged_gym: a gap of 1 m at difficulty 1, around a platform of 3 m.
     width: float = parameter.length(0.0, 1.0, allow_zero=True)
     """Width of the gap [m]; it ends at the edge of the patch."""
 

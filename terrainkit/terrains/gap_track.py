@@ -21,6 +21,7 @@ class GapTrack(Lane):
 
     has_column_seed: ClassVar[bool] = True
 
+    # Extreme Parkour leaps 0.8 m, Robot Parkour Learning 0.6 m.
     length: float = parameter.length(0.05, 1.0)
     """Length of a gap along x [m]."""
 

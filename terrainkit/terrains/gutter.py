@@ -21,6 +21,7 @@ class Gutter(FlatTerrain, Lane):
     the gutter. The slopes are solids; the ground is flat.
     """
 
+    # 10 to 30 degrees, the range of `side_ramps`.
     roll: float = parameter.scalar(0.175, 0.524, allow_zero=False)
     """Angle between a slope and the ground [rad]."""
 

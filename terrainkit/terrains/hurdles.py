@@ -24,6 +24,8 @@ class Hurdles(Lane):
 
     has_column_seed: ClassVar[bool] = True
 
+    # Extreme Parkour climbs 0.5 m. Thickness and spacing span the tracks of Extreme Parkour, Robot
+    # Parkour Learning and Isaac Lab.
     height: float = parameter.height(0.05, 0.5)
     """Height of the hurdles [m]."""
 

@@ -24,6 +24,8 @@ class KRails(Lane):
     low x, and there is a goal behind the field. The rails are solids.
     """
 
+    # The tests for response robots have beams of 0.1 m, or 0.2 m for large robots, on panels of 1.2
+    # m.
     height: float = parameter.size(0.1, 0.2)
     """Height and width of a rail [m]."""
 

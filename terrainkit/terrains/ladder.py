@@ -25,6 +25,7 @@ class Ladder(Terrain):
     The deck spans the width of the patch. The ladders are solids with round rungs.
     """
 
+    # 70 to 90 degrees, and the distances of the rungs, are from arXiv:2409.17731.
     angle: float = parameter.scalar(1.222, 1.57, allow_zero=False)
     """Angle between a ladder and the ground [rad]."""
 
@@ -84,6 +85,7 @@ class Ladder(Terrain):
         )
         low, high, side = -SINK, self.height, (self.width + RAIL) / 2
         middle = (low + high) / 2
+        # A leaning rail is longer than it is high, by 1 / sin(angle).
         rails = make_boxes(
             [[foot + middle * slope, grid.center[1] + y, middle] for y in (-side, side)],
             (RAIL, RAIL, (high - low) / np.sin(self.angle)),

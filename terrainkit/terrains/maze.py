@@ -24,6 +24,7 @@ class Maze(FlatTerrain):
 
     has_column_seed: ClassVar[bool] = True
 
+    # The corridors of Isaac Lab's maze, which also opens 30 % of the walls.
     corridor: float = parameter.size(1.5, 0.8)
     """Width of the corridors [m]."""
 

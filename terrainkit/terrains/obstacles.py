@@ -21,6 +21,7 @@ class Obstacles(Terrain):
 
     has_column_seed: ClassVar[bool] = True
 
+    # All values are legged_gym's: 0.05 + 0.2 d high, 20 boxes of 1 to 2 m, a platform of 3 m.
     height: float = parameter.height(0.05, 0.25)
     """Height of the highest block and depth of the deepest trench [m]."""
 

@@ -22,6 +22,8 @@ class OpenStairs(FlatTerrain, Lane):
     on the top and one behind the stairs.
     """
 
+    # The treads are mjlab's; the tests for response robots have risers of 0.2 m and 0.03 m thick
+    # treads.
     riser: float = parameter.size(0.1, 0.2)
     """Height from one tread to the next [m]."""
 

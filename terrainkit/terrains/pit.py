@@ -19,6 +19,7 @@ class Pit(Terrain):
 
     has_random_heights: ClassVar[bool] = False
 
+    # legged_gym: a square of 4 m that is 1 m deep at difficulty 1.
     depth: float = parameter.height(0.0, 1.0)
     """Depth of the pit [m]."""
 

@@ -31,6 +31,7 @@ class Poles(FlatTerrain):
     number: int = parameter.count(35)
     """Largest number of poles; fewer if no more fit."""
 
+    # Sizes and number are in the range of Robot Parkour Learning and Project Instinct.
     min_width: float = parameter.size(0.25)
     """Minimum diameter of a pole [m]."""
 

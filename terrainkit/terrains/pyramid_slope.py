@@ -21,6 +21,7 @@ class PyramidSlope(Terrain):
 
     has_random_heights: ClassVar[bool] = False
 
+    # legged_gym's grade, which its own product of two ramps reaches in few places only.
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides."""
 
@@ -39,5 +40,6 @@ class PyramidSlope(Terrain):
                 f"pyramid_slope: a platform of {self.platform:g} m leaves no slope in a patch of "
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
+        # Rings, unlike legged_gym's product of two ramps, have the requested grade everywhere.
         rise = grid.by_ring(platform, lambda k: self.grade * grid.cell * np.maximum(run - k, 0))
         return -rise if self.inverted else rise

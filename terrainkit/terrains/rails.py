@@ -20,6 +20,7 @@ class Rails(FlatTerrain):
     The rails are solids, so that their width is exact; the ground is flat.
     """
 
+    # Isaac Lab: two nested rails, 0.05 m to 0.25 m wide.
     width: float = parameter.size(0.05, 0.25)
     """Width of a rail [m]."""
 

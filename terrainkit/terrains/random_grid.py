@@ -17,6 +17,7 @@ class RandomGrid(Terrain):
     The blocks are centered. The remaining cells at the edges, at least one, are at height 0.
     """
 
+    # mjlab's heights and cells; Isaac Lab has 0.05 m to 0.2 m on cells of 0.45 m.
     height: float = parameter.height(0.0, 0.3)
     """Largest height of a block above or below 0 [m]."""
 

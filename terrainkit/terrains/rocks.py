@@ -61,6 +61,7 @@ class Rocks(Terrain):
                 "max, and a rock that fits beside the platform in a patch of "
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
+        # Normalized Gaussian vectors are distributed evenly over the sphere.
         direction = rng.standard_normal((len(xy), _POINTS, 3))
         direction /= np.sqrt((direction**2).sum(axis=-1, keepdims=True))
         z = self.height / self.max_radius * r

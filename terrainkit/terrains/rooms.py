@@ -23,6 +23,7 @@ class Rooms(FlatTerrain):
 
     has_column_seed: ClassVar[bool] = True
 
+    # As wide as the corridors of `maze`.
     door: float = parameter.size(1.5, 0.8)
     """Width of a door [m]."""
 

@@ -15,6 +15,8 @@ from terrainkit.terrain.parameter import Value
 class Rough(Terrain):
     """Uniform noise around height 0, with a flat platform at the center."""
 
+    # legged_gym's noise of its rough slope, 0.05 m, is within the range; step and spacing are the
+    # same.
     amplitude: float = parameter.height(0.02, 0.1, tolerance=STEP)
     """Largest height above or below 0 [m], rounded down to whole steps."""
 

@@ -22,6 +22,7 @@ class RoughSlope(Terrain):
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides without the noise."""
 
+    # legged_gym: noise of 0.05 m in steps of 0.005 m, drawn every 0.2 m.
     amplitude: float = parameter.height(0.05, tolerance=STEP)
     """Largest height of the noise above or below the slope [m], rounded down to whole steps."""
 

@@ -21,6 +21,7 @@ class Slope(Terrain):
 
     has_random_heights: ClassVar[bool] = False
 
+    # legged_gym's grade.
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the slope."""
 

@@ -24,6 +24,7 @@ class SpiralStairs(FlatTerrain):
     and one on the last. The treads and the column are solids; the ground is flat.
     """
 
+    # Risers and treads span Eurekaverse and terrain-generator.
     riser: float = parameter.size(0.1, 0.2)
     """Height from one tread to the next [m]."""
 
@@ -83,6 +84,7 @@ class SpiralStairs(FlatTerrain):
         The first tread starts at -90 degrees, so that a robot on it walks along x.
         """
         start, width = grid.length(grid.cells(self.start)), 2 * self.radius
+        # The tread is measured in the middle between the column and the outer edge.
         angle = 2 * self.tread / (self.column + self.radius)
         x = (grid.lower[0] + start + grid.upper[0]) / 2
         if (

@@ -22,6 +22,7 @@ class Stairs(Terrain):
 
     has_random_heights: ClassVar[bool] = False
 
+    # legged_gym's steps.
     step_height: float = parameter.height(0.05, 0.23)
     """Rise of a step [m]."""
 

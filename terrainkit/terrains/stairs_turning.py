@@ -19,6 +19,7 @@ class StairsTurning(Terrain):
     goal on each landing.
     """
 
+    # The risers span Eurekaverse and terrain-generator.
     riser: float = parameter.height(0.1, 0.2)
     """Rise of a step [m]."""
 

@@ -20,6 +20,7 @@ class Stakes(Terrain):
     Each stake has the same distance from its six neighbors.
     """
 
+    # The plum-blossom piles of Unitree's demonstrations and of BeamDojo.
     diameter: float = parameter.size(0.3, 0.15)
     """Diameter of a stake [m]."""
 

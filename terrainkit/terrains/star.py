@@ -20,6 +20,7 @@ class Star(Terrain):
     beams are solids, so that their width is exact. The rim of the patch is flat.
     """
 
+    # Isaac Lab: 12 beams to 1, 0.7 m to 0.4 m wide.
     number: int = parameter.count(12, 1)
     """Number of beams."""
 
@@ -63,6 +64,7 @@ class Star(Terrain):
         platform = np.array([grid.length(n) for n in grid.centered(self.platform)])
         yaw = 2 * np.pi * (rng.random() + np.arange(self.number)) / self.number
         direction = np.column_stack([np.cos(yaw), np.sin(yaw)])
+        # A ray from the center leaves a rectangle where it meets the first of its sides.
         first, last = (
             (half / np.maximum(np.abs(direction), 1e-9)).min(axis=1)
             for half in (platform / 2, np.array(grid.size) / 2 - rim)

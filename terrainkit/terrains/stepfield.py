@@ -23,6 +23,7 @@ class Stepfield(Lane):
     is spawned at low x. There is a goal on each field but the last, and one behind the fields.
     """
 
+    # The tests for response robots have units and posts of 0.1 m.
     unit: float = parameter.height(0.02, 0.1)
     """Height of a unit [m]."""
 

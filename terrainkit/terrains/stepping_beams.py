@@ -26,6 +26,7 @@ class SteppingBeams(Lane):
 
     has_column_seed: ClassVar[bool] = True
 
+    # Width, gap, yaw and length are in the range of Isaac Lab's and BeamDojo's beams.
     width: float = parameter.size(0.5, 0.2)
     """Width of a beam along x, if it is straight [m]."""
 

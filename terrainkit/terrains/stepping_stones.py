@@ -21,6 +21,7 @@ class SteppingStones(Terrain):
 
     has_column_seed: ClassVar[bool] = True
 
+    # legged_gym: stones of 1.5 (1.05 - d), holes 10 m deep, a platform of 4 m.
     stone: float = parameter.length(1.575, 0.075)
     """Side of a stone [m]."""
 

@@ -22,6 +22,7 @@ class StoneRows(Lane):
     behind the pit. A block behind the last pair takes the rest of the pit.
     """
 
+    # The first and the last of BeamDojo's nine levels, with its variation and depth.
     stone: float = parameter.size(0.8, 0.2)
     """Side of a stone [m]."""
 

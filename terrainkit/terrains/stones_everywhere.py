@@ -22,6 +22,7 @@ class StonesEverywhere(Terrain):
     Stones are truncated at the platform and at the edges of the pit.
     """
 
+    # The ranges of Isaac Lab's development branch.
     stone: float = parameter.size(0.96, 0.2)
     """Side of a stone [m]."""
 

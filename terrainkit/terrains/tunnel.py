@@ -21,6 +21,7 @@ class Tunnel(FlatTerrain, Lane):
     the ground is flat.
     """
 
+    # The clearance of `crawl`, which Robot Parkour Learning passes.
     clearance: float = parameter.size(0.5, 0.2)
     """Height of a tunnel [m]."""
 

@@ -21,6 +21,7 @@ class Wave(Terrain):
 
     has_random_heights: ClassVar[bool] = False
 
+    # mjlab and Genesis have up to 0.2 m and 4 waves.
     amplitude: float = parameter.height(0.0, 0.2)
     """Height of a crest above 0 and depth of a trough below 0 [m]."""
 

@@ -44,6 +44,7 @@ def _foot_site(leg: "Leg", foot: str, facts: "Facts", poses: Sequence[Matrix]) -
         return Site(name=foot, body=foot, pose=np.eye(4))
     center = np.eye(4)
     center[:3, 3] = box.mean(axis=0)
+    # MuJoCo's touch sensors count contacts inside of the site only.
     half = np.ptp(box, axis=0) / 2 + _MARGIN
     pose = invert_poses(local) @ center
     return Site(name=foot, body=foot, pose=pose, half_size=tuple(half.tolist()))

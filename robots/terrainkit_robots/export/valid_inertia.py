@@ -95,6 +95,8 @@ def _correct_rounding(link: Link) -> Link:
         or not _MIN_ROUNDED_RATIO <= triangle_ratio(moments) < 1 + _MIN_MOMENT_RATIO
     ):
         return link
+    # The second moments of mass are tr(I) / 2 - I. A plate has one of 0, rounded to a negative
+    # number.
     second, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
     second_moments = (axes * np.maximum(second, _MIN_MOMENT_RATIO * second.max())) @ axes.T
     assert link.inertial is not None

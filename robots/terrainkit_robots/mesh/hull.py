@@ -76,6 +76,7 @@ def _extreme_points_per_direction(
 ) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Return the indices of extreme points in directions distributed evenly on a sphere."""
     k = np.arange(count) + 0.5
+    # Equal steps of z have equal areas on a sphere (Archimedes).
     z = 1 - 2 * k / count
     around = np.pi * (1 + 5**0.5) * k  # multiples of the golden angle
     radius = np.sqrt(1 - z**2)

@@ -104,6 +104,7 @@ def unique_points(points: Points) -> tuple[Points, NDArray[np.intp]]:
     return points[first], indices
 
 
+# 2^64 divided by the golden ratio, and two primes of xxHash64.
 _PRIMES = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], np.uint64)
 """Odd numbers with well distributed bits."""
 
@@ -111,6 +112,7 @@ _PRIMES = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9],
 def signed_volume(surface: Surface) -> float:
     """Return the volume of a closed surface [m3]; negative if its faces point inward."""
     corners = surface.points[surface.faces].astype(np.float64)
+    # Far from the origin, the tetrahedra between the faces and the origin would lose digits.
     corners -= corners.mean(axis=(0, 1))
     cross = np.cross(corners[:, 1], corners[:, 2])
     return float(np.einsum("ij,ij->", corners[:, 0], cross) / 6)
@@ -128,6 +130,7 @@ def is_closed(surface: Surface) -> bool:
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     edge = start != end
     start, end, count = start[edge], end[edge], np.int64(len(surface.points))
+    # One number per directed edge. The sorted lists are equal if each edge has its opposite.
     there, back = np.sort(start * count + end), np.sort(end * count + start)
     return start.size > 0 and bool((there == back).all())
 
@@ -152,6 +155,7 @@ def thickness(points: Points) -> float:
     if len(points) < 4:
         return 0.0
     centered = points - points.mean(axis=0, dtype=np.float64)
+    # The eigenvectors of the scatter matrix are the principal axes of the points.
     _, axes = np.linalg.eigh(centered.T @ centered)
     along = centered @ axes
     spans = along.max(axis=0) - along.min(axis=0)
@@ -188,6 +192,7 @@ def _unique_triangles(faces: Faces, points: int) -> Faces:
     return rotated[np.unique(key, return_index=True)[1]]
 
 
+# 2,000,000^3 is 8e18, below 2^63 = 9.2e18.
 _MAX_KEY_POINTS = 2_000_000
 """Maximum number of points for which three indices fit into 64 bits."""
 

@@ -550,6 +550,7 @@ class EvaluationRollout:
         heights = gait.swing_heights(contact, height, measured)
         duty = gait.duty_factors(contact, measured)
         mirror = mirror_feet(scene.foot_pos)
+        # Energy over weight times distance; the time step cancels in the ratio of the two sums.
         work = 9.81 * scene.model.body_subtreemass[scene.base] * motion.speed.sum()
         return result | {
             "step_frequency": _number(gait.step_frequency(contact, measured, self.env.cfg.dt)),

@@ -29,6 +29,7 @@ def find_swings(contact: BoolArray, measured: BoolArray) -> tuple[NDArray[np.int
     steps, _, feet = contact.shape
     known = np.repeat(measured, feet, axis=1).T
     air = known & ~contact.reshape(steps, -1).T
+    # Padding with steps that do not count ends every run of steps in the air.
     edges = np.diff(np.pad(air.astype(np.int8), ((0, 0), (1, 1))), axis=1)
     (column, start), stop = np.nonzero(edges == 1), np.nonzero(edges == -1)[1]
     inside = (start > 0) & (stop < steps) & (stop - start >= MIN_SWING_STEPS)

@@ -137,6 +137,7 @@ def fit_camera(
     right = np.array([np.sin(a), -np.cos(a), 0.0])
     target = (points.min(axis=0) + points.max(axis=0)) / 2
     offsets, slope = points - target, FILL_RATIO * np.tan(np.radians(appearance.FIELD_OF_VIEW) / 2)
+    # A point is in the image if its distance along the view is at least |x| and |y|.
     x, y = offsets @ right / (slope * aspect_ratio), offsets @ np.cross(right, forward) / slope
     return target, 1e-4 + float((np.maximum(abs(x), abs(y)) - offsets @ forward).max())
 

@@ -26,6 +26,8 @@ from terrainkit_robots.rl.run import PolicySpec
 SCHEMA_VERSION = 1
 """Version of the JSON; it changes when a key changes its meaning or is removed."""
 
+# Wilson's interval is valid for the 0 or 10 successes of 10 that are common here; the normal
+# approximation has no width there.
 CONFIDENCE = 0.95
 """Confidence level of the intervals, which are Wilson's."""
 

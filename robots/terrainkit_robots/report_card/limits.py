@@ -17,12 +17,14 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
 from terrainkit_robots.rl.run import PolicySpec
 
+# Bisection has 21 outcomes, none of the values to all of them, and takes at most five rounds.
 LEVELS = 20
 """Values of each quantity."""
 
 PATCH_SIZE, CELL = (8.0, 4.0), 0.05
 """Size of the patches and distance between two height samples [m]."""
 
+# Twice the default limit is a grade of 1.154, tan(49 degrees).
 SLOPE_THRESHOLD = 1.25
 """Steepest slope that is not a wall: twice the default limit of 30 degrees is 49 degrees."""
 
@@ -88,6 +90,7 @@ def limit_tests(limits: RobotLimits) -> tuple[LimitTest, ...]:
     corridors = (min(3 * limits.body_width, 1.5), 0.5 * limits.body_width)
     stones = (max(8 * limits.foothold, 0.1), 0.5 * limits.foothold)
     gaps = (0.1 * limits.gap, 2 * limits.gap)
+    # A robot starts and ends on flat ground, and only the tested quantity changes.
     ramps = {"start": 1.5, "gap": 0.0, "offset": 0.0, "width": 1.2, "spacing": 2.0, "depth": 1.0}
     bars = {"start": 1.5, "max_depth": 0.4, "spacing": 2.0}
     level = {"gap": 0.5 * limits.gap, "shift": 0.0, "variation": 0.0}

@@ -35,9 +35,11 @@ def sample_commands(
     """
     low, high = np.array([cfg.lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_yaw], np.float32).T
     commands = low + (high - low) * rng.random((count, 3), dtype=np.float32)
+    # As in legged_gym, small commands are commands to stand.
     commands[np.hypot(commands[:, 0], commands[:, 1]) < cfg.min_norm, :2] = 0
     commands[np.abs(commands[:, 2]) < cfg.min_norm, 2] = 0
     left, right = cfg.heading
+    # Also sampled without a heading command, so that the random numbers do not depend on it.
     heading = (left + (right - left) * rng.random(count)).astype(np.float32)
     standing = rng.random(count) < cfg.standing
     commands[standing] = 0
@@ -121,6 +123,8 @@ class Gait:
         self.period = default if cfg.gait_period is None else cfg.gait_period
         x, left = foot_pos[:, 0], foot_pos[:, 1] > 0
         in_front = ((x > x[:, None]) & (left == left[:, None])).sum(axis=1)  # on the same side
+        # Neighbors on a side, and opposite feet, have opposite phases: a trot on four legs, a walk
+        # on two.
         self.offset = 0.5 * ((in_front + left) % 2)
         self._swing_fraction = cfg.swing_fraction
         # Time constant of the mean velocity that is to track the command [s]. The sway of two legs
@@ -138,6 +142,7 @@ class Gait:
             `gait_phase`, shape (n, 2), and `swing_phase`, shape (n, f), of a :class:`State`.
         """
         phase = np.outer(time, [1 / self.period]) if self.period else np.zeros((len(time), 1))
+        # Sine and cosine have no jump at the end of the period, unlike the phase itself.
         angle, foot_phase = 2 * np.pi * phase, (phase + self.offset) % 1
         walks = moving[:, None] & (self.period > 0)
         swings = walks & (foot_phase < self._swing_fraction)

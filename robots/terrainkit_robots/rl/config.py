@@ -168,6 +168,7 @@ class Commands(Config):
     gait_period: NonNegativeFloat | None = None
     """Period of the gait, whose phase the policy observes [s]; none: 2.3, on two legs 3, times
     sqrt(leg length / g); 0 for no gait. Neighboring feet swing in turn: a walk or a trot."""
+    # Below 0.5, the stances of opposite feet overlap between two steps.
     swing_fraction: Fraction = 0.45
     """Fraction of the period that a foot is in the air."""
 

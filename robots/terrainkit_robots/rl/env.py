@@ -127,6 +127,7 @@ class LeggedEnv(VecEnv):
         time_out = self.episode_length_buf.numpy() >= self.max_episode_length
         if self.waypoints and self.velocity_command.fixed is None:
             time_out |= self.waypoints.update(state.base_pos[:, :2])
+        # A fall at the last step is a termination, which must not be bootstrapped.
         time_out &= ~state.fallen
         done = state.fallen | time_out
         self._update_progress(state, unstable)
@@ -179,6 +180,7 @@ class LeggedEnv(VecEnv):
         """
         target = np.tile(self.action_offset, (len(actions), 1))
         target[:, self.action_joints] += self.action_scale[self.action_joints] * actions
+        # A joint with a zero offset reads too much, so its motor stops short by the same angle.
         return target - self.joint_offset * self.is_position_controlled
 
     def _apply_actions(self, actions: torch.Tensor) -> None:
@@ -235,6 +237,7 @@ class LeggedEnv(VecEnv):
         total = np.zeros(self.num_envs, np.float32)
         termination = np.zeros_like(total)
         for name, (function, scale) in self.reward_terms.items():
+            # Scales are per second, so that they do not depend on the control frequency.
             term = function(state, self.robot, settings) * np.float32(scale) * dt
             if name == "termination":
                 termination += term

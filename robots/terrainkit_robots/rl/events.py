@@ -80,6 +80,8 @@ def apply_params(sim: Simulation, params: RandomizedParams) -> None:
     # MuJoCo's affine actuators: force = gain * ctrl + bias . (1, q, dq).
     gain, bias = batch.expand("actuator_gainprm"), batch.expand("actuator_biasprm")
     k, d, s = params.stiffness, params.damping, params.strength
+    # A position actuator has gain k and bias -k, a velocity actuator gain d and bias -d: both must
+    # change by the same factor, or the target moves.
     has_stiffness, has_damping = model.actuator_biasprm[:, 1:3].T != 0
     factor = np.where(has_stiffness, k, np.where(has_damping, d, 1))
     gain[:, :, 0] = model.actuator_gainprm[:, 0] * factor * s
@@ -107,6 +109,7 @@ class Pushes:
         """
         self.velocity[env_ids] = 0
         if self._max_vel:
+            # Random phases, so that not all robots are pushed in the same step.
             self.steps_until_push[env_ids] = rng.integers(1, self._interval + 1, len(env_ids))
 
     def apply(self, rng: np.random.Generator, qvel: NDArray[np.float64]) -> None:
@@ -164,10 +167,13 @@ def sample_reset_state(
         uneven = highest - height.min(axis=1) > MAX_RESET_RELIEF
         if not uneven.any():
             break
+        # Half of the offset first, then none, so that robots start near the origin only where they
+        # have to.
         offset[uneven] *= factor
     qpos[:, :2] = env_origins[:, :2] + offset
     qpos[:, 2] = highest + robot.spawn_height
     yaw = rng.uniform(-cfg.yaw, cfg.yaw, count)
+    # The quaternion of a rotation about z.
     qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
     low, high = cfg.reset_range or robot.spec.reset_range
     factors = rng.uniform(low, high, (count, len(robot.default_pose)))

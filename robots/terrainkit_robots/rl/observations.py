@@ -73,6 +73,7 @@ def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTe
         return state.dof_pos + state.joint_offset - robot.default_pose
 
     def height_scan(state: State) -> FloatArray:
+        # Clipped at 1 m, as in legged_gym.
         return np.clip(state.height_scan - np.float32(HEIGHT_SCAN_OFFSET), -1, 1)
 
     group: tuple[ObservationTerm, ...] = (

@@ -93,7 +93,9 @@ def _attach(robot: Robot, terrain: Ground, task: Task) -> Any:
     for each in (mjspec, ground_mjspec):  # options of both, or MuJoCo warns about differences
         each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
         each.option.timestep = task.sim.dt
+        # Implicit in forces that depend on the velocity, such as the damping of the motors.
         each.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        # Faster than elliptic cones; see `Asset` for what else halves the time of a step.
         each.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
         each.option.iterations = task.sim.iterations
         each.option.ls_iterations = task.sim.ls_iterations

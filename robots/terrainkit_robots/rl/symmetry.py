@@ -78,6 +78,7 @@ def mirror_maps(
     controlled = np.flatnonzero(scale)
     images = np.searchsorted(controlled, joints.index[controlled])
     maps = {
+        # A reflection of y changes the y of vectors, and the x and z of rotations (axial vectors).
         "vector": _map(range(3), [1, -1, 1]),
         "axial": _map(range(3), [-1, 1, -1]),
         "command": _map(range(3), [1, -1, -1]),
@@ -193,5 +194,6 @@ def _scan_map(cfg: Terrain) -> SignedPermutation:
     for k in np.flatnonzero(error.min(axis=1) > TOLERANCE):
         got = f"terrain.measured_points_y: got {lateral[k]:g} without {-lateral[k]:g}"
         raise ConfigError(f"{got}; symmetry expects the same points on both sides")
+    # Each point takes the height at the same x and the opposite y.
     index = np.arange(len(cfg.measured_points_x))[:, None] * len(lateral) + error.argmin(axis=1)
     return _map(index.ravel(), np.ones(index.size))

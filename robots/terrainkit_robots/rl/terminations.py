@@ -25,6 +25,7 @@ def bad_orientation(projected_gravity: FloatArray, cfg: Termination) -> NDArray[
         projected_gravity: Unit vector of gravity in the frame of the base, shape (n, 3).
         cfg: The limits.
     """
+    # The z component of gravity in the base frame is minus the cosine of the tilt.
     return -projected_gravity[:, 2] < np.cos(cfg.tilt)
 
 

@@ -21,10 +21,12 @@ clear the edge."""
 STEP_DOWN = 0.5
 """Highest step down, in leg lengths. The leg reaches down as far as the other legs fold."""
 
+# 2 sin(20 degrees) = 0.68.
 GAP = 0.7
 """Widest gap, in leg lengths: the chord of a leg that swings 20 degrees to the front and to the
 back, a long step without a flight phase."""
 
+# tan(30 degrees); the friction angle at a coefficient of 1 is 45 degrees.
 SLOPE = 0.577
 """Steepest slope, as rise over run: 30 degrees, two thirds of the friction angle at a friction
 coefficient of 1."""

@@ -52,6 +52,7 @@ class Rollout:
             )
         if not self_collision:
             can_collide, floor = collides(model), model.geom_bodyid == 0
+            # Only the floor offers a contact bit, and only the robot accepts it.
             model.geom_contype[:] = floor
             model.geom_conaffinity[:] = can_collide & ~floor
         for index, name in enumerate(sim.actuated if gains else ()):
@@ -93,6 +94,7 @@ class Rollout:
         model, data = self.model, self.data
         data.qpos[:] = qpos
         if self.sim.floating and clearance is not None:
+            # Measured from far above the floor, so that all distances are positive.
             data.qpos[2] = qpos[2] + _MAX_DISTANCE / 2
             mujoco.mj_kinematics(model, data)
             data.qpos[2] += clearance - self._clearance()

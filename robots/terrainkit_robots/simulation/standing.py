@@ -151,6 +151,7 @@ def stand_test(
         rollout = Rollout(sim, {} if joints_locked else gains, self_collision=self_collision)
         if joints_locked:
             rollout.lock_joints()
+        # Without a drop, a failure is a failure to stand and not to land.
         rollout.reset(sim.qpos_at(positions), clearance=0.0)
         recorder = _Recorder(rollout, positions, areas, seconds)
         for step in rollout.steps(seconds):

@@ -96,6 +96,7 @@ def _cylinder(radius: float, half_length: float) -> tuple[NDArray[np.float64], N
     # The sides of a regular polygon are radius (1 - cos(pi / n)) inside of its circle.
     n = max(8, int(np.ceil(np.pi / np.arccos(max(0.0, 1 - MAX_CHORD_ERROR / radius)))))
     angle = np.arange(n) * (2 * np.pi / n)
+    # The mean of corners and sides is on the circle: half of the error is outside, half inside.
     around = radius * 2 / (1 + np.cos(np.pi / n))
     circle = around * np.column_stack([np.cos(angle), np.sin(angle)])
     ends = [np.column_stack([circle, np.full(n, z)]) for z in (-half_length, half_length)]
@@ -111,6 +112,7 @@ def _hull(vertices: NDArray[np.float32]) -> TriMesh:
     faces = hull.simplices
     corners = vertices[faces].astype(float)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # Qhull's normals point outward, but its triangles have any orientation.
     inward = (normal * hull.equations[:, :3]).sum(axis=1) < 0
     faces[inward] = faces[inward][:, ::-1]
     return _mesh(vertices.astype(float), faces)

@@ -27,6 +27,7 @@ class TriMesh:
         numbers = np.empty((3, len(self.triangles)), dtype=np.int64)
         for k, number in enumerate(numbers):
             a, b = self.triangles[:, k], self.triangles[:, (k + 1) % 3]
+            # The arguments `out` and `dtype` avoid a temporary array in double words.
             np.multiply(np.minimum(a, b), 2 * len(self.vertices), out=number, dtype=np.int64)
             number += 2 * np.maximum(a, b)
             number += a > b

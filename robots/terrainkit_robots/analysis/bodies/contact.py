@@ -61,6 +61,8 @@ def flat_foot_angle(body: Body, pose: Matrix, axis: Matrix, meshes: Meshes) -> f
     for rotation in axis_angle_to_matrix(axis, _ANGLES):
         rotated = np.eye(4)
         rotated[:3, :3] = rotation @ pose[:3, :3]
+        # A flat sole touches the ground over its whole length, so the longest contact is the
+        # flattest.
         lengths.append(float(np.ptp(contact_points(body, rotated, meshes) @ forward)))
     flat = np.array(lengths) >= 0.98 * max(lengths)
     start = int(np.flatnonzero(flat)[np.abs(_ANGLES[flat]).argmin()])
@@ -104,6 +106,7 @@ def _extreme_points(shape: BodyShape, pose: Matrix, meshes: Meshes) -> Matrix:
         case "ellipsoid":
             local = rotation.T @ down
             radii = np.array(size)
+            # The support point of an ellipsoid in direction d is R^2 d / |R d| for the radii R.
             lowest = radii**2 * local / max(float(np.linalg.norm(radii * local)), 1e-12)
             return np.asarray(rotation @ lowest + center)[None]
     assert geometry.mesh is not None

@@ -64,6 +64,8 @@ def nearest_physical(inertia: Matrix) -> Matrix | None:
     """
     if principal_moments(inertia)[2] <= 0:
         inertia = -inertia  # every sign is wrong
+    # The second moments of mass, S = tr(I) / 2 - I, must not be negative. This is equivalent to the
+    # triangle inequality of the principal moments, and I = tr(S) - S turns them back.
     moments, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
     largest = float(moments.max())
     if not 0 < largest < np.inf:
@@ -81,6 +83,7 @@ def box_inertia(mass: float, size: Matrix) -> Matrix:
         size: Side lengths, shape (3,) [m].
     """
     squares = size**2
+    # m (b^2 + c^2) / 12 about the axis along side a.
     return np.asarray(np.diag(mass / 12 * (squares.sum() - squares)))
 
 

@@ -112,6 +112,7 @@ class InertiaRepair:
             return None
         if abs(mass - other_mass) > _MAX_MASS_DIFFERENCE * other_mass:
             return None
+        # From the other inertial frame to the trunk, mirrored, and to the own inertial frame.
         transform = self._axes(link).T @ self.mirror.reflection @ self._axes(other)
         return np.asarray(transform @ inertia @ transform.T)
 
@@ -133,6 +134,7 @@ class InertiaRepair:
         if nearest is None or box is None or not mass > 0:
             return nearest
         radius = gyration_radius(principal_moments(nearest), mass)
+        # No mass inside the box is farther from its center than half of the diagonal.
         return nearest if radius <= np.linalg.norm(box[1] - box[0]) / 2 else None
 
     def _solid_box(self, link: Link, inertial: Inertial) -> Matrix | None:

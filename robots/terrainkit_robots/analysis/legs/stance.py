@@ -110,6 +110,7 @@ def _force_points(
     weight = float(forces.sum())
     if weight <= 0:
         return contacts
+    # Clipping in `ground_forces` may leave a moment, which the soles take by moving the pressure.
     shift = (center - forces @ contacts / weight) * [1, 1, 0]
     shifted = [
         np.clip(contact + shift, points.min(axis=0), points.max(axis=0))
@@ -171,9 +172,13 @@ def ground_forces(points: Matrix, center: Matrix, weight: float) -> Matrix:
     forces = np.zeros(len(points))
     loaded = np.arange(len(points))
     while len(loaded):
+        # The vertical forces must add up to the weight, and their moments about the center of mass
+        # to 0.
         balance = np.vstack([np.ones(len(loaded)), (points[loaded] - center).T])
         even = np.full(len(loaded), weight / len(loaded))
         residual = np.array([weight, 0.0, 0.0]) - balance @ even
+        # Of all solutions, lstsq returns the change with the smallest norm: the forces closest to
+        # even.
         change, *_ = np.linalg.lstsq(balance, residual, rcond=1e-9)
         pulling = even + change < -1e-9 * abs(weight)  # the ground cannot pull: this foot lifts off
         if not pulling.any():

@@ -113,6 +113,8 @@ def _misalignment(
     lengths = [float(np.linalg.norm(joint.offset)) for joint in (left, right)]
     tolerance = MAX_POSITION_ERROR + MAX_RELATIVE_POSITION_ERROR * min(lengths)
     if distance > tolerance:
+        # The apex angle of an isosceles triangle with the mean length as legs and the distance as
+        # base.
         angle = 2 * math.asin(min(1.0, distance / (lengths[0] + lengths[1])))
         is_same_length = abs(lengths[0] - lengths[1]) <= tolerance
         if parents is not None and is_same_length and _is_rotated(mirror, parents, angle):

@@ -131,6 +131,7 @@ def detect_mirror(legs: Sequence[Leg], bodies: Sequence[Body]) -> Mirror:
     points = np.array([body.zero_pose[:3, 3] - offset * normal for body in bodies]).reshape(-1, 3)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     image_index: dict[int, int] = {}
+    # Positions come first, because names may be wrong; names pair what is left.
     for candidates in (
         _pairs_by_position(bodies, mirror, points, MAX_MIRROR_ERROR * size),
         _pairs_by_name(bodies, mirror, points),
@@ -161,6 +162,7 @@ def _plane_offset(legs: Sequence[Leg], bodies: Sequence[Body], normal: Matrix) -
 
     Zero unless the center of mass of the trunk is there too; otherwise a leg is misplaced.
     """
+    # The median of the legs, since one leg may be misplaced.
     starts = sorted(float(leg.limb.points[0] @ normal) for leg in legs)
     if len(starts) < 2:
         return 0.0

@@ -85,7 +85,9 @@ def _capsule(points: Matrix, axis: Matrix) -> PrimitiveFit:
     # height of the spherical cap over each point
     squared = radius**2 - ((local[:, :2] - center) ** 2).sum(axis=1)
     cap = np.sqrt(np.maximum(squared, 0))
+    # A point is inside if the center of the end cap is at least as high as the point minus its cap.
     upper, lower = float((local[:, 2] - cap).max()), float((local[:, 2] + cap).min())
+    # Negative if a sphere encloses all points.
     half_length = max(0.0, (upper - lower) / 2)
     pose = np.eye(4)
     pose[:3, :3] = rotation

@@ -12,10 +12,13 @@ from terrainkit_robots.text import contrast, names
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import Link
 
+# 9 of 536 published files exceed it, all of them with placeholders of 10 g and less beside
+# kilograms.
 _MAX_MASS_RATIO = 1000.0
 """Mass ratio of neighboring bodies above which solvers become stiff at common time steps, such as
 10 kg on 10 g."""
 
+# The 7 published files with an error have 6 % to 305 %.
 _MAX_INFERRED, _MAX_INFERRED_ERROR = 0.01, 0.05
 """Inferred mass divided by the declared mass: limits of the warning and the error."""
 

@@ -3,6 +3,7 @@
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
+# 6 of 536 published files exceed it, with a friction of 100 %: grippers that cannot move.
 _MAX_FRICTION, _MAX_LEG_FRICTION = 0.99, 0.3
 """Allowed friction as a share of the effort, for all joints and for leg joints. Harmonic drives
 need up to 20 %."""
@@ -15,6 +16,7 @@ _MIN_SPEED_SHARE, _MAX_LEG_VELOCITY = 0.3, 60.0
 """Smallest plausible share of its velocity limit that a leg joint reaches against its damping, and
 the limit above which it is a placeholder [rad/s]."""
 
+# 5 of 536 published files are below it: motors with a control range of 1 and an armature of 1.
 _MIN_ACCELERATION = 20.0
 """Smallest plausible ratio of effort to armature [rad/s2]. Motors with a high gear ratio reach
 200."""

@@ -7,6 +7,7 @@ from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Actuator, Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
+# 46 of 536 published files have placeholders, with 1,000 to 50,000.
 _MAX_EFFORT = 1000.0
 """Torque [N m] or force [N] from which a limit may be a placeholder."""
 

@@ -7,6 +7,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
 from terrainkit_robots.text import contrast
 
+# The two published files with an error need 166 % and 270 %.
 _MAX_LOAD, _MAX_LOAD_ERROR = 0.5, 0.9
 """Share of the effort that standing may need: limits of the warning and the error. Walking needs
 two to three times as much as standing."""

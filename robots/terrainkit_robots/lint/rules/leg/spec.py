@@ -14,6 +14,7 @@ from terrainkit_robots.text import names
 _MAX_PENETRATION = 0.001
 """Depth of the feet in the ground that a simulator tolerates at the start [m]."""
 
+# v = sqrt(2 g h).
 _MAX_DROP = 0.06
 """Largest height of the feet above the ground at the start [m]; the robot lands at 1.1 m/s."""
 

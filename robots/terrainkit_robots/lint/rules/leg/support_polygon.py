@@ -12,6 +12,7 @@ from terrainkit_robots.text import contrast
 _MIN_MARGIN = 0.01
 """Required distance of the center of mass from the edge of the support polygon [m]."""
 
+# The margin at the mean of the contacts is taken as the largest possible one.
 _MIN_MARGIN_SHARE = 0.25
 """The same as a share of the largest possible distance, for small feet."""
 

@@ -21,6 +21,8 @@ from terrainkit_robots.lint.rules.sym.other_rules import OtherRules, check_joint
 from terrainkit_robots.text import contrast, numbers
 from terrainkit_robots.transforms import Matrix
 
+# The 20 published files that exceed it are 7 % to 62 % apart; tested robots without defects agree
+# to 0.1 %.
 _MAX_MOMENT_DIFFERENCE = 0.05
 """Allowed difference of principal moments, as a share of the largest one."""
 

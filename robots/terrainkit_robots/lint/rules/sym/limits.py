@@ -17,6 +17,7 @@ from terrainkit_robots.lint.rules.sym.other_rules import OtherRules
 from terrainkit_robots.text import contrast, numbers
 from terrainkit_robots.transforms import Matrix
 
+# The 4 published files that exceed it have differences such as 100 N m and 160 N m.
 _MAX_LIMIT_DIFFERENCE = 0.01
 """Allowed relative difference of effort and velocity limits."""
 
