@@ -77,7 +77,7 @@ _NAMES = {
     "terrain.sub_terrain": ("SubTerrain",),
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
-"""Module of each public name, so that only those in use are imported: a robot needs no terrain."""
+"""Module of each public name, imported on first use: a robot needs no terrain."""
 
 
 def __getattr__(name: str) -> Any:

@@ -52,7 +52,7 @@ class Feasibility(Command):
     """Name of a bundled robot, or a folder written by terrainkit onboard."""
 
     limit: Limits = ()
-    """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
+    """Limits of the robot that replace the derived limits, such as `step_up=0.2 gap=0.4`."""
 
     output: OutputPath | None = None
     """Write PATH.json with all paths, and PATH.png with the paths on the preview."""

@@ -58,7 +58,7 @@ class Generate(ConfigCommand):
     ground, 1 the limit of the robot; see terrainkit feasibility."""
 
     limit: Limits = ()
-    """Limits of the robot that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
+    """Limits of the robot that replace the derived limits, such as `step_up=0.2 gap=0.4`."""
 
     jobs: Jobs = 1
     """Number of processes that build patches; the map does not depend on it. Processes start in a

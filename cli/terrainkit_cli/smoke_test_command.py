@@ -65,7 +65,7 @@ class SmokeTest(Command):
     """For robot files: value of a xacro argument."""
 
     spec: InputPath | None = None
-    """For a robot file: a robot.toml whose values override the derived ones."""
+    """For a robot file: a robot.toml whose values override the derived values."""
 
     def run(self) -> int:
         """Test each robot, and report."""

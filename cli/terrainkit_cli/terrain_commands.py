@@ -150,7 +150,7 @@ def _print_budget(terrain_map: TerrainMap, foot_radius: float) -> None:
         f"a foot of radius {foot_radius:g} m has at most {budget.foot_contacts} with a heightfield"
     )
     if budget.foot_contacts > MAX_CONTACTS:
-        contacts += f"; MuJoCo drops those beyond {MAX_CONTACTS}: use larger cells, or boxes"
+        contacts += f"; MuJoCo drops contacts beyond {MAX_CONTACTS}: use larger cells, or boxes"
     else:
         contacts += f"; MuJoCo allows {MAX_CONTACTS}"
     render.table(
@@ -235,7 +235,7 @@ class CheckMap(Command):
     written by terrainkit onboard."""
 
     limit: Limits = ()
-    """With --robot: limits that replace the derived ones, such as `step_up=0.2 gap=0.4`."""
+    """With --robot: limits that replace the derived limits, such as `step_up=0.2 gap=0.4`."""
 
     def run(self) -> int:
         """Print the issues and the largest seam, and return 1 if there are issues."""

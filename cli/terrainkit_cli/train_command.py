@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 class Train(ConfigCommand):
     """Train a policy for a robot on a terrain, and save it as a run.
 
-    A run is a folder with the task, checkpoints (model_100.pt is the one after 100 iterations) and
+    A run is a folder with the task, checkpoints (model_100.pt is written after 100 iterations) and
     TensorBoard logs. Ctrl-C writes a checkpoint and stops. Training is deterministic: the same seed
     and number of threads give the same policy. With torchrun, each process simulates a part of the
     environments.

@@ -101,7 +101,7 @@ def _set_collider(prim: Any, approximation: str, material: Any) -> None:
 
 
 def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> None:
-    """Add a prim for each solid. Those that are not visible are drawn only as guides."""
+    """Add a prim for each solid. Invisible solids are drawn only as guides."""
     from pxr import Gf, UsdGeom
 
     shapes = np.concatenate([solids.boxes, solids.cylinders])

@@ -98,7 +98,7 @@ def columns_per_cell(patch: Patch) -> int:
 
 
 def sample_columns(patch: Patch, threshold: float) -> Columns:
-    """Return the columns of a patch: its samples, or finer ones if it has solids.
+    """Return the columns of a patch: its samples, or finer columns if it has solids.
 
     Args:
         patch: The patch. Solids that do not collide are ignored.

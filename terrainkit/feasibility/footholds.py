@@ -22,7 +22,7 @@ def foothold_sizes(columns: Columns, steps: Edges, limits: RobotLimits) -> Float
 
     Args:
         columns: The columns.
-        steps: Edges between neighboring columns, first those toward x and y.
+        steps: Edges between neighboring columns; edges toward x and y are first.
         limits: The limits of the robot.
 
     Returns:

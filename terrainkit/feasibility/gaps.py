@@ -15,14 +15,14 @@ _MAX_PAIRS = 100_000
 """Pairs of nodes that are compared at once, to bound the memory."""
 
 _MAX_ENDS = 4
-"""Largest number of gaps from a node to a region, the easiest ones. Steps of little demand join the
+"""Largest number of gaps from a node to a region; the easiest are kept. Easy steps join the
 nodes of a region, so it does not matter where a gap ends, unless there is a wall in between."""
 
 _MAX_SEARCHED_ENDS = 16
 """The same where one gap into each region is enough: most are not evaluated."""
 
 _MORE = 8
-"""Factor by which more gaps into a region are tried where the easiest ones lead through a wall."""
+"""Factor by which more gaps into a region are tried where the easiest gaps lead through a wall."""
 
 
 def gap_edges(
@@ -65,7 +65,7 @@ def gap_edges(
 
 
 def _batches(parts: Iterable[Edges]) -> Iterator[Edges]:
-    """Yield the edges of all parts, at least `_MAX_PAIRS` at once but for the last ones."""
+    """Yield the edges of all parts in batches of at least `_MAX_PAIRS`, except for the last."""
     batch, number = [], 0
     for part in parts:
         batch.append(part)
@@ -221,7 +221,7 @@ def _with_width(graph: FootholdGraph, edges: Edges, max_demand: float) -> Edges:
 def _line(
     columns: Columns, start: IntArray, end: IntArray
 ) -> Iterator[tuple[IntArray, IntArray, IntArray]]:
-    """Yield the columns between the nodes of each edge: those at each place, and their edges."""
+    """Yield the columns between the nodes of each edge: x and y index, and index of the edge."""
     (i, j), (i2, j2) = columns.column(start), columns.column(end)
     di, dj = i2 - i, j2 - j
     count = 2 * np.maximum(np.abs(di), np.abs(dj))  # points half a column apart

@@ -14,7 +14,7 @@ MAX_DEMAND = 2.0
 
 _REACHES = (0.5, 1.0, float(np.nextafter(MAX_DEMAND, np.inf)))
 """Demands below which gaps are searched one after the other where steps alone lead nowhere: few
-patches need the widest ones."""
+patches need the widest gaps."""
 
 
 def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) -> Edges:

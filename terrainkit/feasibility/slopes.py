@@ -56,7 +56,7 @@ def slopes_of(floor: FloatArray, spacing: float) -> Slopes:
 
 
 def _slope(floor: FloatArray, lag: tuple[int, int]) -> FloatArray:
-    """Return the smaller of the slopes to both sides, with the sign of the one behind.
+    """Return the smaller of the slopes to both sides, with the sign of the slope behind.
 
     Where they differ in sign, as on a ridge or in a valley, both must continue for twice the lag;
     else the slope is 0, as on rough ground.

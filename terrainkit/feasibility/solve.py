@@ -44,8 +44,8 @@ class SolvedTerrain:
     """The solved ranges, by parameter."""
 
     demand: Range
-    """Demands at difficulty 0 and 1. They are above those requested if no value is easy enough, and
-    below if the demand changes in steps, or no value reaches them."""
+    """Demands at difficulty 0 and 1. They are above the requested demands if no value is easy
+    enough, and below if the demand changes in steps, or no value reaches them."""
 
     elements: "tuple[SolvedTerrain, ...]" = ()
     """The elements of a course, each solved on its own."""
@@ -235,8 +235,8 @@ def _is_same(first: Patch, second: Patch) -> bool:
 def _largest(demand_at: Callable[[float], float], max_demand: float) -> float:
     """Return the largest difficulty that demands at most `max_demand`, or else the closest.
 
-    If none is easy enough, it is the easiest valid one; if all are, the hardest. It is 0 or 1 if
-    those demand the same.
+    If no difficulty is easy enough, the result is the easiest valid one; if all are, the hardest.
+    It is 0 or 1 if these demand the same.
     """
     low, high = _EASIEST, _HARDEST
     if demand_at(high) <= max_demand:

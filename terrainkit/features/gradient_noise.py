@@ -60,7 +60,7 @@ def perlin_noise(grid: Grid, wavelength: float, rng: np.random.Generator) -> NDA
 def fractal_noise(
     grid: Grid, wavelength: float, octaves: int, rng: np.random.Generator, *, gain: float = 0.5
 ) -> NDArray[np.float64]:
-    """Return a sum of gradient noises, each with half the wavelength of the one before.
+    """Return a sum of gradient noises, each with half the wavelength of the previous one.
 
     Args:
         grid: Grid of the patch.

@@ -206,7 +206,7 @@ def _cover_ranks(flat: NDArray[np.bool_], ranks: NDArray[np.int64]) -> Iterator[
 
 
 def _first_cells(start: int, stop: int, differ: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the cells from `start` that differ from the one before, and `stop`."""
+    """Return the cells from `start` that differ from the previous cell, and `stop`."""
     return np.concatenate([[start], np.flatnonzero(differ) + start + 1, [stop]])
 
 

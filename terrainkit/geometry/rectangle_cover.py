@@ -122,7 +122,7 @@ def _select_greedily(candidates: list[_Rectangle], missing: int) -> list[tuple[_
 
 
 def _drop_redundant(selected: list[tuple[_Rectangle, int]]) -> list[_Rectangle]:
-    """Return the chosen rectangles without those whose cells others cover, last ones first."""
+    """Return the chosen rectangles, last first, except those that others cover."""
     kept, covered = [], 0
     for rectangle, first in reversed(selected):
         # Earlier rectangles do not cover the cells that this one was the first to cover.

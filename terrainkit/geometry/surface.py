@@ -40,7 +40,7 @@ def surface_at(
     """Evaluate the surface at `points`.
 
     Between four samples without a wall the ground is two triangles that share the diagonal from
-    (i, j) to (i + 1, j + 1), the one along which MuJoCo splits a cell. A quad with a wall is a fan
+    (i, j) to (i + 1, j + 1), along which MuJoCo splits a cell as well. A quad with a wall is a fan
     of triangles around its center; see :mod:`terrainkit.geometry.walls`. Beyond the outermost
     samples the ground continues level.
 

@@ -1,7 +1,7 @@
 """Walls: edges between two samples at which the ground is vertical.
 
 A quad is the square between four neighboring samples. Its corners are numbered counterclockwise
-from the one with the smallest x and y. Edge k runs from corner k to corner k + 1:
+from the corner with the smallest x and y. Edge k runs from corner k to corner k + 1:
 
 .. code-block:: text
 

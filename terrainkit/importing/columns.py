@@ -1,7 +1,7 @@
 """Columns: where the vertical lines through a grid of points cross a mesh.
 
 The triangles are rasterized, which finds every crossing in double precision, also where a line
-meets an edge or a vertex. Casting rays finds one crossing at a time and may miss those.
+meets an edge or a vertex. Casting rays finds one crossing at a time, and may miss edges.
 """
 
 from collections.abc import Iterator

@@ -40,8 +40,8 @@ class _Group:
     """Their parent class."""
 
     package: str
-    """Name of the package of the built-in ones, which is also the group of the entry points of
-    other packages."""
+    """Name of the package of the built-in classes, and of the group of entry points of other
+    packages."""
 
 
 _TERRAINS = _Group(noun="terrain", parent=Terrain, package="terrainkit.terrains")

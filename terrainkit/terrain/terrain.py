@@ -42,7 +42,7 @@ class Terrain(Parameterized, ABC):
     """Whether the rows of a column have the same random numbers in mode curriculum.
 
     Set it where single random objects decide how hard a patch is. Otherwise a row could be easier
-    than the one before.
+    than the previous row.
     """
 
     has_random_heights: ClassVar[bool] = True

@@ -92,8 +92,8 @@ class FloatingIslands(Terrain):
         """Return the centers of the platform and the islands, and the walkways between them.
 
         Returns:
-            Centers [m], shape (n + 1, 2), the platform first; for each, the index of the one before
-            it on the way from the platform, and the length of this way [m], shapes (n + 1,).
+            Centers [m], shape (n + 1, 2), the platform first; for each, the index of the previous
+            center on the way from the platform, and the length of this way [m], shapes (n + 1,).
         """
         from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 

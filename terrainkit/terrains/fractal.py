@@ -24,7 +24,7 @@ class Fractal(Terrain):
     """Wavelength of the first octave [m]; about the diameter of the largest hills."""
 
     octaves: int = parameter.count(5)
-    """Number of octaves. Each has half the wavelength and half the amplitude of the one before."""
+    """Number of octaves. Each halves the wavelength and the amplitude of the previous octave."""
 
     platform: float = parameter.platform(2.0, slopes_away=True)
     """Side of the flat square at the center [m]."""

@@ -72,7 +72,7 @@ class Rooms(FlatTerrain):
     def _lines(
         self, grid: Grid, rng: np.random.Generator
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
-        """Return the walls across x and those across y.
+        """Return the walls across x and the walls across y.
 
         Returns:
             For each axis, the lower side of each wall across the axis, its start along the other

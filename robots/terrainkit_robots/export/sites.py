@@ -26,7 +26,7 @@ def foot_sites(facts: "Facts", feet: Sequence[str] = ()) -> tuple[Site, ...]:
 
     Args:
         facts: The robot.
-        feet: Names of the feet, links that are fixed to them; empty to use the detected ones.
+        feet: Names of the feet, links that are fixed to them; empty to use the detected feet.
     """
     poses = body_poses(facts.bodies, facts.default_pose)
     foot_names = {facts.body_of[name].index: name for name in feet}

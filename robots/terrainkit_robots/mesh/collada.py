@@ -30,7 +30,7 @@ _READ = {"asset", "library_geometries", "library_nodes", "library_visual_scenes"
 """Elements below the root that hold the geometry."""
 
 _REMOVED = ("bind_material", "extra", "instance_camera", "instance_controller", "instance_light")
-"""Elements inside of those that do not matter for the geometry."""
+"""Elements inside of `_READ` that do not matter for the geometry."""
 
 
 def read_dae(data: bytes) -> Surface:

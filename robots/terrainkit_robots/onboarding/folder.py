@@ -17,7 +17,7 @@ _BACKUP_SUFFIX = ".before"
 _GENERATED = frozenset(
     {"robot.urdf", "robot.xml", "scene.xml", "report.md", "report", "meshes", "__pycache__"}
 )
-"""Files and folders that onboarding or Python writes, except those that users edit."""
+"""Files and folders that onboarding or Python writes, and that users do not edit."""
 
 
 def check_folder(target: Path, *, overwrite: bool) -> None:

@@ -63,7 +63,7 @@ class OnboardOptions:
     """Whether the base is floating; None to decide from the file and the legs."""
 
     spec: Path | None = None
-    """A robot.toml whose values override the derived ones."""
+    """A robot.toml whose values override the derived values."""
 
     gains: "GainSet" = "stand"
     """PD gains to suggest: `stand` holds the default pose without a policy; `train` is as soft as

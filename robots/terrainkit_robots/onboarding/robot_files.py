@@ -58,7 +58,7 @@ class RobotFiles:
 
 @dataclass(frozen=True, kw_only=True)
 class SpecOverride:
-    """A spec with measured or edited values, which replace the derived ones."""
+    """A spec with measured or edited values, which replace the derived values."""
 
     spec: "RobotSpec"
     """The spec."""
@@ -87,7 +87,7 @@ def make_robot_files(
         collision: How collision meshes are simplified.
         floating: Whether the base is floating; by default as in the overriding spec or the file,
             or as the legs suggest.
-        user_spec: Values that replace the derived ones.
+        user_spec: Values that replace the derived values.
         gain_set: The PD gains to suggest.
         unknown_effort: Joints whose effort limit in the file is a placeholder.
         cache_dir: Folder that caches convex decompositions between runs.

@@ -379,7 +379,7 @@ class ErrorMean:
 class MotionSums:
     """Sums over the measured steps of robots that are commanded to move, shapes (n,).
 
-    Power and speed are those under a linear command.
+    Power and speed count only under a linear command.
     """
 
     lin_vel: NDArray[Any]  # dot product of linear velocity and command [m2/s2]

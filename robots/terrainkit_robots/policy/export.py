@@ -42,7 +42,7 @@ _FORMULAS = {
     "clip of its own is (clip(raw - offset, *clip)) * scale",
     "gait": "gait_phase = (sin, cos)(2 pi time / period); 0 while commanded to stand: no linear "
     "velocity, and a yaw rate below min_yaw_rate",
-    "history": "first numbers of the previous obs; in the first step, copies of those before it",
+    "history": "first numbers of the previous obs; in the first step, copies of the numbers before",
     "foot_contact": "1 if the vertical contact force on the foot is above contact_force, else 0",
     "action": "target = action_offset + action_scale * action for the joints of action.joints, "
     "action_offset for the others",

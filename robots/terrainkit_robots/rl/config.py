@@ -58,9 +58,9 @@ class Terrain(Config):
     """Collision geometry of the terrain: the map's heightfield, its boxes, the better of the two
     for the map, or a flat plane in place of the map."""
     curriculum: SamplerName | None = "levels"
-    """How patches are sampled: levels moves robots that succeed to more difficult rows, uniform
-    samples any, learning_progress those where success changes, prioritized_replay those where it
-    is hard to predict; none keeps the patch of each robot."""
+    """How patches are sampled: levels moves robots that succeed to more difficult rows; uniform
+    samples any patch; learning_progress samples patches where success changes; prioritized_replay
+    samples patches where success is hard to predict; none keeps the patch of each robot."""
     # 5, and the 17 x 11 points of the height scan below, are legged_gym's.
     max_init_level: Annotated[int, Meta(ge=0)] = 5
     """Highest row to start on; the last row of the map if it has fewer."""

@@ -282,7 +282,7 @@ class LeggedEnv(VecEnv):
         }
         log["Episode/falls"] = float(fallen.mean())
         log["Episode/speed"] = float((self.path_length[env_ids] / seconds).mean())
-        # rsl-rl cuts the first episodes to random lengths; those say nothing about the terrain.
+        # rsl-rl cuts the first episodes to random lengths, so their progress is not meaningful.
         complete = (self.episode_length_buf.numpy() == self.steps_since_reset)[env_ids]
         left_map = terrain_out_of_bounds(state.base_pos, self.terrain) & ~unstable
         progress = self.curriculum.progress.of_episodes(

@@ -204,7 +204,7 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
 
 
 def changed_robot_files(run: Run) -> tuple[str, ...]:
-    """Return the names of the robot's files that differ from those it was trained with."""
+    """Return the names of the robot's files that changed since the training."""
     recorded = run.info.robot_sha256
     if recorded is None:
         return ()

@@ -116,7 +116,7 @@ class MetricsLogger(Logger):
         return own | means | {"tot_time": float(self.tot_time)}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore the buffers; those per environment only if their number is the same."""
+        """Restore the buffers; buffers per environment only if their number is the same."""
         expected = self.state_dict() | {"rewbuffer": [0.0], "lenbuffer": [0.0]}
         sums = ("cur_reward_sum", "cur_episode_length")
         is_same = any(np.shape(state.get(name, 0)) == (self.num_envs,) for name in sums)

@@ -21,7 +21,7 @@ CONTACT_FORCE = 1.0
 class State:
     """The state of n robots: j joints, a actions, f feet, p penalized bodies, k scan points.
 
-    The arrays are copies: they may change within a step, not in later ones.
+    The arrays are copies: they may change within a step, but not in later steps.
     """
 
     base_pos: FloatArray  # position of the base, world frame [m], shape (n, 3)

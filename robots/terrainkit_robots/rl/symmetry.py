@@ -128,7 +128,7 @@ def augment(
         actions: Actions, shape (n, a), or None.
 
     Returns:
-        Observations and actions of 2 n samples: the given ones, then their mirror images.
+        Observations and actions of 2 n samples: the given samples, then their mirror images.
     """
     maps = env.mirror_maps
 

@@ -3,10 +3,10 @@
 The stiffness follows from the loads of a joint, and is capped by its effort limit and the time
 step. The damping is critical. Similar joints share one rounded value. The constants were compared
 with the gains that a1, go2, cassie, h1 and g1 are trained with in legged_gym, walk-these-ways,
-unitree_rl_gym and Isaac Lab. The results for bipeds are close. Those for quadrupeds are 1.5 to 3
-times as stiff, the more the lower they stand: with the 20 N m/rad of a go2 or the 80 of an
-anymal_c, legs that are bent as much as here collapse without a policy. The gain set `train` is as
-soft as these.
+unitree_rl_gym and Isaac Lab. The results for bipeds are close. Quadrupeds get 1.5 to 3 times the
+stiffness, and more the lower they stand: with the 20 N m/rad of a go2 or the 80 of an anymal_c,
+legs that are bent as much as here collapse without a policy. The gain set `train` is as soft as
+these.
 """
 
 import math

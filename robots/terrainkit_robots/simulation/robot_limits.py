@@ -59,7 +59,7 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
 
     Args:
         folder: Folder with `robot.toml` and the MJCF file that it names.
-        overrides: Limits that replace the derived ones, by name.
+        overrides: Limits that replace the derived limits, by name.
 
     Raises:
         ConfigError: if the spec has no legs, leg length or foot radius, the MJCF file cannot be

@@ -69,7 +69,7 @@ def find_patterns(names: Sequence[str], all_names: Sequence[str]) -> list[str]:
 def _best_parts(names: Sequence[str], others: Sequence[str]) -> tuple[_Parts, list[str]]:
     """Return the parts that most names share and no other name has, and these names.
 
-    Among equals, an end is preferred to a start, that to both, and longer texts to shorter ones.
+    Among equals, an end is preferred to a start, a start to both, and a longer text to a shorter.
     """
     best: tuple[_Parts, list[str]] = (), list(names[:1])
     rank = 1, 0, 0

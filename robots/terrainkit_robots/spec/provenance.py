@@ -1,4 +1,4 @@
-"""Provenance of an edited spec: which values are derived, and which ones the user gave."""
+"""Provenance of an edited spec: which values are derived, and which values the user gave."""
 
 from collections.abc import Iterator
 from dataclasses import replace

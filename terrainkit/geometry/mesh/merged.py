@@ -1,4 +1,4 @@
-"""The merged mesh: coplanar faces merged to large ones.
+"""The merged mesh, in which coplanar faces are merged.
 
 Flat quads are merged to rectangles, quads that are flat along one axis to rows, and straight
 walls of constant height to panels with a flat strip on both sides. Each polygon keeps the boundary

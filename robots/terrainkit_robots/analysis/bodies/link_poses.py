@@ -18,7 +18,7 @@ def random_positions(
 
     Args:
         ranges: Smallest and largest position of each joint.
-        joints: The joints; those that mimic others get the positions that follow from them.
+        joints: The joints; positions of mimic joints follow from the joints that they mimic.
         count: Number of positions.
         seed: Seed of the positions.
     """

@@ -18,8 +18,8 @@ class Tree:
     """A forest of links, and its main tree."""
 
     roots: tuple[str, ...]
-    """Links without a parent. The first one is the root of the robot: the root with the most
-    descendants among those that never had a parent."""
+    """Links without a parent. The first one is the root of the robot: of the links that never had a
+    parent, the link with the most descendants."""
 
     links: Mapping[str, Link]
     """The first link of each name."""

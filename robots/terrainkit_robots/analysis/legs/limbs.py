@@ -58,7 +58,7 @@ _MAX_JOINTS = 32
 """A chain of more joints is a tail, a snake or a rope."""
 
 _MAX_LIMBS = 64
-"""Number of leaves that are considered: the lowest ones."""
+"""Number of leaves that are considered, from the lowest upward."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -169,8 +169,8 @@ class _Robot:
     def _merge_variants(self) -> Iterator[MergedTree]:
         """Yield the tree as importers of different versions merge it.
 
-        They merge all fixed joints, only those without dont_collapse, only those above massless
-        links, or none.
+        They merge all fixed joints, only fixed joints without dont_collapse, only fixed joints
+        above massless links, or none.
         """
         if not self.bodies:
             return

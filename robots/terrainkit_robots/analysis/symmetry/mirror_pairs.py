@@ -105,7 +105,7 @@ def outlier_first(
     legs: Sequence[Leg],
     mirror: Mirror,
 ) -> tuple[MirrorSide, MirrorSide]:
-    """Return two mirrored joints, the one that deviates more from the legs on its side first.
+    """Return two mirrored joints, first the joint that deviates more from the legs on its side.
 
     The right joint is first if there are no other legs to compare with.
 

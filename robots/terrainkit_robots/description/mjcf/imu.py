@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 def find_imu(spec: "mujoco.MjSpec") -> Any:
     """Return the site of a gyro or an accelerometer, else a site named imu, else None.
 
-    Of several sites, the one closest to the base is returned.
+    Of several sites, the site closest to the base is returned.
     """
     import mujoco
 

@@ -73,7 +73,7 @@ class Node:
             stack.extend(reversed(node.children))
 
     def elements(self) -> Iterator["Node"]:
-        """Yield the elements of a body, including those in frames."""
+        """Yield the elements of a body, including elements in frames."""
         for child in self.children:
             yield child
             if child.tag in ("frame", "replicate"):

@@ -45,7 +45,7 @@ _BLOCKED_EVENTS = (
 """Prefixes of blocked audit events; see Python's table of audit events."""
 
 _ALLOWED_EVENTS = frozenset({"os.listdir", "os.scandir", "os.walk", "os.fwalk"})
-"""Exceptions to those, which only list folders."""
+"""Events that are not blocked, since they only list folders."""
 
 
 class _RejectedError(Exception):

@@ -126,7 +126,7 @@ def _foot_height(facts: "Facts", spec: RobotSpec) -> float:
 
 
 def _roles(leg: "Leg") -> dict[str, str]:
-    """Return the role of each joint of a leg; those below the knee belong to the ankle."""
+    """Return the role of each joint of a leg; joints below the knee belong to the ankle."""
     roles: dict[str, str] = {}
     for joint, role in zip(leg.joints, leg.roles, strict=True):
         is_ankle = "knee" in roles.values() and role != "slide"

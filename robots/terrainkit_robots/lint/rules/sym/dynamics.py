@@ -9,7 +9,7 @@ from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.transforms import Matrix
 
 _MAX_RATIO = 5.0
-"""Allowed ratio of two losses. Those that were identified joint by joint differ by up to 3."""
+"""Allowed ratio of two losses. Losses identified joint by joint differ by a factor of up to 3."""
 
 _TYPICAL = {"damping": 10.0, "friction": 1.0, "armature": 100.0}
 """Typical speed [rad/s], sign and acceleration [rad/s2] of a leg joint, by which a loss takes
