@@ -1,6 +1,6 @@
 """Call a function in a child process with limits of time and memory.
 
-Image decoders, mesh readers and CoACD are native code, which may crash, run for hours, or trust the
+Image decoders, mesh readers and CoACD are native code, which may crash, run for hours, or allocate the
 sizes that a file claims.
 """
 

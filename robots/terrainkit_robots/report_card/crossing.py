@@ -78,7 +78,7 @@ class Crossing:
 
     @single_torch_thread()
     def attempt(self, levels: NDArray[np.int64], columns: NDArray[np.int64]) -> Attempts:
-        """Let robots cross patches.
+        """Return the attempts of robots to cross patches.
 
         Args:
             levels: Row of the patch of each robot, shape (num_envs,).

@@ -1,7 +1,7 @@
 """Observations: groups of terms, each with its scale, noise and mirror symmetry.
 
 The policy group is what a real robot can measure, with noise. The privileged group has the same
-terms without noise, and terms that only a simulation knows. Exported policies use this order.
+terms without noise, and terms that only a simulation has. Exported policies use this order.
 """
 
 from collections.abc import Callable, Mapping, Sequence

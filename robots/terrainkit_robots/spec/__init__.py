@@ -1,1 +1,1 @@
-"""The spec: what training needs to know of a robot beyond its description."""
+"""The spec: the parameters of a robot that training needs besides its description."""

@@ -1,4 +1,4 @@
-"""RobotSpec: what training needs to know about a robot, with units and provenance.
+"""RobotSpec: the parameters of a robot that training needs, with units and provenance.
 
 An onboarded robot has it as `robot.toml`, which users edit. Tables by joint accept patterns, as in
 Isaac Lab and mjlab: a key is the name of a joint, or a regular expression that matches a whole
@@ -84,7 +84,7 @@ class MirrorJoint(Config):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotSpec(Config):
-    """What training needs to know about a robot besides its description. SI units and radians.
+    """The parameters of a robot that training needs besides its description. SI units and radians.
 
     The tables need not name all joints: an edited file is read first and checked then.
 
