@@ -1,7 +1,7 @@
 """Call a function in a child process with limits of time and memory.
 
-Image decoders, mesh readers and CoACD are native code, which may crash, run for hours, or allocate the
-sizes that a file claims.
+Image decoders, mesh readers and CoACD are native code, which may crash, run for hours, or allocate
+the sizes that a file claims.
 """
 
 import os
