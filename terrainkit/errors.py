@@ -81,6 +81,15 @@ def prefixed_errors(prefix: str) -> Iterator[None]:
         raise type(error)(f"{prefix}{error}") from error.__cause__ or error
 
 
+def install_command(extra: str) -> str:
+    """Return the command that installs an extra, such as `view`.
+
+    The name `terrainkit` is not registered on a package index, and anyone may register it. Until
+    it is registered, no message or page says `pip install terrainkit[view]`.
+    """
+    return f"pip install '.[{extra}]' (in a clone of terrainkit)"
+
+
 MAX_LISTED = 80
 """Names that an error message lists at most."""
 

@@ -3,7 +3,7 @@
 import importlib.util
 import os
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, install_command
 
 _PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "mujoco.batch")
 """Packages that training imports; MuJoCo has `batch` since version 3.17."""
@@ -21,6 +21,6 @@ def require_training(*packages: str, extra: str = "train") -> None:
     """
     missing = [name for name in (*_PACKAGES, *packages) if importlib.util.find_spec(name) is None]
     if missing:
-        raise ConfigError(f"missing packages: {', '.join(missing)}; run: pip install '.[{extra}]'")
+        raise ConfigError(f"missing packages: {', '.join(missing)}; run: {install_command(extra)}")
     # Busy-waiting threads of torch slow the physics down. torch reads this when it is imported.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, install_command
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
@@ -155,7 +155,8 @@ class View(ViewerCommand):
         if not self.source:
             raise ConfigError("MAP.npz, ROBOT or RUN: missing; expected a map, a robot or a run")
         if importlib.util.find_spec("viser") is None:
-            raise ConfigError("view requires viser; install it with: pip install '.[view]'")
+            command = install_command("view")
+            raise ConfigError(f"view requires viser; install it with: {command}")
         self.check_address()
         kind = source_kind(self.source, policy=self.policy)
         for name, expected in OPTION_KINDS.items():

@@ -86,6 +86,8 @@ def _add_shapes(link: ET.Element, solids: Solids, contact: dict[str, float]) -> 
     from scipy.spatial.transform import Rotation
 
     shapes = np.concatenate([solids.boxes, solids.cylinders]).astype(float)
+    if not len(shapes):  # SciPy before 1.16 has no empty rotations
+        return
     angles = Rotation.from_matrix(rotation_matrices(shapes[:, 6:])).as_euler("xyz")
     friction = np.where(np.isnan(solids.friction), contact["static_friction"], solids.friction)
     for k, (shape, rpy) in enumerate(zip(shapes, angles, strict=True)):

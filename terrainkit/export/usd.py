@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ExportError
+from terrainkit.errors import ExportError, install_command
 from terrainkit.export.requirements import require_one_ground_friction
 from terrainkit.geometry.mesh.solid_mesh import solid_meshes
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
@@ -41,7 +41,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         from pxr import Kind, Tf, Usd, UsdGeom
     except ModuleNotFoundError:
         raise ExportError(
-            f"{path.suffix} requires usd-core; install it with: pip install terrainkit[usd]"
+            f"{path.suffix} requires usd-core; install it with: {install_command('usd')}"
         ) from None
     require_one_ground_friction(terrain_map, "a USD mesh")
     config = terrain_map.config

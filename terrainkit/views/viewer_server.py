@@ -146,7 +146,7 @@ def _is_valid(message: bytes, handles: Mapping[str, Any]) -> bool:
                 return min(distance, math.hypot(*camera.up_direction)) > _MIN_LENGTH
             case {"type": "GuiUpdateMessage", "uuid": str(uuid), "updates": dict(new)}:
                 return [*new] == ["value"] and _accepts(handles.get(uuid), new["value"])
-    except ValueError:
+    except (msgspec.DecodeError, ValueError):
         pass
     return False
 

@@ -1,7 +1,11 @@
-"""The interpreters of other Python versions on this machine."""
+"""The interpreters of other Python versions on this machine.
+
+python tests/frameworks/pythons.py VERSION prints one; the exit code is 1 if there is none.
+"""
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 
@@ -19,3 +23,10 @@ def find_python(version, *modules):
             if found.stdout.strip() == version:
                 return str(python)
     return None
+
+
+if __name__ == "__main__":
+    python = find_python(sys.argv[1])
+    if python is None:
+        sys.exit(1)
+    print(python)

@@ -195,7 +195,8 @@ def test_export_names_the_missing_extra(here, monkeypatch):
     run = here("export", "run")
     assert run.returncode == 2
     assert run.stderr == (
-        "terrainkit: error: missing packages: no_such_package; run: pip install '.[train]'\n"
+        "terrainkit: error: missing packages: no_such_package; run: "
+        "pip install '.[train]' (in a clone of terrainkit)\n"
     )
 
 

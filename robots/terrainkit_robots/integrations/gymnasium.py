@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, install_command
 from terrainkit.integrations import missing
 from terrainkit_robots.rendering.child_process import Frame
 from terrainkit_robots.rendering.pose_renderer import PoseRenderer
@@ -27,7 +27,7 @@ try:
     from gymnasium.vector import AutoresetMode
     from gymnasium.vector.utils import batch_space
 except ModuleNotFoundError as error:
-    raise missing("Gymnasium", "pip install terrainkit[gymnasium]") from error
+    raise missing("Gymnasium", install_command("gymnasium")) from error
 
 
 class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):

@@ -49,8 +49,9 @@ def read_dae(data: bytes) -> Surface:
     content = etree.tostring(root)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error", DeprecationWarning)  # numpy: text that is not a number
-            warnings.simplefilter("ignore", PendingDeprecationWarning)  # pycollada: np.matrix
+            warnings.simplefilter("ignore")  # pycollada: np.matrix; NumPy 2.5: setting a shape
+            # numpy.fromstring: text that is not a number
+            warnings.filterwarnings("error", "string or file could not be read to its end")
             document = collada.Collada(
                 BytesIO(content), ignore=[collada.common.DaeUnsupportedError]
             )

@@ -234,7 +234,7 @@ def test_generate_with_an_executor_gives_same_bytes(pool, config):
 
 def test_generate_on_a_dask_cluster_gives_same_bytes(tmp_path):
     distributed = pytest.importorskip(
-        "distributed", reason="needs the extra distributed: pip install 'terrainkit[distributed]'"
+        "distributed", reason="needs the extra distributed: pip install '.[distributed]'"
     )
     cluster = distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, dashboard_address=None, local_directory=tmp_path

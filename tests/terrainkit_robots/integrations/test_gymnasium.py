@@ -207,6 +207,6 @@ def test_env_rejects_unknown_robot():
 def test_missing_gymnasium_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "gymnasium", None)
     monkeypatch.delitem(sys.modules, MODULE)
-    message = r"Gymnasium is not installed; install it with: pip install terrainkit\[gymnasium\]"
+    message = r"Gymnasium is not installed; install it with: pip install '\.\[gymnasium\]'"
     with pytest.raises(ModuleNotFoundError, match=message):
         importlib.import_module(MODULE)
