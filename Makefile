@@ -33,6 +33,7 @@ wheel:         ## the wheel that pip installs
 
 site:          ## build the documentation site in .site; broken links are errors
 	NO_MKDOCS_2_WARNING=1 mkdocs build --strict
+	cp docs/*.md .site  # llms.txt links to them
 
 browser:       ## open the viewer in headless Chromium
 	TERRAINKIT_BROWSER=1 python -m pytest -n 0 tests/terrainkit_robots/viewer/test_browser.py

@@ -1,10 +1,11 @@
-"""Build the generated docs: terrains.md, rules.md, config.md, cli.md, pictures.
+"""Build the generated docs: pages, llms.txt and pictures.
 
 python docs/build.py              write them
 python docs/build.py TERRAIN...   write all texts, and the pictures of these terrains only
 python docs/build.py --check      exit with 1 if a text is out of date or a picture is missing
 """
 
+import ast
 import dataclasses
 import inspect
 import os
@@ -17,6 +18,7 @@ from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
+import yaml
 from gallery import render_patches
 
 import terrainkit
@@ -210,6 +212,43 @@ def help_of(arguments: list[str]) -> str:
     return "\n".join(line.rstrip() for line in run.stdout.strip().splitlines())
 
 
+def examples_page() -> str:
+    parts = ["# Examples\n", NOTE, EXAMPLES, "| example | | install |", "|---|---|---|"]
+    for path in sorted((DOCS / "examples").glob("*.py")):
+        summary, install = example_text(path)
+        parts.append(f"| [{path.stem}](examples/{path.name}) | {summary} | {install} |")
+    return "\n".join(parts) + "\n"
+
+
+EXAMPLES = """Each example is a program of at most 60 lines that runs as it is, in any folder,
+and writes its files there: `python docs/examples/generate_map.py` in a clone. The tests run them.
+[terrainkit.ipynb](examples/terrainkit.ipynb) is a notebook, in which a map is shown as a picture.
+"""
+
+
+def example_text(path: Path) -> tuple[str, str]:
+    """Return the first paragraph of an example's docstring, and what to install."""
+    first, _, rest = ast.get_docstring(ast.parse(path.read_text())).partition("\n\n")
+    command = re.search(r"pip install [^(,\n]+", rest)
+    return " ".join(first.split()), f"`{command[0].strip()}`"
+
+
+def llms_text() -> str:
+    """Return the pages of the site with a line each, in the format of llmstxt.org."""
+    about = dict(re.findall(r"\[[^]]*\]\((\w+\.md)\): (.*)", written("index.md")))
+    title, *sections = yaml.safe_load((DOCS.parent / "mkdocs.yml").read_text())["nav"]
+    summary = " ".join(written("index.md").split("\n\n")[2].split())
+    parts = [f"# {next(iter(title))}\n", f"> {summary}"]
+    for section in sections:
+        for name, pages in section.items():
+            parts.append(f"\n## {name}\n")
+            links = pages if isinstance(pages, list) else [{name: pages}]
+            for page in links:
+                ((text, file),) = page.items()
+                parts.append(f"- [{text}]({file}): {about[file]}")
+    return "\n".join(parts) + "\n"
+
+
 def draw_pictures() -> None:
     PICTURES.mkdir(exist_ok=True)
     for name in registry.terrain_names():
@@ -305,6 +344,8 @@ def main() -> int:
         "rules.md": rules_page(),
         "config.md": config_page(),
         "cli.md": cli_page(),
+        "examples.md": examples_page(),
+        "llms.txt": llms_text(),
     }
     if sys.argv[1:] == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]

@@ -79,6 +79,12 @@ class TerrainMap:
         names = ", ".join(self.terrain_names)
         return f"<TerrainMap {rows} x {cols} patches, {self.heights.shape} samples: {names}>"
 
+    def _repr_png_(self) -> bytes:
+        """Return the preview, which notebooks display."""
+        from terrainkit.views.preview import notebook_preview
+
+        return notebook_preview(self)
+
     @cached_property
     def env_origins(self) -> NDArray[np.float32]:
         """Spawn origin of each patch [m], shape (rows, cols, 3), a view of `spawns`."""

@@ -46,6 +46,9 @@ _BAR_WIDTH, _MAX_BAR_HEIGHT = 22, 500
 MAX_PIXELS = 10_000
 """Largest side of the relief [px]."""
 
+NOTEBOOK_PIXELS = 800
+"""Approximate length of the longer side of the relief in notebooks [px]."""
+
 _LABEL_HEIGHT, _LABEL_WIDTH = 18, 80
 """Size of a label [px]; where patches are smaller, only some are labeled."""
 
@@ -93,8 +96,6 @@ def write_preview(
     Raises:
         ExportError: if the suffix is not .png, or the target cannot be written.
     """
-    import cv2
-
     path = Path(path)
     if path.suffix.lower() != ".png":
         raise ExportError(f"preview: got {path}; expected a .png file")
@@ -102,10 +103,23 @@ def write_preview(
         raise ExportError(f"width: got {width}; expected 100 to {MAX_PIXELS}")
     require_finite(terrain_map)
     with atomic_write(path, overwrite=overwrite) as temporary:
-        image = render_preview(terrain_map, width, routes)
-        _, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
-        temporary.write_bytes(data.tobytes())
+        temporary.write_bytes(_png(render_preview(terrain_map, width, routes)))
     return path
+
+
+def notebook_preview(terrain_map: "TerrainMap") -> bytes:
+    """Return the preview as a PNG, in the size of a notebook's output."""
+    heights, _ = _without_border(terrain_map)
+    # The longer side of the relief is limited.
+    width = round(NOTEBOOK_PIXELS * min(1.0, heights.shape[0] / heights.shape[1]))
+    return _png(render_preview(terrain_map, max(1, width)))
+
+
+def _png(image: Picture) -> bytes:
+    import cv2
+
+    _, data = cv2.imencode(".png", cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
+    return bytes(data)
 
 
 def render_preview(

@@ -3,6 +3,8 @@
 import argparse
 import contextlib
 import importlib
+import re
+import subprocess
 import sys
 import time
 from importlib.metadata import version
@@ -272,3 +274,9 @@ parkour = terrainkit.generate(CONFIG)
 error, started = rest(parkour, ball_starts(parkour))
 assert error < 2e-3, error
 print(f"mesh with solids: started in {started:.1f} s, all balls within {error * 1e3:.1f} mm")
+
+example = Path(__file__).parents[2] / "docs/examples/isaaclab_terrain.py"
+run = subprocess.run([sys.executable, example], cwd=folder, capture_output=True, text=True)
+(distance,) = re.findall(r"balls rest within ([0-9.]+) mm", run.stdout) or [run.stderr]
+assert float(distance) < 2.0, distance
+print(f"{example.name}: all balls within {distance} mm")

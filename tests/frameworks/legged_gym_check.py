@@ -7,6 +7,8 @@ rsl_rl 1.0.2 is the folder rsl_rl beside it.
 import ast
 import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -35,3 +37,10 @@ assert np.abs(seen["vertices"] + shift - mesh.vertices).max() < 1e-4
 assert (seen["triangles"] == mesh.triangles).all()
 assert seen["friction"] == terrain_map.config.static_friction
 print(f"the mesh of {len(mesh.triangles)} triangles is in place")
+
+# The example of the documentation, with both of its steps.
+example = HERE.parents[1] / "docs/examples/legged_gym_terrain.py"
+subprocess.run([sys.executable, example], cwd=checkout, check=True)
+options = "--task=quad --headless --sim_device=cpu --rl_device=cpu --num_envs=8 --max_iterations=2"
+run_command(f"python {example} {options}", checkout, *modules)
+print(f"{example.name}: 2 iterations")

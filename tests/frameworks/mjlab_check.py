@@ -1,7 +1,6 @@
 """Run a map with solids in mjlab's rough task. Needs mjlab; `make integrations` runs it."""
 
 import os
-import re
 import subprocess
 import sys
 import time
@@ -68,22 +67,26 @@ for name, sensor in env.scene.sensors.items():
         assert np.median(gap) < 1e-4, (name, np.median(gap))
 print(f"mjlab {version('mjlab')}: {off.sum()} of 200 rays off by more than 1 mm, next to walls")
 
-# The plug-in of the documentation, with mjlab's own `train`.
+# The example of the documentation: as a program, and as a plug-in of mjlab's own `train`.
 folder = path.parent
-page = (Path(__file__).parents[2] / "docs/integrations.md").read_text()
-(code,) = re.findall(r"```python\n(import mjlab\.tasks.*?)```", page, re.DOTALL)
-(folder / "my_tasks.py").write_text(code)
-(folder / "my_tasks-0.1.0.dist-info").mkdir()
-(folder / "my_tasks-0.1.0.dist-info/METADATA").write_text("Name: my-tasks\nVersion: 0.1.0\n")
-entry_point = "[mjlab.tasks]\nmy_tasks = my_tasks\n"
-(folder / "my_tasks-0.1.0.dist-info/entry_points.txt").write_text(entry_point)
-command = [sys.executable, "-m", "mjlab.scripts.train", "Map-Go1", "--env.scene.num-envs", "4"]
-command += ["--agent.max-iterations", "2", "--agent.logger", "tensorboard", "--gpu-ids", "None"]
-variables = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder), *sys.path[1:]])}
-train = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True)
-assert "Learning iteration 1/2" in train.stdout, train.stderr
-assert "terrain_progress" in train.stdout
-print("train: 2 iterations of the plug-in in docs/integrations.md")
+example = Path(__file__).parents[2] / "docs/examples/mjlab_terrain.py"
+plug_in = folder / "mjlab_terrain-0.1.0.dist-info"
+plug_in.mkdir()
+(plug_in / "METADATA").write_text("Name: mjlab-terrain\nVersion: 0.1.0\n")
+(plug_in / "entry_points.txt").write_text("[mjlab.tasks]\nmjlab_terrain = mjlab_terrain\n")
+options = ["Map-Go1", "--env.scene.num-envs", "4", "--agent.max-iterations", "2"]
+options += ["--gpu-ids", "None"]
+modules = os.pathsep.join([str(folder), str(example.parent), *sys.path[1:]])
+for command, variables in (
+    ([example], os.environ),
+    (["-m", "mjlab.scripts.train", *options], os.environ | {"PYTHONPATH": modules}),
+):
+    train = subprocess.run(
+        [sys.executable, *command], cwd=folder, env=variables, capture_output=True, text=True
+    )
+    assert "Learning iteration 1/2" in train.stdout, train.stderr
+    assert "terrain_progress" in train.stdout
+print(f"{example.name}: 2 iterations, as a program and as a plug-in")
 
 
 def mjlab_terrain(cfg):

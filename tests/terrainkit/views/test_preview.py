@@ -167,3 +167,13 @@ def test_preview_draws_solids_and_goals(solid_map):
     assert pixel(with_solids, 1, 6) == pytest.approx(expected, abs=2)
     assert (pixel(with_solids, 3, 1) == pixel(without, 3, 1)).all()
     assert (pixel(with_solids, 3.1, 6) != pixel(without, 3.1, 6)).any()  # the arrow of a goal
+
+
+@pytest.mark.parametrize(("rows", "cols", "longer"), [(1, 40, 0), (40, 1, 1), (3, 3, 0)])
+def test_map_in_a_notebook_is_a_picture_of_limited_size(rows, cols, longer):
+    flat = tk.SubTerrain(terrain="flat")
+    terrain_map = tk.generate(tk.MapConfig(rows=rows, cols=cols, terrains=(flat,)))
+    picture = cv2.imdecode(np.frombuffer(terrain_map._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
+    relief = np.subtract(picture.shape[:2], (130, 380))  # without the margins
+    assert relief.argmax() == longer or rows == cols
+    assert 700 <= relief.max() <= 1100

@@ -1,0 +1,130 @@
+"""Run the examples of docs/examples as they are, and the notebook."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import nbclient
+import nbformat
+import pytest
+
+ROOT = Path(__file__).parent.parent
+EXAMPLES = ROOT / "docs/examples"
+SCRIPTS = sorted(EXAMPLES.glob("*.py"))
+
+WRITTEN = {
+    "generate_map": ("map.npz", "map.png", "map.xml"),
+    "own_terrain": ("furrows.png",),
+    "own_solids": ("logs.png", "logs.xml"),
+    "import_scan": ("scan.npz", "scan.ply", "scan.png"),
+    "height_scan": (),
+    "onboard_robot": ("my_robot/robot.toml", "my_robot/mjlab_config.py"),
+    "train_and_export": ("ground.npz", "policy/policy.onnx", "policy/run_policy.py"),
+}
+"""Files that an example writes. The others need frameworks, and run in tests/frameworks."""
+
+STAND_IN = """
+import runpy, sys
+sys.path[:0] = ["", {frameworks!r}]
+from stand_ins import StandIns
+sys.meta_path.insert(0, StandIns({packages!r}))
+{before}
+sys.argv[:] = [{script!r}]
+runpy.run_path({script!r}, run_name="__main__")
+"""
+
+
+def run(folder, *arguments):
+    """Run Python in a folder, and return what it prints."""
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    command = [sys.executable, *map(str, arguments)]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "Warning" not in done.stderr, done.stderr
+    return done.stdout
+
+
+def run_with_stand_ins(folder, script, packages, check, before=""):
+    """Run an example with mocks in place of a framework, and then a check."""
+    names = {"frameworks": str(ROOT / "tests/frameworks"), "script": str(EXAMPLES / script)}
+    code = STAND_IN.format(packages=packages, before=before, **names)
+    return run(folder, "-c", code + check)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_example_runs_in_an_empty_folder(name, tmp_path):
+    shutil.copy(EXAMPLES / f"{name}.py", tmp_path)
+    arguments = ("1",) if name == "train_and_export" else ()
+    for _ in range(1 if arguments else 2):  # the second time, the files exist
+        assert run(tmp_path, f"{name}.py", *arguments)
+    for file in WRITTEN[name]:
+        assert (tmp_path / file).stat().st_size > 100
+    for picture in tmp_path.glob("*.png"):
+        assert cv2.imread(str(picture)).std() > 5
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def test_example_is_short_and_says_what_to_install(path):
+    text = path.read_text()
+    assert len(text.splitlines()) <= 60
+    summary, _, rest = ast.get_docstring(ast.parse(text)).partition("\n")
+    assert summary.endswith(".")
+    assert "pip install" in rest
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def test_example_imports_names_that_exist(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("terrainkit.integrations."):
+            module = (ROOT / f"{node.module.replace('.', '/')}.py").read_text()
+            defined = {getattr(each, "name", "") for each in ast.parse(module).body}
+            assert {each.name for each in node.names} <= defined
+
+
+def test_mjlab_example_registers_task_of_a_stand_in(tmp_path):
+    check = """
+from mjlab.tasks.registry import register_mjlab_task
+from mjlab.scripts.train import main
+print(register_mjlab_task.call_args.args[0], main.call_count, *sys.argv[1:4])
+"""
+    before = """
+from dataclasses import make_dataclass
+import mjlab.terrains
+fields = [("flat_patch_sampling", dict, None)]
+mjlab.terrains.SubTerrainCfg = make_dataclass("SubTerrainCfg", fields)
+"""
+    printed = run_with_stand_ins(tmp_path, "mjlab_terrain.py", ("mjlab",), check, before)
+    assert printed.split() == ["Map-Go1", "1", "Map-Go1", "--env.scene.num-envs", "16"]
+    assert (tmp_path / "map.npz").exists()
+
+
+def test_legged_gym_example_replaces_terrain_of_a_stand_in(tmp_path):
+    assert "terrain.npz" in run(tmp_path, EXAMPLES / "legged_gym_terrain.py")
+    check = """
+import terrain
+from legged_gym.envs.base import legged_robot
+print(legged_robot.Terrain is terrain.Terrain)
+"""
+    before = """
+sys.version_info = (3, 8)
+from legged_gym.utils import task_registry
+pair = (task_registry.env, task_registry.cfg)
+task_registry.make_env.return_value = task_registry.make_alg_runner.return_value = pair
+"""
+    packages, script = ("isaacgym", "legged_gym"), "legged_gym_terrain.py"
+    printed = run_with_stand_ins(tmp_path, script, packages, check, before)
+    assert printed.splitlines()[-1] == "True"
+
+
+def test_notebook_runs_and_shows_maps(tmp_path, monkeypatch):
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
+    notebook = nbformat.read(EXAMPLES / "terrainkit.ipynb", as_version=4)
+    assert not any(cell.get("outputs") for cell in notebook.cells)
+    nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute(cwd=tmp_path)
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    assert sum("image/png" in output.get("data", ()) for output in outputs) == 2
+    assert not any(output.output_type == "stream" for output in outputs)
