@@ -3,8 +3,8 @@
 python benchmarks/mutate.py [--package FOLDER ...] [--changes N] [--seed N] [--hours H] [--retry]
 
 Each change is planted in a copy of the working tree. The tests that mirror the changed file run
-first, then the tests of its package and at last those of the whole suite, where coverage says that
-they execute the changed line. The results are kept in .mutate/, and the same command goes on where
+first, then the tests of its package, and at last all tests that execute the changed line according
+to coverage. The results are kept in .mutate/, and the same command goes on where
 it stopped. Changes that alter nothing are listed in mutation/equivalent.toml and not counted.
 """
 

@@ -229,7 +229,7 @@ and writes its files there: `python docs/examples/generate_map.py` in a clone. T
 def example_text(path: Path) -> tuple[str, str]:
     """Return the first paragraph of an example's docstring, and what to install."""
     first, _, rest = ast.get_docstring(ast.parse(path.read_text())).partition("\n\n")
-    command = re.search(r"pip install [^(,\n]+", rest)
+    command = re.search(r"pip install [^(,#\n]+", rest)
     return " ".join(first.split()), f"`{command[0].strip()}`"
 
 

@@ -36,7 +36,7 @@ OptionalFlag = Annotated[bool, option("")]
 
 
 def is_map(path: str | Path) -> bool:
-    """Return whether a path is that of a map: its suffix is .npz in any case."""
+    """Return whether a path names a map: its suffix is .npz in any case."""
     return Path(path).suffix.lower() == ".npz"
 
 

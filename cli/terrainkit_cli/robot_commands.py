@@ -52,7 +52,7 @@ class CheckRobot(Command):
 
     files: Annotated[tuple[str, ...], positional("FILE [FILE ...]")] = ()
     """Files to check; folders, whose robot files are all checked, with one line for each in the
-    text report; or names of robots: quadruped, biped, or those of the package robot_descriptions,
+    text report; or names of robots: quadruped, biped, or names in the package robot_descriptions,
     such as go2_description."""
 
     format: Literal["text", "json", "sarif", "github", "markdown"] = "text"

@@ -3,7 +3,7 @@
 Install: pip install . (in a clone of terrainkit), and legged_gym with Isaac Gym in Python 3.8.
 1. With Python 3.11 or newer, `python legged_gym_terrain.py` writes terrain.py and terrain.npz.
 2. With Python 3.8, in the same folder, `python legged_gym_terrain.py --task=a1 --headless` trains
-   on them. The options are those of legged_gym's own train.py.
+   on them. It takes the options of legged_gym's own train.py.
 """
 
 import sys

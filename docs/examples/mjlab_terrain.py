@@ -1,7 +1,7 @@
 """Train a task of mjlab on a map. Robots move up its levels and scan its heights.
 
 Install: pip install mjlab==1.6.0 . (in a clone of terrainkit, in an environment of its own)
-Run: python mjlab_terrain.py [OPTIONS]; the options are those of mjlab's `train`, such as
+Run: python mjlab_terrain.py [OPTIONS]; it takes the options of mjlab's `train`, such as
 --env.scene.num-envs 4096. Without any, it takes two iterations with 16 robots on the CPU.
 """
 

@@ -252,13 +252,13 @@ class TerrainMap:
 
         Such a map is not compared with its config by :func:`terrainkit.map.validate.validate`, and
         cannot be generated from it. Spawn positions and goals follow the height of the ground.
-        Where a spawn position of a patch is no longer flat and free, those of the patch are placed
-        again.
+        Where a spawn position is no longer flat and free, all spawn positions of its patch are
+        placed again.
 
         Args:
-            heights: Heights [m], shape `grid.shape`; None for those of the map.
-            solids: All solids of the map; None for those of the map. Each belongs to the patch of
-                its center.
+            heights: Heights [m], shape `grid.shape`; None to keep the heights.
+            solids: All solids of the map; None to keep the solids. Each belongs to the patch of its
+                center.
 
         Raises:
             ConfigError: if the heights have another shape or are not finite, or a patch has no

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from lxml import etree
 
 MAX_FILES = 100_000
-"""Maximum number of files in a folder, those of all kinds."""
+"""Maximum number of files of all kinds in a folder."""
 
 _SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 _IGNORE_FILES = {"COLCON_IGNORE", "CATKIN_IGNORE"}
-"""Files that mark folders without sources, such as those of a build."""
+"""Files that mark folders without sources, such as folders of a build."""
 
 _FRAGMENTS = {"macro", "property", "arg", "material", "transmission", "gazebo"}
 """Elements of `<robot>` that describe no robot without others."""
@@ -32,7 +32,7 @@ def robot_files(folder: Path) -> list[Path]:
     A file with the root `<robot>` is one unless another file includes it, or it only defines
     macros, materials and the like. A file with the root `<mujoco>` is one if it has a joint, unless
     it includes another robot, as a scene does. Damaged files count, except those that end in .xml.
-    Links to folders are not followed. Hidden folders, and those of a colcon or catkin build, are
+    Links to folders are not followed. Hidden folders and folders of a colcon or catkin build are
     skipped.
 
     Raises:

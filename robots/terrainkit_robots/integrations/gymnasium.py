@@ -33,8 +33,8 @@ except ModuleNotFoundError as error:
 class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
     """A robot that tracks velocity commands on a terrain, as in the training of its task.
 
-    Observations and rewards are those of the task; an episode is truncated when its time is over.
-    The observations are those of the policy, without the privileged ones of the critic. The action
+    Observations and rewards are defined by the task; an episode is truncated when its time is over.
+    The observations are the policy's, without the privileged observations of the critic. The action
     space is as large as `normalization.clip_actions` of the task, 100 by default; set it to a few
     units for algorithms that scale their actions to the space, such as SAC.
     """

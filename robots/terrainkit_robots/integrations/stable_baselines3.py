@@ -83,7 +83,7 @@ class Sb3VecEnvWrapper(VecEnv):
         """Set an attribute of the :class:`TaskVectorEnv`, which all environments share.
 
         Raises:
-            ConfigError: If the indices are not those of all environments.
+            ConfigError: If an environment is not among the indices.
         """
         if len(chosen := set(self._get_indices(indices))) < self.num_envs:
             expected = f"expected all {self.num_envs} environments, which share one simulation"

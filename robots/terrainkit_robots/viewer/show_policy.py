@@ -37,7 +37,7 @@ class PolicyView:
         Args:
             server: The server.
             run: Run of the policy.
-            terrain: Terrain as `load_terrain` takes it; None for that of the training.
+            terrain: Terrain as `load_terrain` takes it; None for the terrain of the training.
 
         Raises:
             ConfigError: If the run has no policy, or one of another robot; if the terrain cannot be

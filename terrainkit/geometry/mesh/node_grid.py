@@ -21,9 +21,9 @@ from terrainkit.geometry.walls import wall_edges
 _BYTES_PER_NODE = 11
 """Peak memory of the nodes and of the masks of what is merged, per node [bytes]; measured."""
 
-_BYTES_PER_VERTEX = 48
-"""Peak memory of the faces and vertices per vertex of the mesh [bytes]; measured: 40 to 48. A
-vertex and its two triangles take 36."""
+_BYTES_PER_VERTEX = 56
+"""Peak memory of the faces and vertices per vertex of the mesh [bytes]; measured: 40 to 48, and up
+to 59 since NumPy 2.5, whose `resize` copies. A vertex and its two triangles take 36."""
 
 QUADS_PER_BLOCK = 1 << 14
 """Quads whose faces are built at a time, so that intermediate arrays stay in the cache."""

@@ -43,6 +43,6 @@ class RowBuffer:
         return self._rows
 
     def _resize(self, length: int) -> None:
-        # The system moves the pages of a large array without copying them. No other reference
-        # exists before `array` returns one.
+        # Before NumPy 2.5, the system moves the pages of a large array without copying them. No
+        # other reference exists before `array` returns one.
         self._rows.resize((length, 3), refcheck=False)

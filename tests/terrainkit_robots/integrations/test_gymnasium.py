@@ -36,7 +36,7 @@ def test_registered_env_passes_check(robot):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         check_env(env.unwrapped, skip_render_check=True)
-    # The actions are those of the training, which are not normalized.
+    # The actions are the same as in training, where they are not normalized.
     others = [str(each.message) for each in caught if "normalized space" not in str(each.message)]
     assert not others
 
