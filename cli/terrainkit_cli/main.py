@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from terrainkit_cli.parse import Command
 
 COMMAND_GROUPS = {
-    "Start here": {
-        "demo": "view_command",
-    },
     "Terrain": {
         "generate": "generate_command",
         "import": "import_command",
@@ -39,6 +36,7 @@ COMMAND_GROUPS = {
         "smoke-test": "smoke_test_command",
     },
     "Policies": {
+        "demo": "view_command",
         "train": "train_command",
         "evaluate": "evaluate_command",
         "play": "play_command",
@@ -139,7 +137,6 @@ def _run_command(prog: str, chosen: "type[Command]", words: list[str]) -> int:
 
 def _print_overview() -> None:
     render.result("usage: terrainkit COMMAND [OPTIONS]")
-    render.result("Generate terrain for legged robots, check robot files, and train policies.")
     rows: list[tuple[str, str]] = []
     for group, names in COMMAND_GROUPS.items():
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)

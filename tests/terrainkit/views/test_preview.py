@@ -122,13 +122,14 @@ def test_write_preview_writes_the_image(pits, tmp_path):
         ("a.jpg", 300, "expected a .png file"),
         ("a.png", 0, "width: got 0; expected 100 to 10000"),
         ("a.png", 10**6, "width: got 1000000; expected 100 to 10000"),
-        ("no/a.png", 300, "does not exist"),
+        ("file/a.png", 300, "is not a folder"),
     ],
 )
 def test_write_preview_rejects_invalid_input(pits, tmp_path, name, width, said):
+    (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match=said):
         write_preview(pits, tmp_path / name, width=width)
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
 def test_write_preview_keeps_existing_file(pits, tmp_path):
