@@ -9,8 +9,10 @@ from terrainkit_robots.analysis.inertia.physical import triangle_ratio
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from tests.robots import BUNDLED
 
 ROBOTS = [
+    *BUNDLED,
     "a1/urdf/a1.urdf",
     "go2/urdf/go2.urdf",
     "go2_mjcf/go2.xml",
@@ -102,10 +104,18 @@ def test_massless_body_lists_links_of_cassie(robot_file):
     assert "left_pelvis_abduction, right_pelvis_abduction" in violation.message
 
 
-def test_inr_reads_no_visual_mesh(robot_file):
+def test_inr_reads_no_visual_mesh(arm):
     meshes = RecordingMeshes()
-    check(robot_file("go2/urdf/go2.urdf"), meshes)
+    path, shell = arm(), '<visual><geometry><mesh filename="shell.stl"/></geometry></visual></link>'
+    path.write_text(path.read_text().replace("</collision>\n  </link>", f"</collision>{shell}"))
+    facts = Facts(load_robot(path))
+    assert [mesh.filename for link in facts.links for mesh in meshes_of(link)] == ["shell.stl"]
+    check(path, meshes)
     assert meshes.requested == set()
+
+
+def meshes_of(link):
+    return [shape.mesh for shape in (*link.visuals, *link.collisions) if shape.mesh]
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,10 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule, rules
+from tests.robots import BUNDLED
 
 ROBOTS = [
+    *BUNDLED,
     "a1/urdf/a1.urdf",
     "go2/urdf/go2.urdf",
     "go2_mjcf/go2.xml",

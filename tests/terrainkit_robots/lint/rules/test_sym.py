@@ -5,7 +5,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import rules
-from tests.robots import REAL_ROBOTS
+from tests.robots import BUNDLED, QUADRUPED, REAL_ROBOTS
 
 
 def check(path, text=None):
@@ -29,7 +29,7 @@ def replace(text, tag, name, pattern, replacement):
     return text[:start] + block + text[end:]
 
 
-@pytest.mark.parametrize("name", REAL_ROBOTS)
+@pytest.mark.parametrize("name", [*BUNDLED, *REAL_ROBOTS])
 def test_sym_accepts_published_robots(robot_file, name):
     assert check(robot_file(name)) == []
 
@@ -43,22 +43,21 @@ def test_sym_accepts_published_robots(robot_file, name):
         ("joint", "thigh_joint", r'upper="[^"]*"', 'upper="2"', "SYM004"),
         ("joint", "thigh_joint", r'effort="[^"]*"', 'effort="20"', "SYM005"),
         ("joint", "calf_joint", r"-0\.213", "-0.18", "SYM006"),
-        ("joint", "thigh_joint", r'rpy="0 0 0"', 'rpy="0 0.3 0"', "SYM006"),
-        ("joint", "thigh_joint", r'rpy="0 0 0"', 'rpy="0.3 0 0"', "SYM006"),
+        ("joint", "thigh_joint", r"<origin", '<origin rpy="0 0.3 0"', "SYM006"),
+        ("joint", "thigh_joint", r"<origin", '<origin rpy="0.3 0 0"', "SYM006"),
         ("joint", "thigh_joint", r'axis\s+xyz="0 1 0"', 'axis xyz="0 -1 0"', "SYM007"),
         ("joint", "hip_joint", r'axis\s+xyz="1 0 0"', 'axis xyz="-1 0 0"', "SYM007"),
         ("joint", "calf_joint", r'axis\s+xyz="0 1 0"', 'axis xyz="0.2 0.98 0"', "SYM007"),
     ],
 )
-def test_sym_reports_modified_leg(robot_file, leg, tag, name, pattern, replacement, finding):
-    path = robot_file("go2/urdf/go2.urdf")
-    text = replace(path.read_text(), tag, f"{leg}_{name}", pattern, replacement)
-    assert check(path, text) == [(finding, f"{leg}_{name}")]
+def test_sym_reports_modified_leg(leg, tag, name, pattern, replacement, finding):
+    text = replace(QUADRUPED.read_text(), tag, f"{leg}_{name}", pattern, replacement)
+    assert check(QUADRUPED, text) == [(finding, f"{leg}_{name}")]
 
 
 def test_sym_reports_no_child_joints(robot_file):
-    path = robot_file("g1/g1_29dof.urdf")
-    text = path.read_text()
-    modified = replace(text, "joint", "left_hip_roll_joint", r'rpy="[^"]*"', 'rpy="0.2 -0.1749 0"')
-    assert {code for code, _ in check(path, modified)} == {"SYM006"}
-    assert len(check(path, modified)) == 1
+    biped = robot_file("biped.urdf")
+    rotated = '<origin rpy="0.2 0 0"'
+    modified = replace(biped.read_text(), "joint", "left_hip_roll_joint", "<origin", rotated)
+    assert {code for code, _ in check(biped, modified)} == {"SYM006"}
+    assert len(check(biped, modified)) == 1
