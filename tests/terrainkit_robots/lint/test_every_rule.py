@@ -1,6 +1,13 @@
-"""Run every rule on its cases: robots in cases/<CODE>.toml that violate it or not."""
+"""Run every rule on its cases: robots in cases/<CODE>.toml that violate it or not.
 
+The texts of all findings are in findings.json. Write them anew with `python -m
+tests.terrainkit_robots.lint.test_every_rule`, and read the difference.
+"""
+
+import json
+import re
 import struct
+import tempfile
 import tomllib
 from dataclasses import dataclass, field
 from functools import cache
@@ -20,6 +27,8 @@ from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 CASES = Path(__file__).parent / "cases"
+FINDINGS = CASES.with_name("findings.json")
+OTHERS_SENTENCE = re.compile(r"(malformed XML|cannot load the file|rejects <geom>): .*")
 BUNDLED = Path(terrainkit_robots.__file__).parent / "description/bundled"
 
 
@@ -241,6 +250,7 @@ def test_failing_case_is_found(case, tmp_path):
     report = lint_case(case, path, selected=None if case.only else [get_rule(case.code)])
     found = [f for f in report.findings if f.code == case.code]
     assert found, f"no finding; skipped: {report.skipped}"
+    assert [text_of(finding, tmp_path) for finding in found] == expected_texts()[str(case)]
     for finding in found:
         check_text(case, finding)
         assert finding.file.is_relative_to(tmp_path)
@@ -254,6 +264,26 @@ def test_failing_case_is_found(case, tmp_path):
     if case.only:
         others = [f for f in report.findings if f.code != case.code and f.severity != "note"]
         assert not others, messages(report)
+
+
+@cache
+def expected_texts():
+    """Return the texts of the findings of each case, by its title."""
+    return json.loads(FINDINGS.read_text(encoding="utf-8"))
+
+
+def text_of(finding, folder):
+    """Return a finding as a line, with three digits of what was measured.
+
+    The folder and the sentences of libxml2 and MuJoCo are left out.
+    """
+    measured = [
+        f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {value}"
+        for name, value in finding.measured.items()
+    ]
+    about = f"{finding.severity} {finding.certainty} {finding.subject}, line {finding.line}"
+    message = OTHERS_SENTENCE.sub(r"\1: ...", finding.message.replace(str(folder), "FOLDER"))
+    return "; ".join([f"{about}: {message}", *measured])
 
 
 def check_text(case, finding):
@@ -336,3 +366,17 @@ def problems(report):
     Notes may appear only after a robot is fixed.
     """
     return {(f.code, f.subject) for f in report.findings if f.severity != "note"}
+
+
+def write_texts():
+    """Write findings.json."""
+    texts = {}
+    for case in (each for each in ALL_CASES if each.fails):
+        with tempfile.TemporaryDirectory() as folder:
+            report = lint_case(case, case.write(Path(folder)), selected=[get_rule(case.code)])
+            texts[str(case)] = [text_of(finding, folder) for finding in report.findings]
+    FINDINGS.write_text(json.dumps(texts, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_texts()
