@@ -165,6 +165,7 @@ class Tree:
     ) -> NoReturn:
         try:
             os.setsid()
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
             os.chdir(self.folder)
             os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
             for number in (1, 2):
@@ -277,23 +278,22 @@ def wait(child: int, end: float) -> str:
     """Wait for a process and end what it left; return why it was ended before its time."""
     process, ended, looked = psutil.Process(child), "", 0.0
     descendants: set[psutil.Process] = set()
-    while not os.waitpid(child, os.WNOHANG)[0]:
-        time.sleep(0.02)
-        if time.monotonic() > looked + 0.5:
-            looked = time.monotonic()
-            with suppress(psutil.NoSuchProcess):
+    try:
+        while not ended and process.status() != psutil.STATUS_ZOMBIE:
+            time.sleep(0.02)
+            if time.monotonic() > looked + 0.5:
+                looked = time.monotonic()
                 descendants |= set(process.children(recursive=True))
-            ended = "time" * (looked > end) or "memory" * (_memory(process, *descendants) > _MEMORY)
-        if ended:
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
-            break
-    with suppress(ProcessLookupError):
-        os.killpg(child, signal.SIGKILL)
-    for each in descendants:
-        with suppress(psutil.NoSuchProcess):
-            each.kill()
-    psutil.wait_procs(descendants, timeout=10)
+                memory = _memory(process, *descendants)
+                ended = "time" * (looked > end) or "memory" * (memory > _MEMORY)
+    finally:  # also if this process is to end
+        with suppress(ProcessLookupError):
+            os.killpg(child, signal.SIGKILL)
+        for each in (process, *descendants):
+            with suppress(psutil.NoSuchProcess):
+                each.kill()
+        os.waitpid(child, 0)
+        psutil.wait_procs(descendants, timeout=10)
     return ended
 
 
