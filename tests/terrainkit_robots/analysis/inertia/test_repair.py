@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import mujoco
@@ -107,3 +108,63 @@ def test_fix_of_derived_inertia_is_none(tmp_path):
     path.write_text(ARM.format(inertia='diaginertia="1 1 1"'))
     facts = Facts(load_robot(path), Meshes())
     assert facts.inertia_repair.fix(facts.tree.links["base"]) is None
+
+
+def urdf_fix(left, right=(), right_mass="1.152"):
+    """Return the fix of FL_thigh: what it takes, and the six values that it writes.
+
+    Args:
+        left: Changed attributes of its inertia.
+        right: Changed attributes of FR_thigh, its mirror image.
+        right_mass: Mass of FR_thigh [kg].
+    """
+    path = QUADRUPED.with_suffix(".urdf")
+    text = path.read_text()
+    for link, changes in (("FL_thigh", dict(left)), ("FR_thigh", dict(right))):
+        start = text.index(f'<link name="{link}">')
+        end = text.index("</inertial>", start)
+        block = text[start:end]
+        for name, value in changes.items():
+            block = re.sub(rf'{name}="[^"]*"', f'{name}="{value}"', block)
+        if link == "FR_thigh":
+            block = block.replace('mass value="1.152"', f'mass value="{right_mass}"')
+        text = text[:start] + block + text[end:]
+    facts = Facts(load_robot(path, contents={path: text.encode()}), Meshes())
+    fix = facts.inertia_repair.fix(facts.tree.links["FL_thigh"])
+    taken = fix.description.removeprefix("Replace the inertia of link FL_thigh by ")
+    return taken, {edit.name: float(edit.value) for edit in fix.edits}
+
+
+NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+MIRRORED = dict(zip(NAMES, (0.00584, 0.0058, 0.00103, 8.72e-05, -0.000289, 0.000808), strict=True))
+# 1.152 kg / 12 times the squares of the sides 0.034, 0.0245 and 0.213 m.
+BOX = dict(zip(NAMES, (0.00441305, 0.00446640, 0.00016860, 0.0, 0.0, 0.0), strict=True))
+
+
+@pytest.mark.parametrize("right_mass", ["1.152", "1.13"])
+def test_urdf_fix_mirrors_the_signs_of_products(right_mass):
+    taken, values = urdf_fix({"iyy": -0.0058}, right_mass=right_mass)
+    assert taken == "that of its mirror image."
+    assert values == pytest.approx(MIRRORED)
+
+
+@pytest.mark.parametrize(
+    ("right", "mass"),
+    [
+        ({"izz": 0.5}, "1.152"),  # violates the triangle inequality
+        ({"izz": -0.001}, "1.152"),
+        ({}, "1.129"),  # 2 % lighter
+        ({}, "0"),
+    ],
+)
+def test_urdf_fix_takes_no_invalid_mirror_image(right, mass):
+    taken, values = urdf_fix({"ixx": 0.0075}, right, mass)
+    assert taken == "the nearest physical one."
+    assert values["ixx"] == pytest.approx(0.0075, rel=0.1)
+
+
+@pytest.mark.parametrize("left", [dict.fromkeys(NAMES, 0), {"ixx": 5}])
+def test_urdf_fix_takes_the_box_of_the_shapes_at_last(left):
+    taken, values = urdf_fix(left, {"izz": 0.5})
+    assert taken == "that of a solid box around the body."
+    assert values == pytest.approx(BOX, rel=1e-3, abs=1e-9)
