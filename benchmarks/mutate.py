@@ -194,7 +194,7 @@ def try_change(
 def _run(tree: Tree, path: Path, change: Change, source: bytes, test_file: Path) -> str:
     """Return what notices a change in a test file, or nothing."""
     baseline = tree.baseline(test_file)
-    only = tree.covering(test_file, path, change.line if change.in_function else None)
+    only = tree.covering(test_file, path, change.lines)
     if only is not None and not only:
         return ""
     with tree.changed(path, change.apply(source)):

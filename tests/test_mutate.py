@@ -54,12 +54,21 @@ def test_changes_of_a_line(changed_lines, line, expected):
     assert changed_lines(line) == expected
 
 
-def test_lines_of_changes_count_from_one(monkeypatch):
+def test_lines_of_changes_are_those_of_the_statement(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "benchmarks")
     from mutation.changes import find_changes
 
-    changes = find_changes(b"x = y\ndef f():\n    g()\n")
-    assert [(each.line, each.kind, each.in_function) for each in changes] == [(3, "removed", True)]
+    source = "x = 1\ndef f(a=1):\n  if (a <\n      b):\n    g(\n      True,\n    )\n  return c\n"
+    changes = {(each.line, each.kind): each.lines for each in find_changes(source.encode())}
+    assert changes == {
+        (1, "constant"): range(0),  # executed on import
+        (2, "constant"): range(0),
+        (3, "comparison"): range(3, 5),
+        (3, "condition"): range(3, 5),
+        (5, "removed"): range(5, 8),
+        (6, "constant"): range(5, 8),
+        (8, "return"): range(8, 9),
+    }
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux only")

@@ -54,7 +54,8 @@ Span = tuple[int, int, str, str]
 class Change(NamedTuple):
     """A replacement of one span of a file.
 
-    `start` and `end` are offsets [bytes]; `line` counts from 1.
+    `start` and `end` are offsets [bytes]; `line` counts from 1. `lines` are those of the statement,
+    or of its head, if it is in a function; there are none if it is executed on import.
     """
 
     start: int
@@ -62,7 +63,7 @@ class Change(NamedTuple):
     line: int
     kind: str
     text: str
-    in_function: bool
+    lines: range
 
     def apply(self, source: bytes) -> bytes:
         """Return the file with the change."""
@@ -82,36 +83,36 @@ def find_changes(source: bytes) -> list[Change]:
     Annotations, decorators, docstrings, f-strings and imports are left alone.
     """
     finder = _Finder(source)
-    finder.visit_children(ast.parse(source), in_function=False)
+    finder.visit_children(ast.parse(source), range(0))
     return finder.changes
 
 
 class _Finder:
     def __init__(self, source: bytes) -> None:
         self.source = source
-        self.lines = [0]
+        self.starts = [0]
         for line in source.splitlines(keepends=True):
-            self.lines.append(self.lines[-1] + len(line))
+            self.starts.append(self.starts[-1] + len(line))
         self.changes: list[Change] = []
 
-    def visit_children(self, node: ast.AST, *, in_function: bool) -> None:
-        in_function |= isinstance(node, ast.FunctionDef | ast.Lambda)
+    def visit_children(self, node: ast.AST, lines: range) -> None:
         for name, value in ast.iter_fields(node):
             children = value if isinstance(value, list) else [value]
+            is_inside = lines or (name == "body" and isinstance(node, ast.FunctionDef | ast.Lambda))
             for child in children:
                 if name not in _ANNOTATIONS and isinstance(child, ast.AST):
-                    self.visit(child, in_function=in_function)
+                    self.visit(child, _lines(child) or lines if is_inside else lines)
 
-    def visit(self, node: ast.AST, *, in_function: bool) -> None:
+    def visit(self, node: ast.AST, lines: range) -> None:
         is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         if is_docstring or isinstance(node, ast.JoinedStr | ast.Import | ast.ImportFrom):
             return
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
             return
         for start, end, kind, text in self._changes_of(node):
-            line = bisect_right(self.lines, start)
-            self.changes.append(Change(start, end, line, kind, text, in_function))
-        self.visit_children(node, in_function=in_function)
+            line = bisect_right(self.starts, start)
+            self.changes.append(Change(start, end, line, kind, text, lines))
+        self.visit_children(node, lines)
 
     def _changes_of(self, node: ast.AST) -> Iterator[Span]:
         for kind, find in _FINDERS.items():
@@ -200,8 +201,8 @@ class _Finder:
         assert node.end_lineno is not None
         assert node.end_col_offset is not None
         return (
-            self.lines[node.lineno - 1] + node.col_offset,
-            self.lines[node.end_lineno - 1] + node.end_col_offset,
+            self.starts[node.lineno - 1] + node.col_offset,
+            self.starts[node.end_lineno - 1] + node.end_col_offset,
         )
 
 
@@ -230,6 +231,17 @@ def _stores_into(node: ast.stmt) -> bool:
     return isinstance(node, ast.Assign) and all(
         isinstance(target, ast.Attribute | ast.Subscript) for target in node.targets
     )
+
+
+def _lines(node: ast.AST) -> range:
+    """Return the lines of a statement without the statements in it; none for other nodes."""
+    if not isinstance(node, ast.stmt | ast.Lambda):
+        return range(0)
+    body = getattr(node, "body", None)
+    end = node.end_lineno or node.lineno
+    if isinstance(body, list):
+        end = max(node.lineno, body[0].lineno - 1)
+    return range(node.lineno, end + 1)
 
 
 def _is_text(node: ast.expr) -> bool:

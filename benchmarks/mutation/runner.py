@@ -110,8 +110,8 @@ class Tree:
             self.baselines[path] = Baseline(done.failed, done.cpu_seconds, done.seconds)
         return self.baselines[path]
 
-    def covering(self, test_file: Path, path: Path, line: int | None) -> set[str] | None:
-        """Return the tests that execute a line, or any function of the file without a line.
+    def covering(self, test_file: Path, path: Path, lines: range) -> set[str] | None:
+        """Return the tests that execute one of the lines, or without any, a function of the file.
 
         None stands for all tests of the file: a fixture or an import executed the line.
         """
@@ -121,8 +121,7 @@ class Tree:
         data = CoverageData(str(self._kept(test_file)))
         data.read()
         by_line = data.contexts_by_lineno(str(path))
-        lines = [line] if line else by_line
-        tests = {name for each in lines for name in by_line.get(each, ()) if name}
+        tests = {name for each in lines or by_line for name in by_line.get(each, ()) if name}
         if any(name.endswith("|setup") for name in tests):
             return None
         return tests

@@ -57,3 +57,17 @@ def test_diagonal_corridor():
     heights = np.where(np.abs(i - j) <= 4, 0.0, 1.0)
     # The corners of the cells are 8 diagonals of 0.1 m / sqrt(2) apart, the lines of centers 10.
     assert 0.56 <= widths(heights)[20, 20] <= 0.71
+
+
+def test_ceilings_are_the_lowest_and_highest_within_the_body_width():
+    """The upper floor covers two columns; the body of 0.5 m reaches 6 columns of 0.1 m."""
+    floor = np.full((30, 30, 2), np.nan)
+    floor[..., 0] = 0.0
+    floor[15, 15:17, 1] = 1.2, 2.1
+    ceiling = np.full_like(floor, np.inf)
+    ceiling[15, 15:17, 0] = 1.0, 2.0
+    columns = Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)
+    ((lowest, highest),) = Passages.build(columns, LIMITS).ceilings
+    assert lowest[15, [8, 9, 15, 21, 22, 23]].tolist() == [np.inf, 1, 1, 1, 2, np.inf]
+    assert highest[15, [8, 9, 10, 15, 22, 23]].tolist() == [-np.inf, 1, 2, 2, 2, -np.inf]
+    assert lowest[[8, 9, 21, 22], 15].tolist() == [np.inf, 1, 1, np.inf]

@@ -117,7 +117,8 @@ def test_last_line_has_counts_and_fixes(report):
 
 def test_no_findings_are_stated(report):
     clean = dataclasses.replace(report, findings=(), skipped=())
-    assert to_text([clean]).endswith("\nrobot.urdf: no problems found\n")
+    assert to_text([clean]).endswith("\n\nrobot.urdf: no problems found\n")
+    assert "\n\n\n" not in to_text([clean])
 
 
 def test_several_files_have_total_counts(report):
