@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, make_patch
-from terrainkit.feasibility.columns import MAX_SPACING, sample_columns
+from terrainkit.feasibility.columns import MAX_SPACING, Columns, sample_columns
 
 
 def columns_of(terrain, **parameters):
@@ -34,3 +34,25 @@ def test_patch_with_solids_has_ground_and_roof():
     for z in (low, high):
         node = np.array([columns.node_at(np.array([x, y, z]))])
         assert columns.positions(node)[0] == pytest.approx([x, y, z])
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "node"), [(0, 0, 0), (-0.3, -0.3, 0), (0.5, 0.6, 11), (0.5, -0.3, 8), (0.1, 0.2, 6)]
+)
+def test_node_at_a_place_is_the_nearest_one_of_the_patch(x, y, node):
+    floor = np.zeros((3, 4, 1))
+    ceiling = np.full_like(floor, np.inf)
+    columns = Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)
+    assert columns.node_at(np.array([x, y, 0.0])) == node
+    assert columns.column(np.array([node])) == ([node // 4], [node % 4])
+
+
+def test_node_at_a_height_is_the_floor_of_this_height():
+    floor = np.zeros((3, 3, 2))
+    floor[..., 1] = np.nan
+    floor[1, 1, 1] = 0.5
+    ceiling = np.full_like(floor, np.inf)
+    columns = Columns(spacing=0.1, lower=(1.0, 2.0), floor=floor, ceiling=ceiling)
+    assert columns.node_at(np.array([1.1, 2.1, 0.2])) == 8
+    assert columns.node_at(np.array([1.1, 2.1, 0.3])) == 9
+    assert columns.positions(np.array([9])).tolist() == [[1.1, 2.1, 0.5]]

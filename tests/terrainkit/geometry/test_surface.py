@@ -1,10 +1,12 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from terrainkit.geometry.surface import surface_at
+from terrainkit.geometry.surface import HeightfieldSurface, surface_at
 
 HEIGHTFIELDS = arrays(
     np.float32,
@@ -139,3 +141,17 @@ def test_surface_of_a_single_sample_is_level():
     found = surface_at(np.full((1, 1), 3, np.float32), np.array([[0.3, -8.0]]), threshold=0.1)
     assert found.height.tolist() == [3.0]
     assert found.gradient.tolist() == [[0.0, 0.0]]
+
+
+def test_surface_has_the_solids_that_collide_or_are_seen():
+    surface = HeightfieldSurface(
+        heights=np.full((2, 2), 2.0, np.float32),
+        first_sample=(0.0, 0.0),
+        cell=1.0,
+        colliding=SimpleNamespace(top=lambda x, y, z: x + 10 * y + 100 * (z > 3)),
+        visible=SimpleNamespace(top=lambda x, y, z: 10 * x + y + 0 * z),
+    )
+    x, y = np.array([1, 0.5], np.float32), np.array([0, 0.5], np.float32)
+    assert surface.height(x, y, 3.0).tolist() == [2.0, 5.5]
+    assert surface.height(x, y).tolist() == [101.0, 105.5]
+    assert surface.height(x, y, 3.0, scan=True).tolist() == [10.0, 5.5]
