@@ -19,7 +19,7 @@ import time
 import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from mutation.changes import Change, find_changes
@@ -176,29 +176,43 @@ def _changed_lines(source: bytes, change: Change) -> tuple[str, str]:
 def try_change(
     tree: Tree, planted: Planted, source: bytes, change: Change, stages: tuple[str, ...]
 ) -> Planted:
-    """Run the tests on a change, stage by stage."""
-    path, noticed = Path(planted.path), ""
-    seen = [
-        file for stage in STAGES[: STAGES.index(stages[0])] for file in _tests(tree, path)[stage]
-    ]
+    """Run the tests on a change, stage by stage, until one fails."""
+    files = _tests(tree, Path(planted.path))
+    seen = {file for stage in STAGES[: STAGES.index(stages[0])] for file in files[stage]}
+    noticed = stage = ""
     for stage in stages:
-        for test_file in _tests(tree, path)[stage]:
-            if test_file not in seen and not noticed:
-                seen.append(test_file)
-                noticed = _run(tree, path, change, source, test_file)
+        new = [file for file in files[stage] if file not in seen]
+        seen.update(new)
+        failures = _failures(tree, new, planted, change.apply(source), change.lines, stage)
+        noticed = next(failures, "")
         if noticed:
             break
-    return Planted(**{**asdict(planted), "noticed_by": noticed, "stage": stage})
+    return replace(planted, noticed_by=noticed, stage=stage)
 
 
-def _run(tree: Tree, path: Path, change: Change, source: bytes, test_file: Path) -> str:
-    """Return what notices a change in a test file, or nothing."""
-    baseline = tree.baseline(test_file)
-    only = tree.covering(test_file, path, change.lines)
-    if only is not None and not only:
-        return ""
-    with tree.changed(path, change.apply(source)):
-        return tree.run(test_file, only, limit=baseline).noticed
+def _failures(
+    tree: Tree, files: list[Path], planted: Planted, changed: bytes, lines: range, stage: str
+) -> Iterator[str]:
+    """Yield what notices a change.
+
+    If no test of the package executes the statement, it may run in other processes or as a copy,
+    which coverage does not see; then all tests of the package run.
+    """
+    path = Path(planted.path)
+
+    def run(file: Path, only: set[str] | None) -> str:
+        baseline = tree.baseline(file)
+        with tree.changed(path, changed):
+            return tree.run(file, only, limit=baseline).noticed
+
+    is_covered = False
+    for file in files:
+        only = tree.covering(file, path, lines)
+        if only is None or only:
+            is_covered = True
+            yield from filter(None, [run(file, only)])
+    if not is_covered and stage == STAGES[1]:
+        yield from filter(None, (run(file, None) for file in files))
 
 
 def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
