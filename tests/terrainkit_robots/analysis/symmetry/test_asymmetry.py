@@ -92,6 +92,13 @@ def test_axis_against_those_of_the_three_other_legs_is_flipped(leg):
     assert (found.axis.tolist(), found.expected_axis.tolist()) == ([0, -1, 0], [0, 1, 0])
 
 
+def test_expected_axis_is_that_of_the_first_other_leg():
+    axes = {"FL_thigh_joint": "0 -1 0", "RL_thigh_joint": "0.2 0.98 0"}
+    facts = with_axes("quadruped", axes)
+    (found,) = find_flipped_joints(facts.legs, facts.bodies)
+    assert found.expected_axis.tolist() == [0, 1, 0]  # that of FR
+
+
 def test_two_flipped_axes_are_a_convention():
     facts = with_axes("quadruped", {"FL_thigh_joint": "0 -1 0", "RL_thigh_joint": "0 -1 0"})
     assert list(find_flipped_joints(facts.legs, facts.bodies)) == []
