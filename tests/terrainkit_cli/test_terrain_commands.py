@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.terrain import registry
 
 
@@ -38,6 +39,17 @@ def test_info_patch_shows_requested_and_realized(terrainkit):
         line.split() for line in terrainkit("info", "a.npz", "--patch", 1, 0).stdout.split("\n")
     ]
     assert ["step_width", "0.31", "0.3"] in lines
+
+
+def test_info_patch_shows_a_pair_of_sides_that_differ(terrainkit, tmp_path):
+    pit = SubTerrain(terrain="pit", parameters={"side": 3.0})
+    size = {"rows": 1, "cols": 1, "patch_size": (8.0, 5.1), "border": 1.0}
+    generate(MapConfig(terrains=(pit,), **size)).save(tmp_path / "a.npz")
+    lines = [
+        line.split() for line in terrainkit("info", "a.npz", "--patch", 0, 0).stdout.split("\n")
+    ]
+    (side,) = [line[1:] for line in lines if line[:1] == ["side"]]
+    assert side == ["3", "3", "x", "3.1"]
 
 
 def test_info_unknown_patch_is_rejected(terrainkit, small_map):

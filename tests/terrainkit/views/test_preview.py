@@ -6,7 +6,7 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.views.preview import (
     color_levels,
     height_colors,
@@ -178,3 +178,16 @@ def test_map_in_a_notebook_is_a_picture_of_limited_size(rows, cols, longer):
     relief = np.subtract(picture.shape[:2], (130, 380))  # without the margins
     assert relief.argmax() == longer or rows == cols
     assert 700 <= relief.max() <= 1100
+
+
+def test_preview_draws_the_solid_with_the_highest_top_last(solid_map):
+    """A pillar of 1 m leads through a slab from 0.4 m to 0.6 m."""
+    boxes = make_boxes([(1, 6, 0.5), (1, 6, 0.5)], [(0.5, 0.5, 1.0), (1.5, 1.5, 0.2)])
+    solids = dataclasses.replace(boxes, patch=np.tile(np.array([0, 1], np.int32), (2, 1)))
+    given = dataclasses.replace(solid_map, solids=solids, goals=np.full_like(solid_map.goals, 0.0))
+    ground = dataclasses.replace(given, solids=Solids.empty())
+    picture, bare = (render_preview(each, 700).astype(int) for each in (given, ground))
+    at = bare.shape[0] - 60 - 650, 250 + 150
+    slab = 0.75 * height_colors(np.array(0.6)) + 0.25 * bare[at]
+    expected = 0.75 * height_colors(np.array(1.0)) + 0.25 * slab
+    assert picture[at] == pytest.approx(expected, abs=2)

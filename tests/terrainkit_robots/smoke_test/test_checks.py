@@ -181,6 +181,14 @@ def test_constant_rewards_fail(env, reward, passed, measured):
     assert (check.passed, check.measured) == (passed, measured)
 
 
+def test_every_fourth_robot_stands_for_the_rewards(env):
+    env.set_commands(np.full((env.num_envs, 3), 0.5, np.float32))
+    stands = lambda state, *_: (state.commands == 0).all(axis=1).astype(float)  # noqa: E731
+    env.reward_terms["torques"] = (stands, -0.1)
+    (check,) = (check for check in check_rewards(env, {}) if check.name == "reward torques")
+    assert check.measured == "0 to 1"
+
+
 def test_unreachable_reward_fails(quadruped):
     env = still_env(replace_spec(quadruped, penalized_contacts=()))
     (check,) = (check for check in check_rewards(env, {}) if check.name == "reward collision")
