@@ -3,6 +3,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule
+from terrainkit_robots.lint.rules.tre import connections
 from terrainkit_robots.lint.runner import MAX_FINDINGS, lint
 
 
@@ -30,6 +31,14 @@ def test_unknown_link_suggests_nearest_name(report):
     (finding,) = checked.findings
     assert "link fl_foot: does not exist, but is the child of joint j" in finding.message
     assert finding.hint.startswith("Did you mean FL_foot?")
+
+
+def test_unknown_link_of_a_huge_robot_has_no_suggestion(report, monkeypatch):
+    monkeypatch.setattr(connections, "_MAX_COMPARED", 2)
+    for names, is_compared in (("base FL_foot", True), ("base FL_foot FL_calf FR_calf", False)):
+        parts = links(*names.split()), joint("j", "base", "fl_foot")
+        (finding,) = report("TRE002", *parts).findings
+        assert finding.hint.startswith("Did you mean FL_foot?") == is_compared
 
 
 def test_long_cycle_is_cut(report):
