@@ -77,6 +77,14 @@ def test_validate_finds_non_finite_height(sound):
     ]
 
 
+def test_validate_finds_non_finite_vertex(sound):
+    mesh = sound.mesh()
+    vertices = mesh.vertices.copy()
+    vertices[7, 2] = np.nan
+    messages = found(sound, TriMesh(vertices=vertices, triangles=mesh.triangles))
+    assert ("finite", "vertices: 1 values are not finite, the first at (7, 2)") in messages
+
+
 def test_validate_finds_origin_above_ground(sound):
     origin = sound.env_origins[1, 2] + np.float32([0, 0, 0.5])
     assert found(moved_origin(sound, 1, 2, origin)) == [

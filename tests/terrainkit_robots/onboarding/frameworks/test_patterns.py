@@ -3,7 +3,12 @@ import re
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.onboarding.frameworks.patterns import mjlab_patterns, usd_patterns
+from terrainkit_robots.onboarding.frameworks.patterns import (
+    merge_names,
+    merge_patterns,
+    mjlab_patterns,
+    usd_patterns,
+)
 
 NAMES = ("FL_hip_joint", "FL_hip", "left.knee-2", "1st", "_tail", "\u5173\u8282", "a+b")
 
@@ -41,3 +46,25 @@ def test_mjlab_patterns_match_one_name_by_prefix():
             assert [other for other in seen if match(patterns[name], other)] == [expected]
     with pytest.raises(ConfigError, match="the same name in mjlab"):
         mjlab_patterns(("a/x", "b/x"))
+
+
+@pytest.mark.parametrize(
+    ("patterns", "values", "expected"),
+    [
+        ({}, {"FL_hip": 1, "FR_hip": 1, "FL_calf": 2}, {".*_hip": 1, "FL_calf": 2}),
+        # mjlab may match `hip` at the start of `hip_roll`.
+        ({}, {"hip": 1, "hip_roll": 2, "knee": 2}, {"hip": 1, "hip_roll": 2, "knee": 2}),
+        ({}, {"hip": 1, "hip_roll": 1, "knee": 2}, {"hip.*": 1, "knee": 2}),
+        # A name that differs in the framework keeps all patterns.
+        ({"a_x": "a_x$"}, {"a_x": 1, "b_x": 1}, {"a_x$": 1, "b_x": 1}),
+    ],
+)
+def test_joints_with_equal_values_share_patterns(patterns, values, expected):
+    assert merge_patterns(values, {name: name for name in values} | patterns) == expected
+
+
+def test_names_have_patterns_that_match_no_others():
+    names = ("FL_hip", "FR_hip", "FL_calf", "FR_calf")
+    same = {name: name for name in names}
+    assert merge_names(names[:2], same) == [".*_hip"]
+    assert merge_names(names, same) == [".*"]
