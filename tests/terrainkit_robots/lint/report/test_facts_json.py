@@ -1,11 +1,13 @@
 import json
 import math
+import re
 
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.report.facts_json import facts_json, number
+from tests.robots import QUADRUPED
 
 
 def record(path):
@@ -14,10 +16,10 @@ def record(path):
     return made
 
 
-def test_facts_json_quadruped(robot_file):
-    facts = record(robot_file("go2/urdf/go2.urdf"))
-    assert facts["total_mass"] == pytest.approx(15.0191, abs=1e-3)
-    assert (facts["links"], facts["bodies"], facts["joints"]) == (29, 13, 12)
+def test_facts_json_quadruped():
+    facts = record(QUADRUPED)
+    assert facts["total_mass"] == 15.017  # 6.921 + 4 (0.678 + 1.152 + 0.154 + 0.04)
+    assert (facts["links"], facts["bodies"], facts["joints"]) == (17, 13, 12)
     assert facts["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     assert facts["legs"][0]["joints"] == [
         {"name": "FL_hip_joint", "role": "roll"},
@@ -35,17 +37,21 @@ def test_facts_json_quadruped(robot_file):
     assert (facts["action_size"], facts["observation_size"]) == (12, 48)
 
 
-def test_facts_json_without_legs_has_same_keys(robot_file, tmp_path):
+def test_facts_json_without_legs_has_same_keys(tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text('<robot name="arm"><link name="only"/></robot>')
     facts = record(file)
-    assert facts.keys() == record(robot_file("go2/urdf/go2.urdf")).keys()
+    assert facts.keys() == record(QUADRUPED).keys()
     assert (facts["legs"], facts["feet"], facts["leg_length"]) == ([], [], None)
     assert facts["standing_pose"] is facts["spawn_height"] is facts["holding_torques"] is None
 
 
-def test_facts_json_joint_orders_by_simulator(robot_file):
-    orders = record(robot_file("a1/urdf/a1.urdf"))["joint_orders"]
+def test_facts_json_joint_orders_by_simulator(tmp_path):
+    """The right legs come first in the file."""
+    other = {"FL_": "FR_", "FR_": "FL_", "RL_": "RR_", "RR_": "RL_"}
+    file = tmp_path / "robot.urdf"
+    file.write_text(re.sub("|".join(other), lambda m: other[m[0]], QUADRUPED.read_text()))
+    orders = record(file)["joint_orders"]
     assert list(orders) == ["file", "mujoco", "isaac_gym", "isaac_lab", "genesis"]
     legs = {name: [joint[:2] for joint in orders[name]["joints"]] for name in list(orders)[1:]}
     assert [joint[:2] for joint in orders["file"]][::3] == ["FR", "FL", "RR", "RL"]
@@ -53,7 +59,6 @@ def test_facts_json_joint_orders_by_simulator(robot_file):
     assert legs["isaac_gym"][::3] == legs["isaac_lab"][:4] == ["FL", "FR", "RL", "RR"]
     assert orders["mujoco"]["bodies"][:5] == ["base", "FR_hip", "FR_thigh", "FR_calf", "FL_hip"]
     assert orders["mujoco"]["certain"] is True
-    assert orders["isaac_lab"]["certain"] is False
     assert all(orders[name]["reason"] for name in legs)
 
 
@@ -74,8 +79,8 @@ def test_number_keeps_six_digits(value, kept):
     assert number(value) == kept
 
 
-def test_suggested_gains_require_simulation(robot_file):
-    robot = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
+def test_suggested_gains_require_simulation():
+    robot = Facts(load_robot(QUADRUPED))
     assert facts_json(robot)["suggested_gains"] is None
     gains = facts_json(robot, may_simulate=True)["suggested_gains"]
     assert list(gains) == [joint.name for joint in robot.actuated]
