@@ -1,4 +1,13 @@
+"""Tests of all terrains.
+
+Their parameters and numbers of their patches are in terrain_values.json. Write them anew with
+`python -m tests.terrainkit.test_every_terrain`: maps of equal configs differ between versions then.
+"""
+
+import json
+import warnings
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +23,7 @@ from terrainkit.map.validate import validate
 from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.parameter import MAX_VALUE, parameters_of
 
+VALUES = Path(__file__).with_name("terrain_values.json")
 VARIANTS = [(name, {}) for name in registry.terrain_names()] + [
     (name, {"inverted": True})
     for name in registry.terrain_names()
@@ -169,6 +179,49 @@ def test_every_terrain_spawn_is_level_on_any_map(terrain, given_parameters, rest
     assert_spawns_are_inside(terrain_map, terrain_map.config.spawn_radius)
 
 
+@coarse
+@every_terrain
+def test_every_terrain_keeps_its_values(terrain, given_parameters):
+    recorded = json.loads(VALUES.read_text())[f"{terrain} {json.dumps(given_parameters)}"]
+    for found, expected in zip(values_of(terrain, given_parameters), recorded, strict=True):
+        assert found.keys() == expected.keys()
+        for name, value in expected.items():
+            is_text = isinstance(value, str)
+            assert found[name] == (value if is_text else pytest.approx(value, 1e-6, 1e-3)), name
+
+
+def values_of(terrain, parameters):
+    """Return parameters and sums of arrays of a patch of difficulty 0 and of one of difficulty 1.
+
+    Each element has another weight in a sum, so that no two can be swapped.
+    """
+    grid = Grid(shape=(81, 60), cell=0.1)
+    terrain_map = map_of(terrain, parameters, grid, rows=2, seed=5)
+    patches = [terrain_map.patch(row, 0) for row in range(2)]
+    return [
+        {name: str(value) for name, value in patch.parameters.requested.items()}
+        | {f"{name}, realized": value for name, value in patch.parameters.realized.items()}
+        | {
+            name: weighted(values)
+            for name, values in (
+                ("heights", patch.heights),
+                ("friction", patch.friction),
+                ("goals", patch.goals),
+                ("spawns", patch.spawns),
+                ("boxes", patch.solids.boxes),
+                ("cylinders", patch.solids.cylinders),
+                ("hulls", patch.solids.hull_vertices),
+            )
+        }
+        for patch in patches
+    ]
+
+
+def weighted(values):
+    weights = 1 + np.cos(np.arange(values.size)).reshape(values.shape)
+    return round(float((values * weights).sum()), 4)
+
+
 @every_terrain
 def test_every_terrain_depends_on_the_seed(terrain, given_parameters):
     grid, rng = Grid(shape=(80, 80), cell=0.1), np.random.default_rng(1)
@@ -279,3 +332,10 @@ def test_every_terrain_builds_or_rejects_any_patch(variant, shape, cell, difficu
     assert np.isfinite(terrain_map.heights).all()
     assert_spawns_are_level(terrain_map, radius)
     assert_spawns_are_inside(terrain_map, radius)
+
+
+if __name__ == "__main__":
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        values = {f"{name} {json.dumps(given)}": values_of(name, given) for name, given in VARIANTS}
+    VALUES.write_text(json.dumps(values, indent=0) + "\n")

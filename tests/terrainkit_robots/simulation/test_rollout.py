@@ -105,3 +105,26 @@ def test_rollout_rejects_many_contacts(tmp_path):
     sim = chain(tmp_path, 40, ball)
     with quiet_mujoco(), pytest.raises(CannotCheckError, match="contacts: got"):
         Rollout(sim).reset(sim.standing_qpos)
+
+
+def test_inertia_of_the_contact_solver_includes_the_armature_of_the_gains():
+    facts = quadruped()
+    sim, gains = make_sim_model(facts), suggest_gains(facts)
+    with quiet_mujoco():
+        added = Rollout(sim, gains).model.dof_M0 - Rollout(sim).model.dof_M0
+    for name in sim.actuated:
+        dof = sim.model.joint(name).dofadr[0]
+        declared = sim.model.dof_armature[dof]
+        assert added[dof] == pytest.approx(gains[name].armature - declared)
+
+
+@pytest.mark.parametrize("self_collision", [False, True])
+def test_disabled_floor_has_no_contacts(self_collision):
+    sim = make_sim_model(quadruped())
+    with quiet_mujoco():
+        rollout = Rollout(sim, self_collision=self_collision)
+        rollout.reset(sim.standing_qpos, clearance=-0.01)
+        assert 0 in rollout.model.geom_bodyid[rollout.data.contact.geom]
+        rollout.disable_floor()
+        rollout.reset(sim.standing_qpos, clearance=-0.01)
+        assert 0 not in rollout.model.geom_bodyid[rollout.data.contact.geom]

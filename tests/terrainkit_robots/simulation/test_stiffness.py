@@ -1,10 +1,14 @@
 import re
+from types import SimpleNamespace
 
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.pd_gains import suggest_gains
+from terrainkit_robots.simulation.sim_model import make_sim_model
+from terrainkit_robots.simulation.stiffness import _max_gravity_load, leg_gain_target
 
 LEGS = ("FL", "FR", "RL", "RR")
 
@@ -39,3 +43,55 @@ def test_stiffness_of_slides_limits_sag(sliding):
     assert gain.stiffness == pytest.approx(pushed / 0.009, rel=0.12)
     assert f"to hold {pushed:.2g} N in the standing pose within 0.009 m" in gain.reason
     assert not re.search(r"N m|rad|kg m2", gain.reason)
+
+
+INERTIAL = """<inertial><origin xyz="{com} 0 0"/><mass value="{mass}"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>"""
+JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
+<origin xyz="{x} 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="5"/>
+</joint>"""
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_gravity_load_is_that_of_all_bodies_below_a_joint(tmp_path, kind):
+    """An arm of 2 kg and 1 kg beside one of 4 kg, which does not count."""
+    links = {"base": (0, 9), "other": (0.1, 4), "upper": (0.3, 2), "fore": (0.2, 1)}
+    text = "".join(
+        f'<link name="{name}">{INERTIAL.format(com=com, mass=mass)}</link>'
+        for name, (com, mass) in links.items()
+    )
+    for name, parent, child, x in (
+        ("shoulder", "base", "upper", 0.1),
+        ("elbow", "upper", "fore", 0.5),
+        ("side", "base", "other", -0.1),
+    ):
+        text += JOINT.format(name=name, kind=kind, parent=parent, child=child, x=x)
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="r">{text}</robot>')
+    sim = make_sim_model(Facts(load_robot(path)))
+    loads = {name: _max_gravity_load(sim, name) / 9.81 for name in ("shoulder", "elbow", "side")}
+    turning = {"shoulder": 2 * 0.3 + 1 * (0.5 + 0.2), "elbow": 0.2, "side": 0.4}
+    expected = turning if kind == "revolute" else {"shoulder": 3, "elbow": 1, "side": 4}
+    assert loads == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("effort", "gain_set", "factor", "limit"),
+    [
+        ("139", "stand", 1.5 / 2, 139),  # by its effort at 1 rad
+        ("900", "stand", 1.5 / 2, 900),
+        ("900", "train", 0.36, 900),
+    ],
+)
+def test_knees_of_a_biped_are_stiff_for_its_weight(effort, gain_set, factor, limit):
+    file = bundled.urdf_path("biped")
+    text = file.read_text().replace('effort="139"', f'effort="{effort}"')
+    biped = Facts(load_robot(file, contents={file: text.encode()}))
+    names = "left_knee_joint", "right_knee_joint"
+    heavy = {name: SimpleNamespace(free=10.0, locked=10.0) for name in names}
+    target = leg_gain_target(biped, make_sim_model(biped), heavy, names, gain_set)
+    length = sum(leg.length for leg in biped.legs) / 2
+    expected = factor * biped.total_mass * 9.81 * length
+    assert target.stiffness == pytest.approx(min(expected, limit))
+    assert target.joints == names
+    assert not target.extra_armature

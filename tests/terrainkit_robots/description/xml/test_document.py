@@ -1,4 +1,5 @@
 import os
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -364,3 +365,12 @@ def test_no_permission(file):
     file.chmod(0)
     with pytest.raises(RobotFileError, match=r"cannot read .*ermission"):
         read_bytes(file)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-be", "utf-16-le", "utf-32-be", "utf-32-le", "utf-16"])
+def test_wide_encodings_are_read_in_their_byte_order(encoding):
+    text = '<robot name="\u00e9"/>'
+    data = text.encode(encoding)
+    problem = parse_xml(Path("robot.urdf"), data).problems[0]
+    assert (problem.code, problem.details["text"]) == ("XML009", text)
+    assert problem.details["bytes"] == str(len(data))
