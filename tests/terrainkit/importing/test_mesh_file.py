@@ -6,6 +6,7 @@ import pytest
 import trimesh
 
 from terrainkit.errors import HeightFileError
+from terrainkit.importing import mesh_file
 from terrainkit.importing.mesh_file import read
 from terrainkit.importing.options import ReadOptions
 
@@ -118,3 +119,38 @@ def test_mesh_file_with_invalid_vertex_is_rejected(tmp_path, value):
     path.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 {value}\nf 1 2 3\n")
     with pytest.raises(HeightFileError, match="got vertices that are not finite"):
         read(path, ReadOptions())
+
+
+TRIANGLE = [[0, 0, 0], [1, 0, 2], [0, 3, 0]]
+
+
+@pytest.fixture
+def decoded(monkeypatch, tmp_path):
+    """Return a function that reads arrays as if they were in a file."""
+
+    def run(vertices, faces, **options):
+        arrays = {"vertices": vertices, "faces": faces}
+        monkeypatch.setattr(mesh_file, "decode", lambda *_: arrays)
+        return read(tmp_path / "a.ply", ReadOptions(**options))
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "message"),
+    [
+        (TRIANGLE, [[0, 1, 3]], "a face with a vertex that does not exist"),
+        (TRIANGLE, [[0, 1, -1]], "a face with a vertex that does not exist"),
+        (TRIANGLE, np.empty((0, 3)), "a file without triangles"),
+        ([*TRIANGLE[:2], [0, np.nan, 0]], [[0, 1, 2]], "vertices that are not finite"),
+    ],
+)
+def test_invalid_arrays_of_a_mesh_are_rejected(decoded, vertices, faces, message):
+    with pytest.raises(HeightFileError, match=f"got {message}"):
+        decoded(vertices, faces)
+
+
+def test_unused_vertices_are_dropped_and_the_rest_scaled_and_turned(decoded):
+    mesh = decoded([[9, 9, np.inf], *TRIANGLE], [[1, 2, 3]], scale=0.5, up="y")
+    assert mesh.faces.tolist() == [[0, 1, 2]]
+    assert mesh.vertices.tolist() == [[0, 0, 0], [0.5, -1, 0], [0, 0, 1.5]]

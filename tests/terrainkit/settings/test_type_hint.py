@@ -11,9 +11,13 @@ from msgspec import Meta
 from terrainkit.errors import ConfigError
 from terrainkit.settings.type_hint import (
     UNIQUE,
+    Count,
+    Fraction,
     Interval,
+    NonNegative,
     PositiveFloat,
     PositiveInt,
+    Size,
     convert,
     describe,
 )
@@ -135,3 +139,15 @@ def test_convert_rejects_other_types(value, annotation, message):
 )
 def test_describe_states_type_and_range(annotation, text):
     assert describe(annotation) == text
+
+
+@pytest.mark.parametrize(
+    ("hint", "low", "high"),
+    [(Size, 1e-4, 1e6), (NonNegative, 0.0, 1e6), (Count, 1, 1_000_000), (Fraction, 0.0, 1.0)],
+)
+def test_named_types_include_their_ends(hint, low, high):
+    assert [convert("x", value, hint) for value in (low, high)] == [low, high]
+    step = 1 if hint is Count else 1e-6
+    for value in (low - step, high * (1 + 1e-9) if step < 1 else high + 1):
+        with pytest.raises(ConfigError, match="x: got "):
+            convert("x", value, hint)

@@ -3,7 +3,11 @@ from dataclasses import replace
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe, keyframe_defect
+from terrainkit_robots.analysis.legs.keyframe import (
+    _lower_leg,
+    is_standing_keyframe,
+    keyframe_defect,
+)
 from terrainkit_robots.analysis.legs.standing_pose import solve_standing_pose
 
 LEG = {"hip": 0.0, "thigh": 0.9, "calf": -1.8}
@@ -47,3 +51,16 @@ def test_keyframe_without_all_joints_has_no_defect(bundled):
     partial = Facts(replace(facts.model, keyframe={"FL_calf_joint": -2.6}), facts.meshes)
     assert not keyframe_defect(partial.leg_model)
     assert not is_standing_keyframe(partial.leg_model)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("quadruped.xml", ["FL_calf"]),
+        ("biped.xml", ["left_knee_link", "left_ankle_pitch_link", "left_ankle_roll_link"]),
+    ],
+)
+def test_lower_leg_is_what_the_knee_moves(bundled, name, expected):
+    robot = bundled(name).leg_model
+    leg = robot.legs[0]
+    assert [robot.bodies[index].name for index in _lower_leg(leg, robot)] == expected

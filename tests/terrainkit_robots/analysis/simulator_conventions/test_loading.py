@@ -1,3 +1,4 @@
+import logging
 import os
 import struct
 from pathlib import Path
@@ -80,6 +81,13 @@ def test_mujoco_load_error_without_meshes(tmp_path):
     assert mujoco_load_error(model, with_meshes=False) is None
     with pytest.raises(NotAttemptedError, match="only URDF"):
         mujoco_load_error(facts_of(tmp_path, f"<mujoco>{BODY}</mujoco>").model, with_meshes=False)
+
+
+def test_yourdfpy_keeps_its_level_of_logging(tmp_path, monkeypatch):
+    log = logging.getLogger("yourdfpy")
+    monkeypatch.setattr(log, "level", logging.DEBUG)
+    load_in_yourdfpy(facts_of(tmp_path, '<robot name="r"><link name="a"/></robot>', "robot.urdf"))
+    assert log.level == logging.DEBUG
 
 
 def test_yourdfpy_load_error_is_one_line(tmp_path):
