@@ -65,6 +65,11 @@ class Planted:
         return self.path, self.digest, self.line, self.after
 
     @property
+    def edit(self) -> tuple[str, str, str]:
+        """Return what identifies the change in the list of those that alter nothing."""
+        return self.path, self.before, self.after
+
+    @property
     def package(self) -> str:
         """Return the package in which it is counted."""
         parts = Path(self.path).parts
@@ -97,7 +102,7 @@ def main() -> int:
 def _plant_all(tree: Tree, arguments: argparse.Namespace, results: Path) -> None:
     end = time.monotonic() + 3600 * arguments.hours
     plan = list(make_plan(tree, arguments.package, arguments.changes, arguments.seed))
-    known = _read(results)
+    known, equivalent = _read(results), _read_equivalent()
     for k, (planted, source, change) in enumerate(plan):
         if time.monotonic() > end:
             print(f"{len(plan) - k} changes are left; the same command goes on")
@@ -106,14 +111,16 @@ def _plant_all(tree: Tree, arguments: argparse.Namespace, results: Path) -> None
         done = STAGES.index(last.stage) + 1 if last.stage and not arguments.retry else 0
         if last.noticed_by or done >= arguments.stages:
             continue
-        begin = time.monotonic()
-        found = try_change(tree, planted, source, change, STAGES[done : arguments.stages])
+        begin, found = time.monotonic(), planted
+        if planted.edit not in equivalent:
+            found = try_change(tree, planted, source, change, STAGES[done : arguments.stages])
+        elif planted.key in known:
+            continue
         with results.open("a") as file:
             file.write(json.dumps(asdict(found)) + "\n")
         outcome = f"noticed by {found.noticed_by}" if found.noticed_by else "SURVIVED"
-        print(
-            f"{k + 1}/{len(plan)} {time.monotonic() - begin:.0f} s {found}: {outcome}", flush=True
-        )
+        seconds = time.monotonic() - begin
+        print(f"{k + 1}/{len(plan)} {seconds:.0f} s {found}: {outcome}", flush=True)
 
 
 def make_plan(
@@ -248,14 +255,18 @@ def _read(results: Path) -> dict[tuple[str, str, int, str], Planted]:
     return {each.key: each for each in (Planted(**json.loads(line)) for line in lines)}
 
 
+def _read_equivalent() -> set[tuple[str, str, str]]:
+    """Return the changes that alter nothing."""
+    listed = tomllib.loads(EQUIVALENT.read_text())["change"]
+    return {(each["file"], each["before"], each["after"]) for each in listed}
+
+
 def _print_table(found: list[Planted]) -> None:
-    listed = tomllib.loads(EQUIVALENT.read_text()).get("change", [])
-    equivalent = {(each["file"], each["before"], each["after"]) for each in listed}
+    equivalent = _read_equivalent()
     counts: dict[str, list[int]] = defaultdict(lambda: [0, 0, 0, 0])
     survivors = []
     for each in found:
-        is_equivalent = (each.path, each.before, each.after) in equivalent
-        outcome = 1 if each.noticed_by else 3 if is_equivalent else 2
+        outcome = 1 if each.noticed_by else 3 if each.edit in equivalent else 2
         survivors += [each] * (outcome == 2)
         for package in (each.package, "all"):
             counts[package][0] += 1
