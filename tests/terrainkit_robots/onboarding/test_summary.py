@@ -1,0 +1,106 @@
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from terrainkit_robots.onboarding import summary
+from terrainkit_robots.onboarding.summary import summarize
+from terrainkit_robots.onboarding.verify import Verification
+
+
+@pytest.fixture
+def lines(monkeypatch, stood):
+    """Return a function that summarizes a robot that stood; keywords replace results."""
+    monkeypatch.setattr(summary, "summarize_findings", lambda _: "2 findings")
+    equivalences = (
+        SimpleNamespace(file="robot.urdf", distance=2e-6, mass=-3e-9),
+        SimpleNamespace(file="robot.xml", distance=1e-6, mass=1e-9),
+    )
+
+    def run(standing=stood, files=(), legs=(1,), changes=(), missing=0, verified=None, **given):
+        checks = Verification(equivalences=equivalences, standing=standing, **(verified or {}))
+        findings = [SimpleNamespace(code="MSH001")] * missing + [SimpleNamespace(code="MSH002")]
+        result = {
+            "report": SimpleNamespace(findings=findings),
+            "fixed": (),
+            "robot": SimpleNamespace(
+                files=dict(files), facts=SimpleNamespace(legs=legs), changes=changes
+            ),
+            "verification": checks,
+            "configs": {},
+            "skipped_configs": {},
+            "images": (),
+            "images_error": "no display",
+            "edits": (),
+        }
+        return dict(summarize(SimpleNamespace(**result | given)))
+
+    return run
+
+
+def test_summary_of_a_plain_robot(lines):
+    files = {"robot.urdf": b"", "meshes/a.stl": b"x" * 1_000_000, "meshes/b.stl": b"x" * 500_000}
+    assert lines(files=files) == {
+        "checked": "2 findings",
+        "wrote": "robot.urdf, 2 mesh files (1.5 MB)",
+        "compared": "robot.urdf and robot.xml match the source: link positions within 0.002 mm at "
+        f"{summary.NUM_POSES} poses, mass within 3e-09",
+        "standing": "yes: 5 s with the gains of robot.toml, tilt 0.6 degrees, only the feet touch "
+        "the ground",
+        "pictures": "none: no display",
+    }
+
+
+def test_summary_without_files_ends_after_the_fixes(lines):
+    fixed = [SimpleNamespace(code="INR003", subject=name) for name in "abcd"]
+    assert lines(robot=None, fixed=fixed) == {
+        "checked": "2 findings",
+        "fixed": "4 findings: INR003",
+        "repaired": "the inertias of a, b, c, ...; see report.md",
+    }
+    (one,) = (SimpleNamespace(code="MSH001", subject="a.stl"),)
+    assert lines(robot=None, fixed=[one])["repaired"] == "the path of a.stl; see report.md"
+
+
+def test_summary_lists_what_else_happened(lines):
+    found = lines(
+        configs={"mjlab": ("a.py", "b.py"), "isaaclab": ("c.py",)},
+        skipped_configs={"legged_gym": "it has no legs"},
+        images=("a.png",),
+        edits=("robot.toml.bak",),
+        changes=("renamed it",),
+        missing=1,
+    )
+    assert found["configs"] == "a.py, b.py, c.py"
+    assert found["skipped"] == "legged_gym: it has no legs"
+    assert found["pictures"] == "1 picture in report.md"
+    assert found["backups"].startswith("your edits are in robot.toml.bak; use --spec")
+    assert found["missing"].startswith("1 mesh is missing; ")
+    assert found["notes"] == "1 change listed in report.md"
+    assert lines(missing=2)["missing"].startswith("2 meshes are missing; ")
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"standing": None}, "not simulated: the robot has a fixed base"),
+        ({"standing": None, "legs": ()}, "not simulated: the robot has no legs"),
+        ({"verified": {"error": "too many contacts"}}, "not simulated: too many contacts"),
+        (
+            {"verified": {"joints_locked": True}},
+            "yes: 5 s with locked joints, since bipeds need a controller to balance, tilt",
+        ),
+        ({"verified": {"stand_gains": True}}, "yes: 5 s with the gains of --gains stand, which"),
+    ],
+)
+def test_summary_says_how_the_robot_stood(lines, options, text):
+    assert lines(**options)["standing"].startswith(text)
+
+
+def test_summary_says_why_the_robot_fell(lines, stood):
+    fallen = replace(stood, tilt=1.0)
+    assert lines(standing=fallen)["standing"].startswith("NO: 5 s with the gains of robot.toml; ")
+    free = lines(verified={"free_standing": fallen})["free"]
+    assert free.startswith("no, a policy has to balance it: 5 s with the gains of robot.toml")
+    free = lines(verified={"free_standing": stood})["free"]
+    assert free == "yes: 5 s with the gains of robot.toml and without a policy"
