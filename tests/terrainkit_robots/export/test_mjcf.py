@@ -46,6 +46,13 @@ def test_masses_and_inertias(quadruped):
         )
 
 
+def test_visual_geoms_have_their_colors(quadruped):
+    model = written(quadruped.model)
+    shown = model.geom_rgba[model.geom_contype == 0]
+    colors = {tuple(color.astype(float).round(3).tolist()) for color in shown}
+    assert colors == {(0.75, 0.77, 0.8, 1.0), (0.2, 0.21, 0.23, 1.0)}
+
+
 def test_several_joints_of_one_body(tmp_path):
     """Two hinges and a slide on one body, off its origin and with references."""
     text = f"""<mujoco><compiler angle="radian"/><worldbody><body name="base">{MASS}

@@ -168,3 +168,13 @@ def test_urdf_fix_takes_the_box_of_the_shapes_at_last(left):
     taken, values = urdf_fix(left, {"izz": 0.5})
     assert taken == "that of a solid box around the body."
     assert values == pytest.approx(BOX, rel=1e-3, abs=1e-9)
+
+
+def test_links_without_inertia_have_no_fix(tmp_path):
+    path = tmp_path / "robot.urdf"
+    bare = '<link name="b"><inertial><mass value="1"/></inertial></link>'
+    path.write_text(f'<robot name="r"><link name="a"/>{bare}</robot>')
+    facts = Facts(load_robot(path), Meshes())
+    for link in facts.model.links:
+        assert facts.inertia_repair.fix(link) is None
+        assert facts.inertia_repair.relative_change(link) == np.inf

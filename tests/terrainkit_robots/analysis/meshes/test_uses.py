@@ -1,9 +1,12 @@
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.meshes.uses import (
+    _unused_path,
     is_missing,
     mesh_uses,
     meshes_by_file,
@@ -138,3 +141,12 @@ def test_replace_edits_of_malformed_file_are_none(robot):
     facts = robot(TWO_LINKS.replace("</robot>", ""))
     (used,) = meshes_by_file(facts.model, facts.meshes)
     assert replace_edits(facts.model, facts.meshes, used.uses, ".stl", bytes) is None
+
+
+@pytest.mark.parametrize(
+    ("number", "expected"), [(0, "a_hull.stl"), (1, "a_hull_2.stl"), (99, "a_hull.stl")]
+)
+def test_unused_path_has_the_first_free_number(number, expected):
+    taken = ["a_hull.stl", *(f"a_hull_{k}.stl" for k in range(2, 101))][:number]
+    meshes = SimpleNamespace(exists=lambda path: path.name in taken)
+    assert _unused_path(meshes, Path("m/a.dae"), "_hull.stl") == Path("m", expected)

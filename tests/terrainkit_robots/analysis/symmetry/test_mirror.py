@@ -64,6 +64,13 @@ def test_link_of_a_chain_is_no_mirror_image():
     assert pairs(chain) == []
 
 
+def test_side_without_a_counterpart_has_no_mirror_image():
+    one_arm = facts(
+        ("trunk", "left_arm", "0 0.2 0", "0 1 0"), ("trunk", "neck", "0 0 0.3", "0 0 1")
+    )
+    assert pairs(one_arm) == []
+
+
 def test_lone_letter_is_a_side_at_the_same_depth():
     arms = facts(
         ("trunk", "link_l", "0 0.1 0.1", "0 0 1"), ("trunk", "link_r", "0.1 -0.2 0.1", "0 0 1")

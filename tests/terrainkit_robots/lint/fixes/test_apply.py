@@ -183,6 +183,8 @@ class TestFixRobot:
 
         result = fix_robot(robot, make_check(endless, robot))
         assert [u.reason for u in result.unfixed] == ["not done after 50 rounds"]
+        (after,) = result.after.values()
+        assert after.count(b"r" * 51) == 1  # the name began with one
 
     def test_impossible_fix_does_not_affect_others(self, robot):
         def check(element, source):
