@@ -225,7 +225,7 @@ def _failures(
 def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
     """Return the test files of each stage. Those that import the changed module come first.
 
-    They also stand for a missing mirrored file.
+    They also stand for a missing mirrored file, and else the files of the mirrored folder.
     """
     root = next(name for name in IMPORT_ROOTS if name in path.parts)
     parts = path.parts[path.parts.index(root) : -1]
@@ -246,6 +246,7 @@ def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
     package = sorted(tree.test_files(Path(*nearest.parts[:3])), key=rank)
     suite = sorted(tree.test_files(Path("tests")), key=rank)
     mirrored = mirrored or list(filter(imports, package))
+    mirrored = mirrored or [file for file in package if file.parent == nearest]
     return dict(zip(STAGES, (mirrored, package, suite), strict=True))
 
 

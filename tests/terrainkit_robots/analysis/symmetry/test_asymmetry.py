@@ -44,6 +44,12 @@ def test_axis_is_mirrored_up_to_one_degree(degrees):
         assert math.degrees(found[0].angle) == pytest.approx(degrees)
 
 
+@pytest.mark.parametrize("axes", [("0 0 0", "0 1 0"), ("0 1 0", "0 0 0"), ("0 0 0", "0 0 0")])
+def test_joint_without_an_axis_is_not_compared(axes):
+    assert arms("0.1 0.2 0", "0.1 -0.2 0", *axes) == []
+    assert arms("0.1 0.2 0", "0.1 -0.3 0", *axes) == []
+
+
 @pytest.mark.parametrize("error", [0.0039, 0.0041])
 def test_joint_is_mirrored_up_to_2_mm_and_a_hundredth_of_its_offset(error):
     # The tolerance is 0.002 m + 0.01 * 0.2 m of the shorter offset.
