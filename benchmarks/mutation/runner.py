@@ -14,6 +14,7 @@ import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -189,9 +190,15 @@ class Tree:
         finally:
             os._exit(0)
 
+    @cache  # noqa: B019
     def _kept(self, test_file: Path) -> Path:
-        digest = hashlib.sha1((self.folder / test_file).read_bytes()).hexdigest()[:12]
-        return self.kept / f"{test_file.stem}-{digest}"
+        """Return where the baseline of a test file is kept, and of what it reads beside it."""
+        file = self.folder / test_file
+        beside = [path for path in file.parent.rglob("*") if path.suffix in (".toml", ".json")]
+        digest = hashlib.sha1()
+        for path in (file, file.with_name("conftest.py"), *sorted(beside)):
+            digest.update(path.read_bytes() if path.exists() else b"")
+        return self.kept / f"{test_file.stem}-{digest.hexdigest()[:12]}"
 
     def _digest(self) -> str:
         """Return a digest of the files that the tests run, which the lines of coverage are of."""
