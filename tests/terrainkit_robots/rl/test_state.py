@@ -7,6 +7,7 @@ import torch
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Commands, InitState
+from terrainkit_robots.rl.state import CONTACT_FORCE
 
 
 @pytest.fixture
@@ -46,6 +47,13 @@ def sensed(cart, moving):
         sensors = {model.sensor(k).name: data.sensor(k).data.copy() for k in range(model.nsensor)}
         found.append(sensors | {"wheel": data.body("wheel").xpos.copy()})
     return {name: np.array([each[name] for each in found]) for name in found[0]}
+
+
+def test_feet_touch_the_ground_by_their_vertical_force(moving):
+    force = np.zeros((5, moving.state.foot_force.shape[1], 3), np.float32)
+    force[0, 0, 2], force[1, 0, 0], force[2, 0, 2] = CONTACT_FORCE + 0.01, 99, CONTACT_FORCE - 0.01
+    state = replace(moving.state, foot_force=force)
+    assert state.foot_contact[:, 0].tolist() == [True, False, False, False, False]
 
 
 def test_state_matches_sensors(moving, sensed):
