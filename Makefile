@@ -25,7 +25,7 @@ fuzz:          ## read damaged and hostile files for 10 minutes
 mutate:        ## plant changes and print which of them the tests notice; ARGS="--package FOLDER"
 	python benchmarks/mutate.py $(ARGS)
 
-docs:          ## rewrite the generated docs and pictures
+docs:          ## write the generated docs, and draw the pictures that are missing
 	python docs/build.py
 
 wheel:         ## the wheel that pip installs

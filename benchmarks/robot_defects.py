@@ -268,6 +268,10 @@ def _num_bytes(path: Path) -> int:
     return sum(file.stat().st_size for file in _robot_folder(path).rglob("*"))
 
 
+def _is_selected(defect: Defect, only: str) -> bool:
+    return any(code.startswith(only) for code in defect.codes)
+
+
 def measure(sites: int = 2, seed: int = 0, only: str = "", robot: str = "") -> Result:
     """Test every defect on every robot.
 
@@ -284,10 +288,12 @@ def measure(sites: int = 2, seed: int = 0, only: str = "", robot: str = "") -> R
         indices = [
             index
             for index, defect in enumerate(defects())
-            if defect.format == format_ and any(code.startswith(only) for code in defect.codes)
+            if defect.format == format_ and _is_selected(defect, only)
         ]
         size = _num_bytes(path)
         tasks.append((size, path, indices, (sites + 1) // 2 if size > _MAX_MESH_BYTES else sites))
+    if not any(indices for _, _, indices, _ in tasks):
+        sys.exit(f"no defect for --only {only!r} and --robots {robot!r}; see {DEFECTS}")
     tasks.sort(key=lambda task: -task[0])  # start the longest first
     sources: dict[Path, SourceResult] = {}
     mutants: list[MutantResult] = []
@@ -345,9 +351,10 @@ def run() -> Iterator[tuple[str, float]]:
     yield from _values(measure())
 
 
-def _table(result: Result) -> Iterator[str]:
+def _table(result: Result, only: str) -> Iterator[str]:
     by_title = _by_title(result)
-    expected = {m.title: f"{'/'.join(m.codes)} {m.severity}" for m in defects()}
+    selected = [defect for defect in defects() if _is_selected(defect, only)]
+    expected = {m.title: f"{'/'.join(m.codes)} {m.severity}" for m in selected}
     rows = [
         (_recall(group), title, len(group), sum(mutant.extra for mutant in group) / len(group))
         for title, group in by_title.items()
@@ -376,7 +383,7 @@ def main() -> None:
     parser.add_argument("--misses", type=int, default=2, help="misses to print for each defect")
     options = parser.parse_args()
     result = measure(options.sites, options.seed, options.only, options.robots)
-    print(*_table(result), sep="\n")
+    print(*_table(result, options.only), sep="\n")
     print(*_missed(result, options.misses), sep="\n")
     for source in result.sources:
         print(f"original: {source.robot}: {source.seconds:.2f} s", *source.findings, sep="\n    ")

@@ -1,7 +1,8 @@
 """Build the generated docs: pages, llms.txt and pictures.
 
-python docs/build.py              write them
-python docs/build.py TERRAIN...   write all texts, and the pictures of these terrains only
+python docs/build.py              write the texts, and draw the pictures that are missing
+python docs/build.py NAME...      also draw these pictures again, such as `wave`
+python docs/build.py --pictures   also draw every picture again
 python docs/build.py --check      exit with 1 if a text is out of date or a picture is missing
 """
 
@@ -12,7 +13,8 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,11 +24,10 @@ import yaml
 from gallery import render_patches
 
 import terrainkit
-from terrainkit.errors import listing
+from terrainkit.errors import ConfigError, listing
 from terrainkit.feasibility import assess_map
 from terrainkit.feasibility.report import routes
 from terrainkit.map.config import MapConfig
-from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.schema import Config, field_keys, field_types, is_required
 from terrainkit.settings.toml_text import value_text
@@ -228,8 +229,11 @@ and writes its files there: `python docs/examples/generate_map.py` in a clone. T
 
 def example_text(path: Path) -> tuple[str, str]:
     """Return the first paragraph of an example's docstring, and what to install."""
-    first, _, rest = ast.get_docstring(ast.parse(path.read_text())).partition("\n\n")
+    docstring = ast.get_docstring(ast.parse(path.read_text())) or ""
+    first, _, rest = docstring.partition("\n\n")
     command = re.search(r"pip install [^(,#\n]+", rest)
+    if command is None:
+        raise ConfigError(f"{path}: got a docstring without `pip install`; expected a command")
     return " ".join(first.split()), f"`{command[0].strip()}`"
 
 
@@ -249,16 +253,20 @@ def llms_text() -> str:
     return "\n".join(parts) + "\n"
 
 
-def draw_pictures() -> None:
-    PICTURES.mkdir(exist_ok=True)
-    for name in registry.terrain_names():
-        draw_terrain(name)
-    terrain_map = terrainkit.generate(terrainkit.MapConfig())
+def pictures() -> dict[str, Callable[[], None]]:
+    """Return the functions that draw the pictures, by name."""
+    return {name: partial(draw_terrain, name) for name in registry.terrain_names()} | {
+        "map": draw_map,
+        "feasibility": partial(draw_feasibility, "quadruped"),
+        "parkour_course": draw_courses,
+        "quadruped": partial(draw_robot, "quadruped"),
+        "quadruped_map": partial(draw_walk, "quadruped_map"),
+    }
+
+
+def draw_map() -> None:
+    terrain_map = terrainkit.generate(MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
-    draw_feasibility(terrain_map, "quadruped")
-    draw_courses()
-    draw_robot("quadruped")
-    draw_walk("quadruped_map")
 
 
 def draw_terrain(name: str) -> None:
@@ -298,9 +306,10 @@ def draw_robot(name: str) -> None:
     cv2.imwrite(str(PICTURES / f"{name}.png"), np.hstack(pictures))
 
 
-def draw_feasibility(terrain_map: TerrainMap, name: str) -> None:
+def draw_feasibility(name: str) -> None:
     found = bundled.urdf_path(name)
     assert found is not None
+    terrain_map = terrainkit.generate(MapConfig())
     results = assess_map(terrain_map, derive_limits(found.parent).limits)
     picture = PICTURES / "feasibility.png"
     write_preview(terrain_map, picture, width=820, overwrite=True, routes=routes(results))
@@ -335,9 +344,13 @@ def words(text: str) -> list[str]:
 
 
 def main() -> int:
-    names = [] if sys.argv[1:] == ["--check"] else sys.argv[1:]
-    if unknown := set(names) - set(registry.terrain_names()):
-        print(f"got {listing(sorted(unknown))}; expected --check or terrains", file=sys.stderr)
+    options, known = sys.argv[1:], pictures()
+    names = [] if options in (["--check"], ["--pictures"]) else options
+    if unknown := set(names) - set(known):
+        print(
+            f"got {listing(sorted(unknown))}; expected --check, --pictures or {listing(known)}",
+            file=sys.stderr,
+        )
         return 2
     pages = {
         "terrains.md": terrains_page(),
@@ -347,31 +360,25 @@ def main() -> int:
         "examples.md": examples_page(),
         "llms.txt": llms_text(),
     }
-    if sys.argv[1:] == ["--check"]:
+    missing = [name for name in known if not (PICTURES / f"{name}.png").exists()]
+    if options == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
-        pictures = [
-            f"{name}.png"
-            for name in (
-                *registry.terrain_names(),
-                "map",
-                "feasibility",
-                "parkour_course",
-                "quadruped",
-                "quadruped_map",
-            )
-        ]
-        stale += [name for name in pictures if not (PICTURES / name).exists()]
-        if stale:
-            print(f"out of date: {', '.join(stale)}; run python docs/build.py")
-        return 1 if stale else 0
+        for problem, files in (
+            ("out of date", stale),
+            ("missing", [f"pictures/{name}.png" for name in missing]),
+        ):
+            if files:
+                print(f"docs: {problem}: {', '.join(files)}; run python docs/build.py")
+        return 1 if stale or missing else 0
     for name, text in pages.items():
         (DOCS / name).write_text(text)
-    for name in names:
-        draw_terrain(name)
-    if not names:
-        draw_pictures()
+    for name in known if options == ["--pictures"] else {*missing, *names}:
+        known[name]()
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    try:
+        sys.exit(main())
+    except ConfigError as error:
+        sys.exit(str(error))

@@ -27,6 +27,8 @@ WRITTEN = {
 }
 """Files that an example writes. The others need frameworks, and run in tests/frameworks."""
 
+CHECKS = "".join(path.read_text() for path in (ROOT / "tests/frameworks").glob("*_check.py"))
+
 STAND_IN = """
 import runpy, sys
 sys.path[:0] = ["", {frameworks!r}]
@@ -65,6 +67,12 @@ def test_example_runs_in_an_empty_folder(name, tmp_path):
         assert (tmp_path / file).stat().st_size > 100
     for picture in tmp_path.glob("*.png"):
         assert cv2.imread(str(picture)).std() > 5
+
+
+@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
+def test_example_is_run(path):
+    is_run = path.stem in WRITTEN or f"docs/examples/{path.name}" in CHECKS
+    assert is_run, f"{path.name} is neither in WRITTEN nor in a check of tests/frameworks"
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)

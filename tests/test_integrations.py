@@ -30,7 +30,7 @@ def m(tmp_path, monkeypatch):
 
 
 def test_integrations_all_blocks_are_tested():
-    assert len(BLOCKS) == 20
+    assert len(BLOCKS) == 20, "add a test of the new block, and count it here"
 
 
 def test_numpy_block_reads_map(m):
@@ -56,7 +56,7 @@ def test_scripts_of_checks_are_short():
 
 def test_blocks_import_what_the_adapters_define():
     imports = re.findall(r"^from (terrainkit\.integrations\.\w+) import (.+)$", PAGE, re.MULTILINE)
-    assert len(imports) == 8
+    assert len(imports) == 8, "count the import of the new adapter here"
     for module, names in imports:
         path = ROOT / f"{module.replace('.', '/')}.py"
         defined = {getattr(node, "name", "") for node in ast.parse(path.read_text()).body}

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from lxml import etree
 
 from .xpath_functions import FUNCTIONS
 
@@ -97,14 +98,21 @@ class Mutant:
         return text
 
     def xpath(self, expression: str, element: Element | None = None) -> Any:
-        """Evaluate an XPath expression relative to an element, by default to `it`."""
+        """Evaluate an XPath expression relative to an element, by default to `it`.
+
+        Raises:
+            ValueError: If the expression is invalid.
+        """
         names = set(re.findall(r"\$(\w+)", expression))
-        return (self.it if element is None else element).xpath(
-            expression,
-            namespaces=_NAMESPACES,
-            extensions=self.functions,
-            **{name: self._variable(name) for name in names},
-        )
+        try:
+            return (self.it if element is None else element).xpath(
+                expression,
+                namespaces=_NAMESPACES,
+                extensions=self.functions,
+                **{name: self._variable(name) for name in names},
+            )
+        except etree.XPathError as error:
+            raise ValueError(f"{expression}: {error}; expected XPath 1.0") from None
 
     def _variable(self, name: str) -> Any:
         if name == "it":

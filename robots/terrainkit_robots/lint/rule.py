@@ -235,6 +235,10 @@ def _join_lines(text: str) -> str:
     return " ".join(text.split())
 
 
+def _path(check: Check) -> str:
+    return f"{check.__module__}.{check.__qualname__}"
+
+
 _RULES: dict[str, Rule] = {}
 
 
@@ -248,10 +252,16 @@ def rule(
     certainty: Certainty = "proven",
 ) -> Callable[[Check], Check]:
     """Return a decorator that registers a function as the rule `code`."""
+    if code[:3] not in FAMILIES or not re.fullmatch(r"\d{3}", code[3:]):
+        families = ", ".join(FAMILIES)
+        raise ConfigError(f"rule code: got {code}; expected a family ({families}) and three digits")
 
     def register(check: Check) -> Check:
-        if code in _RULES and _RULES[code].check.__module__ != check.__module__:
-            raise ConfigError(f"rule code {code}: registered twice; expected a unique code")
+        # A module that is loaded again replaces its rules.
+        if code in _RULES and (other := _path(_RULES[code].check)) != _path(check):
+            raise ConfigError(
+                f"rule code {code}: got {_path(check)} and {other}; expected one rule"
+            )
         _RULES[code] = Rule(
             code=code,
             name=name,

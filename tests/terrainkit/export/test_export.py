@@ -25,10 +25,10 @@ def test_export_has_the_usual_formats():
 
 
 @every_suffix
-def test_exporter_signature_is_uniform(suffix):
-    map_, path, *options = inspect.signature(
-        exporters_by_suffix()[suffix].export
-    ).parameters.values()
+def test_exporter_is_uniform(suffix):
+    exporter = exporters_by_suffix()[suffix]
+    assert exporter.BYTES_PER_SAMPLE >= 0
+    map_, path, *options = inspect.signature(exporter.export).parameters.values()
     assert (map_.name, path.name) == ("terrain_map", "path")
     assert all(option.kind is option.KEYWORD_ONLY for option in options)
 

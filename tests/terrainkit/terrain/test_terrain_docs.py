@@ -16,17 +16,17 @@ from terrainkit.terrain.terrain_docs import (
 @pytest.mark.parametrize("name", registry.terrain_names())
 def test_terrain_doc_has_text_and_unit(name):
     about = terrain_doc(name)
-    assert about.text.partition("\n")[0].endswith(".")
+    assert about.text.partition("\n")[0].endswith("."), "the first line lacks a period"
     requested = registry.get_terrain(name).at(0).requested()
     assert [p.name for p in about.parameters] == [each for each in requested if "." not in each]
-    unitless = {"grade", "number", "layers", "octaves", "opening", "opened", "iterations"}
-    unitless |= {"vertical_exaggeration", "scale", "elements"}
+    unitless = {"grade", "opening", "opened", "vertical_exaggeration", "scale", "elements"}
     declared = parameters_of(registry.get_terrain(name))
-    unitless |= {each for each, p in declared.items() if isinstance(p.easy, str | bool)}
+    unitless |= {each for each, p in declared.items() if isinstance(p.easy, str | int)}
     for each in about.parameters:
-        assert each.text.endswith(".")
+        assert each.text.endswith("."), f"{each.name}: expected a docstring that ends with a period"
         has_unit = "[m]" in each.text or "[rad]" in each.text
-        assert has_unit != (each.name in unitless)
+        problem = f"{each.name}: expected [m] or [rad] in its docstring, or its name in `unitless`"
+        assert has_unit != (each.name in unitless), problem
 
 
 @pytest.mark.parametrize("name", registry.overlay_names())

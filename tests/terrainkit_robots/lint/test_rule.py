@@ -82,10 +82,18 @@ def test_incomplete_page_is_rejected(empty, text):
 def test_duplicate_code_is_rejected(empty):
     rule("INR099", "one", "error")(check())
     other = check()
-    other.__module__ = "elsewhere"
-    with pytest.raises(ConfigError, match="rule code INR099: registered twice"):
+    other.__qualname__ = "other"
+    expected = r"code INR099: got \S+\.test_rule\.other and \S+\.negative; expected one rule"
+    with pytest.raises(ConfigError, match=expected):
         rule("INR099", "two", "error")(other)
     assert empty["INR099"].name == "one"
+
+
+@pytest.mark.parametrize("code", ["ZZZ001", "INR12", "inr001"])
+def test_invalid_code_is_rejected(empty, code):
+    with pytest.raises(ConfigError, match=f"rule code: got {code}; expected a family .*INR.* and"):
+        rule(code, "n", "error")(check())
+    assert not empty
 
 
 # All of them
