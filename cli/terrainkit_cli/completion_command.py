@@ -1,7 +1,8 @@
-"""The command that prints the completion of a shell, and what it completes.
+"""The command that prints the completion code of a shell, and the completions themselves.
 
-The shell runs `terrainkit` with the line that is being typed in environment variables, and
-argcomplete answers; the functions here translate the options of a command for it.
+To complete a line, the shell runs `terrainkit` with the line in environment variables, and
+argcomplete prints the completions. The functions here describe the options of a command to
+argcomplete.
 """
 
 import argparse

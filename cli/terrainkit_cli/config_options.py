@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 
 from terrainkit.errors import TerrainkitError
 from terrainkit.settings.schema import Config
-from terrainkit_cli.parse import Command, Option, options_of, read_words, split_words
+from terrainkit_cli.parse import Command, Option, options_of, read_args, split_args
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class ConfigCommand(Command):
         """Return the config with the defaults of its class."""
 
     @classmethod
-    def load_config(cls, words: Sequence[str]) -> Config:  # noqa: ARG003 - for subclasses
+    def load_config(cls, argv: Sequence[str]) -> Config:  # noqa: ARG003 - for subclasses
         """Return the config whose values the options change; the words may name its file.
 
         Raises:
@@ -38,24 +38,24 @@ class ConfigCommand(Command):
         return cls.default_config()
 
     @classmethod
-    def options(cls, words: Sequence[str]) -> list[Option]:
+    def options(cls, argv: Sequence[str]) -> list[Option]:
         """Return the options; the defaults of the class are shown if the config is invalid."""
         try:
-            defaults = cls.load_config(words)
+            defaults = cls.load_config(argv)
         except TerrainkitError:
             defaults = cls.default_config()
         return [*options_of(cls), *options_of(defaults, cls.ALIASES)]
 
     @classmethod
-    def parse(cls, words: Sequence[str]) -> Self:
+    def parse(cls, argv: Sequence[str]) -> Self:
         """Return the command that the words describe.
 
         Raises:
             TerrainkitError: if the config cannot be loaded.
             ConfigError: if an option is unknown, missing, or has an invalid value.
         """
-        defaults, own = cls.load_config(words), options_of(cls)
-        values = read_words([*own, *options_of(defaults, cls.ALIASES)], words)
+        defaults, own = cls.load_config(argv), options_of(cls)
+        values = read_args([*own, *options_of(defaults, cls.ALIASES)], argv)
         arguments = {each.key: values.pop(each.key) for each in own if each.key in values}
         return cls(defaults=defaults, changes=_nested(values), **arguments)
 
@@ -68,14 +68,14 @@ class ConfigCommand(Command):
         return type(self.defaults).from_table(self.changes, self.defaults)
 
     @classmethod
-    def split(cls, words: Sequence[str]) -> tuple[dict[str, str], list[str]]:
-        """Return the last word of each option that is given, and the other words.
+    def split(cls, argv: Sequence[str]) -> tuple[dict[str, str], list[str]]:
+        """Return the last value of each given option, and the remaining words.
 
-        The options are the options of the default config. If the config has other options, they and
-        their values are among the other words.
+        Only the options of the default config are recognized. If the config has other options, they
+        and their values are among the remaining words.
         """
         options = [*options_of(cls), *options_of(cls.default_config(), cls.ALIASES)]
-        given, rest = split_words(options, words)
+        given, rest = split_args(options, argv)
         return {key: values[-1] for key, values in given.items() if values}, rest
 
 

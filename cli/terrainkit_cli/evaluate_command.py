@@ -121,8 +121,8 @@ class Evaluate(PolicyCommand):
     On a plane, the commands of the robots form a grid over the command ranges of the task. On a
     map, robots walk forward, backward, left and right from the spawn origin of every patch until
     they have crossed half of it. The rollout has no noise, pushes or domain randomization. The
-    first 2 s after a command are not measured, and nothing is measured after a fall. The same seed
-    gives the same result.
+    first 2 s after each command and the time after a fall are not measured. The same seed gives the
+    same result.
     """
 
     seconds: float = 20.0

@@ -21,13 +21,13 @@ class Export(Command):
 
     A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .yaml (ROS), .stl, .ply, .obj,
     .glb, .png or .py (legged_gym, LeggedGym-Ex, Isaac Gym): the suffix of --output selects the
-    format. A .sdf has its meshes in .stl files beside it, a .png its scale in a .json file, a .yaml
-    an occupancy image and an image of the heights, and a .py its arrays in an .npz file.
+    format. Some formats also write files beside it: .sdf its meshes (.stl), .png its scale (.json),
+    .yaml an occupancy image and an image of the heights, and .py its arrays (.npz).
 
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
-    the name of a robot with a bundled policy. The output folder gets policy.onnx, policy.pt
-    (TorchScript) and policy.json, which describes the observations and their scales, the default
-    pose, gains, limits, and the order of the joints, and robot.xml (MJCF) with its meshes. The
+    the name of a robot with a bundled policy. The output folder contains policy.onnx, policy.pt
+    (TorchScript), robot.xml (MJCF) with its meshes, and policy.json. The latter describes the
+    observations and their scales, the default pose, gains, limits, and the order of the joints. The
     exported policies are verified against the checkpoint.
     """
 

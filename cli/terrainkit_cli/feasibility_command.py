@@ -38,8 +38,9 @@ class Feasibility(Command):
     """Show whether a robot can cross each patch, and what blocks it.
 
     The demand of a patch is 0 on level ground and 1 at the limit of the robot. It is the largest
-    ratio to a limit on the least demanding path from the spawn origin through the goals, or to the
-    far edge.
+    ratio of a quantity, such as the height of a step, to its limit for the robot. It is computed on
+    the least demanding path from the spawn origin through the goals or, without goals, to the far
+    edge.
 
     Exit code 0: the robot can cross every patch. 1: a patch demands more than 1. 2: the input is
     invalid.

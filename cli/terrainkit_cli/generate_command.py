@@ -77,9 +77,9 @@ class Generate(ConfigCommand):
         return MapConfig()
 
     @classmethod
-    def load_config(cls, words: Sequence[str]) -> MapConfig:
+    def load_config(cls, argv: Sequence[str]) -> MapConfig:
         """Return the config in the file of --config, or the default one."""
-        path = cls.split(words)[0].get("config", "")
+        path = cls.split(argv)[0].get("config", "")
         if is_map(path):
             return TerrainMap.load(path).config
         return MapConfig.load(path) if path else MapConfig()

@@ -121,15 +121,15 @@ def _run(arguments: list[str]) -> int:
     return _run_command(f"terrainkit {name}", command(name), arguments[1:])
 
 
-def _run_command(prog: str, chosen: "type[Command]", words: list[str]) -> int:
+def _run_command(prog: str, command_class: "type[Command]", argv: list[str]) -> int:
     from terrainkit_cli.parse import HELP, UsageError, format_help
 
-    if {*HELP} & {*takewhile(lambda word: word != "--", words)}:
-        options, doc = chosen.options(words), chosen.__doc__ or ""
+    if {*HELP} & {*takewhile(lambda word: word != "--", argv)}:
+        options, doc = command_class.options(argv), command_class.__doc__ or ""
         render.help_page(format_help(prog, doc, options, render.width()))
         return 0
     try:
-        parsed = chosen.parse(words)
+        parsed = command_class.parse(argv)
     except UsageError as error:
         raise UsageError(f"{error}; see {prog} --help") from None
     return parsed.run()

@@ -104,7 +104,7 @@ class Onboard(Command):
             result = onboard(self.file, self.output, self._options(steps))
         if result.folder is None:
             render.report(_blocking_errors(result))
-            render.error(f"{self.file}: errors remain{self._advice(result)}; nothing was written")
+            render.error(f"{self.file}: errors remain{self._hint(result)}; nothing was written")
             return 1
         render.table([(f"  {label}", text) for label, text in summarize(result)])
         render.result(f"wrote {result.folder}; view the robot with:")
@@ -142,7 +142,7 @@ class Onboard(Command):
             on_step=steps.update,
         )
 
-    def _advice(self, result: "OnboardResult") -> str:
+    def _hint(self, result: "OnboardResult") -> str:
         """Return which option helps with the blocking errors."""
         if not result.report.facts.bodies:
             return ""

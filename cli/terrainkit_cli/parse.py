@@ -35,7 +35,7 @@ def option(metavar: str, alias: str = "", *, is_repeated: bool = False) -> Meta:
     Args:
         metavar: Placeholders of the values in the help, separated by spaces.
         alias: A second name, such as `-o`.
-        is_repeated: Whether a tuple consists of one value of each occurrence of the option.
+        is_repeated: Whether each occurrence of the option adds one value to a tuple.
     """
     return Meta(extra={"metavar": metavar, "alias": alias, "is_repeated": is_repeated})
 
@@ -54,18 +54,18 @@ class Command(ABC):
     """A command of `terrainkit`: its fields are the options."""
 
     @classmethod
-    def options(cls, words: Sequence[str]) -> "list[Option]":  # noqa: ARG003 - for subclasses
-        """Return the options; for the help of some commands, `words` select the defaults."""
+    def options(cls, argv: Sequence[str]) -> "list[Option]":  # noqa: ARG003 - for subclasses
+        """Return the options; for the help of some commands, `argv` selects the defaults."""
         return options_of(cls)
 
     @classmethod
-    def parse(cls, words: Sequence[str]) -> Self:
+    def parse(cls, argv: Sequence[str]) -> Self:
         """Return the command that the words describe.
 
         Raises:
             ConfigError: if an option is unknown, missing, or has an invalid value.
         """
-        return cls(**read_words(options_of(cls), words))
+        return cls(**read_args(options_of(cls), argv))
 
     @abstractmethod
     def run(self) -> int:
@@ -99,7 +99,7 @@ class Option:
     """Placeholders of the values in the help."""
 
     is_repeated: bool
-    """Whether a tuple consists of one value of each occurrence of the option."""
+    """Whether each occurrence of the option adds one value to a tuple."""
 
     @property
     def name(self) -> str:
@@ -119,21 +119,23 @@ class Option:
             return doc
         return f"{doc} (default: {_format_value(self.default)})"
 
-    def convert(self, words: Sequence[str]) -> Any:
-        """Return the value that words describe.
+    def convert(self, arguments: Sequence[str]) -> Any:
+        """Return the value that the arguments of the option describe.
 
         Raises:
             ConfigError: if they have another type, or the value is out of range.
         """
         kind, origin, args, _, is_optional = parse_hint(self.annotation)
-        if is_optional and list(words) == [NONE]:
+        if is_optional and list(arguments) == [NONE]:
             return None
-        if kind is Path and self.default is None and list(words) == [""]:
+        if kind is Path and self.default is None and list(arguments) == [""]:
             return None
         is_tuple = origin is tuple
         item = parse_hint(args[0]).kind if is_tuple else kind
         from_word = {str: str, Path: Path}.get(item, value_of)
-        values = words if get_origin(item) is Literal else [from_word(word) for word in words]
+        values = (
+            arguments if get_origin(item) is Literal else [from_word(word) for word in arguments]
+        )
         return convert(self.name, values if is_tuple else values[0], self.annotation)
 
 
@@ -143,7 +145,7 @@ def options_of(
     """Return an option for each field of a command or config, nested configs included.
 
     Args:
-        owner: The class of a command, or a config, whose values are the defaults.
+        owner: The class of a command, or a config. The values of a config are the defaults.
         aliases: Second names of options by key.
         prefix: Beginning of the keys.
     """
@@ -183,14 +185,14 @@ def _option(owner: Any, key: str, default: Any, annotation: Any, alias: str) -> 
     )
 
 
-def read_words(options: Sequence[Option], words: Sequence[str]) -> dict[str, Any]:
+def read_args(options: Sequence[Option], argv: Sequence[str]) -> dict[str, Any]:
     """Return the values of the options that are given, by key.
 
     Raises:
         ConfigError: if an option is unknown.
         UsageError: if one is missing, or has an invalid value.
     """
-    given, rest = split_words(options, words)
+    given, rest = split_args(options, argv)
     end = rest.index("--") if "--" in rest else len(rest)
     for word in filter(is_option, rest[:end]):
         name = word.partition("=")[0]
@@ -219,8 +221,8 @@ def read_words(options: Sequence[Option], words: Sequence[str]) -> dict[str, Any
         raise UsageError(str(error)) from None
 
 
-def split_words(
-    options: Iterable[Option], words: Sequence[str]
+def split_args(
+    options: Iterable[Option], argv: Sequence[str]
 ) -> tuple[dict[str, list[str]], list[str]]:
     """Return the words of each option that is given, by key, and the other words.
 
@@ -242,15 +244,15 @@ def split_words(
         else:
             action = "extend" if each.is_repeated else "store"
             parser.add_argument(name, dest=each.key, action=action, nargs=each.nargs)
-    end = words.index("--") if "--" in words else len(words)
+    end = argv.index("--") if "--" in argv else len(argv)
     try:
-        given, rest = parser.parse_known_args([_with_dashes(word) for word in words[:end]])
+        given, rest = parser.parse_known_args([_with_dashes(word) for word in argv[:end]])
     except argparse.ArgumentError as error:
         name = str(error.argument_name)
         nargs = by_name[name].nargs
         message = f"too few values; expected {nargs}" if nargs else "got a value; expected none"
         raise UsageError(f"{name}: {message}") from None
-    return vars(given), [*rest, *words[end:]]
+    return vars(given), [*rest, *argv[end:]]
 
 
 def is_option(word: str) -> bool:

@@ -61,7 +61,7 @@ def _print(text: str, end: str = "\n") -> None:
         drop_stdout()
 
 
-def styled(lines: "Iterator[tuple[Span, ...]]") -> None:
+def print_lines(lines: "Iterator[tuple[Span, ...]]") -> None:
     """Print lines whose spans have styles, in color."""
     from rich.console import Console
     from rich.text import Text

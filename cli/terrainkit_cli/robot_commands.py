@@ -35,8 +35,8 @@ class CheckRobot(Command):
     The rules find errors that break training or simulation, from XML syntax to the behavior in
     simulation; `terrainkit rule` lists them.
 
-    In a folder and the folders below it, all robot files are checked, without scenes, and without
-    files that others include. Links to folders, hidden folders, and those with a COLCON_IGNORE are
+    For a folder, all robot files in it and its subfolders are checked, except scenes and files that
+    other files include. Links to folders, hidden folders, and folders with a COLCON_IGNORE file are
     skipped.
 
     Exit code 0: no errors, and no warnings with --strict. 1: errors were found. 2: a file cannot
@@ -47,7 +47,7 @@ class CheckRobot(Command):
     strict, simulation.
 
     The comment <!-- terrainkit: ignore INR004 the reason --> suppresses a rule for the element that
-    contains it, for those on the same line, and for the next one.
+    contains the comment, for the elements on the same line, and for the next element.
     """
 
     files: Annotated[tuple[str, ...], positional("FILE [FILE ...]")] = ()
@@ -242,7 +242,7 @@ class CheckRobot(Command):
                 lines = text_report.format_lines(
                     reports, width=render.width(), verbose=self.notes, brief=brief
                 )
-                render.styled(lines)
+                render.print_lines(lines)
                 return
             text = text_report.to_text(reports, verbose=self.notes, brief=brief)
         else:

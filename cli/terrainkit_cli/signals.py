@@ -40,27 +40,28 @@ def raise_on_signals() -> None:
 
 @contextmanager
 def stop_on_signals() -> Iterator[Callable[[], int]]:
-    """Yield a function that returns the signal that requested to stop, or 0.
+    """Yield a function that returns the number of the first stop signal, or 0.
 
-    Its first call installs the handlers; before that, a signal ends the command. The first SIGINT,
-    SIGTERM or SIGHUP then only sets the returned value. A second one raises KeyboardInterrupt.
+    Its first call installs the handlers; before that, a signal ends the command. After it, the
+    first SIGINT, SIGTERM or SIGHUP only sets the returned value. Another one after `REPEAT_TIME`
+    raises KeyboardInterrupt.
     """
-    received: list[tuple[int, float]] = []
+    signals: list[tuple[int, float]] = []
     previous: dict[int, Any] = {}
 
     def handle(number: int, _: object) -> None:
-        if received and time.monotonic() - received[0][1] >= REPEAT_TIME:
+        if signals and time.monotonic() - signals[0][1] >= REPEAT_TIME:
             raise KeyboardInterrupt
-        received.append((number, time.monotonic()))
+        signals.append((number, time.monotonic()))
 
-    def requested() -> int:
+    def stop_signal() -> int:
         if not previous:
             for number in (signal.SIGINT, *_termination_signals()):
                 previous[number] = signal.signal(number, handle)
-        return received[0][0] if received else 0
+        return signals[0][0] if signals else 0
 
     try:
-        yield requested
+        yield stop_signal
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)

@@ -223,8 +223,8 @@ class Preview(Command):
 class CheckMap(Command):
     """Validate a map: spawn origins, patches, sizes, difficulty, mesh.
 
-    It also prints the largest height difference between neighboring patches, which is no issue.
-    Exit code 0: no issues. 1: the map has issues. 2: the file cannot be read.
+    It also prints the largest height difference between neighboring patches, which does not count
+    as an issue. Exit code 0: no issues. 1: the map has issues. 2: the file cannot be read.
     """
 
     map: MapFile

@@ -27,10 +27,10 @@ class Train(ConfigCommand):
 
     A run is a folder with the task, checkpoints (model_100.pt is written after 100 iterations) and
     TensorBoard logs. Ctrl-C writes a checkpoint and stops. Training is deterministic: the same seed
-    and number of threads give the same policy. With torchrun, each process simulates a part of the
-    environments.
+    and number of threads give the same policy. With torchrun, the environments are divided among
+    the processes.
 
-    The options of the groups below are the values of the task; the defaults shown come from ROBOT,
+    The options in the groups below set the values of the task. Their defaults come from ROBOT,
     --resume and --config.
     """
 
@@ -70,9 +70,9 @@ class Train(ConfigCommand):
         return Task()
 
     @classmethod
-    def load_config(cls, words: Sequence[str]) -> "Task":
+    def load_config(cls, argv: Sequence[str]) -> "Task":
         """Return the task before options: the task of the run or the robot, then --config."""
-        given, rest = cls.split(words)
+        given, rest = cls.split(argv)
         if resume := given.get("resume"):
             from terrainkit_robots.rl.run import open_run
 
@@ -114,7 +114,7 @@ class Train(ConfigCommand):
         return 128 + signal_number if signal_number else 0
 
 
-def _task_word(words: Sequence[str]) -> str:
+def _task_word(argv: Sequence[str]) -> str:
     """Return ROBOT among words.
 
     An option that only the task of ROBOT has may precede it. How many of the words in between are
@@ -126,11 +126,11 @@ def _task_word(words: Sequence[str]) -> str:
     from terrainkit_robots.rl.tasks import task_names
 
     names = task_names()
-    for word in words:
+    for word in argv:
         if word in names or isdir(word):  # noqa: PTH112 - Path.is_dir raises OSError for long names
             return word
-    if words and words[0] and not is_option(words[0]):
-        return words[0]
+    if argv and argv[0] and not is_option(argv[0]):
+        return argv[0]
     raise ConfigError(
         "ROBOT: missing; expected a folder written by terrainkit onboard, or one of: "
         f"{listing(names)}"

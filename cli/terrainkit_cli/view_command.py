@@ -39,7 +39,7 @@ DEMO_POLICY = "quadruped_map"
 
 Kind = Literal["map", "robot", "run"]
 
-OPTION_KINDS: dict[str, Kind] = {
+OPTION_TYPES: dict[str, Kind] = {
     "terrain": "run",
     "checkpoint": "run",
     "package": "robot",
@@ -159,7 +159,7 @@ class View(ViewerCommand):
             raise ConfigError(f"view requires viser; install it with: {command}")
         self.check_address()
         kind = source_kind(self.source, policy=self.policy)
-        for name, expected in OPTION_KINDS.items():
+        for name, expected in OPTION_TYPES.items():
             if getattr(self, name) != getattr(type(self), name) and kind != expected:
                 option = name.replace("_", "-")
                 raise ConfigError(

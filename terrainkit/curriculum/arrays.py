@@ -31,18 +31,18 @@ def to_numpy(name: str, values: Any) -> NDArray[Any]:
         raise ConfigError(f"{name}: got lists of different lengths; expected one list") from None
 
 
-def like(array: NDArray[Any], given: Any) -> Any:
-    """Return an array as a tensor on the device of `given` if that is a tensor of torch.
+def like(array: NDArray[Any], original: Any) -> Any:
+    """Return an array as a tensor on the device of `original` if that is a tensor of torch.
 
     Args:
         array: The result as an array.
-        given: An argument of the caller, which decides the type of the result.
+        original: An argument of the caller, which decides the type of the result.
     """
-    if not hasattr(given, "new_tensor"):
+    if not hasattr(original, "new_tensor"):
         return array
     import torch
 
-    return torch.as_tensor(array, device=given.device)
+    return torch.as_tensor(array, device=original.device)
 
 
 def to_indices(name: str, values: Any, size: int, number: int | None = None) -> NDArray[np.int64]:

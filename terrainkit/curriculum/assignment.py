@@ -95,9 +95,9 @@ def resample_columns(
 ) -> Any:
     """Return a random column with the same terrain type in the same row for each environment.
 
-    The patches of a row with the same terrain type are variants: they have one difficulty, and
-    different random numbers. Sampling one of them at each reset changes the terrain during
-    training, without a change of the map.
+    Patches of the same row and terrain type are variants: they have the same difficulty and
+    different random numbers. Sampling a variant at each reset varies the terrain during training
+    without changing the map.
 
     Args:
         levels: Row of each environment, shape (n,).
@@ -106,8 +106,8 @@ def resample_columns(
         seed: Seed of the random columns. Pass a new one at each call, such as (seed, iteration).
 
     Returns:
-        Columns, shape (n,), a tensor if `columns` is one: each variant with the same probability,
-        the current one included.
+        Columns, shape (n,); a tensor if `columns` is one. All variants, including the current one,
+        have the same probability.
 
     Raises:
         ConfigError: if an environment is not on the map, or `seed` is negative.

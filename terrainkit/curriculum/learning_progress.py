@@ -20,12 +20,12 @@ EXPLORATION = 0.2
 class LearningProgressSampler(UniformSampler):
     """Sample patches on which the rate of success changes, up or down.
 
-    The learning progress of a patch is the absolute difference of two running means of success, one
-    of which follows faster. It is 0 on patches that always or never succeed. Half of it counts
-    for the adjacent levels, where the next progress is likely. From I. Kanitscheider
-    et al., Multi-task curriculum learning in a complex, visual, hard-exploration domain: Minecraft,
-    2021 (arXiv:2106.14876); the absolute value and the share of uniform samples from R. Portelas
-    et al., Teacher algorithms for curriculum learning of Deep RL in continuously parameterized
+    The learning progress of a patch is the absolute difference of a fast and a slow running mean of
+    success. It is 0 on patches that always or never succeed. Half of it is assigned to the adjacent
+    levels, where the next progress is likely. The method is from I. Kanitscheider et al.,
+    Multi-task curriculum learning in a complex, visual, hard-exploration domain: Minecraft, 2021
+    (arXiv:2106.14876). The absolute value and the share of uniform samples are from R. Portelas et
+    al., Teacher algorithms for curriculum learning of Deep RL in continuously parameterized
     environments, 2019 (arXiv:1910.07224).
     """
 

@@ -25,16 +25,17 @@ def update_levels(
     curriculum at half of the maximum.
 
     Args:
-        levels: Levels before, shape (n,).
+        levels: Current levels, shape (n,).
         progress: Progress of each episode, 0 to 1, or NaN to ignore the episode, shape (n,). See
             :class:`CommandProgress`, and for robots with goals
             :meth:`terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
         rows: Rows of the map.
         seed: Seed of the random rows. Pass a new one at each call, such as (seed, iteration).
-        top_levels: Number of rows that solved environments are spread over.
+        top_levels: Number of the last rows, over which environments that solve the last row are
+            spread.
 
     Returns:
-        Levels after, shape (n,): a tensor if `levels` is one.
+        New levels, shape (n,); a tensor if `levels` is one.
 
     Raises:
         ConfigError: if `top_levels` is below 1, a level is not on the map, the progress is not from

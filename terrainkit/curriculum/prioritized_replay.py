@@ -23,12 +23,13 @@ STALENESS = 0.1
 class PrioritizedReplaySampler(UniformSampler):
     """Sample patches by the rank of their score and by the time since their last episode.
 
-    As in M. Jiang et al., Prioritized Level Replay, 2021 (arXiv:2010.03934): patches without an
-    episode are sampled uniformly, with their share of the map as the probability; the others with a
-    probability of (1 - s) P_score + s P_staleness, where P_score is proportional to (1 / rank)^(1 /
-    temperature). The paper scores a level by the magnitude of the error of the value function.
-    Samplers have no value function. This one uses the error of the running mean of the success on
-    the patch, |success - mean|, which is 0 on patches that always or never succeed.
+    The method is from M. Jiang et al., Prioritized Level Replay, 2021 (arXiv:2010.03934). Patches
+    without an episode are sampled uniformly; their total probability is their share of the map. The
+    other patches are sampled with a probability proportional to (1 - s) P_score + s P_staleness,
+    where P_score is proportional to (1 / rank)^(1 / temperature). The paper scores a level by the
+    magnitude of the error of the value function. This sampler has no value function, and uses the
+    error of the running mean of the success on the patch, |success - mean|, which is 0 on patches
+    that always or never succeed.
     """
 
     def __init__(self, rows: int, cols: int, num_envs: int, **options: Any) -> None:

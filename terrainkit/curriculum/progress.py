@@ -16,18 +16,18 @@ FloatArray = NDArray[np.float64]
 class CommandProgress:
     """The progress of n robots along their velocity commands, since the start of each episode.
 
-    A robot that follows its commands exactly moves along a reference: it turns at the commanded
-    yaw rate, and walks at the commanded velocity in the frame that turns with it. The progress of a
-    robot is the integral of its velocity along the velocity of the reference, in the world frame.
-    At no time is it larger than the distance that was commanded until then, so that sliding down
-    a slope gains nothing. The reference takes over the robot's yaw at the start and with each new
-    linear velocity command, so that small errors of the yaw rate do not add up.
+    The reference is a robot that follows the commands exactly: it turns at the commanded yaw rate,
+    and walks at the commanded velocity in its own frame. The progress of a robot is the integral of
+    its velocity component along the velocity of the reference. It never exceeds the distance
+    commanded so far, so that sliding down a slope gains nothing. At the start and with each new
+    linear velocity command, the yaw of the reference is set to the yaw of the robot, so that small
+    errors of the yaw rate do not add up.
 
     legged_gym compares the distance from the spawn origin with the commanded speed times the length
-    of the episode. By this measure, a robot succeeds that drifts sideways, or slides down a
-    slope while it is commanded to walk up; one fails that walks back and forth as commanded.
-    Commands in the frame of the robot itself would be no better: a robot that keeps turning would
-    follow them on a circle.
+    of the episode. By this measure, a robot that drifts sideways succeeds, and so does a robot that
+    slides down a slope that it is commanded to climb. A robot that walks back and forth as
+    commanded fails. Measuring the velocity in the frame of the robot itself would be no better: a
+    robot that keeps turning would succeed by walking in a circle.
     """
 
     start: FloatArray
@@ -109,21 +109,22 @@ class CommandProgress:
     def of_episodes(
         self, env_ids: Any, fallen: Any, distance: float, *, left_map: Any = False
     ) -> Any:
-        """Return the progress of episodes that end, as samplers take it.
+        """Return the progress of episodes that end, as the samplers expect it.
 
         - 1 if the robot crossed: its progress and its distance from the start were both at least
           `distance` at some time, or it left the map after at least half of the commanded distance.
         - 0 if it fell before that.
-        - NaN if the commands led nowhere, and it followed them: its progress is at least half of
-          the commanded distance, but the reference itself did not get `distance` away from its
-          start. That says nothing about the terrain. Examples are commands to stand, to walk back
-          and forth, and to walk in a circle on the spawn platform.
+        - NaN if it followed commands that lead nowhere: its progress is at least half of the
+          commanded distance, but the reference itself did not get `distance` away from its start.
+          Such an episode says nothing about the terrain. Examples are commands to stand, to walk
+          back and forth, and to walk in a circle on the spawn platform.
         - Otherwise, its progress as a share of the commanded distance.
 
         Args:
             env_ids: Environments, shape (k,).
             fallen: Whether each robot fell, shape (k,).
-            distance: Distance that crosses a patch [m]; half its length, as in legged_gym.
+            distance: Distance at which a patch counts as crossed [m]: half of its length in
+                legged_gym.
             left_map: Whether each robot left the map, shape (k,).
 
         Returns:

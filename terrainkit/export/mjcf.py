@@ -99,11 +99,11 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
     Args:
         terrain_map: The map.
         path: Target.
-        collision: hfield: one heightfield, whose walls are slopes over one cell. boxes: boxes with
-            vertical walls for the flat ground of patches with walls, and heightfields for the rest,
-            if any, whose walls are slopes over one cell. auto: boxes if they cover all of the
-            ground and are so few that a step of a robot is faster than on a heightfield. Boxes and
-            heightfields are divided where the friction changes.
+        collision: hfield: one heightfield. boxes: boxes for the flat ground of patches with walls,
+            and heightfields for the rest, if any. auto: boxes if they cover all of the ground and
+            are so few that a step of a robot is faster than on a heightfield, and hfield otherwise.
+            Boxes have vertical walls; the walls of a heightfield are slopes over one cell. Boxes
+            and heightfields are divided where the friction changes.
 
     Raises:
         ConfigError: if `collision` is invalid.
@@ -247,7 +247,7 @@ def make_model(terrain_map: "TerrainMap", collision: Collision) -> Model:
             boxes = [(*box, static) for box in _border_boxes(terrain_map, height)]
     else:
         heights = without_boxes(heights, decomposition)
-        parts = _uncovered_parts(terrain_map, decomposition)
+        parts = _remaining_parts(terrain_map, decomposition)
         centers, half_sizes = decomposition.centers, decomposition.half_sizes
         boxes = list(zip(centers, half_sizes, decomposition.friction, strict=True))
     split = [each for part in parts for each in _split_by_friction(terrain_map, part)]
@@ -302,7 +302,7 @@ def _patches_part(terrain_map: "TerrainMap") -> _Part:
     return slice(x[0], x[-1]), slice(y[0], y[-1])
 
 
-def _uncovered_parts(terrain_map: "TerrainMap", decomposition: BoxDecomposition) -> list[_Part]:
+def _remaining_parts(terrain_map: "TerrainMap", decomposition: BoxDecomposition) -> list[_Part]:
     """Return rectangles of samples around the patches that have cells without boxes.
 
     A heightfield costs time wherever a robot is above it, even if its ground there is far below.
@@ -322,10 +322,10 @@ def _uncovered_parts(terrain_map: "TerrainMap", decomposition: BoxDecomposition)
         for _, r0, r1, c0, c1 in merged.astype(int).tolist()
     ]
     max_length = max(_HFIELD_LENGTH / terrain_map.config.cell, 1.0)
-    return [each for part in parts for each in _divide(part, max_length)]
+    return [each for part in parts for each in _split_by_length(part, max_length)]
 
 
-def _divide(part: _Part, max_length: float) -> list[_Part]:
+def _split_by_length(part: _Part, max_length: float) -> list[_Part]:
     """Divide a part into equal parts of about `max_length`, which share samples where they meet."""
     spans = []
     for each in part:

@@ -120,7 +120,7 @@ def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFe
     _check_goals(patch, threshold)
     columns = sample_columns(patch, threshold)
     segments = _segments(patch, columns)
-    graph = FootholdGraph.build(columns, limits, _rim(patch, columns, segments))
+    graph = FootholdGraph.build(columns, limits, _outer_nodes(patch, columns, segments))
     path = _Path(graph, segments)
     return PatchFeasibility(
         row=0,
@@ -156,7 +156,7 @@ def _far_edge(patch: Patch, columns: Columns) -> IntArray:
     return np.unique(found[~np.isnan(columns.floor.reshape(-1)[found])])
 
 
-def _rim(patch: Patch, columns: Columns, segments: list[Segment]) -> NDArray[np.bool_]:
+def _outer_nodes(patch: Patch, columns: Columns, segments: list[Segment]) -> NDArray[np.bool_]:
     """Return which nodes are in the outermost cells of the patch, shape (nx, ny, m).
 
     Many terrains are level there, to meet the next patch without a cliff; a path on this rim would
@@ -165,14 +165,14 @@ def _rim(patch: Patch, columns: Columns, segments: list[Segment]) -> NDArray[np.
     n = round(patch.grid.cell / columns.spacing)
     node = np.concatenate([np.append(targets, start) for start, targets in segments])
     i, j = columns.column(node)
-    (nx, ny), is_rim = columns.shape, np.zeros(columns.floor.shape, dtype=bool)
-    is_rim[:n] |= not (i < n).any()
-    is_rim[-n:] |= not (i >= nx - n).any()
-    is_rim[:, :n] |= not (j < n).any()
-    is_rim[:, -n:] |= not (j >= ny - n).any()
+    (nx, ny), is_outer = columns.shape, np.zeros(columns.floor.shape, dtype=bool)
+    is_outer[:n] |= not (i < n).any()
+    is_outer[-n:] |= not (i >= nx - n).any()
+    is_outer[:, :n] |= not (j < n).any()
+    is_outer[:, -n:] |= not (j >= ny - n).any()
     # Corners of a side with a target belong to the other side as well.
-    is_rim.reshape(-1)[node] = False
-    return is_rim
+    is_outer.reshape(-1)[node] = False
+    return is_outer
 
 
 class _Path:

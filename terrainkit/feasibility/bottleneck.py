@@ -18,17 +18,17 @@ Segment = tuple[int, IntArray]
 """A piece of the path: a start node, and target nodes. The path ends at any of the targets."""
 
 
-def find_components(edges: Edges, usable: NDArray[np.bool_], num_nodes: int) -> IntArray:
+def find_components(edges: Edges, mask: NDArray[np.bool_], num_nodes: int) -> IntArray:
     """Return the number of the strongly connected component of each node, shape (num_nodes,).
 
     Args:
         edges: The edges.
-        usable: Which edges join nodes, shape (n,).
+        mask: Which edges join nodes, shape (n,).
         num_nodes: Number of nodes.
     """
     from scipy.sparse.csgraph import connected_components
 
-    graph = _matrix(edges, usable, num_nodes)
+    graph = _matrix(edges, mask, num_nodes)
     labels = connected_components(graph, directed=True, connection="strong")[1]
     return np.asarray(labels, dtype=np.int64)
 
@@ -94,14 +94,14 @@ def shortest_path(
 
 
 def _reaches(
-    rows: IntArray, ends: IntArray, usable: NDArray[np.bool_], start: int, targets: IntArray
+    rows: IntArray, ends: IntArray, mask: NDArray[np.bool_], start: int, targets: IntArray
 ) -> bool:
     """Return whether usable edges lead from `start` to a target.
 
     Args:
         rows: Number of the first edge of each node, and the number of edges, shape (nodes + 1,).
         ends: Second node of each edge, in the order of the first nodes.
-        usable: Which edges the path may use.
+        mask: Which edges the path may use.
         start: The first node.
         targets: Nodes at which the path may end.
     """
@@ -109,16 +109,16 @@ def _reaches(
     from scipy.sparse.csgraph import breadth_first_order
 
     # No sorting is needed: the edges stay in the order of the rows when some are left out.
-    before = np.concatenate([[0], np.cumsum(usable)])[rows].astype(np.int32)
+    before = np.concatenate([[0], np.cumsum(mask)])[rows].astype(np.int32)
     values, size = np.ones(int(before[-1])), len(rows) - 1
-    graph = csr_matrix((values, ends[usable].astype(np.int32), before), shape=(size, size))
+    graph = csr_matrix((values, ends[mask].astype(np.int32), before), shape=(size, size))
     reached = breadth_first_order(graph, start, return_predecessors=False)
     return bool(np.isin(targets, reached).any())
 
 
-def _matrix(edges: Edges, which: Any, num_nodes: int, weight: FloatArray | None = None) -> Any:
+def _matrix(edges: Edges, index: Any, num_nodes: int, weight: FloatArray | None = None) -> Any:
     from scipy.sparse import csr_matrix
 
-    start, end = edges.start[which], edges.end[which]
-    values = np.ones(len(start)) if weight is None else weight[which]
+    start, end = edges.start[index], edges.end[index]
+    values = np.ones(len(start)) if weight is None else weight[index]
     return csr_matrix((values, (start, end)), shape=(num_nodes, num_nodes))

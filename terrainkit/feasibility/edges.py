@@ -42,9 +42,9 @@ class Edges:
             **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)}
         )
 
-    def select(self, which: NDArray[np.bool_] | IntArray | slice) -> Self:
+    def select(self, index: NDArray[np.bool_] | IntArray | slice) -> Self:
         """Return the edges at a mask, indices or a slice."""
-        return type(self)(**{name: values[which] for name, values in vars(self).items()})
+        return type(self)(**{name: values[index] for name, values in vars(self).items()})
 
 
 def step_edges(columns: Columns, slopes: Slopes) -> Edges:

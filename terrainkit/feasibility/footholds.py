@@ -91,7 +91,7 @@ def _surface_sizes(
     is_free[i1 + i2 - 2 * low_i, j1 + j2 - 2 * low_j] = 1
     along_x, along_y = is_free[1::2, ::2], is_free[::2, 1::2]
     is_free[1::2, 1::2] = along_x[:, :-1] & along_x[:, 1:] & along_y[:-1] & along_y[1:]
-    is_free = _framed(is_free, columns, (low_i, low_j), (nx, ny))
+    is_free = _pad(is_free, columns, (low_i, low_j), (nx, ny))
     sizes = np.ones(len(nodes))
     if is_free.all():
         return np.full(len(nodes), float(max_size))
@@ -107,7 +107,7 @@ def _surface_sizes(
     return sizes
 
 
-def _framed(
+def _pad(
     is_free: NDArray[np.uint8], columns: Columns, low: tuple[int, int], size: tuple[int, int]
 ) -> NDArray[np.uint8]:
     """Return the image with a frame of walls; at an edge of the patch, the ground continues."""

@@ -90,7 +90,7 @@ def _pairs(
     columns, floor = graph.columns, graph.columns.floor.reshape(-1)
     shape = columns.floor.shape
     max_rise, max_drop = max_demand * graph.limits.step_up, max_demand * graph.limits.step_down
-    moves, widths = _moves(columns, max_demand * graph.limits.gap)
+    moves, widths = _offsets(columns, max_demand * graph.limits.gap)
     n = int(moves.max(initial=0))
     is_usable = graph.node_demand < max_demand
     is_end = (ends & is_usable).reshape(shape)
@@ -123,7 +123,7 @@ def _pairs(
         )
 
 
-def _moves(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
+def _offsets(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
     """Return the moves over gaps below `max_gap` [m] in columns, shape (n, 2), and their gaps."""
     # The gap is narrower than the distance of the nodes by at most a column along each axis.
     n = min(math.ceil(max_gap / columns.spacing), max(columns.shape))

@@ -88,43 +88,49 @@ class Passages:
         """
         max_width = 2 * self.limits.body_width
         width = np.full(len(z), max_width)
-        need = np.minimum(clearance, self.limits.crouched_height)
-        near = self._near_walls(i, j, z, need)
+        min_clearance = np.minimum(clearance, self.limits.crouched_height)
+        near = self._near_walls(i, j, z, min_clearance)
         if not near.any():
             return width
         # Many edges cross the same columns at the same height.
         heights, height = np.unique(np.rint(z[near] / _TOLERANCE), return_inverse=True)
-        needs, part = np.unique(np.rint(need[near] / _TOLERANCE), return_inverse=True)
-        shape = *self.columns.shape, len(heights), len(needs)
+        min_clearances, part = np.unique(
+            np.rint(min_clearance[near] / _TOLERANCE), return_inverse=True
+        )
+        shape = *self.columns.shape, len(heights), len(min_clearances)
         key = np.ravel_multi_index((i[near], j[near], height, part), shape)
         unique, which = np.unique(key, return_inverse=True)
         *place, height, part = np.unravel_index(unique, shape)
-        z, need = heights[height] * _TOLERANCE, needs[part] * _TOLERANCE
+        z, min_clearance = heights[height] * _TOLERANCE, min_clearances[part] * _TOLERANCE
         found = np.full(len(unique), max_width)
         # A line has two opposite directions, so half a turn covers all lines.
         for angle in np.arange(NUM_DIRECTIONS) * (math.pi / NUM_DIRECTIONS):
-            ahead = self._free_length((place[0], place[1]), z, need, angle)
+            ahead = self._free_length((place[0], place[1]), z, min_clearance, angle)
             # A line with no wall within `max_width` on one side is long enough.
             both = np.flatnonzero(ahead < max_width)
             behind = place[0][both], place[1][both]
-            back = self._free_length(behind, z[both], need[both], angle + math.pi)
+            back = self._free_length(behind, z[both], min_clearance[both], angle + math.pi)
             found[both] = np.minimum(found[both], ahead[both] + back)
         width[near] = found[which]
         return width
 
     def _near_walls(
-        self, i: IntArray, j: IntArray, z: FloatArray, need: FloatArray
+        self, i: IntArray, j: IntArray, z: FloatArray, min_clearance: FloatArray
     ) -> NDArray[np.bool_]:
         """Return where there may be a wall within the body width, shape (n,)."""
         highest = self.highest[i, j]
         near = highest > z + self.limits.step_up
-        top = np.maximum(z, highest) + need
+        top = np.maximum(z, highest) + min_clearance
         for lowest, highest in self.ceilings:
             near |= (lowest[i, j] < top) & (highest[i, j] > z)
         return near
 
     def _free_length(
-        self, place: tuple[IntArray, IntArray], z: FloatArray, need: FloatArray, angle: float
+        self,
+        place: tuple[IntArray, IntArray],
+        z: FloatArray,
+        min_clearance: FloatArray,
+        angle: float,
     ) -> FloatArray:
         """Return the distance to the first wall in a direction [m], at most twice the body width.
 
@@ -140,12 +146,12 @@ class Passages:
             # Beyond the patch, the ground continues as at its edge.
             a = np.minimum(np.maximum(i + cell.i, 0), nx - 1)
             b = np.minimum(np.maximum(j + cell.j, 0), ny - 1)
-            above = self._pass(a * ny + b, levels[-1], levels[cell.before] + step_up, need)
+            above = self._pass(a * ny + b, levels[-1], levels[cell.before] + step_up, min_clearance)
             is_open = np.isfinite(above)
             if not is_open.all():
                 free[active[~is_open]] = cell.distance
                 i, j, active = i[is_open], j[is_open], active[is_open]
-                above, need = above[is_open], need[is_open]
+                above, min_clearance = above[is_open], min_clearance[is_open]
                 # No later cell looks further back.
                 levels[cell.before :] = [each[is_open] for each in levels[cell.before :]]
             if not len(active):
@@ -154,7 +160,7 @@ class Passages:
         return free
 
     def _pass(
-        self, column: IntArray, level: FloatArray, highest: FloatArray, need: FloatArray
+        self, column: IntArray, level: FloatArray, highest: FloatArray, min_clearance: FloatArray
     ) -> FloatArray:
         """Return the height at which the body passes each column [m], inf if it does not.
 
@@ -162,16 +168,16 @@ class Passages:
             column: Number of each column, shape (n,).
             level: Height of the ray before the column [m].
             highest: Highest floor that is not a wall [m].
-            need: Clearance that the body needs [m].
+            min_clearance: Clearance that the body needs [m].
         """
         lowest = np.full(len(column), np.inf)
-        highest, need = highest + _TOLERANCE, need - _TOLERANCE
+        highest, min_clearance = highest + _TOLERANCE, min_clearance - _TOLERANCE
         # One interval after the other: reducing a short axis of an array takes several times as
         # long.
         for floors, ceilings in self.intervals:
             floor = floors[column]
             above = np.fmax(floor, level)
-            passes = (floor <= highest) & (ceilings[column] - above >= need)
+            passes = (floor <= highest) & (ceilings[column] - above >= min_clearance)
             lowest = np.minimum(lowest, np.where(passes, above, np.inf))
         return lowest
 

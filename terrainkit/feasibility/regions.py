@@ -25,16 +25,16 @@ class Regions:
     """First and second region of the steps from one to another, shape (2, n)."""
 
     @classmethod
-    def build(cls, steps: Edges, usable: NDArray[np.bool_], num_nodes: int) -> Self:
+    def build(cls, steps: Edges, mask: NDArray[np.bool_], num_nodes: int) -> Self:
         """Return the regions that usable steps form.
 
         Args:
             steps: Edges between neighboring columns, in both directions.
-            usable: Which steps a path may use, shape (n,).
+            mask: Which steps a path may use, shape (n,).
             num_nodes: Number of nodes.
         """
-        labels = find_components(steps, usable, num_nodes)
-        ends = np.stack([labels[steps.start[usable]], labels[steps.end[usable]]])
+        labels = find_components(steps, mask, num_nodes)
+        ends = np.stack([labels[steps.start[mask]], labels[steps.end[mask]]])
         return cls(labels=labels, links=ends[:, ends[0] != ends[1]].astype(np.int32))
 
     def reached(self, start: int, gaps: Edges) -> NDArray[np.bool_]:

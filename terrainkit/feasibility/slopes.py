@@ -65,8 +65,8 @@ def _slope(floor: FloatArray, lag: tuple[int, int]) -> FloatArray:
         floor: Floors [m], shape (nx, ny, m).
         lag: Columns along x and y to the place with which a column is compared.
     """
-    behind, ahead = _shifted(floor, -1, lag), _shifted(floor, 1, lag)
-    far_behind, far_ahead = _shifted(floor, -2, lag), _shifted(floor, 2, lag)
+    behind, ahead = _shift(floor, -1, lag), _shift(floor, 1, lag)
+    far_behind, far_ahead = _shift(floor, -2, lag), _shift(floor, 2, lag)
     before, after = floor - behind, ahead - floor
     least = np.minimum(np.abs(before), np.abs(after))
     # All comparisons with NaN are False.
@@ -77,7 +77,7 @@ def _slope(floor: FloatArray, lag: tuple[int, int]) -> FloatArray:
     return np.where(same | bent, np.copysign(least, before), 0.0) / max(map(abs, lag))
 
 
-def _shifted(floor: FloatArray, times: int, lag: tuple[int, int]) -> FloatArray:
+def _shift(floor: FloatArray, times: int, lag: tuple[int, int]) -> FloatArray:
     """Return the floors `times` the lag away, NaN beyond the patch, shape (nx, ny, m)."""
     (nx, ny), (di, dj) = floor.shape[:2], (times * lag[0], times * lag[1])
     shifted = np.full_like(floor, np.nan)

@@ -59,11 +59,12 @@ def solve_ranges(
     progress: "Progress | None" = None,
     executor: "Executor | None" = None,
 ) -> list[SolvedTerrain]:
-    """Return the sub-terrains of `config`, with ranges from one demand to another.
+    """Return the sub-terrains of `config` with ranges that lead from one demand to another.
 
-    The ranges of a terrain are interpolated and extrapolated together, as with the difficulty, to
-    the hardest values that demand at most `demand`; if there are none, to the closest. Overlays and
-    friction keep their ranges. Each element of a course is solved as a course of that element.
+    For each demand, all ranges of a terrain are interpolated or extrapolated together, as they are
+    by the difficulty. The hardest values that demand at most the given demand are used; if there
+    are none, the closest. Overlays and friction keep their ranges. Each element of a course is
+    solved as the only element of a course.
 
     Args:
         config: The map. Its sub-terrains with parameters that depend on the difficulty are solved.
@@ -116,16 +117,16 @@ def _key(part: SubTerrain) -> str:
 
 
 def _solved(
-    sub_terrain: SubTerrain, solutions: list[tuple[Mapping[str, Range], Range]]
+    sub_terrain: SubTerrain, results: list[tuple[Mapping[str, Range], Range]]
 ) -> SolvedTerrain:
     """Return a sub-terrain with the ranges and demands of its parts."""
     name = _table_name(sub_terrain)
     if name is None:
-        ((ranges, demand),) = solutions
+        ((ranges, demand),) = results
         return SolvedTerrain(sub_terrain=_with(sub_terrain, ranges), ranges=ranges, demand=demand)
     elements = tuple(
         SolvedTerrain(sub_terrain=_with(element, ranges), ranges=ranges, demand=demand)
-        for element, (ranges, demand) in zip(_value(sub_terrain, name), solutions, strict=True)
+        for element, (ranges, demand) in zip(_value(sub_terrain, name), results, strict=True)
     )
     course = _with(sub_terrain, {name: tuple(each.sub_terrain for each in elements)})
     # A course demands as much as the hardest of its elements.
@@ -140,14 +141,14 @@ def _solve(
     name = _table_name(part)
     solved_part = part if name is None else part.parameters[name][0]
     ranges, grid = _ranges(solved_part), config.patch_grid(0, 0)
-    known: dict[tuple[float, float], float] = {}
+    cache: dict[tuple[float, float], float] = {}
 
     def demand_at(end: float, difficulty: float) -> float:
         """Return the demand with the ranges at a difficulty, and all else at an end of the map.
 
         Values outside of the ranges may be invalid: their demand is -inf below, and inf above.
         """
-        if (end, difficulty) not in known:
+        if (end, difficulty) not in cache:
             values = {name: r.at(difficulty, grid) for name, r in ranges.items()}
             try:
                 terrain = _with(solved_part, values)
@@ -159,8 +160,8 @@ def _solve(
                 # An invalid value counts as too easy below the range and as too hard above it,
                 # so that the bisection returns into the range.
                 demand = np.copysign(np.inf, difficulty)
-            known[end, difficulty] = demand
-        return known[end, difficulty]
+            cache[end, difficulty] = demand
+        return cache[end, difficulty]
 
     easy, hard = (_largest(partial(demand_at, end), demand[int(end)]) for end in (0.0, 1.0))
     if not ranges or easy >= hard:

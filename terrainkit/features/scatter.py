@@ -24,10 +24,10 @@ def scatter(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return random positions and radii of disks that keep their distance.
 
-    The disks are far apart where there is space. With a smaller gap, more disks come after the
-    same first ones, so that the pattern is the same at every difficulty. Any two disks are at
-    least `gap` apart, and a disk is at least half of it from the edge of the patch, so that a robot
-    that is narrower than `gap` reaches every free place.
+    The disks are far apart where there is space. A smaller gap keeps the disks of a larger gap and
+    adds more, so that the pattern is the same at every difficulty. Disks are at least `gap` apart,
+    and at least `gap / 2` from the edge of the patch. A robot that is narrower than `gap` can
+    therefore reach every free place.
 
     Args:
         grid: Grid of the patch.

@@ -17,20 +17,20 @@ def modules_by_suffix(package: str) -> dict[str, ModuleType]:
     return {suffix: module for module in modules for suffix in getattr(module, "SUFFIXES", ())}
 
 
-def find_module(path: Path, package: str, noun: str, error: type[TerrainkitError]) -> ModuleType:
+def find_module(path: Path, package: str, label: str, error: type[TerrainkitError]) -> ModuleType:
     """Return the module of a package for the suffix of `path`.
 
     Args:
         path: File whose suffix selects the module.
         package: Name of the package with one module per suffix.
-        noun: What a module is, for the error.
+        label: What a module is, for the error.
         error: Class of the error.
 
     Raises:
-        TerrainkitError: of class `error`, with `noun` for what is missing, if there is none.
+        TerrainkitError: of class `error`, with `label` for what is missing, if there is none.
     """
     modules = modules_by_suffix(package)
     suffix = repr(path.suffix) if path.suffix else "a name without suffix"
     if path.suffix.lower() not in modules:
-        raise error(f"no {noun} for {suffix} ({path}); there are: {listing(modules)}")
+        raise error(f"no {label} for {suffix} ({path}); there are: {listing(modules)}")
     return modules[path.suffix.lower()]

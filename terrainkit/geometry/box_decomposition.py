@@ -62,11 +62,11 @@ def decompose_boxes(
 ) -> BoxDecomposition:
     """Return the flat parts of the ground as boxes.
 
-    A cell is flat if its whole square is flat. Within a patch, the boxes of each height are found
-    by :func:`.rectangle_cover`, and may extend under higher ground. Boxes of different patches that
-    share a whole side are merged, and divided at `MAX_LENGTHS` unless that doubles their number.
-    They are sorted by their centers, since MuJoCo's bounding volume hierarchy divides boxes with
-    equal centers along an axis in this order.
+    A cell is flat if the ground is level in its whole square. Within a patch,
+    :func:`.rectangle_cover` finds the boxes of each height, which may extend under higher ground.
+    Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTHS`
+    unless that doubles their number. They are sorted by their centers, since MuJoCo's bounding
+    volume hierarchy keeps this order for boxes with equal centers along an axis.
 
     A patch that has slopes and no walls gets no boxes: a heightfield represents it exactly.
 
@@ -75,7 +75,7 @@ def decompose_boxes(
         grid: Positions of the samples.
         threshold: Difference between neighboring samples above which there is a wall [m].
         patch_edges: Cells along x and along y where patches meet. Boxes are searched per patch.
-        friction: Friction of each cell, broadcast to `grid.shape`. The top of a box has one.
+        friction: Friction of each cell, broadcast to `grid.shape`. Each box has one friction.
     """
     import cv2
 
@@ -96,7 +96,7 @@ def decompose_boxes(
     ]
     differ_x = (flat[1:] != flat[:-1]) | (low[1:] != low[:-1])
     differ_y = (flat[:, 1:] != flat[:, :-1]) | (low[:, 1:] != low[:, :-1])
-    covers: _Covers = {}
+    cache: _Covers = {}
     boxes = []
     for i0, i1 in itertools.pairwise(edges[0]):
         for j0, j1 in itertools.pairwise(edges[1]):
@@ -105,7 +105,7 @@ def decompose_boxes(
             x = _first_cells(i0, i1, differ_x[i0 : i1 - 1, j0:j1].any(axis=1))
             y = _first_cells(j0, j1, differ_y[i0:i1, j0 : j1 - 1].any(axis=0))
             cells = np.ix_(x[:-1], y[:-1])
-            for top, span in _cover_block(flat[cells], low[cells], covers):
+            for top, span in _cover_block(flat[cells], low[cells], cache):
                 a, b, c, d = span
                 boxes.append((top, x[a], x[b], y[c], y[d], friction[i0, j0]))
     table = np.array(boxes, dtype=np.float64).reshape(-1, 6)
@@ -176,19 +176,19 @@ def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
 
 
 def _cover_block(
-    flat: NDArray[np.bool_], low: NDArray[np.float32], covers: _Covers
+    flat: NDArray[np.bool_], low: NDArray[np.float32], cache: _Covers
 ) -> Iterator[tuple[float, Span]]:
     """Yield the top and the span of each box of a block of cells, in the order of their tops.
 
     The boxes depend only on the order of the heights. The rows of a curriculum often differ only
-    in the height of their steps, so `covers` has the boxes of the blocks so far.
+    in the height of their steps, so `cache` has the boxes of the blocks so far.
     """
     heights, ranks = np.unique(low, return_inverse=True)
     ranks = ranks.reshape(low.shape)
     key = (low.shape, flat.tobytes(), ranks.tobytes())
-    if key not in covers:
-        covers[key] = list(_cover_ranks(flat, ranks))
-    for rank, span in covers[key]:
+    if key not in cache:
+        cache[key] = list(_cover_ranks(flat, ranks))
+    for rank, span in cache[key]:
         yield float(heights[rank]), span
 
 

@@ -82,10 +82,10 @@ class Solids:
             return cls.empty()
         kind = np.concatenate([part.kinds for part in parts])
         order = np.argsort(kind, kind="stable")
-        joined: dict[str, Any] = {
+        arrays: dict[str, Any] = {
             name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])
         }
-        return cls(**joined | {name: joined[name][order] for name in _PER_SOLID})
+        return cls(**arrays | {name: arrays[name][order] for name in _PER_SOLID})
 
     def select(self, mask: NDArray[np.bool_]) -> Self:
         """Return some of the solids.
@@ -125,7 +125,7 @@ class Solids:
         """
         matrix, offset = np.asarray(rotation, float), np.asarray(translation, float)
 
-        def moved(shapes: NDArray[np.float32]) -> NDArray[np.float32]:
+        def transform_shapes(shapes: NDArray[np.float32]) -> NDArray[np.float32]:
             axes = matrix @ rotation_matrices(shapes[:, 6:])
             axes[..., 2] *= np.sign(np.linalg.det(axes))[:, None]  # z is as good as -z
             centers = shapes[:, :3] @ matrix.T + offset
@@ -134,8 +134,8 @@ class Solids:
         vertices = (self.hull_vertices @ matrix.T + offset).astype(np.float32)
         return replace(
             self,
-            boxes=moved(self.boxes),
-            cylinders=moved(self.cylinders),
+            boxes=transform_shapes(self.boxes),
+            cylinders=transform_shapes(self.cylinders),
             hull_vertices=vertices,
         )
 

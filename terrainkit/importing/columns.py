@@ -56,7 +56,7 @@ def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) 
     Raises:
         HeightFileError: if the mesh has too many large triangles.
     """
-    blocks = list(_crossings(vertices[faces], x, y))
+    blocks = list(_intersections(vertices[faces], x, y))
     column, z, sign = (np.concatenate(part) for part in zip(*blocks, strict=True))
     for _ in range(2):
         order = np.lexsort((-sign, -z, column))
@@ -78,7 +78,7 @@ def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) 
     return Columns(top=top, floor=floor, ceiling=ceiling)
 
 
-def _crossings(
+def _intersections(
     corners: Array, x: Array, y: Array
 ) -> Iterator[tuple[NDArray[np.int64], Array, NDArray[np.int64]]]:
     """Yield number of the column, z, and direction (1 is up) of the crossings, in blocks."""

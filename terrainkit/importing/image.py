@@ -39,7 +39,7 @@ def read(path: Path, options: ReadOptions) -> Raster:
     """
     pixels = decode(_read_pixels, path)["pixels"]
     tags = read_geo_tags(path) if path.suffix.lower() in _TIFF_SUFFIXES else GeoTags()
-    stated = _sidecar(path.with_suffix(".json"))
+    stated = _read_json(path.with_suffix(".json"))
     cell, (x, y) = stated.get("cell"), stated.get("first_sample", (0.0, 0.0))
     half = (options.file_cell or cell or 0.0) / 2 if "first_sample" in stated else 0.0
     if tags.cell and not (options.file_cell or cell):
@@ -86,7 +86,7 @@ def _read_pixels(path: Path) -> dict[str, Any]:
     return {"pixels": pixels}
 
 
-def _sidecar(path: Path) -> dict[str, Any]:
+def _read_json(path: Path) -> dict[str, Any]:
     """Return the numbers that the .json file of an image states."""
     if not path.is_file():
         return {}

@@ -89,7 +89,7 @@ def _closed_bodies(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> I
             yield solid
 
 
-def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float) -> Any:
+def _space_above(columns: Columns, grid: Grid, threshold: float, max_z: float) -> Any:
     """Return the space above the cut as a manifold; elsewhere the cut is above the mesh."""
     from scipy.ndimage import (
         binary_dilation,
@@ -114,7 +114,7 @@ def _space_above(columns: Columns, grid: Grid, threshold: float, highest: float)
     cut[is_open] = beside[is_open]
     is_leg = is_support & binary_fill_holes(has_ceiling)
     cut[is_leg] = beneath[is_leg]
-    surface = np.where(np.isnan(cut), highest + 1.0, cut).astype(np.float32)
+    surface = np.where(np.isnan(cut), max_z + 1.0, cut).astype(np.float32)
     # A closed mesh extends downward, so the space is built upside down.
     mesh = closed_mesh(merged_mesh(-surface, grid, threshold))
     return manifold(mesh.vertices * np.array([1.0, 1.0, -1.0]), mesh.triangles[:, ::-1])

@@ -47,22 +47,23 @@ def terrain_importer_cfg(
 
     The stock importer, its curriculum and `terrain_out_of_bounds` work as with Isaac Lab's own
     generator. There is one sub-terrain for each column of the map. The flat patches `init_pos` and
-    `target` are the spawn positions and the goals of the map. Solids are a part of the mesh.
+    `target` are the spawn positions and the goals of the map. Solids are part of the mesh.
 
     Args:
-        path: Path of a .npz file. Isaac Lab writes its configuration to a file, so a map itself is
-            not accepted.
-        heightfield: Whether Newton collides with a heightfield, whose walls are slopes over one
-            cell, instead of the mesh. None for maps without solids. Isaac Lab 2 and PhysX collide
-            with the mesh.
+        path: Path of a .npz file. A `TerrainMap` is not accepted, since Isaac Lab writes the
+            configuration to a file.
+        heightfield: Whether Newton collides with a heightfield instead of the mesh. The walls of a
+            heightfield are slopes over one cell. None: for maps without solids and with at most
+            4096 samples along an axis. Isaac Lab 2 and PhysX always collide with the mesh.
         max_init_terrain_level: Highest initial level; None for the last row.
         prim_path: Path of the terrain on the stage.
 
     Raises:
         ExportError: if the map has several friction coefficients, or solids that only collide or
-            are only visible; an imported mesh has one friction and does both. Also if `heightfield`
-            is True and the map has solids or more than 4096 samples along an axis. The simulation
-            raises it if the contacts of Newton are wrong for a mesh or a heightfield.
+            are only visible: the imported mesh has one friction, collides and is visible. Also if
+            `heightfield` is True and the map has solids or more than 4096 samples along an axis.
+            When the terrain is created, it is also raised if Newton's settings would give wrong
+            contacts with the map.
     """
     terrain_map = TerrainMap.load(path)
     requirements.require_one_friction(terrain_map, "the mesh of Isaac Lab's terrain importer")

@@ -28,8 +28,8 @@ def write_scene(
 ) -> str:
     """Write a scene whose floor is the map, and return its path.
 
-    Contact sensors with the floor report all contacts of their geom: a map has several geoms, and
-    MJX has no contact sensors with a body.
+    A contact sensor between a geom and the floor is changed to report all contacts of the geom,
+    since a map has several geoms, and MJX has no contact sensors with a body.
 
     Args:
         scene: MJCF of a scene of Playground, with a geom called `floor`.
@@ -37,8 +37,8 @@ def write_scene(
         path: Target.
         assets: Contents of the files that the scene refers to; the result needs them, too.
         collision: Geometry that robots collide with; see :func:`terrainkit.export.mjcf.export`.
-        num_contacts: Contacts of a kind of pair, such as sphere and heightfield, that MJX keeps in
-            each step. Without a limit, it tests every pair of geoms.
+        num_contacts: Maximum number of contacts that MJX keeps in each step for each kind of pair,
+            such as sphere and heightfield. Without a limit, MJX tests every pair of geoms.
 
     Raises:
         ExportError: if the scene has no floor.

@@ -73,7 +73,7 @@ def generate(
         for (row, col), (terrain_type, patch) in zip(places, patches, strict=True):
             builder.add(row, col, terrain_type, patch)
     terrain_map = builder.build()
-    for text in _problems(builder, terrain_map):
+    for text in _warnings(builder, terrain_map):
         warnings.warn(text, TerrainkitWarning, stacklevel=2)
     return terrain_map
 
@@ -180,7 +180,7 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     return padded
 
 
-def _problems(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
+def _warnings(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
     """Yield the warnings about a generated map."""
     config = terrain_map.config
     if builder.deviations:

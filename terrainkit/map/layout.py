@@ -110,10 +110,10 @@ def patch_rng(config: MapConfig, terrain: Terrain, row: int, col: int) -> "np.ra
     terrains with :attr:`~terrainkit.terrain.Terrain.has_column_seed`.
     """
     is_column = config.mode == "curriculum" and terrain.has_column_seed
-    words: Any = [config.seed, col] if is_column else [config.seed, row, col]
+    entropy: Any = [config.seed, col] if is_column else [config.seed, row, col]
     if config.seed < 2**32:
-        words = np.array(words, dtype=np.uint32)  # takes half as long to convert
-    seed = np.random.SeedSequence(words, spawn_key=_COLUMN_KEY if is_column else ())
+        entropy = np.array(entropy, dtype=np.uint32)  # takes half as long to convert
+    seed = np.random.SeedSequence(entropy, spawn_key=_COLUMN_KEY if is_column else ())
     return np.random.default_rng(seed)
 
 

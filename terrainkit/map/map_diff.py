@@ -41,7 +41,7 @@ def diff_maps(a: TerrainMap, b: TerrainMap) -> MapDiff:
     Patches are compared in their own frame: a map that is only moved has the same patches. Only
     patches that both maps have are compared, and only if they have the same shape and cells.
     """
-    config = tuple(_diff_configs(a.config, b.config))
+    config = tuple(_diff_config(a.config, b.config))
     shapes = [(m.config.patch_shape, m.config.cell) for m in (a, b)]
     if shapes[0] != shapes[1]:
         texts = [f"{x} x {y} cells of {cell:g} m" for (x, y), cell in shapes]
@@ -52,10 +52,10 @@ def diff_maps(a: TerrainMap, b: TerrainMap) -> MapDiff:
     for index in np.ndindex(rows, cols):
         if found := tuple(_diff_patches(a.patch(*index), b.patch(*index))):
             patches[index] = found
-    return MapDiff(config=config, grid=tuple(_diff_grids(a, b)), patches=patches)
+    return MapDiff(config=config, grid=tuple(_diff_grid(a, b)), patches=patches)
 
 
-def _diff_configs(a: MapConfig, b: MapConfig) -> Iterator[str]:
+def _diff_config(a: MapConfig, b: MapConfig) -> Iterator[str]:
     one, other = _values(a), _values(b)
     for key in dict.fromkeys([*one, *other]):
         texts = [value_text(t[key]) if t.get(key) is not None else NONE for t in (one, other)]
@@ -74,7 +74,7 @@ def _values(config: MapConfig) -> dict[str, Any]:
     return table
 
 
-def _diff_grids(a: TerrainMap, b: TerrainMap) -> Iterator[str]:
+def _diff_grid(a: TerrainMap, b: TerrainMap) -> Iterator[str]:
     if a.difficulty.shape != b.difficulty.shape:
         texts = ["{} x {}".format(*m.difficulty.shape) for m in (a, b)]
         yield f"{texts[0]} -> {texts[1]} patches; the common ones are compared"

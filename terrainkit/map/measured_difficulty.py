@@ -20,8 +20,8 @@ def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float)
     L = `MAX_STEP_HEIGHT`. The first term measures slopes, risers and edges within one step. The
     second measures the height to climb and the depth of holes. The measure is our own.
 
-    Solids do not count. Heights alone do not tell whether a robot goes over or under a solid: a bar
-    is harder the lower it is, and a tread the higher it is.
+    Solids do not count. Heights alone do not tell whether a robot goes over or under a solid: a
+    lower bar is harder to pass, but a lower tread is easier to climb.
 
     Args:
         heights: Heights of a patch [m], shape (nx, ny).

@@ -40,10 +40,10 @@ class Seams:
     def cliffs(self) -> list[Seam]:
         """Return the seams that are cliffs, the highest first.
 
-        A seam is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and than the sum of the largest
-        steps within the two patches. The holes of stepping stones, which end at the edge of their
-        patch, are therefore no cliffs; the side of a flight of stairs is one. There are no cliffs
-        where walls stand on both sides of the whole seam.
+        A seam is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and higher than the largest steps
+        within the two patches added together. The holes of stepping stones, which end at the edge
+        of their patch, are therefore not cliffs, but the side of a flight of stairs is. A seam is
+        not a cliff if walls stand along its whole length on both sides.
         """
         candidates = list(self._above(MIN_CLIFF_HEIGHT))
         steps = {p: self._max_step(p) for p in {p for seam in candidates for p in seam.patches}}

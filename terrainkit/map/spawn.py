@@ -69,8 +69,8 @@ def sample_spawns(
     """Return up to `spawns_per_patch` spawn positions on the level ground around the origin.
 
     The positions are a Poisson-disk sample: random, and at least two disk radii apart, so that the
-    disks do not overlap. Each is the center of a flat and free disk, and a path over the centers
-    of such disks leads to it from the origin. No position is therefore beyond an obstacle.
+    disks do not overlap. Each is the center of a flat and free disk, and is connected to the origin
+    by the centers of such disks. No position is therefore beyond an obstacle.
 
     Args:
         config: Configuration of the map.
@@ -78,7 +78,8 @@ def sample_spawns(
         heights: Heights on `grid` [m], shape `grid.shape`.
         solids: Solids of the patch.
         origin: Spawn origin of the patch [m], the first position.
-        rng: Returns the random number generator; slow, so called only if needed.
+        rng: Function that returns the random number generator. It is slow, so it is called only if
+            needed.
 
     Returns:
         Positions (x, y, z) [m], shape (n, 3) with 1 <= n <= `spawns_per_patch`.

@@ -34,9 +34,9 @@ def import_terrain_mesh(
 ) -> ImportedMap:
     """Return the map of a mesh whose patches are centered at the world origin.
 
-    Isaac Lab and mjlab place their patches like that. The map has the coordinates of the mesh. An
-    origin remains the spawn position of its patch if the disk around it is flat and free, and is
-    replaced by the nearest such disk otherwise.
+    Isaac Lab and mjlab generate such meshes. The map has the coordinates of the mesh. An origin
+    remains the spawn position of its patch if the disk around it is flat and free. Otherwise, the
+    center of the nearest such disk replaces it.
 
     Args:
         vertices: Vertices [m], z up, shape (nv, 3).

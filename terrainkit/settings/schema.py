@@ -194,6 +194,13 @@ def nested_values(path: str, value: Any, hint: Any, default: Any = None) -> Any:
     return value
 
 
+def _summary(kind: type[Any]) -> str:
+    """Return the first line of the docstring of a config, or of its nearest base with one."""
+    # A dataclass without a docstring gets its signature as one.
+    docs = {each.__name__: each.__doc__ or "" for each in kind.__mro__}
+    return next(d for name, d in docs.items() if not d.startswith(f"{name}(")).partition("\n")[0]
+
+
 def _toml_lines(path: str, config: Config) -> Iterator[str]:
     """Yield the lines of a config: values first, then a table for each nested config."""
     kind: Any = type(config)
@@ -206,5 +213,5 @@ def _toml_lines(path: str, config: Config) -> Iterator[str]:
         else:
             yield line_text(key, NONE if value is None else value, docs.get(key, ""))
     for header, nested in tables:
-        yield from ["", f"# {(type(nested).__doc__ or '').splitlines()[0]}", header]
+        yield from ["", f"# {_summary(type(nested))}", header]
         yield from _toml_lines(f"{header.strip('[]')}.", nested)

@@ -62,16 +62,16 @@ class PatchGeometry:
         center3 = np.array([*center, 0.0])
         goals = self.goals.copy()
         goals[:, :2] = (goals[:, :2] - center) @ matrix.T + center
-        goals[:, 3] = _turn(goals[:, 3], matrix)
+        goals[:, 3] = _rotate_heading(goals[:, 3], matrix)
         x, y = (matrix @ (self.spawn - center) + center).tolist()
         return replace(
             self,
-            heights=_permute(self.heights, matrix),
-            friction=_permute(self.friction, matrix),
+            heights=_rotate_grid(self.heights, matrix),
+            friction=_rotate_grid(self.friction, matrix),
             solids=self.solids.transformed(rotation, center3 - rotation @ center3),
             goals=goals,
             spawn=(x, y),
-            heading=float(_turn(np.array(self.heading), matrix)),
+            heading=float(_rotate_heading(np.array(self.heading), matrix)),
         )
 
 
@@ -105,13 +105,13 @@ def checked_geometry(geometry: object, grid: Grid) -> PatchGeometry:
     return replace(geometry, grid=grid, heights=heights, friction=friction, goals=goals)
 
 
-def checked_heights(heights: ArrayLike, grid: Grid, got: str) -> NDArray[np.float32]:
+def checked_heights(heights: ArrayLike, grid: Grid, prefix: str) -> NDArray[np.float32]:
     """Return the heights of a patch as float32.
 
     Args:
         heights: What a terrain or an overlay returned [m].
         grid: Grid of the patch.
-        got: Start of the error message, which the shape follows.
+        prefix: Start of the error message, which the shape follows.
 
     Raises:
         ConfigError: if the shape is not `grid.shape`, or a height is out of range.
@@ -122,7 +122,7 @@ def checked_heights(heights: ArrayLike, grid: Grid, got: str) -> NDArray[np.floa
         result = real_array(heights, np.float32) + np.float32(0)
     if result.shape != grid.shape or not (np.abs(result) <= MAX_VALUE).all():
         raise ConfigError(
-            f"{got} shape {result.shape}; expected {grid.shape} with values up to {MAX_VALUE} m"
+            f"{prefix} shape {result.shape}; expected {grid.shape} with values up to {MAX_VALUE} m"
         )
     return result
 
@@ -154,13 +154,13 @@ def uniform_friction(friction: float, shape: tuple[int, int]) -> NDArray[np.floa
     return np.broadcast_to(np.float32(friction), shape)
 
 
-def _permute(values: NDArray[np.float32], matrix: NDArray[np.int64]) -> NDArray[np.float32]:
+def _rotate_grid(values: NDArray[np.float32], matrix: NDArray[np.int64]) -> NDArray[np.float32]:
     """Return the values of all cells at their new positions."""
     old_axis = np.abs(matrix).argmax(axis=1)
     reversed_axes = tuple(np.flatnonzero(matrix.sum(axis=1) < 0).tolist())
     return np.ascontiguousarray(np.flip(values.transpose(old_axis), reversed_axes))
 
 
-def _turn(heading: NDArray[np.float64], matrix: NDArray[np.int64]) -> NDArray[np.float64]:
+def _rotate_heading(heading: NDArray[np.float64], matrix: NDArray[np.int64]) -> NDArray[np.float64]:
     x, y = np.tensordot(matrix, [np.cos(heading), np.sin(heading)], axes=1)
     return np.asarray(np.arctan2(y, x))

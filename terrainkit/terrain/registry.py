@@ -33,7 +33,7 @@ _Overlay = TypeVar("_Overlay", bound=type[Overlay])
 class _Group:
     """The classes of one parent."""
 
-    noun: str
+    label: str
     """What a class is called in errors: terrain or overlay."""
 
     parent: Any
@@ -44,11 +44,11 @@ class _Group:
     packages."""
 
 
-_TERRAINS = _Group(noun="terrain", parent=Terrain, package="terrainkit.terrains")
-_OVERLAYS = _Group(noun="overlay", parent=Overlay, package="terrainkit.overlays")
+_TERRAINS = _Group(label="terrain", parent=Terrain, package="terrainkit.terrains")
+_OVERLAYS = _Group(label="overlay", parent=Overlay, package="terrainkit.overlays")
 
 _registered: dict[tuple[str, str], type[Any]] = {}
-"""The classes that this process has registered, by noun and name."""
+"""The classes that this process has registered, by label and name."""
 
 
 def terrain_names() -> tuple[str, ...]:
@@ -94,7 +94,7 @@ def registered_overlays() -> tuple[str, ...]:
 
 
 def _registered_names(group: _Group) -> tuple[str, ...]:
-    return tuple(name for noun, name in _registered if noun == group.noun)
+    return tuple(name for label, name in _registered if label == group.label)
 
 
 def register_terrain(terrain: _Terrain) -> _Terrain:
@@ -129,12 +129,12 @@ def register_overlay(overlay: _Overlay) -> _Overlay:
 
 def _register(group: _Group, item: Any) -> None:
     name = _checked_name(group, item)
-    existing: Any = _registered.get((group.noun, name))
+    existing: Any = _registered.get((group.label, name))
     if existing is None and (name in _module_names(group) or name in _plugins(group)):
         existing = _get(group, name)
     if existing is None or _path(existing) == _path(item):
         if existing is not item:
-            _registered[group.noun, name] = item
+            _registered[group.label, name] = item
             _get.cache_clear()
     elif existing is not item:
         raise ConfigError(
@@ -148,7 +148,7 @@ def _checked_name(group: _Group, item: Any) -> str:
     is_subclass = isinstance(item, type) and issubclass(item, group.parent)
     if not is_subclass:
         raise ConfigError(
-            f"{group.noun}: got {item!r}; expected a subclass of {group.parent.__name__}"
+            f"{group.label}: got {item!r}; expected a subclass of {group.parent.__name__}"
         )
     if inspect.isabstract(item):
         missing = ", ".join(sorted(item.__abstractmethods__))
@@ -163,8 +163,8 @@ def plugin_name(item: type[Any]) -> str | None:
     """Return the name of a terrain or overlay class in errors; None if it is built in."""
     if is_built_in(item):
         return None
-    noun = (_OVERLAYS if issubclass(item, Overlay) else _TERRAINS).noun
-    return f"{noun} {item.kind()} ({item.__module__}:{item.__qualname__})"
+    label = (_OVERLAYS if issubclass(item, Overlay) else _TERRAINS).label
+    return f"{label} {item.kind()} ({item.__module__}:{item.__qualname__})"
 
 
 def _path(item: type[Any]) -> str:
@@ -193,12 +193,12 @@ def get_overlay(name: str) -> type[Overlay]:
 def _get(group: _Group, name: str) -> Any:
     if name in _module_names(group):
         return _load_class(group, name)
-    if (group.noun, name) in _registered:
-        return _registered[group.noun, name]
+    if (group.label, name) in _registered:
+        return _registered[group.label, name]
     plugins = _plugins(group)
     if name not in plugins:
         raise _unknown_name(group, name, plugins)
-    with plugin_errors(f"{group.noun} {name} ({plugins[name].value}) cannot be loaded"):
+    with plugin_errors(f"{group.label} {name} ({plugins[name].value}) cannot be loaded"):
         found = plugins[name].load()
         _checked_name(group, found)
     return found
@@ -211,12 +211,12 @@ def _unknown_name(group: _Group, name: str, plugins: Mapping[str, Any]) -> Confi
         and base in _module_names(group)
         and "inverted" in parameters_of(_get(group, base))
     ):
-        return ConfigError(f"no {group.noun} {name!r}; use {base} with inverted = true")
+        return ConfigError(f"no {group.label} {name!r}; use {base} with inverted = true")
     near = closest_names(name, [*_module_names(group), *plugins, *_registered_names(group)])
     hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
     return ConfigError(
-        f"no {group.noun} {name!r} is built in, installed, or registered with "
-        f"terrainkit.register_{group.noun}; {hint}terrainkit list prints all"
+        f"no {group.label} {name!r} is built in, installed, or registered with "
+        f"terrainkit.register_{group.label}; {hint}terrainkit list prints all"
     )
 
 

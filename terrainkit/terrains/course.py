@@ -67,12 +67,12 @@ class Element(SubTerrain):
 
 @dataclass(frozen=True, kw_only=True)
 class Course(Lane):
-    """Terrains one after another along a lane along x, with flat platforms between them.
+    """A sequence of terrains in a lane along x, with flat platforms between them.
 
     The robot is spawned at low x. There is a goal on each platform, and one behind the last
-    element. The elements are any terrains, as wide as the patch, in the given order or drawn at
-    random, and each has the difficulty of the patch. The platforms are at height 0, where all
-    terrains begin and end. The overlay `side_walls` keeps the robot in the lane. In mode
+    element. Any terrain can be an element. Elements are as wide as the patch and have its
+    difficulty. They come in the given order or are drawn at random. The platforms are at height 0,
+    where all terrains begin and end. The overlay `side_walls` keeps the robot in the lane. In mode
     curriculum, the rows of a column have the same elements.
 
     In TOML, each element is a `[[terrains.elements]]` table with `terrain`, `element_length`,

@@ -43,7 +43,7 @@ class SteppingStones(Terrain):
         longest = max(grid.shape)
         stone, distance = (min(grid.cells(v), longest) for v in (self.stone, self.distance))
         pitch, (nx, ny) = stone + distance, grid.shape
-        draws = rng.random(nx)
+        samples = rng.random(nx)
         tops = (2 * rng.random(grid.shape) - 1) * self.variation
         # In each row along x, the platform covers the cells in `across`.
         along, across = grid.centered_slices(grid.centered(self.platform))
@@ -65,7 +65,7 @@ class SteppingStones(Terrain):
         areas = np.outer(counts[0], gaps_y.sum(axis=1)) - np.outer(counts[1], covered_gaps)
         sizes = counts[0] * ny - counts[1] * num_covered
         missing = free * (1 - (stone / pitch) ** 2) - area[start]
-        shifts = _shifts(areas, missing * sizes / max(1, sizes.sum()), draws)
+        shifts = _offsets(areas, missing * sizes / max(1, sizes.sum()), samples)
         # Each row of stones has its own offset along y.
         stone_column, phase_y = np.divmod(np.arange(ny) + shifts[stone_row, None], pitch)
         top = tops[stone_row[:, None] % nx, stone_column % ny]
@@ -80,8 +80,8 @@ def _gaps(number: int, stone: int, pitch: int) -> NDArray[np.bool_]:
     return (np.arange(number) + np.arange(pitch)[:, None]) % pitch >= stone
 
 
-def _shifts(
-    areas: NDArray[np.float64], expected: NDArray[np.float64], draws: NDArray[np.float64]
+def _offsets(
+    areas: NDArray[np.float64], expected: NDArray[np.float64], samples: NDArray[np.float64]
 ) -> NDArray[np.int64]:
     """Return a random offset for each row of stones, such that the areas of their holes add up.
 
@@ -91,7 +91,7 @@ def _shifts(
     Args:
         areas: Area of the holes of each row for each offset [cells], shape (rows, pitch).
         expected: Area of the holes of each row on an endless field [cells], shape (rows,).
-        draws: Random numbers from 0 to 1.
+        samples: Random numbers from 0 to 1.
     """
     shifts, missing = [], 0.0
     # Lists, since a row has few offsets.
@@ -100,6 +100,6 @@ def _shifts(
         error = [abs(each - missing) for each in area]
         limit = min(error) + 1e-9
         nearest = [offset for offset, each in enumerate(error) if each <= limit]
-        shifts.append(nearest[int(draws[k % len(draws)] * len(nearest))])
+        shifts.append(nearest[int(samples[k % len(samples)] * len(nearest))])
         missing -= area[shifts[k]]
     return np.array(shifts)

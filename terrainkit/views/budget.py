@@ -85,7 +85,7 @@ def compute_budget(terrain_map: "TerrainMap", foot_radius: float = 0.03) -> Budg
     contacts = foot_contacts(foot_radius, terrain_map.config.cell)
     sizes: dict[str, int | str] = {}
     collisions = {}
-    for name, file, options in _exports():
+    for name, file, options in _format_files():
         with TemporaryDirectory() as folder:
             path = Path(folder) / file
             try:
@@ -138,7 +138,7 @@ def box_step_time(num_boxes: int) -> float:
     return float(np.interp(log, logs, costs) + slope * max(log - logs[-1], 0))
 
 
-def _exports() -> Iterator[tuple[str, Path, dict[str, Any]]]:
+def _format_files() -> Iterator[tuple[str, Path, dict[str, Any]]]:
     """Yield name, file and options of each format."""
     from terrainkit.export import export_options, exporters_by_suffix
 

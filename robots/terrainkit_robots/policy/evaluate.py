@@ -75,8 +75,8 @@ class RolloutMetrics:
     """Metrics of all robots, or of a group with the same command, terrain or level.
 
     Errors are averaged over the measured steps of each robot, then over robots. They are None if no
-    robot was measured. The gait (:mod:`.gait`) is measured on robots that are commanded to move,
-    and None if there are none.
+    robot was measured. The metrics of the gait (:mod:`.gait`) only include robots that are
+    commanded to move, and are None if there are no such robots.
 
     Attributes:
         command: Command of the group: forward and left velocity [m/s], yaw velocity [rad/s].
@@ -87,7 +87,8 @@ class RolloutMetrics:
         falls: Number of robots that fell.
         success: Fraction of successful robots; None on a plane.
         lin_vel_error: Norm of the horizontal velocity error [m/s].
-        lin_vel_error_1s: The same with velocities averaged over 1 s, without the sway of a gait.
+        lin_vel_error_1s: The same with velocities averaged over 1 s, which removes the sway of the
+            gait.
         ang_vel_error: Absolute yaw velocity error [rad/s].
         ang_vel_error_1s: The same with velocities averaged over 1 s.
         swing_height: Mean peak height of the swings of each foot [m].
@@ -128,7 +129,7 @@ class RolloutMetrics:
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationResult:
-    """Result of an evaluation; `config` names the terrain of the training if none was given.
+    """Result of an evaluation. If no terrain was given, `config` names the terrain of the training.
 
     Attributes:
         robot: Name of the robot in its spec.
@@ -137,8 +138,8 @@ class EvaluationResult:
         metrics: Metrics of all robots.
         groups: Metrics of groups of robots: `by_command` on a plane; `by_direction`,
             `by_direction_and_level`, `by_terrain`, `by_level` and `by_terrain_and_level` on a map.
-        contacts: Contacts of each foot in the last 2 s of the robot that is commanded to walk ahead
-            fastest: one character per step, 1 in contact.
+        contacts: Contacts of each foot in the last 2 s, for the robot with the fastest forward
+            command: one character per step, 1 in contact.
         dt: Time between two steps [s].
     """
 

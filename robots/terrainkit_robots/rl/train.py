@@ -33,18 +33,18 @@ def train(
         terrain: `plane`, a map (.npz), or a map config (.toml).
         task: The task; by default, the registered task of the robot.
         folder: Folder of the run; by default, `logs/<robot>/<date-time>`.
-        resume: A run to continue. With the same robot, terrain and task it continues, exactly if
-            `env.num_envs` and the number of processes are also the same; otherwise the episodes
-            start again. With another robot, terrain or task, a new run starts with its networks,
-            its optimizer state if the learning rate and its schedule are the same, and its terrain
-            levels if the map is the same.
+        resume: A run to continue. If robot, terrain and task are the same, the run continues. The
+            continuation is exact if `env.num_envs` and the number of processes are also the same;
+            otherwise, new episodes start. If the robot, terrain or task differs, a new run starts
+            with the networks of the run. It also starts with the optimizer state if the learning
+            rate and its schedule are the same, and with the terrain levels if the map is the same.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
         start_callback: Called before the first iteration.
         progress_callback: Called after each iteration.
         should_stop: Called before each iteration; True stops training with a checkpoint.
 
     Returns:
-        The runner, with the folder of the run (None in all processes except the main one), the
+        The runner. It has the folder of the run (None in all processes except the main one), the
         number of completed iterations, and the policy.
 
     Raises:

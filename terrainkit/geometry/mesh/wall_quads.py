@@ -25,11 +25,11 @@ _Face = tuple[int, int, int]
 _MIDPOINTS, _LINE, _SECOND_LINE = 4, 12, 16
 
 _SADDLE_OFFSET = 1 / 128
-"""Offset of the walls of two high corners that meet in a point, as a fraction of the cell.
+"""Offset of the walls of two high corners that meet in a point, as a fraction of half a cell.
 
 Four walls meet where two opposite corners are higher than the other two. Their common edge would be
-shared by four faces. With this offset, less than a millimeter in a cell of 0.1 m, each pair of
-walls has an edge of its own.
+shared by four faces. With this offset, 0.4 mm in a cell of 0.1 m, each pair of walls has an edge of
+its own.
 """
 
 
@@ -99,9 +99,9 @@ class _Quads:
             corner0=np.stack([x[i] - x[i + 1], y[j] - y[j + 1]]) / 2,
         )
 
-    def select(self, which: NDArray[np.bool_]) -> "_Quads":
+    def select(self, mask: NDArray[np.bool_]) -> "_Quads":
         """Return some of the quads."""
-        index = np.flatnonzero(which)
+        index = np.flatnonzero(mask)
         return _Quads(**{name: value[..., index] for name, value in vars(self).items()})
 
     def rotate_corners(self) -> "_Quads":

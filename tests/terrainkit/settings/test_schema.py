@@ -92,6 +92,14 @@ def test_flatten_yields_dotted_names():
     assert dict(flatten(Robot(legs=4)))["motor.effort"] == 1.0
 
 
+def test_to_toml_describes_subclass_without_docstring():
+    @dataclass(frozen=True, kw_only=True)
+    class Servo(Motor):
+        effort: PositiveFloat = 3.0
+
+    assert "\n# A motor.\n[motor]\neffort = 3.0" in Robot(legs=4, motor=Servo()).to_toml()
+
+
 def test_to_toml_rejects_name_that_is_not_utf8():
     config = Motor(names=("hip", "a\udcff"))
     with pytest.raises(ConfigError, match=r"got .*a\\udcff'; expected a name that is UTF-8"):

@@ -1,12 +1,12 @@
 """Compute the order in which each simulator lists the joints and the bodies of a robot.
 
 Observations and actions of a policy are arrays with one number per joint and no names. A policy
-that is trained in one order fails in another one.
+that was trained with one order fails with another one.
 
-The orders, and where they are known from:
+The orders and their sources:
 
 - **MuJoCo** traverses depth first, with siblings in the order of their joints (URDF) or bodies
-  (MJCF) in the file. The children of a merged link replace it. The tests compare this with the
+  (MJCF) in the file. The children of a merged link take its place. The tests compare this with the
   compiler.
 - **Genesis** traverses the links of a URDF depth first too, but merges fixed joints before that,
   and then sorts siblings by the position of their joints in the file. This follows the source of
@@ -18,7 +18,7 @@ The orders, and where they are known from:
 - **Isaac Gym** is closed source. The joint lists published for A1, Go1 and Open Duck Mini are depth
   first with siblings sorted by name, although their URDFs have another order.
 
-If these possibilities lead to different orders for a robot, its order has to be verified.
+If the possible orders of a simulator differ for a robot, the order has to be verified.
 """
 
 import re

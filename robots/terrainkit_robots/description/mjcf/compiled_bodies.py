@@ -1,16 +1,16 @@
 """Compile the poses, scales and masses of the bodies of a parsed MJCF with MuJoCo.
 
-The compiler resolves orientations, frames and their scales, and computes the inertia of geoms. It
-also opens all files, and rejects a model with an invalid value, which the reader keeps for the lint
-rules. Therefore it gets a copy of the bodies, in which placeholders replace what it cannot use:
+The compiler resolves orientations, frames and their scales, and computes the inertia of geoms. But
+it also opens all files, and rejects models with invalid values, which the reader keeps for the lint
+rules. It therefore gets a copy of the bodies with placeholders for everything that it cannot use:
 
 - A shape that needs a file or has an invalid size is a unit sphere without mass.
 - An explicit inertial has a mass of 1 kg and moments of 1 kg m2.
 - A joint is a fixed body at its anchor, because the time to compile joints grows with the third
-  power of their number in a chain. In a scaled frame there is also a joint with limits and an
-  armature of 1, which moves another body.
+  power of their number in a chain. In a scaled frame, a joint with limits and an armature of 1, on
+  another body, is added.
 
-The compiled value of a placeholder is the scale of what it replaces.
+The compiled value of a placeholder is the scale of the value that it replaces.
 """
 
 import math

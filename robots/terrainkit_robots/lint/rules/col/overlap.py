@@ -46,14 +46,14 @@ _DEFAULT_RANGE = 1.5
 def overlap(robot: Facts) -> Violations:
     """Two bodies that are not neighbors overlap at the default pose.
 
-    Simulators ignore contacts between a body and its parent only. All other overlaps are pushed
-    apart from the first step on: the robot jumps, jitters, or becomes unstable. Primitives are
-    compared as they are, meshes by their convex hulls, as in most simulators. An overlap above 1 mm
-    is a warning, and above 10 mm an error on a robot with legs. The severity is one level lower if
-    a convex hull is involved, since other simulators may use the mesh itself or its convex parts.
-    Without a keyframe, it is a note on arms, grippers and hands if a convex hull is involved or if
-    zero is at the end or outside of the range of a joint between the two bodies: nobody starts them
-    there.
+    Simulators only ignore contacts between a body and its parent. They push all other overlapping
+    bodies apart from the first step on: the robot jumps, jitters, or becomes unstable. Primitives
+    are compared as they are, meshes by their convex hulls, as in most simulators. An overlap above
+    1 mm is a warning, and above 10 mm an error on a robot with legs. The severity is one level
+    lower if a convex hull is involved, since other simulators may use the mesh itself or its convex
+    parts. Without a keyframe, the default pose of arms, grippers and hands is arbitrary. Their
+    overlap is a note if a convex hull is involved, or if zero is at an end of the range of a joint
+    between the two bodies or outside of it.
 
     Fix:
         Shrink or move one of the shapes, or disable contacts of this pair (<exclude> in MJCF,

@@ -35,12 +35,12 @@ _OVERLAP_HINT = "Shapes of the robot push each other apart: check for overlaps (
 def unstable_drop(robot: Facts) -> Violations:
     """The robot becomes unstable when it is dropped without torques.
 
-    A robot that falls from 10 cm with limp joints comes to rest within the 1.5 s of the simulation;
-    a robot with a fixed base swings. A joint velocity above 100 rad/s means that overlapping shapes
-    push each other apart, or that a body is too light for its contacts; above 500 rad/s, or if the
-    state becomes NaN, it is an error. If the robot is stable without self-collision, the message
-    says so, and the severity is one level lower if meshes collide, since other simulators may not
-    use their convex hulls.
+    The robot is dropped from 10 cm without joint torques and simulated for 1.5 s. It normally comes
+    to rest in this time; a robot with a fixed base swings. A joint velocity above 100 rad/s means
+    that overlapping shapes push each other apart, or that a body is too light for its contacts. It
+    is an error above 500 rad/s, or if the state becomes NaN. If the robot is stable without
+    self-collision, the message says so. If it also has collision meshes, the severity is then one
+    level lower, since other simulators may not use their convex hulls.
 
     Fix:
         Check for overlaps (COL005) and for inertias that are too small (INR006 to INR011).
@@ -97,7 +97,7 @@ def does_not_stand(robot: Facts) -> Violations:
     standing pose. A robot that falls within two seconds is reset before it learns anything. A robot
     that leans, stands on its shanks, lifts a foot or saturates a motor learns to do so. A tilt of 3
     to 9 degrees is only a note, and so are robots with more than six legs. Robots with one or two
-    legs need not balance: their joints are locked, so that only the feet and the pose count.
+    legs need not balance: their joints are locked, so that only the feet and the pose are tested.
 
     Fix:
         The message names the cause. Otherwise check the pose, the feet and the effort limits.

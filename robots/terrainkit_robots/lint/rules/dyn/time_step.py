@@ -26,8 +26,7 @@ def low_joint_inertia(robot: Facts) -> Violations:
     The explicit actuators of legged_gym and Isaac Lab compute the torque once per time step of 5
     ms. A joint with little inertia oscillates at this rate for any useful gain. Real joints also
     have the reflected inertia of the rotor, which URDF cannot express: simulators call it armature.
-    An inertia that is lower by a factor of several hundred is a warning, since it is probably
-    wrong.
+    An inertia that is several hundred times too low is a warning, since it is probably wrong.
 
     Fix:
         Set the suggested armature in the simulator, or halve the time step.

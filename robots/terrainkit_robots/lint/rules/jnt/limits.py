@@ -54,13 +54,14 @@ def missing_limit(robot: Facts) -> Violations:
     """A revolute or prismatic joint has no range.
 
     Its limits are missing, incomplete, or equal. In URDF a missing number counts as 0. With equal
-    limits or without limits, MuJoCo and legged_gym let the joint turn without end, urdfdom rejects
-    the file, and other simulators lock the joint. A limit with one end only is an error as well:
+    limits or without limits, MuJoCo and legged_gym do not limit the joint, urdfdom rejects the
+    file, and other simulators lock the joint. Giving only one of the two limits is also an error:
     MuJoCo then silently applies no limit at all.
 
     Fix:
-        Give <limit> the lower and upper end of the real joint, in radians or meters. A joint that
-        turns without end is of type continuous; one that does not move is of type fixed.
+        Set lower and upper in <limit> to the limits of the real joint, in radians or meters. Use
+        the type continuous for a joint that turns without limits, and fixed for a joint that does
+        not move.
 
     Source:
         http://wiki.ros.org/urdf/XML/joint: limit is required. Tested with MuJoCo 4.0: a URDF joint

@@ -54,9 +54,9 @@ def mujoco_load_failure(robot: Facts) -> Violations:
     """MuJoCo cannot load the unmodified file.
 
     MuJoCo stops at the first error, so there may be more. mjlab and Genesis load robots with MuJoCo
-    as well. This is only a note if an error of another rule has the same cause, if MuJoCo does not
-    find a mesh because its path starts with `package://`, or if the file is a part: a file beside
-    it includes it and may define the element that MuJoCo does not find.
+    as well. The finding is only a note in three cases: another rule reports an error with the same
+    cause; MuJoCo does not find a mesh because its path starts with `package://`; or a file beside
+    this one includes it, and may define the element that MuJoCo does not find.
 
     Fix:
         Correct the reported element; the rule in the help explains how. If MuJoCo does not find an

@@ -106,8 +106,9 @@ def product_asymmetry(robot: Facts) -> Violations:
     """The principal axes of a body's inertia differ from its mirror image.
 
     The principal moments agree, but their axes do not: a product of inertia has the wrong sign, or
-    two moments are exchanged. Exporters differ in the sign of the products, and copies of the other
-    side keep it. The trunk mirrors itself, so that its products with the mirrored axis are small.
+    two moments are exchanged. Exporters differ in the sign of the products, and a side that was
+    copied from the other one has the wrong signs. The trunk is its own mirror image, so its
+    products with the mirrored axis are small.
 
     Fix:
         Negate the two products that contain the mirrored axis: ixy and iyz for left and right.

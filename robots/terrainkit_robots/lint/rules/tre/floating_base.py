@@ -84,12 +84,13 @@ def dummy_root(robot: Facts) -> Violations:
 
     Such a dummy root is common, because KDL does not support a root link with inertia. But the
     trunk then has two names: simulators that merge fixed joints use the name of the root, others
-    use the name of the trunk. A configuration with the other name matches nothing. If the root is
-    called `world`, MuJoCo and Gazebo fix the robot to the ground, which is a warning.
+    use the name of the trunk. A configuration with the other name matches nothing. A root called
+    `world` is a warning, since MuJoCo and Gazebo then fix the robot to the ground.
 
     Fix:
-        Nothing, if your configuration uses the same name as your simulator. If a legged robot is
-        attached to a link called `world` by a fixed joint, remove both, or make the joint floating.
+        Nothing is to be done if your configuration uses the same name as your simulator. If a
+        legged robot is attached to a link called `world` by a fixed joint, remove both, or make the
+        joint floating.
 
     Source:
         KDL's warning about a root link with inertia; Isaac Gym: collapse_fixed_joints.

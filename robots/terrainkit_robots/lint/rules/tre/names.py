@@ -55,8 +55,8 @@ def invalid_reference(robot: Facts) -> Violations:
 
     The names in <gazebo>, <transmission>, <sensor>, <ros2_control> and the SRDF were not changed
     when a link or joint was renamed, removed or copied. A sensor, the friction of a foot or a motor
-    is then missing in that tool, or its controllers do not start. Two simple transmissions of one
-    joint are reported as well: another joint lacks its own.
+    is then missing in that tool, or its controllers do not start. Two simple transmissions of the
+    same joint are also reported, since another joint then has none.
 
     Fix:
         Correct the name, or remove the element.
