@@ -221,8 +221,9 @@ def examples_page() -> str:
     return "\n".join(parts) + "\n"
 
 
-EXAMPLES = """Each example is a program of at most 60 lines that runs as it is, in any folder,
-and writes its files there: `python docs/examples/generate_map.py` in a clone. The tests run them.
+EXAMPLES = """Each example is a program of at most 60 lines. It runs as it is, in any folder, and
+writes its files to that folder. In a clone: `python docs/examples/generate_map.py`.
+The tests run all examples.
 [terrainkit.ipynb](examples/terrainkit.ipynb) is a notebook, in which a map is shown as a picture.
 """
 

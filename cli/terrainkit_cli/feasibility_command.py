@@ -81,7 +81,9 @@ class Feasibility(Command):
         render.result(f"{derived.robot}:")
         rows = [(f"  {name}", f"{value:.3g}") for name, value in vars(derived.limits).items()]
         render.table([(*row, derived.reasons[row[0].strip()]) for row in rows])
-        render.result("\ndemand, the largest of each terrain and level:")
+        render.result(
+            "\nlargest demand of each terrain and level (1: limit; inf: over 2, no path):"
+        )
         render.table(demand_table(results))
         if target:
             self._write(target, terrain_map, results, derived)

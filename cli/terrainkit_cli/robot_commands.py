@@ -162,9 +162,11 @@ class CheckRobot(Command):
             if self.write_baseline:
                 raise ConfigError("--write-baseline: got no file; expected --baseline FILE as well")
             return None
-        if self.write_baseline and not self.baseline.exists():
+        if self.baseline.exists():
+            return Baseline.read(self.baseline)
+        if self.write_baseline:
             return Baseline(path=self.baseline)
-        return Baseline.read(self.baseline)
+        raise ConfigError(f"there is no file {self.baseline}; --write-baseline creates it")
 
     def _accept_findings(
         self, results: "Sequence[_FileResult]", baseline: "Baseline"
@@ -214,7 +216,7 @@ class CheckRobot(Command):
         if self.fix or self.unsafe_fixes or self.diff:
             from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff
 
-            if bundled.is_bundled(path) or path != Path(name):
+            if not self.diff and (bundled.is_bundled(path) or path != Path(name)):
                 kind = "bundled" if bundled.is_bundled(path) else "downloaded"
                 raise ConfigError(f"{name} is a {kind} robot and cannot be changed; copy it first")
             if report.facts.model.kind == "xacro":

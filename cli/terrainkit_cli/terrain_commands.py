@@ -16,13 +16,14 @@ from terrainkit_cli.parse import Command, option, positional
 
 @dataclass(frozen=True, kw_only=True)
 class List(Command):
-    """List terrains, overlays and presets, or the parameters of one."""
+    """List terrains, overlays and presets, or the contents of one."""
 
     terrain: Annotated[str, positional("[NAME]")] = ""
-    """Name of a terrain or overlay, to print its parameters."""
+    """Name of a terrain or overlay, to print its parameters, or of a preset, to print its
+    terrains. `stairs` and `rough` are terrains and presets: the terrain is printed."""
 
     def run(self) -> int:
-        """Print the terrains, overlays and presets, or the parameters of one."""
+        """Print the terrains, overlays and presets, or the contents of one."""
         from terrainkit.terrain.terrain_docs import (
             overlay_doc,
             overlay_summaries,
@@ -48,7 +49,12 @@ class List(Command):
             )
             render.result("\npresets:")
             render.table([(f"  {name}", mix) for name, mix in mixes])
-            render.result("\nterrainkit list NAME shows the parameters of a terrain or overlay.")
+            render.result(
+                "\nterrainkit list NAME shows a terrain's parameters, or a preset's terrains."
+            )
+            return 0
+        if self.terrain in set(presets.preset_names()) - set(registry.terrain_names()):
+            _print_preset(self.terrain)
             return 0
         is_overlay = self.terrain in (*registry.overlay_names(), *registry.plugin_overlays())
         about = (overlay_doc if is_overlay else terrain_doc)(self.terrain)
@@ -57,6 +63,15 @@ class List(Command):
         rows += [(p.name, p.easy, p.hard, p.text) for p in about.parameters]
         render.table(rows)
         return 0
+
+
+def _print_preset(name: str) -> None:
+    render.result(f"{name}: a preset, for --preset of terrainkit generate\n")
+    rows = [("terrain", "proportion", "parameters")]
+    for sub_terrain in presets.get_preset(name):
+        values = (f"{key}={format_value(v)}" for key, v in sub_terrain.parameters.items())
+        rows.append((sub_terrain.name, f"{sub_terrain.proportion:g}", ", ".join(values)))
+    render.table(rows)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -158,7 +158,7 @@ def test_check_robot_checks_folder(here):
         ),
         (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
-        (("good.urdf", "--baseline", "none.json"), "there is no file none.json"),
+        (("good.urdf", "--baseline", "none.json"), "no file none.json; --write-baseline"),
         (("good.urdf", "--baseline", "bad.urdf"), "baseline bad.urdf: JSON is malformed"),
         (
             ("bad.urdf", "--baseline", "bad.urdf", "--write-baseline"),
@@ -320,7 +320,7 @@ def test_check_robot_diff_writes_nothing(here, folder):
     assert (folder / "unnamed.urdf").read_text() == UNNAMED
 
 
-@pytest.mark.parametrize("option", ["--fix", "--unsafe-fixes", "--diff"])
+@pytest.mark.parametrize("option", ["--fix", "--unsafe-fixes"])
 @pytest.mark.parametrize("is_path", [False, True])
 def test_check_robot_fix_rejects_bundled_robot(here, option, is_path):
     file = bundled.urdf_path("quadruped")
@@ -331,6 +331,12 @@ def test_check_robot_fix_rejects_bundled_robot(here, option, is_path):
         f"terrainkit: error: {name} is a bundled robot and cannot be changed; copy it first\n"
     )
     assert file.read_bytes() == text
+
+
+def test_check_robot_diff_reads_bundled_robot(here):
+    run = here("check-robot", "quadruped", "--diff")
+    assert (run.returncode, run.stdout) == (0, "")
+    assert run.stderr == "terrainkit: there is nothing to fix\n"
 
 
 @pytest.mark.usefixtures("folder")

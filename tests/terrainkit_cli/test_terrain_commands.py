@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.terrain import registry
+from terrainkit.terrain import presets, registry
 
 
 def test_list_names_every_terrain(terrainkit):
@@ -17,6 +17,17 @@ def test_list_names_every_terrain(terrainkit):
 def test_list_terrain_shows_parameters(terrainkit):
     lines = [line.split() for line in terrainkit("list", "pyramid_stairs").stdout.splitlines()]
     assert ["step_height", "0.05", "0.23", "Rise", "of", "a", "step", "[m]."] in lines
+
+
+def test_list_preset_shows_terrains(terrainkit):
+    lines = [line.split() for line in terrainkit("list", "legged_gym").stdout.splitlines()]
+    assert ["pyramid_stairs_inverted", "2", "inverted=true"] in lines
+    assert ["gap", "1"] in lines
+
+
+def test_list_prefers_terrain_to_preset_of_equal_name(terrainkit):
+    assert "stairs" in presets.preset_names()
+    assert terrainkit("list", "stairs").stdout.startswith("stairs: A flight of stairs")
 
 
 def test_info_describes_the_map(terrainkit, small_map):

@@ -116,5 +116,5 @@ def load_terrain(source: str | Path, collision: str = "auto") -> Ground:
         terrain_map = TerrainMap.load(path) if is_map else generate(MapConfig.load(path))
         return MapGround(terrain_map, collision)
     suggestion = " did you mean 'plane'?" if closest(str(source), ["plane"]) else ""
-    expected = "expected plane, a map (.npz), or the config of a map (.toml)"
+    expected = "expected plane, a map (.npz) of terrainkit generate, or the config of a map (.toml)"
     raise ConfigError(f"terrain: got {str(source)!r};{suggestion} {expected}")
