@@ -210,6 +210,22 @@ def test_action_without_upload_prints_annotations(act):
     assert "::error file=robots/new.urdf,line=3,title=INR002 negative-mass::" in done.stdout
 
 
+def test_action_runs_no_module_of_the_repository(act, repository):
+    (repository / "json.py").write_text("raise SystemExit('executed')")
+    done, outputs = act(args="--select INR002")
+    assert "executed" not in done.stderr
+    assert results(outputs) == [("INR002", "robots/new.urdf")]
+    for step in ACTION["runs"]["steps"]:
+        assert not re.search(r"\bpython\b\W* -(?!I)", step.get("run", ""), re.IGNORECASE)
+
+
+def test_action_finds_suffixes_in_capitals(act, repository):
+    for words in ("mv robots/new.urdf robots/new.URDF", "rm -q robots/good.urdf"):
+        subprocess.run(["git", *words.split()], cwd=repository, check=True)
+    _, outputs = act("push", paths="robots/new.URDF", args="--select INR002")
+    assert results(outputs) == [("INR002", "robots/new.URDF")]
+
+
 def test_action_without_robots_succeeds(act):
     done, outputs = act("push", paths="'robots/good.urdf' ':!robots'")
     assert (done.returncode, outputs) == (0, {})

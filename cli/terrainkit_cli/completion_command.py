@@ -8,7 +8,7 @@ argcomplete.
 import argparse
 import os
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import MISSING, dataclass
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -66,15 +66,12 @@ def complete(commands: Iterable[str], load: Callable[[str], type[Command]]) -> N
 
 
 def _add_option(parser: argparse.ArgumentParser, command: str, option: Option) -> None:
-    settings: dict[str, Any] = {"help": option.help.partition("\n")[0].replace("%", "%%")}
+    text = option.help.partition("\n")[0].replace("%", "%%")
     if option.nargs == 0:
-        parser.add_argument(*option.names, action="store_true", **settings)
+        parser.add_argument(*option.names, action="store_true", help=text)
         return
-    settings["nargs"] = option.nargs
-    if not option.names and option.nargs == 1:
-        settings["nargs"] = None if option.default is MISSING else "?"
-    settings["action"] = "append" if option.is_repeated else "store"
-    action: Any = parser.add_argument(*option.names or [option.key], **settings)
+    kind, names = "append" if option.is_repeated else "store", option.names or [option.key]
+    action: Any = parser.add_argument(*names, action=kind, nargs=option.nargs, help=text)
     action.completer = partial(_values, command, option)
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from terrainkit_cli.parse import Command
 
 COMMAND_GROUPS = {
+    "": {"demo": "view_command"},
     "Terrain": {
         "generate": "generate_command",
         "import": "import_command",
@@ -36,13 +37,12 @@ COMMAND_GROUPS = {
         "smoke-test": "smoke_test_command",
     },
     "Policies": {
-        "demo": "view_command",
         "train": "train_command",
         "evaluate": "evaluate_command",
         "play": "play_command",
     },
 }
-"""Module of each command, so that only the one in use is imported."""
+"""Module of each command, so that only the one in use is imported, by the title of its group."""
 
 COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module in group.items()}
 COMMANDS["completion"] = "completion_command"
@@ -136,13 +136,15 @@ def _run_command(prog: str, command_class: "type[Command]", argv: list[str]) -> 
 
 
 def _print_overview() -> None:
-    render.result("usage: terrainkit COMMAND [OPTIONS]")
+    # The text fits into 24 lines, the size of a terminal.
+    render.result("usage: terrainkit COMMAND [OPTIONS | --help]; see also --version, completion.")
+    render.result("Generate terrain for legged robots, check robot files, and train policies.")
     rows: list[tuple[str, str]] = []
     for group, names in COMMAND_GROUPS.items():
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
-        rows += [(f"{group}:", ""), *zip((f"  {name}" for name in names), summaries, strict=True)]
+        rows += [(f"{group}:", "")] if group else []
+        rows += zip((f"  {name}" for name in names), summaries, strict=True)
     render.table(rows)
-    render.result("terrainkit COMMAND --help lists its options; see also --version, completion.")
 
 
 def command(name: str) -> "type[Command]":

@@ -115,18 +115,19 @@ class CheckRobot(Command):
             raise ConfigError("FILE: missing; expected robot files, quadruped, or biped")
         if self.diff and self.format != "text":
             raise ConfigError(f"--diff prints a diff and cannot be combined with {self.format}")
-        files = [each for name in self.files for each in _files(name)]
+        settings = self._settings()
+        files = self._find_files(settings)
         if len(files) > 1 and (self.against or self.spec):
             raise ConfigError(f"--against and --spec: got {len(files)} files; expected one")
-        settings = self._settings()
-        if self.changed:
-            files = self._changed_robots(settings)
         if self.output:
             _check_output(self.output, [Path(name) for name in files])
         baseline = self._read_baseline()
         results = [result for name in files if (result := self._check_file(name, settings))]
-        if baseline is not None:
-            results = self._accept_findings(results, baseline)
+        if self.write_baseline:
+            baseline = baseline.updated(result.report for result in results)
+            baseline.write()
+            render.note(f"wrote {baseline.path}")
+        results = [replace(each, report=baseline.accept(each.report)) for each in results]
         self._print([result.report for result in results], "".join(r.diff for r in results))
         crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
@@ -147,36 +148,29 @@ class CheckRobot(Command):
         select_rules(settings)  # reject unknown codes before reading files
         return settings
 
-    def _changed_robots(self, settings: "Settings") -> list[str]:
+    def _find_files(self, settings: "Settings") -> list[str]:
+        from terrainkit_robots.description.robot_folder import robot_files
         from terrainkit_robots.lint.changed import changed_robots
 
-        robots = changed_robots((Path(name) for name in self.files), settings)
+        if not self.changed:
+            found = [robot_files(Path(f)) if _is_folder(f) else [f] for f in self.files]
+            return [str(file) for files in found for file in files]
+        robots = changed_robots(map(Path, self.files), settings)
         if not robots:
             render.note("no robot in this folder reads a changed file")
         return list(map(str, robots))
 
-    def _read_baseline(self) -> "Baseline | None":
+    def _read_baseline(self) -> "Baseline":
+        """Return the baseline; an empty one without a file."""
         from terrainkit_robots.lint.baseline import Baseline
 
-        if self.baseline is None:
-            if self.write_baseline:
-                raise ConfigError("--write-baseline: got no file; expected --baseline FILE as well")
-            return None
-        if self.baseline.exists():
-            return Baseline.read(self.baseline)
-        if self.write_baseline:
-            return Baseline(path=self.baseline)
-        raise ConfigError(f"there is no file {self.baseline}; --write-baseline creates it")
-
-    def _accept_findings(
-        self, results: "Sequence[_FileResult]", baseline: "Baseline"
-    ) -> "list[_FileResult]":
-        """Return the results without the findings of the baseline, after updating it if asked."""
-        if self.write_baseline:
-            baseline = baseline.updated(result.report for result in results)
-            baseline.write()
-            render.note(f"wrote {baseline.path}")
-        return [replace(result, report=baseline.accept(result.report)) for result in results]
+        if self.write_baseline and self.baseline is None:
+            raise ConfigError("--write-baseline: got no file; expected --baseline FILE as well")
+        if self.baseline is None or (self.write_baseline and not self.baseline.exists()):
+            return Baseline(path=self.baseline or Path())
+        if not self.baseline.exists():
+            raise ConfigError(f"there is no file {self.baseline}; --write-baseline creates it")
+        return Baseline.read(self.baseline)
 
     def _check_file(self, name: str, settings: "Settings") -> "_FileResult | None":
         """Return the result for a file; print an error and return None if the check fails."""
@@ -217,8 +211,9 @@ class CheckRobot(Command):
             from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff
 
             if not self.diff and (bundled.is_bundled(path) or path != Path(name)):
-                kind = "bundled" if bundled.is_bundled(path) else "downloaded"
-                raise ConfigError(f"{name} is a {kind} robot and cannot be changed; copy it first")
+                raise ConfigError(
+                    f"{name} is not your file and cannot be changed; copy {path} first"
+                )
             if report.facts.model.kind == "xacro":
                 raise ConfigError(f"{name}: xacro files cannot be fixed; edit the reported lines")
             result = fix_robot(path, lint_contents, report=report, unsafe=self.unsafe_fixes)
@@ -239,14 +234,13 @@ class CheckRobot(Command):
         elif self.format == "text":
             from terrainkit_robots.lint.report import text as text_report
 
-            brief = any(map(_is_folder, self.files)) and not self.notes
+            brief = any(map(_is_folder, self.files)) and not (self.notes or self.changed)
+            options = {"verbose": self.notes, "brief": brief}
             if self.output is None and render.has_colors():
-                lines = text_report.format_lines(
-                    reports, width=render.width(), verbose=self.notes, brief=brief
-                )
+                lines = text_report.format_lines(reports, width=render.width(), **options)
                 render.print_lines(lines)
                 return
-            text = text_report.to_text(reports, verbose=self.notes, brief=brief)
+            text = text_report.to_text(reports, **options)
         else:
             text = to_text(reports, self.format)
         if self.output is None:
@@ -282,14 +276,7 @@ def _is_folder(name: str) -> bool:
     from terrainkit_robots.description import bundled
     from terrainkit_robots.description.package_resolver import is_folder
 
-    return name not in bundled.robot_names() and is_folder(Path(name))
-
-
-def _files(name: str) -> list[str]:
-    """Return the robot files in a folder, or the name of something else."""
-    from terrainkit_robots.description.robot_folder import robot_files
-
-    return [str(file) for file in robot_files(Path(name))] if _is_folder(name) else [name]
+    return name not in ("", *bundled.robot_names()) and is_folder(Path(name))
 
 
 def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":

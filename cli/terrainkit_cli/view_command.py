@@ -10,6 +10,7 @@ import webbrowser
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -72,7 +73,7 @@ class ViewerCommand(Command):
         with viewer_server(self.host, self.port) as server:
             with render.steps() as steps:
                 steps.update(f"loading {title}")
-                run = show(server)
+                run = getattr(show(server), "run", wait)
             host = f"[{self.host}]" if ":" in self.host else self.host
             address = f"http://{host}:{server.get_port()}"
             with suppress(KeyboardInterrupt, Terminated):
@@ -171,13 +172,7 @@ class View(ViewerCommand):
     def _load_map(self) -> "Show":
         from terrainkit.views.viewer import show_map
 
-        terrain_map = TerrainMap.load(self.source)
-
-        def show(server: "viser.ViserServer") -> Callable[[], None]:
-            show_map(server, terrain_map)
-            return wait
-
-        return show
+        return partial(show_map, terrain_map=TerrainMap.load(self.source))
 
     def _check_robot(self) -> "Show":
         from terrainkit_robots.lint.check import check_robot
@@ -197,19 +192,15 @@ class View(ViewerCommand):
         if not report.facts.bodies:
             raise ConfigError(f"{path} does not describe a robot; see terrainkit check-robot")
 
-        def show(server: "viser.ViserServer") -> Callable[[], None]:
-            show_robot(server, report)
-            return wait
-
-        return show
+        return partial(show_robot, report=report)
 
     def _open_run(self) -> "Show":
         require_training()
         return open_policy(self.source, self.checkpoint, self.terrain or None)
 
 
-Show = Callable[["viser.ViserServer"], Callable[[], None]]
-"""A function that fills the scene, and returns a function that runs until a signal ends it."""
+Show = Callable[["viser.ViserServer"], object]
+"""A function that fills the scene. If what it returns has a method `run`, it never returns."""
 
 
 def open_policy(source: str, checkpoint: int | None = None, terrain: str | None = None) -> "Show":
@@ -222,7 +213,7 @@ def open_policy(source: str, checkpoint: int | None = None, terrain: str | None 
     from terrainkit_robots.viewer.show_policy import PolicyView
 
     run = open_run(source, checkpoint)
-    return lambda server: PolicyView(server, run, terrain).run
+    return partial(PolicyView, run=run, terrain=terrain)
 
 
 def open_page(address: str) -> None:

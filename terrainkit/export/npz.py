@@ -272,12 +272,6 @@ def _read_parameters(
             if not record["requested"].keys() == record["realized"].keys() == expected:
                 raise ValueError(f"expected {listing(sorted(expected))}, requested and realized")
             table[row, col] = PatchParameters(**record)
-    except (
-        msgspec.DecodeError,
-        ValueError,
-        LookupError,
-        TypeError,
-        RecursionError,
-    ) as error:
+    except (msgspec.DecodeError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise MapFileError(f"{archive.path}: parameters cannot be read: {error}") from error
     return table

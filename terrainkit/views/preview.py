@@ -198,9 +198,7 @@ def map_title(config: "MapConfig") -> str:
     return f"{patches}, seed {config.seed}"
 
 
-def _without_border(
-    terrain_map: "TerrainMap",
-) -> tuple[NDArray[np.float32], tuple[float, float]]:
+def _without_border(terrain_map: "TerrainMap") -> tuple[NDArray[np.float32], tuple[float, float]]:
     """Return the heights with 1 m of the border, and their lower corner [m]."""
     config = terrain_map.config
     cut = max(0, config.border_cells - round(1.0 / config.cell))

@@ -147,35 +147,31 @@ def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
 
 
 def _add_solids(server: "viser.ViserServer", terrain_map: "TerrainMap") -> list[Any]:
-    solids, handles = terrain_map.solids, []
-    is_usual = solids.visible & solids.collides
-    if is_usual.any():
-        mesh = concatenate_meshes(solid_meshes(solids.select(is_usual)))
-        corners = mesh.vertices[mesh.triangles].astype(np.float64)
-        linear = 255 * (triangle_colors(corners) / 255) ** 2.2  # glTF's vertex colors are linear
-        colors = linear.astype(np.uint8).repeat(3, axis=0)
-        vertices, triangles = corners.reshape(-1, 3), np.arange(corners.size // 3).reshape(-1, 3)
-        data = _shaded_glb(vertices, triangles, vertex_colors=colors)
-        handles.append(server.scene.add_glb("/map/solids", data, receive_shadow=False))
-    if not is_usual.all():
-        mesh = concatenate_meshes(solid_meshes(solids.select(~is_usual)))
-        handles.append(
-            server.scene.add_mesh_simple(
-                "/map/special_solids",
-                mesh.vertices,
-                mesh.triangles,
-                color=_HIDDEN_COLOR,
-                flat_shading=True,
+    solids = terrain_map.solids
+    is_usual, handles = solids.visible & solids.collides, []
+    for name, chosen in (("solids", is_usual), ("special_solids", ~is_usual)):
+        if chosen.any():
+            mesh = concatenate_meshes(solid_meshes(solids.select(chosen)))
+            corners = mesh.vertices[mesh.triangles].astype(np.float64)
+            colors = triangle_colors(corners, None if name == "solids" else _HIDDEN_COLOR)
+            linear = 255 * (colors / 255) ** 2.2  # as glTF defines the colors of vertices
+            data = _shaded_glb(
+                corners.reshape(-1, 3),
+                np.arange(corners.size // 3).reshape(-1, 3),
+                vertex_colors=linear.astype(np.uint8).repeat(3, axis=0),
             )
-        )
+            handles.append(server.scene.add_glb(f"/map/{name}", data, receive_shadow=False))
     return handles
 
 
-def triangle_colors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the colors of triangles as in the preview: by height, and shaded by slope.
+def triangle_colors(
+    corners: NDArray[np.float64], color: tuple[int, int, int] | None = None
+) -> NDArray[np.float64]:
+    """Return the colors of triangles, shaded by slope as in the preview.
 
     Args:
         corners: Corners [m], counter-clockwise, shape (n, 3, 3).
+        color: Color of level triangles; None to color by height as in the preview.
 
     Returns:
         Red, green and blue, 0 to 255, shape (n, 3).
@@ -183,8 +179,8 @@ def triangle_colors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     shade = np.clip(normals @ LIGHT / LIGHT[2], MIN_SHADE, MAX_SHADE)
-    colors = height_colors(corners[:, :, 2].max(axis=1)) * shade[:, None]
-    return np.asarray(np.clip(colors, 0, 255))
+    level = height_colors(corners[:, :, 2].max(axis=1)) if color is None else np.array(color)
+    return np.asarray(np.clip(level * shade[:, None], 0, 255))
 
 
 def _shaded_glb(

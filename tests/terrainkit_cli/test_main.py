@@ -36,7 +36,7 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("generat",), "no command 'generat'; did you mean 'generate'? There are: gen"),
+        (("generat",), "no command 'generat'; did you mean 'generate'? There are: demo, gen"),
         (
             ("check-robot", "quadruped", "--format", "jso"),
             "--format: got 'jso'; expected one of: text, json, sarif, github, markdown;",

@@ -158,11 +158,12 @@ def test_check_robot_checks_folder(here):
         ),
         (("good.urdf", "--xacro-arg", "a=1"), "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         (("good.urdf", "--diff", "--format", "json"), "--diff prints a diff"),
+        (("",), "it is a folder"),  # not all robots of the working directory
         (("good.urdf", "--baseline", "none.json"), "no file none.json; --write-baseline"),
-        (("good.urdf", "--baseline", "bad.urdf"), "baseline bad.urdf: JSON is malformed"),
+        (("good.urdf", "--baseline", "bad.urdf"), "baseline bad.urdf: Expecting value"),
         (
             ("bad.urdf", "--baseline", "bad.urdf", "--write-baseline"),
-            "baseline bad.urdf: JSON is malformed",
+            "baseline bad.urdf: Expecting value",
         ),
         (
             ("bad.urdf", "--baseline", "good.urdf/a.json", "--write-baseline"),
@@ -328,7 +329,7 @@ def test_check_robot_fix_rejects_bundled_robot(here, option, is_path):
     run = here("check-robot", name, option)
     assert (run.returncode, run.stdout) == (2, "")
     assert run.stderr == (
-        f"terrainkit: error: {name} is a bundled robot and cannot be changed; copy it first\n"
+        f"terrainkit: error: {name} is not your file and cannot be changed; copy {file} first\n"
     )
     assert file.read_bytes() == text
 
@@ -383,7 +384,8 @@ def test_check_robot_baseline_is_written_without_unreadable_robots(here, folder)
 @pytest.mark.usefixtures("folder")
 def test_check_robot_changed_checks_robots_of_the_files(here, folder):
     (folder / "notes.txt").touch()
-    run = here("check-robot", "--changed", "notes.txt", "bad.urdf")
+    (folder / "submodule").mkdir()  # git lists it as a changed file
+    run = here("check-robot", "--changed", "notes.txt", "bad.urdf", "submodule")
     assert run.returncode == 1
     assert run.stdout.startswith("bad.urdf\n")
     run = here("check-robot", "--changed", "notes.txt")

@@ -7,19 +7,15 @@ executed.
 """
 
 import importlib
-import json
 import os
 import re
 from collections.abc import Mapping
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
-from functools import cache
+from io import StringIO
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from terrainkit.errors import listing
-from terrainkit.files.isolated import IsolatedError, ProcessLimits, run_isolated
 from terrainkit.settings.text import closest_names, expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.xml.document import RobotFileError
@@ -28,9 +24,6 @@ from terrainkit_robots.text import one_line
 _PACKAGE = "robot_descriptions"
 _SUFFIX = "_description"
 """End of all names in the package."""
-
-_DOWNLOAD_LIMITS = ProcessLimits(seconds=3600.0)
-"""Repositories have up to a few GB."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +86,6 @@ def _description_names() -> tuple[str, ...]:
         return ()
 
 
-@cache
 def _find_description(name: str) -> RobotFile:
     names = _description_names()
     if not names:
@@ -105,31 +97,19 @@ def _find_description(name: str) -> RobotFile:
         similar = closest_names(name, names)
         expected = f"expected one such as {listing(similar or names[:3])}"
         raise RobotFileError(f"no robot {truncate(name)} in {_PACKAGE}; {expected}")
+    os.environ.setdefault("GIT_TERMINAL_PROMPT", "0")  # a repository that is gone needs a password
     try:
-        # The package prints while it downloads.
-        found = json.loads(str(run_isolated(_download, name, limits=_DOWNLOAD_LIMITS)["json"]))
-    except IsolatedError as error:
-        raise RobotFileError(f"{name}: {_PACKAGE} cannot download it: {error}") from error
-    return RobotFile(
-        path=Path(found["path"]),
-        packages={package: Path(folder) for package, folder in found["packages"].items()},
-        xacro_arguments=found["xacro_arguments"],
-    )
-
-
-def _download(name: str) -> dict[str, Any]:
-    """Download a robot in a child process, and return the fields of its file as JSON."""
-    os.environ["GIT_TERMINAL_PROMPT"] = "0"  # git asks for a password if a repository is gone
-    try:
-        module = importlib.import_module(f"{_PACKAGE}.{name}")
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # the package prints
+            module = importlib.import_module(f"{_PACKAGE}.{name}")
     except Exception as error:
         reason = re.search(r"(?:fatal|error): (.*?)'?$", str(error), re.MULTILINE)
-        raise RobotFileError(one_line(reason[1] if reason else str(error))) from None
+        why = one_line(reason[1] if reason else str(error))
+        raise RobotFileError(f"{name}: {_PACKAGE} cannot download it: {why}") from error
     # A few modules have the URDF that their MJCF was made of, too.
     kinds = ("MJCF", "URDF", "XACRO") if "_mj_" in name else ("URDF", "XACRO", "MJCF")
-    found = {
-        "path": next(filter(None, (getattr(module, f"{kind}_PATH", None) for kind in kinds))),
-        "packages": getattr(module, "XACRO_PACKAGE_PATHS", {}),
-        "xacro_arguments": getattr(module, "XACRO_ARGS", {}),
-    }
-    return {"json": np.array(json.dumps(found))}
+    packages = getattr(module, "XACRO_PACKAGE_PATHS", {})
+    return RobotFile(
+        path=Path(next(filter(None, (getattr(module, f"{kind}_PATH", None) for kind in kinds)))),
+        packages={package: Path(folder) for package, folder in packages.items()},
+        xacro_arguments=getattr(module, "XACRO_ARGS", {}),
+    )

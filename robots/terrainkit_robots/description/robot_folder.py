@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from lxml import etree
 
 MAX_FILES = 100_000
-"""Maximum number of files of all kinds in a folder."""
+"""Maximum number of files in a folder that may be robots, by their suffix."""
 
 _SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf")
 _IGNORE_FILES = {"COLCON_IGNORE", "CATKIN_IGNORE"}
@@ -38,19 +38,24 @@ def robot_files(folder: Path) -> list[Path]:
     Raises:
         RobotFileError: If there is no robot file, or the folder has too many files.
     """
-    files = list(islice(_iter_files(folder), MAX_FILES + 1))
+    files = list(islice(filter(_may_be_robot, _iter_files(folder)), MAX_FILES + 1))
     if len(files) > MAX_FILES:
-        raise RobotFileError(f"{folder}: got more than {MAX_FILES} files; expected a subfolder")
+        raise RobotFileError(f"{folder}: got more than {MAX_FILES} files of robots; expected fewer")
     # Of a file and links to it, the last one counts.
-    files = sorted(filter(_may_be_robot, files), key=lambda path: (not path.is_symlink(), path))
-    roots = {path: _read_root(path) for path in files}
-    included = {path: _included_files(path, root) for path, root in roots.items()}
-    fragments = {file for files in included.values() for file in files}
-    robots = {os.path.realpath(path): path for path, root in roots.items() if _is_robot(path, root)}
+    files.sort(key=lambda path: (not path.is_symlink(), path))
+    robots, fragments, scenes = dict[str, Path](), set[str](), dict[str, set[str]]()
+    for path in files:
+        root, file = _read_root(path), os.path.realpath(path)
+        included = _included_files(path, root)
+        fragments |= included
+        if _is_robot(path, root):
+            robots[file] = path
+            if _is_mjcf(root):
+                scenes[file] = included
     found = [
         path
         for file, path in robots.items()
-        if (not included[path] & {*robots} if _is_mjcf(roots[path]) else file not in fragments)
+        if not (scenes[file] & robots.keys() if file in scenes else file in fragments)
     ]
     if not found:
         raise RobotFileError(f"{folder}: got no robot file in it; expected URDF, xacro or MJCF")
@@ -85,7 +90,8 @@ def _is_mjcf(root: "etree._Element | None") -> bool:
 
 def _is_robot(path: Path, root: "etree._Element | None") -> bool:
     """Return whether a file describes a robot, or is one by its suffix and is damaged."""
-    children = set() if root is None else {_local_name(child) for child in root.iterchildren("*")}
+    tags = () if root is None else [str(child.tag) for child in root.iterchildren("*")]
+    children = {tag.rpartition("}")[2] for tag in tags}
     if root is None or root.tag not in ("robot", "mujoco") or not children:
         return path.suffix.lower() != ".xml"
     if _is_mjcf(root):
@@ -96,12 +102,8 @@ def _is_robot(path: Path, root: "etree._Element | None") -> bool:
 
 def _included_files(path: Path, root: "etree._Element | None") -> set[str]:
     """Return the real paths of the files that a file includes."""
-    elements = [] if root is None else [e for e in root.iter("*") if _local_name(e) == "include"]
+    elements = () if root is None else root.iter("{*}include")
     names = [element.get("filename") or element.get("file") or "" for element in elements]
     resolver = PackageResolver(path, {})
     paths = (resolver.resolve(name.replace("$(dirname)/", ""))[0] for name in names)
     return {os.path.realpath(path) for path in paths}  # Path.resolve rejects loops of links
-
-
-def _local_name(element: "etree._Element") -> str:
-    return str(element.tag).rpartition("}")[2]

@@ -171,7 +171,8 @@ class EpisodeEnv(LeggedEnv):
         )
         ground = load_terrain(terrain, task.terrain.collision)
         super().__init__(task, Robot.load(registered.folder), ground)
-        self.final, self.final_qpos = self.policy_observations(), self.sim.qpos
+        self.final = self._before_reset = self.policy_observations()
+        self.final_qpos = self.sim.qpos
         self._renderer = PoseRenderer(self.scene.model) if render_mode else None
 
     def start(self, rng: np.random.Generator, seed: int | None) -> FloatArray:
@@ -196,13 +197,10 @@ class EpisodeEnv(LeggedEnv):
 
         Observations are those after resets; `final` has those before, and `final_qpos` the poses.
         """
-        self._before_reset: FloatArray | None = None
         self.final_qpos = self.sim.qpos
         _, rewards, dones, extras = self.step(torch.as_tensor(actions, dtype=torch.float32))
         observations, ended = self.policy_observations(), dones.numpy()
-        self.final = observations.copy()
-        if self._before_reset is not None:
-            self.final[ended] = self._before_reset[ended]
+        self.final = np.where(ended[:, None], self._before_reset, observations)
         return observations, rewards.numpy(), ended, extras["time_outs"].numpy()
 
     def render(self, poses: FloatArray) -> tuple[Frame, ...] | None:

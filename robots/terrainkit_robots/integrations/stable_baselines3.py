@@ -1,6 +1,5 @@
 """Tasks as environments of Stable-Baselines3."""
 
-import time
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,27 +12,31 @@ from terrainkit_robots.rendering.child_process import Frame
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
 try:
-    from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 except ModuleNotFoundError as error:
     raise missing("Stable-Baselines3", "pip install stable-baselines3") from error
 
 
-class Sb3VecEnvWrapper(VecEnv):
+class Sb3VecEnvWrapper(VecMonitor):
     """A :class:`TaskVectorEnv` as a `VecEnv` of Stable-Baselines3.
 
     An environment is reset in the step that ends its episode. The info of that step has the last
-    observation as `terminal_observation`, `TimeLimit.truncated`, and the statistics of a `Monitor`
-    as `episode`: return `r`, length `l` in steps, and time `t` [s].
+    observation as `terminal_observation`, `TimeLimit.truncated`, and the statistics of a
+    `VecMonitor` as `episode`: return `r`, length `l` in steps, and time `t` [s].
     """
 
     def __init__(self, env: TaskVectorEnv) -> None:
         """Wrap the environment, which needs a reset before the first step."""
-        self.env, n = env, env.num_envs
-        super().__init__(n, env.single_observation_space, env.single_action_space)
+        super().__init__(_TaskVecEnv(env))
+
+
+class _TaskVecEnv(VecEnv):
+    """A :class:`TaskVectorEnv` as a `VecEnv`, without statistics."""
+
+    def __init__(self, env: TaskVectorEnv) -> None:
+        self.env = env
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
         self.metadata["render_fps"] = env.metadata["render_fps"]
-        self._returns, self._lengths = np.zeros(n), np.zeros(n, np.int64)
-        self._start_time = time.time()
 
     def reset(self) -> FloatArray:
         """Start an episode in each environment; the first seed of `seed` determines all of them.
@@ -43,7 +46,6 @@ class Sb3VecEnvWrapper(VecEnv):
         """
         observations, _ = self.env.reset(seed=self._seeds[0])
         self._reset_seeds()  # each seed is used once
-        self._returns[:] = self._lengths[:] = 0
         return observations
 
     def step_async(self, actions: FloatArray) -> None:
@@ -53,18 +55,13 @@ class Sb3VecEnvWrapper(VecEnv):
     def step_wait(self) -> tuple[FloatArray, FloatArray, BoolArray, list[dict[str, Any]]]:
         """Apply the stored actions, and return observations (n, k), rewards, dones and infos."""
         observations, rewards, terminated, truncated, extras = self.env.step(self._actions)
-        self._returns += rewards
-        self._lengths += 1
         dones = terminated | truncated
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for index in np.flatnonzero(dones):
-            episode = {"r": float(self._returns[index]), "l": int(self._lengths[index])}
             infos[index] = {
                 "terminal_observation": extras["final_obs"][index],
                 "TimeLimit.truncated": bool(truncated[index]),
-                "episode": episode | {"t": round(time.time() - self._start_time, 6)},
             }
-        self._returns[dones] = self._lengths[dones] = 0
         return observations, rewards, dones, infos
 
     def get_images(self) -> Sequence[Frame | None]:
@@ -98,5 +95,6 @@ class Sb3VecEnvWrapper(VecEnv):
         return [result for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: Any = None) -> list[bool]:
-        """Return True for `Monitor`, whose statistics the infos have, and False for others."""
-        return [wrapper_class is Monitor for _ in self._get_indices(indices)]
+        """Return False, since there are no single environments that a wrapper could be around."""
+        del wrapper_class
+        return [False for _ in self._get_indices(indices)]

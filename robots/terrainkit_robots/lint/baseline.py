@@ -24,21 +24,15 @@ import msgspec
 
 from terrainkit.errors import ConfigError
 from terrainkit.files.atomic_write import atomic_write
+from terrainkit_robots.description.package_resolver import exists
 from terrainkit_robots.description.xml.document import read_bytes
-from terrainkit_robots.lint.report.escape import escape_surrogates
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report, Skipped
+from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import count, display_path, names
 
 Entries = Mapping[str, Sequence[str]]
 """Subjects of the accepted findings of a robot, by code of the rule."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Accepted(Skipped):
-    """A finding that the baseline file records."""
-
-    finding: Finding
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +62,9 @@ class Baseline:
             ConfigError: if the file has another format.
         """
         try:
-            content = msgspec.json.decode(read_bytes(path), type=_Content)
-        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+            # msgspec.json rejects file names that are not valid text.
+            content = msgspec.convert(json.loads(read_bytes(path)), type=_Content)
+        except (msgspec.MsgspecError, ValueError, RecursionError) as error:
             expected = "expected a file written by --write-baseline"
             raise ConfigError(f"baseline {path}: {error}; {expected}") from error
         return cls(path=path, robots=content.robots)
@@ -87,7 +82,7 @@ class Baseline:
         files that do not exist are removed.
         """
         folder = self.path.parent
-        robots = {key: value for key, value in self.robots.items() if (folder / key).exists()}
+        robots = {key: value for key, value in self.robots.items() if exists(folder / key)}
         for report in reports:
             key = self._key(report)
             entries = {c: v for c, v in robots.get(key, {}).items() if c not in report.completed}
@@ -103,31 +98,22 @@ class Baseline:
         """
         entries = self.robots.get(self._key(report), {})
         recorded = Counter((code, subject) for code in entries for subject in entries[code])
-        found = _counts(report)
-        kept: list[Finding] = []
-        accepted: list[Finding] = []
-        for finding in report.findings:
-            key = _key(finding)
-            is_known = finding.severity != "note" and found[key] <= recorded[key]
-            (accepted if is_known else kept).append(finding)
-        file = display_path(self.path)
-        reason = f"{count(len(accepted), 'finding')} accepted in {file}"
-        unused = _group(key for key in (recorded - found) if key[0] in report.completed)
-        return replace(
-            report,
-            findings=tuple(kept),
-            skipped=(
-                *report.skipped,
-                *(
-                    Accepted(code=f.code, kind="accepted", reason=reason, finding=f)
-                    for f in accepted
-                ),
-                *(
-                    Skipped(code=c, kind="unused", reason=f"no longer needed in {file}: {names(s)}")
-                    for c, s in unused.items()
-                ),
-            ),
-        )
+        found, file = _counts(report), display_path(self.path)
+        known = {key for key in found if found[key] <= recorded[key]}
+        reason = f"{count(sum(found[key] for key in known), 'finding')} accepted in {file}"
+        kept, skipped = list[Finding](), list(report.skipped)
+        for each in report.findings:
+            if each.severity != "note" and (each.code, each.subject) in known:
+                skipped.append(
+                    Suppressed(code=each.code, kind="suppressed", reason=reason, finding=each)
+                )
+            else:
+                kept.append(each)
+        unused = _group(key for key in recorded - found if key[0] in report.completed)
+        for code, subjects in unused.items():
+            reason = f"no longer needed in {file}: {names(subjects)}"
+            skipped.append(Skipped(code=code, kind="unused", reason=reason))
+        return replace(report, findings=tuple(kept), skipped=tuple(skipped))
 
     def _key(self, report: Report) -> str:
         """Return the robot file relative to the folder of the baseline, with forward slashes."""
@@ -136,7 +122,7 @@ class Baseline:
             relative = os.path.relpath(file, folder)
         except ValueError:  # on another drive of Windows
             relative = str(file)
-        return escape_surrogates(Path(relative).as_posix())
+        return Path(relative).as_posix()
 
 
 def _group(keys: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
@@ -149,8 +135,4 @@ def _group(keys: Iterable[tuple[str, str]]) -> dict[str, list[str]]:
 
 def _counts(report: Report) -> Counter[tuple[str, str]]:
     """Return the number of errors and warnings by code and subject. Notes need no acceptance."""
-    return Counter(_key(finding) for finding in report.findings if finding.severity != "note")
-
-
-def _key(finding: Finding) -> tuple[str, str]:
-    return finding.code, escape_surrogates(finding.subject)
+    return Counter((f.code, f.subject) for f in report.findings if f.severity != "note")

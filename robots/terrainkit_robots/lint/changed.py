@@ -9,13 +9,17 @@ from terrainkit_robots.description.robot_folder import robot_files
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.lint.settings import Settings, read_settings
 
+_UNKNOWN = {"XML005": ".xacro", "XML012": ".xml"}
+"""Problems of included files, and the suffix of the files that may be included."""
+
 
 def changed_robots(
     changed: Iterable[Path], settings: Settings, folder: Path = Path()
 ) -> tuple[Path, ...]:
     """Return the robot files in a folder and its subfolders that read one of the changed files.
 
-    A robot that xacro cannot expand is returned if any xacro file changes.
+    A robot that xacro cannot expand is returned if any xacro file changes, and one with an invalid
+    include of MJCF if any .xml file changes.
 
     Args:
         changed: Files of any kind. They need not exist.
@@ -38,8 +42,9 @@ def _reads_any(robot: Path, files: Set[str], settings: Settings) -> bool:
         model = load_robot(robot, packages=packages, xacro_arguments=arguments)
     except RobotFileError:
         return os.path.realpath(robot) in files
-    # Nobody knows what a file includes that xacro cannot expand, such as without an argument.
-    if any(p.code == "XML005" for p in model.problems) and any(f.endswith(".xacro") for f in files):
+    # Nobody knows what a file includes that xacro cannot expand, or what a missing file was.
+    unknown = tuple(_UNKNOWN[p.code] for p in model.problems if p.code in _UNKNOWN)
+    if any(file.endswith(unknown) for file in files):
         return True
     shapes = (shape for link in model.links for shape in (*link.visuals, *link.collisions))
     meshes = (shape.mesh.path for shape in shapes if shape.mesh is not None)

@@ -13,15 +13,7 @@ Verdict = Literal["pass", "warn", "fail"]
 
 
 SkipKind = Literal[
-    "cannot-check",
-    "no-legs",
-    "no-input",
-    "truncated",
-    "crashed",
-    "ignored",
-    "suppressed",
-    "accepted",
-    "unused",
+    "cannot-check", "no-legs", "no-input", "truncated", "crashed", "ignored", "suppressed", "unused"
 ]
 """Why a rule or a finding is not in the report:
 
@@ -31,8 +23,7 @@ SkipKind = Literal[
 - `truncated`: only the first findings of the rule are reported.
 - `crashed`: the rule raised an unexpected exception.
 - `ignored`: the settings ignore the rule.
-- `suppressed`: a comment in the file suppresses the finding.
-- `accepted`: the baseline file records the finding.
+- `suppressed`: a comment in the file suppresses the finding, or the baseline file records it.
 - `unused`: a suppression comment or an entry of the baseline file has no effect.
 """
 

@@ -17,10 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Suppressed(Skipped):
-    """A finding that is suppressed by a comment in the file."""
+    """A finding that is suppressed by a comment in the file, or recorded in the baseline file."""
 
     finding: Finding
-    comment: SuppressionComment
+    comment: SuppressionComment | None = None
+    """None for a finding in the baseline file."""
 
 
 def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:

@@ -61,9 +61,8 @@ def _run_child(
     # MuJoCo may write a log into its working directory, which is therefore a temporary one.
     with tempfile.TemporaryDirectory(prefix="terrainkit-", ignore_cleanup_errors=True) as folder:
         Path(folder, "request").write_bytes(pickle.dumps((render, inputs is not None)))
-        pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
-        if inputs is not None:
-            pipes["stdin"] = subprocess.PIPE
+        pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        pipes["stderr"] = subprocess.DEVNULL
         process = subprocess.Popen(command, env=environment, cwd=folder, **pipes)
         try:
             while isinstance(message := _next_message(process, inputs), np.ndarray):

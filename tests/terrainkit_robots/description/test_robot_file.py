@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 from terrainkit_robots import check_robot, load_robot
-from terrainkit_robots.description import robot_file
 from terrainkit_robots.description.robot_file import find_robot, is_description
 from terrainkit_robots.description.xml.document import RobotFileError
 
@@ -44,7 +43,8 @@ def published(tmp_path_factory, monkeypatch) -> Path:
     monkeypatch.setenv("GIT_CONFIG_COUNT", "1")
     monkeypatch.setenv("GIT_CONFIG_KEY_0", f"url.{cache}/none/.insteadOf")
     monkeypatch.setenv("GIT_CONFIG_VALUE_0", "https://github.com/")
-    robot_file._find_description.cache_clear()
+    for name in [name for name in sys.modules if name.startswith("robot_descriptions.")]:
+        monkeypatch.delitem(sys.modules, name)
     return cache
 
 

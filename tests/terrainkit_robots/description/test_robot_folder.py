@@ -50,6 +50,13 @@ def test_robot_files_finds_robots(folder):
     assert found == sorted(ROBOTS)
 
 
+def test_robot_files_does_not_count_other_files(folder, monkeypatch):
+    monkeypatch.setattr(robot_folder, "MAX_FILES", 30)
+    for k in range(31):
+        (folder / f"{k}.png").touch()
+    assert len(robot_files(folder)) == len(ROBOTS)
+
+
 def test_robot_files_limits_number(folder, monkeypatch):
     monkeypatch.setattr(robot_folder, "MAX_FILES", 9)
     with pytest.raises(RobotFileError, match="got more than 9 files"):

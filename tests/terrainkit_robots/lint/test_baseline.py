@@ -3,7 +3,7 @@ import json
 import pytest
 
 from terrainkit.errors import TerrainkitError
-from terrainkit_robots.lint.baseline import Accepted, Baseline
+from terrainkit_robots.lint.baseline import Baseline
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.report import FORMATS, to_text
 from terrainkit_robots.lint.settings import Settings
@@ -52,9 +52,9 @@ def test_baseline_accepts_recorded_findings_only(robot, file):
     baseline = record(file, check(robot("a", "b")))
     report = baseline.accept(check(robot("a", "b", "new", before="<!-- moved -->\n\n")))
     assert subjects(report) == ["new"]
-    assert [each.finding.subject for each in report.skipped if isinstance(each, Accepted)] == [
-        "a",
-        "b",
+    assert [(each.kind, each.finding.subject) for each in report.skipped] == [
+        ("suppressed", "a"),
+        ("suppressed", "b"),
     ]
     assert report.verdict == "fail"
     assert baseline.accept(check(robot("a", "b"))).verdict == "pass"
@@ -74,7 +74,7 @@ def test_baseline_does_not_depend_on_working_directory(robot, file, tmp_path, mo
     monkeypatch.chdir(tmp_path / "robots")
     report = baseline.accept(check("arm.urdf"))
     assert subjects(report) == []
-    assert [each.kind for each in report.skipped] == ["accepted"]
+    assert [each.kind for each in report.skipped] == ["suppressed"]
 
 
 def test_baseline_reports_recorded_finding_that_was_fixed(robot, file, monkeypatch):
@@ -108,6 +108,17 @@ def test_baseline_update_keeps_what_was_not_checked(robot, file):
     assert record(file, check(second, "XML")).robots == {"robots/2.urdf": {"INR002": ["b"]}}
     second.unlink()
     assert record(file).robots == {}
+
+
+def test_baseline_update_keeps_file_names_that_are_not_text(robot, file):
+    path = robot("a", name="arm \udcff\\udcff.urdf")
+    record(file, check(path))
+    content = json.loads(file.read_text())
+    content["robots"] |= {"x" * 300: {"INR002": ["a"]}, "gone\0.urdf": {"INR002": ["a"]}}
+    file.write_text(json.dumps(content))
+    baseline = record(file)  # without a check of the robot
+    assert list(baseline.robots) == ["robots/arm \udcff\\udcff.urdf"]
+    assert baseline.accept(check(path)).verdict == "pass"
 
 
 @pytest.mark.parametrize("format", FORMATS)

@@ -11,20 +11,13 @@ from collections.abc import Callable, Sequence
 
 from terrainkit_robots.lint.runner import Report
 
-_MODULES = {
-    "text": "text",
-    "json": "json_report",
-    "sarif": "sarif",
-    "github": "github",
-    "markdown": "markdown",
-}
-
-FORMATS = tuple(_MODULES)
+FORMATS = ("text", "json", "sarif", "github", "markdown")
 """Names of the formats."""
 
 
 def to_text(reports: Sequence[Report], format: str) -> str:  # noqa: A002 (as the option is called)
     """Return `reports` in one of FORMATS. The text ends with a newline unless it is empty."""
-    module = importlib.import_module(f"{__name__}.{_MODULES[format]}")
+    name = "json_report" if format == "json" else format
+    module = importlib.import_module(f"{__name__}.{name}")
     format_module: Callable[[Sequence[Report]], str] = module.to_text
     return format_module(reports)

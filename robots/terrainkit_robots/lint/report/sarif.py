@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote_from_bytes
 
-from terrainkit_robots.lint.baseline import Accepted
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import to_json
 from terrainkit_robots.lint.rule import FAMILIES, Finding, Rule, rules
@@ -37,13 +36,11 @@ def _run(reports: Sequence[Report]) -> dict[str, Any]:
     for report in reports:
         results += [_result(finding, index) for finding in report.findings]
         for skipped in report.skipped:
-            if isinstance(skipped, Suppressed | Accepted):
-                results.append(
-                    {
-                        **_result(skipped.finding, index),
-                        "suppressions": [_suppression(skipped)],
-                    }
-                )
+            if isinstance(skipped, Suppressed):
+                comment = skipped.comment
+                source = {"kind": "inSource" if comment else "external"}
+                source["justification"] = comment.reason if comment else skipped.reason
+                results.append({**_result(skipped.finding, index), "suppressions": [source]})
             else:
                 notifications.append(_notification(skipped, report.facts.model.file))
     driver = {"name": "terrainkit", "version": __version__, "rules": [_rule(r) for r in rules()]}
@@ -83,12 +80,6 @@ def _result(finding: Finding, index: dict[str, int]) -> dict[str, Any]:
         "locations": [_location(finding.file, finding.line, finding.subject)],
         "properties": dict(_properties(finding)),
     }
-
-
-def _suppression(skipped: Suppressed | Accepted) -> dict[str, str]:
-    if isinstance(skipped, Suppressed):
-        return {"kind": "inSource", "justification": skipped.comment.reason}
-    return {"kind": "external", "justification": skipped.reason}
 
 
 def _properties(finding: Finding) -> Iterator[tuple[str, Any]]:

@@ -59,15 +59,15 @@ def group_skipped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
     entry.
     """
     reasons: dict[tuple[SkipKind, str], dict[str, None]] = {}
-    suppressed: dict[object, list[Suppressed]] = {}
+    suppressed: dict[tuple[object, str], list[Suppressed]] = {}
     for each in skipped:
-        if isinstance(each, Suppressed):
-            suppressed.setdefault(each.comment, []).append(each)
+        if isinstance(each, Suppressed) and each.comment:
+            suppressed.setdefault((each.comment, each.comment.reason), []).append(each)
         else:
             reasons.setdefault((each.kind, each.reason), {})[each.code] = None
-    for members in suppressed.values():
+    for (_, why), members in suppressed.items():
         subjects = names(each.finding.subject for each in members)
-        reason = f"suppressed for {subjects}: {members[0].comment.reason}"
+        reason = f"suppressed for {subjects}: {why}"
         reason = members[0].reason if len(members) == 1 else reason
         reasons.setdefault(("suppressed", reason), {})[members[0].code] = None
     entries = []

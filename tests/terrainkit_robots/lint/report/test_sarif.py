@@ -7,9 +7,9 @@ from urllib.parse import unquote_to_bytes
 import jsonschema
 import pytest
 
-from terrainkit_robots.lint.baseline import Accepted
 from terrainkit_robots.lint.report.sarif import to_text, uri
 from terrainkit_robots.lint.rule import rules
+from terrainkit_robots.lint.selection import Suppressed
 
 SCHEMA = json.loads((Path(__file__).parent / "sarif-2.1.0.schema.json").read_text())
 
@@ -94,7 +94,7 @@ def test_suppressed_finding_is_a_suppressed_result(report):
 
 
 def test_accepted_finding_is_a_suppressed_result(report, finding):
-    accepted = Accepted(code="INR002", kind="accepted", reason="1 finding", finding=finding())
+    accepted = Suppressed(code="INR002", kind="suppressed", reason="1 finding", finding=finding())
     last = document(replace(report, skipped=(accepted,)))["runs"][0]["results"][-1]
     assert last["ruleId"] == "INR002"
     assert last["suppressions"] == [{"kind": "external", "justification": "1 finding"}]
