@@ -33,8 +33,12 @@ EQUIVALENT = Path(__file__).parent / "mutation/equivalent.toml"
 STAGES = ("mirrored tests", "package", "suite")
 """Tests that run, in this order, until a change is noticed."""
 
-RULE_CASES = Path("tests/terrainkit_robots/lint/test_every_rule.py")
-"""Runs the cases of all rules, so it mirrors each rule."""
+_EVERY = {
+    "rules": Path("tests/terrainkit_robots/lint/test_every_rule.py"),
+    "terrains": Path("tests/terrainkit/test_every_terrain.py"),
+    "overlays": Path("tests/terrainkit/test_every_overlay.py"),
+}
+"""Tests that run for each module of a folder, so that they mirror it as well."""
 
 _SPLIT = {"lint"}
 """Packages that are counted by their subpackages."""
@@ -233,8 +237,7 @@ def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:
     nearest = next(each for each in folders if (tree.folder / each).is_dir())
     names = [nearest / f"test_{name}.py" for name in (path.stem, path.parent.name)]
     mirrored = [name for name in names if (tree.folder / name).exists()][:1]
-    if "rules" in parts:
-        mirrored.append(RULE_CASES)
+    mirrored += [file for folder, file in _EVERY.items() if folder in parts]
     module = ".".join((*parts, path.stem))
 
     def rank(file: Path) -> tuple[bool, bool, Path]:
