@@ -36,6 +36,7 @@ STAGES = ("mirrored tests", "package", "suite")
 _EVERY = {
     "rules": Path("tests/terrainkit_robots/lint/test_every_rule.py"),
     "terrains": Path("tests/terrainkit/test_every_terrain.py"),
+    "features": Path("tests/terrainkit/test_every_terrain.py"),
     "overlays": Path("tests/terrainkit/test_every_overlay.py"),
 }
 """Tests that run for each module of a folder, so that they mirror it as well."""

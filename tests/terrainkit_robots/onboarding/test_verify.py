@@ -9,7 +9,9 @@ def test_robot_that_cannot_be_simulated_is_not_stable(monkeypatch, tmp_path):
         raise CannotCheckError("too many contacts")
 
     monkeypatch.setattr(standing, "stand_test", fail)
-    checks = onboard(QUADRUPED, tmp_path / "robot", OnboardOptions(render_images=False)).verification
+    checks = onboard(
+        QUADRUPED, tmp_path / "robot", OnboardOptions(render_images=False)
+    ).verification
     assert checks.standing is None
     assert checks.failures == ("it could not be simulated: too many contacts",)
     assert not checks.is_stable

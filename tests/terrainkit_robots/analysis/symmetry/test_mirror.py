@@ -64,6 +64,17 @@ def test_link_of_a_chain_is_no_mirror_image():
     assert pairs(chain) == []
 
 
+@pytest.mark.parametrize(
+    ("kind", "sign"), [("continuous", 1), ("prismatic", 0), ("fixed", None), ("planar", 0)]
+)
+def test_joints_of_two_kinds_do_not_mirror_each_other(kind, sign):
+    arms = facts(
+        ("trunk", "left_arm", "0 0.2 0", "0 1 0"), ("trunk", "right_arm", "0 -0.2 0", "0 1 0", kind)
+    )
+    expected = [] if sign is None else [("left_arm", "right_arm", sign)]
+    assert pairs(arms) == expected
+
+
 def test_side_without_a_counterpart_has_no_mirror_image():
     one_arm = facts(
         ("trunk", "left_arm", "0 0.2 0", "0 1 0"), ("trunk", "neck", "0 0 0.3", "0 0 1")

@@ -374,3 +374,4 @@ def test_wide_encodings_are_read_in_their_byte_order(encoding):
     problem = parse_xml(Path("robot.urdf"), data).problems[0]
     assert (problem.code, problem.details["text"]) == ("XML009", text)
     assert problem.details["bytes"] == str(len(data))
+    assert f"encoded as {encoding[:6].upper()}, " in problem.message
