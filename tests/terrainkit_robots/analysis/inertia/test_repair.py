@@ -144,7 +144,7 @@ BOX = dict(zip(NAMES, (0.00441305, 0.00446640, 0.00016860, 0.0, 0.0, 0.0), stric
 @pytest.mark.parametrize("right_mass", ["1.152", "1.13"])
 def test_urdf_fix_mirrors_the_signs_of_products(right_mass):
     taken, values = urdf_fix({"iyy": -0.0058}, right_mass=right_mass)
-    assert taken == "that of its mirror image."
+    assert taken == "the inertia of its mirror image."
     assert values == pytest.approx(MIRRORED)
 
 
@@ -159,14 +159,14 @@ def test_urdf_fix_mirrors_the_signs_of_products(right_mass):
 )
 def test_urdf_fix_takes_no_invalid_mirror_image(right, mass):
     taken, values = urdf_fix({"ixx": 0.0075}, right, mass)
-    assert taken == "the nearest physical one."
+    assert taken == "the nearest physical inertia."
     assert values["ixx"] == pytest.approx(0.0075, rel=0.1)
 
 
 @pytest.mark.parametrize("left", [dict.fromkeys(NAMES, 0), {"ixx": 5}])
 def test_urdf_fix_takes_the_box_of_the_shapes_at_last(left):
     taken, values = urdf_fix(left, {"izz": 0.5})
-    assert taken == "that of a solid box around the body."
+    assert taken == "the inertia of a solid box around the body."
     assert values == pytest.approx(BOX, rel=1e-3, abs=1e-9)
 
 

@@ -7,8 +7,8 @@ from terrainkit_robots.description.load import load_robot
 
 FILE = Path("/robots/robot.xml")
 ROBOT = """<mujoco><asset><material name="m"/></asset><worldbody>{ground}
-<body name="b"><joint name="j"/><geom name="g" size="1"{geom}/><site name="s"/><body name="c"><joint name="k"/>
-<geom name="h" size="1"/></body></body></worldbody>
+<body name="b"><joint name="j"/><geom name="g" size="1"{geom}/><site name="s"/>
+<body name="c"><joint name="k"/><geom name="h" size="1"/></body></body></worldbody>
 <tendon><fixed name="t"><joint joint="j" coef="1"/></fixed>{tendon}</tendon>
 <{section}>{element}</{section}></mujoco>"""
 
