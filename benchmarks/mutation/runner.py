@@ -114,7 +114,7 @@ class Tree:
     def covering(self, test_file: Path, path: Path, lines: range) -> set[str] | None:
         """Return the tests that execute one of the lines, or without any, a function of the file.
 
-        None stands for all tests of the file: a fixture or an import executed the line.
+        None stands for all tests of the file: a fixture or an import executed the lines.
         """
         from coverage import CoverageData
 
@@ -123,7 +123,9 @@ class Tree:
         data.read()
         by_line = data.contexts_by_lineno(str(path))
         tests = {name for each in lines or by_line for name in by_line.get(each, ()) if name}
-        if any(name.endswith("|setup") for name in tests):
+        has_functions = b"def " in (self.folder / path).read_bytes()
+        is_imported = bool(by_line) and not lines and not has_functions
+        if is_imported or any(name.endswith("|setup") for name in tests):
             return None
         return tests
 
