@@ -1,6 +1,7 @@
 """A pool of processes for a command."""
 
 import signal
+import sys
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING
 
@@ -14,10 +15,13 @@ def worker_pool(jobs: int) -> "AbstractContextManager[Executor | None]":
         return nullcontext()
     from concurrent.futures import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(jobs, initializer=_reset_signals)
+    return ProcessPoolExecutor(jobs, initializer=_start_worker)
 
 
-def _reset_signals() -> None:
+def _start_worker() -> None:
     """Leave the reaction to Ctrl-C to the main process; end quietly on SIGTERM."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    if opencv := sys.modules.get("cv2"):
+        # A forked process has no threads of the main process: OpenCV 4.10 was once seen waiting for them.
+        opencv.setNumThreads(0)

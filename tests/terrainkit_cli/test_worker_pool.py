@@ -1,5 +1,8 @@
 import os
 
+import cv2
+import numpy as np
+
 from terrainkit_cli.worker_pool import worker_pool
 
 
@@ -11,3 +14,9 @@ def test_worker_pool_of_one_is_this_process():
 def test_worker_pool_runs_other_processes():
     with worker_pool(2) as executor:
         assert executor.submit(os.getpid).result() != os.getpid()
+
+
+def test_worker_pool_does_not_wait_for_threads_of_opencv():
+    cv2.distanceTransform(np.ones((2000, 2000), np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    with worker_pool(2) as executor:
+        assert executor.submit(cv2.getNumThreads).result() == 1
