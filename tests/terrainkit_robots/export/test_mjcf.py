@@ -42,7 +42,7 @@ def test_masses_and_inertias(quadruped):
             turn @ np.diag(body.inertia) @ turn.T,
             origin @ declared.inertia @ origin.T,
             rtol=1e-6,
-            atol=1e-12,
+            atol=1e-7,  # MuJoCo before 3.14 diagonalizes with an error of 5e-8
         )
 
 
