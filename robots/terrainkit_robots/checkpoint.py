@@ -50,7 +50,9 @@ def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
     data = io.BytesIO()  # torch itself aborts the process on a full disk
     torch.save({"format": "terrainkit checkpoint", "version": 1, **state}, data)
     with atomic_write(path, overwrite=True) as target:
-        target.write_bytes(data.getbuffer())
+        # Not `getbuffer`: the traceback of an error would keep the view, and Python 3.12 crashes
+        # when it then collects the buffer.
+        target.write_bytes(data.getvalue())
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:
