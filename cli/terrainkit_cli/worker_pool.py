@@ -23,5 +23,5 @@ def _start_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if opencv := sys.modules.get("cv2"):
-        # A forked process has no threads of the main process: OpenCV 4.10 was once seen waiting for them.
+        # A forked process lacks the threads of the main process. OpenCV 4.10 once waited for them.
         opencv.setNumThreads(0)
