@@ -21,6 +21,18 @@ REAL_ROBOTS = [
 ]
 """Robot files of other projects. `robot_file` finds them, or skips the test."""
 
+BOX = """<robot name="{name}">
+  <link name="trunk">
+    <inertial>
+      <mass value="{mass}"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
+  </link>
+</robot>
+"""
+"""The URDF of a robot with one link, with a name and a mass [kg] to fill in."""
+
 ARM = """<robot name="arm">
   <link name="stand"><inertial><mass value="5"/>
     <inertia ixx="0.05" iyy="0.05" izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial>

@@ -13,23 +13,13 @@ import yaml
 
 from terrainkit_cli.main import main
 from terrainkit_cli.robot_commands import CheckRobot
+from tests.robots import BOX
 
 ROOT = Path(__file__).parent.parent
 WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
 HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
 PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-
-ROBOT = """<robot name="{name}">
-  <link name="trunk">
-    <inertial>
-      <mass value="{mass}"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
-    </inertial>
-    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
-  </link>
-</robot>
-"""
 
 
 def steps(workflow):
@@ -119,11 +109,11 @@ def repository(tmp_path):
 
     git("init", "--initial-branch", "main")
     for name, mass in {"old bad": -1, "new": 1, "good": 1}.items():
-        (folder / "robots" / f"{name}.urdf").write_text(ROBOT.format(name=name[:3], mass=mass))
+        (folder / "robots" / f"{name}.urdf").write_text(BOX.format(name=name[:3], mass=mass))
     git("add", ".")
     git("commit", "--message", "first")
     git("switch", "--create", "feature")
-    (folder / "robots/new.urdf").write_text(ROBOT.format(name="new", mass=-3))
+    (folder / "robots/new.urdf").write_text(BOX.format(name="new", mass=-3))
     git("commit", "--all", "--message", "second")
     git("switch", "main")
     git("merge", "--no-ff", "feature")
@@ -275,7 +265,7 @@ def test_page_baseline_commands_write_the_example(repository, monkeypatch, capsy
     for path in Path("robots").iterdir():
         path.unlink()
     Path("robots/arm.urdf").write_text(
-        ROBOT.format(name="arm", mass=-1).replace("trunk", "upper_link")
+        BOX.format(name="arm", mass=-1).replace("trunk", "upper_link")
     )
     (commands,), (example,) = blocks("sh"), blocks("json")
     for line in commands.splitlines():

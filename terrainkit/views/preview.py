@@ -171,10 +171,21 @@ def shaded_relief(heights: NDArray[np.float32], cell: float) -> Picture:
     light = LIGHT / np.linalg.norm(LIGHT)
     steepness = np.sqrt(slope_x**2 + slope_y**2 + 1)
     shade = (light[2] - light[0] * slope_x - light[1] * slope_y) / steepness / light[2]
-    relief: Picture = np.clip(
-        height_colors(heights) * np.clip(shade, MIN_SHADE, MAX_SHADE)[..., None], 0, 255
-    ).astype(np.uint8)
-    return relief
+    return shaded_colors(height_colors(heights), shade).astype(np.uint8)
+
+
+def shaded_colors(colors: NDArray[np.floating], shade: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Return colors at a brightness.
+
+    Args:
+        colors: Red, green and blue, 0 to 255, shape (..., 3) or (3,).
+        shade: Brightness relative to level ground, shape (...).
+
+    Returns:
+        Red, green and blue, 0 to 255, shape (..., 3).
+    """
+    brightness = np.clip(shade, MIN_SHADE, MAX_SHADE)[..., None]
+    return np.asarray(np.clip(colors * brightness, 0, 255))
 
 
 def height_colors(heights: NDArray[np.floating]) -> NDArray[np.float64]:

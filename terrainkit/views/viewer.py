@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.views.preview import (
     LIGHT,
-    MAX_SHADE,
-    MIN_SHADE,
     height_colors,
     map_title,
+    shaded_colors,
     shaded_relief,
 )
 
@@ -178,9 +177,8 @@ def triangle_colors(
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    shade = np.clip(normals @ LIGHT / LIGHT[2], MIN_SHADE, MAX_SHADE)
     level = height_colors(corners[:, :, 2].max(axis=1)) if color is None else np.array(color)
-    return np.asarray(np.clip(level * shade[:, None], 0, 255))
+    return shaded_colors(level, normals @ LIGHT / LIGHT[2])
 
 
 def _shaded_glb(

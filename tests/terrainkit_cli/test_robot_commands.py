@@ -9,18 +9,9 @@ import pytest
 from terrainkit_cli.main import main
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import rules
+from tests.robots import BOX
 
-GOOD = """<?xml version="1.0"?>
-<robot name="box">
-  <link name="trunk">
-    <inertial>
-      <mass value="1"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
-    </inertial>
-    <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
-  </link>
-</robot>
-"""
+GOOD = f'<?xml version="1.0"?>\n{BOX.format(name="box", mass=1)}'
 BAD = GOOD.replace('mass value="1"', 'mass value="-1"')
 UNNAMED = GOOD.replace(' name="box"', "")
 
