@@ -1,6 +1,5 @@
 """The terrain under the robots: its MuJoCo model, its heights, and its spawn origins."""
 
-import tempfile
 from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from terrainkit import MapConfig, TerrainMap, generate
 from terrainkit.errors import ConfigError
 from terrainkit.export.mjcf import collision_surface
 from terrainkit.geometry.surface import HeightfieldSurface
+from terrainkit.integrations.mujoco import make_spec
 from terrainkit.settings.text import closest
 from terrainkit_robots.transforms import FloatArray
 
@@ -75,10 +75,8 @@ class MapGround(Ground):
         self.surface = collision_surface(terrain_map, collision)
 
     def spec(self) -> Any:
-        """Return the map as terrainkit exports it for MuJoCo."""
-        with tempfile.TemporaryDirectory() as folder:
-            path = self.terrain_map.save(Path(folder) / "ground.xml", collision=self._collision)
-            mjspec = mujoco.MjSpec.from_file(str(path))
+        """Return the map as terrainkit makes it for MuJoCo."""
+        mjspec = make_spec(self.terrain_map, collision=self._collision)
         for goal in mjspec.sites:  # every step would compute their positions
             mjspec.delete(goal)
         _add_material(mjspec)
