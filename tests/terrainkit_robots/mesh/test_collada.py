@@ -47,46 +47,41 @@ def triangles(data):
 SQUARE = [[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]]
 
 
-def test_read_dae_triangles():
-    assert triangles(dae(geometry(), scene=f"<node>{INSTANCE}</node>")) == SQUARE
-
-
-def test_accessor_without_params():
-    assert triangles(dae(geometry(params=""))) == SQUARE
-
-
-def test_no_scene_includes_all_geometries():
-    assert triangles(dae(geometry(), geometry(name="h"))) == SQUARE * 2
-
-
-def test_geometry_outside_scene_is_ignored():
-    data = dae(geometry(), geometry(name="h"), scene=f"<node>{INSTANCE}</node>")
-    assert triangles(data) == SQUARE
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        pytest.param(dae(geometry(), scene=f"<node>{INSTANCE}</node>"), SQUARE, id="scene"),
+        pytest.param(dae(geometry(params="")), SQUARE, id="accessor without params"),
+        pytest.param(dae(geometry(), rest="<library_images><image/></library_images>"), SQUARE),
+        pytest.param(dae(geometry(), geometry(name="h")), SQUARE * 2, id="all without a scene"),
+        pytest.param(
+            dae(geometry(), geometry(name="h"), scene=f"<node>{INSTANCE}</node>"),
+            SQUARE,
+            id="only those of the scene",
+        ),
+    ],
+)
+def test_read_dae_triangles(data, expected):
+    assert triangles(data) == expected
 
 
 VERTEX = '<input semantic="VERTEX" source="#v" offset="0"/>'
 
 
+NORMALS = '<input semantic="NORMAL" source="#pg" offset="0"/>' + VERTEX.replace("0", "1")
+
+
 @pytest.mark.parametrize(
     "faces",
     [
-        pytest.param(
-            '<triangles><input semantic="NORMAL" source="#pg" offset="0"/>'
-            '<input semantic="VERTEX" source="#v" offset="1"/>'
-            "<p>1 0 1 1 1 2 1 0 1 2 1 3</p></triangles>",
-            id="with normals",
-        ),
-        pytest.param(
-            f"<polylist>{VERTEX}<vcount>4</vcount><p>0 1 2 3</p></polylist>", id="polylist"
-        ),
-        pytest.param(
-            f"<polylist>{VERTEX}<vcount>2 4 1</vcount><p>0 1 0 1 2 3 2</p></polylist>",
-            id="degenerate polygons",
-        ),
-        pytest.param(f"<polygons>{VERTEX}<p>0 1 2</p><p>0 2 3</p></polygons>", id="polygons"),
-        pytest.param(f"<trifans>{VERTEX}<p>0 1 2 3</p></trifans>", id="fans"),
-        pytest.param(f"<lines>{VERTEX}<p>0 1</p></lines>{TRIANGLES}", id="with lines"),
+        f"<triangles>{NORMALS}<p>1 0 1 1 1 2 1 0 1 2 1 3</p></triangles>",
+        f"<polylist>{VERTEX}<vcount>4</vcount><p>0 1 2 3</p></polylist>",
+        f"<polylist>{VERTEX}<vcount>2 4 1</vcount><p>0 1 0 1 2 3 2</p></polylist>",
+        f"<polygons>{VERTEX}<p>0 1 2</p><p>0 2 3</p></polygons>",
+        f"<trifans>{VERTEX}<p>0 1 2 3</p></trifans>",
+        f"<lines>{VERTEX}<p>0 1</p></lines>{TRIANGLES}",
     ],
+    ids=["with normals", "polylist", "degenerate polygons", "polygons", "fans", "with lines"],
 )
 def test_face_elements(faces):
     assert triangles(dae(geometry(faces))) == SQUARE
@@ -144,77 +139,43 @@ def nested_instances(levels, copies):
     return f"<library_nodes>{''.join(nodes)}</library_nodes>"
 
 
-@pytest.mark.parametrize(
-    ("data", "problem"),
-    [
-        pytest.param(b"<COLLADA><a></COLLADA>", "not well-formed", id="not well-formed"),
-        pytest.param(b"<COLLADA/>", "no geometry", id="empty"),
-        pytest.param(zipped(), "not well-formed", id="zip archive"),
-        pytest.param(
-            b'<!DOCTYPE a [<!ENTITY l "ha">]><COLLADA>&l;</COLLADA>', "document type", id="entities"
-        ),
-        pytest.param(b"<COLLADA>" + b"<a/>" * 500_001 + b"</COLLADA>", "tags", id="many tags"),
-        pytest.param(
-            dae(geometry(), scene="<node>" * 5000 + INSTANCE + "</node>" * 5000),
-            "not well-formed",
-            id="deep",
-        ),
-        pytest.param(
-            dae(geometry(), scene='<node id="n"><instance_node url="#n"/></node>'),
-            "Node #n not found",
-            id="a node in itself",
-        ),
-        pytest.param(
-            dae(
-                geometry(),
-                rest=nested_instances(levels=20, copies=10),
-                scene='<node><instance_node url="#n19"/></node>',
-            ),
-            "more than 20,000 nodes",
-            id="nested instances",
-        ),
-        pytest.param(
-            dae(geometry(), scene='<node><instance_node url="#n"/></node>' * 1001),
-            "more than 1,000 instances",
-            id="many instances of nodes",
-        ),
-        pytest.param(
-            dae(
-                geometry(TRIANGLES.replace("0 1 2 0 2 3", "0 1 2 " * 1000)),
-                scene=f"<node>{INSTANCE * 7000}</node>",
-            ),
-            "more than 6,000,000 vertices or faces",
-            id="many instances",
-        ),
-        pytest.param(dae(geometry(numbers="0 0 zero")), "cannot be read", id="words"),
-        pytest.param(dae(geometry(numbers="0 0 NaN")), "not numbers", id="NaN"),
-        pytest.param(
-            dae(geometry(TRIANGLES.replace("0 2 3", "0 2 9"))), "cannot be read", id="index"
-        ),
-        pytest.param(
-            dae(geometry(TRIANGLES.replace('offset="0"', 'offset="999999999"'))),
-            "cannot be read",
-            id="offset",
-        ),
-        pytest.param(
-            dae(geometry(), scene=f"<node><matrix>1 2</matrix>{INSTANCE}</node>"),
-            "Corrupted matrix",
-            id="matrix",
-        ),
-        pytest.param(dae(geometry(), unit='<unit meter="inf"/>'), "unit inf m", id="unit"),
-        pytest.param(
-            dae(
-                geometry(
-                    '<polylist><input semantic="VERTEX" source="#v" offset="0"/>'
-                    "<vcount>1000000000 -4</vcount><p>0 1 2</p></polylist>"
-                )
-            ),
-            "do not match",
-            id="counts",
-        ),
-        pytest.param(dae(geometry().replace("POSITION", "NORMAL")), "Bad vertices", id="positions"),
-    ],
-)
+def scene(inside, **rest):
+    return dae(geometry(), scene=f"<node>{inside}</node>", **rest)
+
+
+DEEP = "<node>" * 5000 + INSTANCE + "</node>" * 5000
+ENTITIES = b'<!DOCTYPE a [<!ENTITY l "ha">]><COLLADA>&l;</COLLADA>'
+NODE = '<instance_node url="#n"/>'
+COUNTS = f"<polylist>{VERTEX}<vcount>1000000000 -4</vcount><p>0 1 2</p></polylist>"
+MANY = TRIANGLES.replace("0 1 2 0 2 3", "0 1 2 " * 1000)
+FAR = TRIANGLES.replace('offset="0"', 'offset="999999999"')
+NESTED = scene('<instance_node url="#n19"/>', rest=nested_instances(levels=20, copies=10))
+ITSELF = dae(geometry(), scene=f'<node id="n">{NODE}</node>')
+INSTANCES = dae(geometry(MANY), scene=f"<node>{INSTANCE * 7000}</node>")
+
+BROKEN = {
+    "not well-formed": (b"<COLLADA><a></COLLADA>", "not well-formed"),
+    "empty": (b"<COLLADA/>", "no geometry"),
+    "zip archive": (zipped(), "not well-formed"),
+    "entities": (ENTITIES, "document type"),
+    "many tags": (b"<COLLADA>" + b"<a/>" * 500_001 + b"</COLLADA>", "more than 500,000 tags"),
+    "deep": (scene(DEEP), "not well-formed"),
+    "a node in itself": (ITSELF, "Node #n not found"),
+    "nested instances": (NESTED, "more than 20,000 nodes"),
+    "many instances of nodes": (scene(NODE * 1001), "more than 1,000 instances"),
+    "many instances": (INSTANCES, "more than 6,000,000 vertices or faces"),
+    "words": (dae(geometry(numbers="0 0 zero")), "cannot be read"),
+    "NaN": (dae(geometry(numbers="0 0 NaN")), "not numbers"),
+    "index": (dae(geometry(TRIANGLES.replace("0 2 3", "0 2 9"))), "cannot be read"),
+    "offset": (dae(geometry(FAR)), "cannot be read"),
+    "matrix": (scene(f"<matrix>1 2</matrix>{INSTANCE}"), "Corrupted matrix"),
+    "unit": (dae(geometry(), unit='<unit meter="inf"/>'), "unit inf m"),
+    "counts": (dae(geometry(COUNTS)), "do not match"),
+    "positions": (dae(geometry().replace("POSITION", "NORMAL")), "Bad vertices"),
+}
+
+
+@pytest.mark.parametrize(("data", "problem"), BROKEN.values(), ids=BROKEN)
 def test_read_dae_rejects_broken_files(data, problem):
     with pytest.raises(MeshError, match=problem):
         read_dae(data)
@@ -226,16 +187,3 @@ def test_external_entities_are_rejected(tmp_path):
     data = f'<!DOCTYPE a [<!ENTITY s SYSTEM "{secret}">]>'.encode() + dae(geometry(numbers="&s;"))
     with pytest.raises(MeshError, match="document type"):
         read_dae(data)
-
-
-@pytest.mark.parametrize("name", ["go2/dae/base.dae", "anymal_c/meshes/hatch.dae"])
-def test_real_files_match_trimesh(robot_file, name):
-    import trimesh
-
-    path = robot_file(name)
-    with np.errstate(all="ignore"):
-        theirs = trimesh.load(path, force="mesh")
-    surface = read_dae(path.read_bytes())
-    ours = surface.points[surface.faces].reshape(-1, 3)
-    assert len(surface.faces) == len(theirs.faces)
-    assert np.allclose([ours.min(axis=0), ours.max(axis=0)], theirs.bounds, atol=1e-6)

@@ -1,4 +1,3 @@
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh import mesh_cache as module
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.surface import Surface, binary_stl
-from tests.robots import REAL_ROBOTS
+from tests.small_robots import joint, link, shape
 
 
 def stl_of(mesh):
@@ -22,12 +21,12 @@ def stl_of(mesh):
 
 BOX = stl_of(trimesh.creation.box([1, 2, 3]))
 RING = stl_of(trimesh.creation.annulus(r_min=0.9, r_max=1.0, height=0.1))
+SQUARE = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
 
 
 def use_of(path, scale=(1.0, 1.0, 1.0)):
-    return MeshFile(
-        source=Source(file=Path("robot.urdf"), line=1), filename=path.name, path=path, scale=scale
-    )
+    source = Source(file=Path("robot.urdf"), line=1)
+    return MeshFile(source=source, filename=path.name, path=path, scale=scale)
 
 
 @pytest.fixture
@@ -41,198 +40,169 @@ def mesh(tmp_path):
     return make
 
 
-class TestVertices:
-    def test_scale_is_applied(self, mesh):
-        vertices = Meshes().vertices(mesh(scale=(1, 10, -0.1)))
-        assert vertices.dtype == np.float64
-        assert np.ptp(vertices, axis=0) == pytest.approx([1, 20, 0.3])
+def test_scale_is_applied_to_vertices(mesh):
+    meshes, use = Meshes(), mesh(scale=(1, 10, -0.1))
+    vertices = meshes.vertices(use)
+    assert vertices.dtype == np.float64
+    assert np.ptp(vertices, axis=0) == pytest.approx([1, 20, 0.3])
+    assert meshes.diagonal(use) == pytest.approx((1 + 400 + 0.09) ** 0.5)
 
-    @pytest.mark.parametrize("factor", [float("nan"), float("inf"), 1e308, 1e7])
-    def test_large_coordinates_are_rejected(self, mesh, factor):
-        use = mesh(scale=(factor, 1, 1))
-        assert not Meshes().is_readable(use)
-        with pytest.raises(MeshError, match="coordinates beyond 1,000,000 m"):
-            Meshes().vertices(use)
-        Meshes().partial_diagonal(use)  # nor does it warn
 
-    def test_missing_file(self, tmp_path):
-        use = use_of(tmp_path / "a.stl")
-        meshes = Meshes()
+@pytest.mark.parametrize("factor", [float("nan"), float("inf"), 1e308, 2e6, -2e6])
+def test_large_coordinates_are_rejected(mesh, factor):
+    use = mesh(scale=(factor, 1, 1))
+    assert not Meshes().is_readable(use)
+    with pytest.raises(MeshError, match="coordinates beyond 1,000,000 m"):
+        Meshes().vertices(use)
+    Meshes().partial_diagonal(use)  # nor does it warn
+    assert Meshes().is_readable(mesh(scale=(1.999e6, 1, 1)))  # the box has half a meter
+
+
+def test_missing_file(tmp_path):
+    use, meshes = use_of(tmp_path / "a.stl"), Meshes()
+    assert not meshes.is_readable(use)
+    assert not meshes.exists(use.path)
+    for ask in (meshes.vertices, meshes.volume, meshes.hull_volume, meshes.is_flat):
+        with pytest.raises(MeshError, match="does not exist"):
+            ask(use)
+    assert not meshes.opened
+
+
+def test_volume_of_solid_and_hull(mesh):
+    meshes, use = Meshes(), mesh(RING, scale=(2, 1, -1))
+    solid = np.pi * (1 - 0.9**2) * 0.1 * 2
+    assert meshes.volume(use) == meshes.solid_volume(use) == pytest.approx(solid, rel=0.02)
+    assert meshes.hull_volume(use) == pytest.approx(np.pi * 0.1 * 2, rel=0.02)
+
+
+def test_open_mesh_has_volume_of_hull(mesh):
+    box = trimesh.creation.box([1, 2, 3])
+    box.update_faces(np.arange(12) > 0)
+    meshes, use = Meshes(), mesh(stl_of(box))
+    assert meshes.solid_volume(use) is None
+    assert meshes.volume(use) == pytest.approx(6.0)
+
+
+def test_flat_mesh_has_no_volume(mesh):
+    meshes, use = Meshes(), mesh(SQUARE, "a.obj")
+    assert (meshes.volume(use), meshes.is_flat(use)) == (0.0, True)
+    with pytest.raises(MeshError, match="flat"):
+        meshes.hull_volume(use)
+    use = mesh(scale=(1, 0, 1))
+    assert (meshes.volume(use), meshes.is_flat(use)) == (0.0, True)
+
+
+def test_file_is_read_once(mesh):
+    meshes, use = Meshes(), mesh()
+    assert meshes.exists(use.path)
+    assert not meshes.opened
+    assert meshes.header(use.path).faces == meshes.faces(use.path) == 12
+    assert meshes.opened == {use.path: 1}
+    other = use_of(use.path, (2, 2, 2))
+    for ask in (meshes.vertices, meshes.volume, meshes.hull_volume, meshes.diagonal):
+        ask(use), ask(other), ask(use)
+    assert meshes.opened == {use.path: 2}  # its header, and all of it
+    assert meshes.vertices(use) is meshes.vertices(use)
+
+
+def test_broken_file_is_read_once(mesh):
+    meshes, use = Meshes(), mesh(b"v 0 0 x\n", "a.obj")
+    for _ in range(3):
         assert not meshes.is_readable(use)
-        assert not meshes.exists(use.path)
-        for ask in (meshes.vertices, meshes.volume, meshes.hull_volume, meshes.is_flat):
-            with pytest.raises(MeshError, match="does not exist"):
-                ask(use)
-        assert not meshes.opened
+        with pytest.raises(MeshError, match="text"):
+            meshes.volume(use)
+    assert meshes.opened == {use.path: 2}
 
 
-class TestVolume:
-    def test_solid_and_hull(self, mesh):
-        meshes, use = Meshes(), mesh(RING, scale=(2, 1, -1))
-        solid = np.pi * (1 - 0.9**2) * 0.1 * 2
-        assert meshes.volume(use) == meshes.solid_volume(use) == pytest.approx(solid, rel=0.02)
-        assert meshes.hull_volume(use) == pytest.approx(np.pi * 0.1 * 2, rel=0.02)
-
-    def test_open_mesh_has_volume_of_hull(self, mesh):
-        box = trimesh.creation.box([1, 2, 3])
-        box.update_faces(np.arange(12) > 0)
-        meshes, use = Meshes(), mesh(stl_of(box))
-        assert meshes.solid_volume(use) is None
-        assert meshes.volume(use) == pytest.approx(6.0)
-
-    def test_flat_mesh_has_no_volume(self, mesh):
-        square = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
-        meshes, use = Meshes(), mesh(square, "a.obj")
-        assert meshes.volume(use) == 0.0
-        assert meshes.is_flat(use)
-        with pytest.raises(MeshError, match="flat"):
-            meshes.hull_volume(use)
-
-    def test_zero_scale_is_flat(self, mesh):
-        meshes, use = Meshes(), mesh(scale=(1, 0, 1))
-        assert meshes.is_flat(use)
-        assert meshes.volume(use) == 0.0
+def test_given_contents_replace_files(mesh, tmp_path):
+    use = mesh(b"not an STL")
+    held = Meshes({use.path: BOX})
+    more = held.with_contents({tmp_path / "new.stl": BOX})
+    for path in (use.path, tmp_path / "new.stl", tmp_path / "x/../new.stl"):
+        assert more.volume(use_of(path)) == pytest.approx(6.0)
+        assert more.exists(path)
+        assert more.data(path) == BOX
+    assert not more.opened
+    found = [held.has_contents(tmp_path / name) for name in ("a.stl", "new.stl")]
+    assert found == [True, False]
+    assert Meshes().data(use.path) == b"not an STL"
 
 
-class TestCaching:
-    def test_file_is_read_once(self, mesh):
-        meshes, use = Meshes(), mesh()
-        other = use_of(use.path, (2, 2, 2))
-        for ask in (meshes.vertices, meshes.volume, meshes.hull_volume, meshes.diagonal):
-            ask(use), ask(other), ask(use)
-        assert meshes.opened == {use.path: 2}  # its header, and all of it
-        assert meshes.vertices(use) is meshes.vertices(use)
-
-    def test_broken_file_is_read_once(self, mesh):
-        meshes, use = Meshes(), mesh(b"v 0 0 x\n", "a.obj")
-        for _ in range(3):
-            assert not meshes.is_readable(use)
-            with pytest.raises(MeshError, match="text"):
-                meshes.volume(use)
-        assert meshes.opened == {use.path: 2}
-
-    def test_header_does_not_read_data(self, mesh):
-        meshes, use = Meshes(), mesh()
-        assert meshes.header(use.path).faces == meshes.faces(use.path) == 12
-        assert meshes.opened == {use.path: 1}
-
-    def test_exists_opens_nothing(self, mesh):
-        meshes, use = Meshes(), mesh()
-        assert meshes.exists(use.path)
-        assert not meshes.opened
+OBJ = b"".join(b"v %d 0 0\n" % x for x in range(10_000)) + b"f 1 2 10000\n"
 
 
-class TestContents:
-    def test_contents_replace_file(self, mesh, tmp_path):
-        use = mesh(b"not an STL")
-        meshes = Meshes({use.path: BOX, tmp_path / "new.stl": BOX})
-        assert meshes.volume(use) == pytest.approx(6.0)
-        assert meshes.exists(tmp_path / "new.stl")
-        assert meshes.volume(use_of(tmp_path / "x/../new.stl")) == pytest.approx(6.0)
-        assert not meshes.opened
+def dae(count, unit=b""):
+    numbers = b" ".join(b"%d 0 0" % x for x in range(count))
+    return b"<COLLADA><asset>%s</asset><float_array>%s</float_array></COLLADA>" % (unit, numbers)
 
 
-class TestPartialDiagonal:
-    OBJ = b"".join(b"v %d 0 0\n" % x for x in range(10_000)) + b"f 1 2 10000\n"
-
-    def test_first_part_of_long_file(self, mesh):
-        meshes, use = Meshes(), mesh(self.OBJ, "a.obj", (0.1, 1, 1))
-        about = meshes.partial_diagonal(use)
-        assert about is not None
-        assert 100 < about < 999.9
-        assert meshes.diagonal(use) == pytest.approx(999.9)
-        assert meshes.partial_diagonal(use) is None  # the whole is known by now
-
-    def test_too_few_vertices(self, mesh):
-        assert Meshes().partial_diagonal(mesh(self.OBJ[:100] + b"\nf 1 2 3\n", "a.obj")) is None
-
-    def test_unit_of_collada(self, mesh):
-        numbers = b" ".join(b"%d 0 0" % x for x in range(1000))
-        data = (
-            b'<COLLADA><asset><unit name="mm" meter="0.001"/></asset><float_array id="a">'
-            + numbers
-            + b"</float_array></COLLADA>"
-        )
-        assert Meshes().partial_diagonal(mesh(data, "a.dae")) == pytest.approx(0.998)
-
-    def test_stl(self, mesh):
-        assert Meshes().partial_diagonal(mesh()) == pytest.approx(14**0.5)
-
-    def test_broken_file(self, mesh):
-        assert Meshes().partial_diagonal(mesh(b"\0" * 100)) is None
-        assert Meshes().partial_diagonal(mesh(b"v a b c\n" * 50, "b.obj")) is None
+def test_first_part_of_long_file(mesh):
+    meshes, use = Meshes(), mesh(OBJ, "a.obj", (0.1, 1, 1))
+    assert 100 < meshes.partial_diagonal(use) < 999.9
+    assert meshes.diagonal(use) == pytest.approx(999.9)
+    assert meshes.partial_diagonal(use) is None  # the whole is known by now
 
 
-class TestLimits:
-    def test_file_size(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_DEFAULT_MAX_BYTES", 100)
-        with pytest.raises(TooLargeError, match="has 684 bytes; expected at most 100"):
-            Meshes().vertices(mesh())
-
-    def test_total_size(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_MAX_TOTAL_BYTES", 1000)
-        meshes = Meshes()
-        meshes.vertices(mesh())
-        with pytest.raises(TooLargeError, match="limit of 1,000 bytes"):
-            meshes.vertices(mesh(name="b.stl"))
-
-    def test_total_numbers(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_MAX_TOTAL_WORDS", 100)
-        with pytest.raises(TooLargeError, match="limit of 100 numbers"):
-            Meshes().vertices(mesh(b"v 0 0 0\n" * 50, "a.obj"))
-
-    def test_welded_faces(self, mesh, monkeypatch):
-        monkeypatch.setattr(module, "_MAX_WELDED_FACES", 10)
-        with pytest.raises(TooLargeError, match="12 faces"):
-            Meshes().solid_volume(mesh())
-        assert Meshes().hull_volume(mesh()) == pytest.approx(6.0)
+# A part has more than 20 vertices. The last one of a text may be cut off.
+@pytest.mark.parametrize(
+    ("name", "data", "diagonal"),
+    [
+        ("a.obj", OBJ[: 8 * 10 + 9 * 12], 20),
+        ("a.obj", OBJ[: 8 * 10 + 9 * 11], None),
+        ("a.dae", dae(1000, b"<unit name='mm' meter='0.001'/>"), 0.998),
+        ("a.dae", dae(22), 20),
+        ("a.dae", dae(21), None),
+        ("a.dae", b"<COLLADA></COLLADA>", None),
+        ("a.stl", BOX, 14**0.5),
+        ("a.stl", bytes(100), None),
+        ("b.obj", b"v a b c\n" * 50, None),
+        ("b.ply", BOX, None),
+    ],
+)
+def test_partial_diagonal(mesh, name, data, diagonal):
+    found = Meshes().partial_diagonal(mesh(data, name))
+    assert found == (None if diagonal is None else pytest.approx(diagonal))
 
 
-AGREED = {
-    # a mesh that is named and not there: MuJoCo does not load this file
-    ("go2_mjcf/go2.xml", "MSH001", "base_4.obj"),
-    # what is drawn, taken for what collides
-    ("h1/urdf/h1.urdf", "MSH009", "../meshes/torso_link.STL"),
-    ("h1/h1.xml", "MSH009", "torso_link.STL"),
-    ("g1/g1_29dof.urdf", "MSH009", "meshes/torso_link.STL"),
-    ("g1/g1_29dof.urdf", "MSH009", "meshes/pelvis_contour_link.STL"),
-    ("g1/g1_29dof.xml", "MSH009", "torso_link.STL"),
-    ("g1/g1_29dof.xml", "MSH009", "pelvis_contour_link.STL"),
-}
+@pytest.mark.parametrize(
+    ("limit", "value", "ask", "data", "message"),
+    [
+        ("_DEFAULT_MAX_BYTES", 684, "vertices", BOX, "has 684 bytes; expected at most 683"),
+        ("_MAX_TOTAL_BYTES", 684, "vertices", BOX, "exceeds the limit of 683 bytes"),
+        ("_MAX_TOTAL_WORDS", 21, "vertices", SQUARE, "exceeds the limit of 20 numbers"),
+        ("_MAX_WELDED_FACES", 12, "solid_volume", BOX, "has 12 faces; expected at most 11"),
+    ],
+)
+def test_limits(mesh, monkeypatch, limit, value, ask, data, message):
+    use = mesh(data, "a.stl" if data == BOX else "a.obj")
+    monkeypatch.setattr(module, limit, value)
+    getattr(Meshes(), ask)(use)
+    monkeypatch.setattr(module, limit, value - 1)
+    with pytest.raises(TooLargeError, match=message):
+        getattr(Meshes(), ask)(use)
+    if ask == "solid_volume":
+        assert Meshes().hull_volume(use) == pytest.approx(6.0)
 
 
-class TestRobots:
-    """What the rules make of robots that other people published."""
-
-    @pytest.mark.parametrize("name", REAL_ROBOTS)
-    def test_only_known_findings(self, robot_file, name):
-        own = [rule for rule in rules() if rule.family == "MSH" and rule.severity != "note"]
-        findings = lint(Facts(load_robot(robot_file(name))), own).findings
-        told = {(name, f.code, f.subject) for f in findings if f.severity != "note"}
-        assert told == {agreed for agreed in AGREED if agreed[0] == name}
-        assert {f.code for f in findings if f.severity == "error"} <= {"MSH001"}
-
-    @pytest.mark.parametrize("name", ["go2/urdf/go2.urdf", "h1/urdf/h1.urdf"])
-    def test_name_rules_open_no_meshes(self, robot_file, name):
-        facts = Facts(load_robot(robot_file(name)))
-        by_name = ("MSH001", "MSH002", "MSH003", "MSH004", "MSH012")
-        lint(facts, [rule for rule in rules() if rule.code in by_name])
-        assert facts.meshes.opened == Counter()
-
-    def test_visual_meshes_are_not_read(self, robot_file):
-        facts = Facts(load_robot(robot_file("go2/urdf/go2.urdf")))
-        lint(facts, [rule for rule in rules() if rule.family == "MSH"])
-        # each header, and the beginning of each
-        assert len(facts.meshes.opened) == 7
-        assert set(facts.meshes.opened.values()) == {2}
-        assert facts.meshes._bytes == 0
+def test_limits_are_those_of_all_meshes(mesh, monkeypatch):
+    monkeypatch.setattr(module, "_MAX_TOTAL_BYTES", 2 * 684 - 1)
+    meshes = Meshes()
+    meshes.vertices(mesh())
+    with pytest.raises(TooLargeError, match="limit of 1,367 bytes"):
+        meshes.vertices(mesh(name="b.stl"))
 
 
-def test_with_contents(tmp_path):
-    (tmp_path / "here.stl").write_bytes(b"here")
-    held = Meshes({tmp_path / "held.stl": b"held"})
-    more = held.with_contents({tmp_path / "more.stl": b"more"})
-    for name in ("here", "held", "more"):
-        assert more.data(tmp_path / f"{name}.stl") == name.encode()
-    assert more.has_contents(tmp_path / "more.stl")
-    assert not held.has_contents(tmp_path / "more.stl")
+def test_rules_read_no_visual_meshes(tmp_path):
+    parts = joint("a", "b", "0 0 1")
+    for name in "ab":
+        (tmp_path / f"{name}.stl").write_bytes(BOX)
+        parts += link(name, shape(f'mesh filename="{name}.stl" scale=".1 .1 .1"', kind="visual"))
+    (tmp_path / "robot.urdf").write_text(f'<robot name="r">{parts}</robot>')
+    robot = Facts(load_robot(tmp_path / "robot.urdf"))
+    by_name = ("MSH001", "MSH002", "MSH003", "MSH004", "MSH012")
+    lint(robot, [rule for rule in rules() if rule.code in by_name])
+    assert not robot.meshes.opened
+    lint(robot, [rule for rule in rules() if rule.family == "MSH"])
+    # The header and the beginning of each.
+    assert robot.meshes.opened == {tmp_path / "a.stl": 2, tmp_path / "b.stl": 2}
+    assert robot.meshes._bytes == 0

@@ -1,5 +1,6 @@
 import os
 import struct
+from pathlib import Path
 
 import pytest
 
@@ -23,6 +24,7 @@ LFS = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 1050284\
         pytest.param(".stl", ASCII, "ascii-stl", None, id="ASCII STL"),
         pytest.param(".obj", b"# nothing\n", "obj", None, id="OBJ"),
         pytest.param(".dae", DAE, "dae", None, id="COLLADA"),
+        pytest.param(".dae", DAE.decode().encode("utf-16"), "dae", None, id="in UTF-16"),
         pytest.param(".msh", struct.pack("<4i", 1, 0, 0, 0) + bytes(12), "msh", None, id="MSH"),
         pytest.param(".ply", b"ply\nelement face 7\nend_header\n", "ply", 7, id="PLY"),
         pytest.param(".glb", b"glTF" + struct.pack("<II", 2, 12), "glb", None, id="GLB"),
@@ -47,6 +49,7 @@ def test_valid_files(suffix, data, kind, faces):
         pytest.param(".stl", b"v 0 0 0\n" * 20, "is a text file, but not", id="an OBJ"),
         pytest.param(".stl", b"solid x\nendsolid x\n", "without facets", id="solid air"),
         pytest.param(".stl", ASCII[:-12], "does not end with endsolid", id="ASCII, cut off"),
+        pytest.param(".stl", b"solid".ljust(4097), "has no facet in its first 4096", id="blank"),
         pytest.param(".obj", stl(1), "is not a text file", id="an STL as OBJ"),
         pytest.param(".dae", DAE[:-4], "is truncated", id="COLLADA, cut off"),
         pytest.param(".dae", b"<robot/>", "does not start with a COLLADA", id="other XML"),
@@ -64,9 +67,12 @@ def test_broken_files(suffix, data, problem):
     assert problem in header.problem
 
 
-def test_stl_with_trailing_data_has_faces():
-    assert header_of(".stl", stl(2) + b"\0").faces == 2
-    assert header_of(".stl", stl(2)[:-1]).faces is None
+@pytest.mark.parametrize(
+    ("data", "faces"),
+    [(stl(2) + b"\0", 2), (stl(2)[:-1], None), (stl(1, bytes(49)), None), (stl(0) + b"\0", None)],
+)
+def test_broken_stl_has_its_faces_if_more_data_follows(data, faces):
+    assert (header_of(".stl", data).faces, header_of(".stl", data).state) == (faces, "broken")
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".dae", ".obj", ".fbx"])
@@ -86,32 +92,34 @@ def test_only_ends_are_read(tmp_path):
     assert (header.state, header.size) == ("fine", 4 * 2**30 + 11)
 
 
-class TestSpecialFiles:
-    def test_missing(self, tmp_path):
-        assert read_header(tmp_path / "a.stl").state == "missing"
+@pytest.mark.parametrize(
+    ("make", "state", "problem"),
+    [
+        pytest.param(str, "missing", "does not exist", id="missing"),
+        pytest.param(Path.mkdir, "special", "is a folder, not a file", id="folder"),
+        pytest.param(os.mkfifo, "special", "is a pipe, not a file", id="pipe"),
+        pytest.param(
+            lambda path: path.symlink_to("/dev/zero"),
+            "special",
+            "is a device, not a file",
+            id="device",
+        ),
+        pytest.param(lambda path: path.symlink_to(path), "missing", "does not exist", id="cycle"),
+    ],
+)
+def test_special_files(tmp_path, make, state, problem):
+    make(tmp_path / "a.stl")
+    header = read_header(tmp_path / "a.stl")
+    assert (header.state, header.problem) == (state, problem)
 
-    @pytest.mark.parametrize("name", ["a" * 300, "a\0b", "\ud800"])
-    def test_invalid_path(self, tmp_path, name):
-        assert read_header(tmp_path / name).state == "missing"
 
-    def test_folder(self, tmp_path):
-        (tmp_path / "a.stl").mkdir()
-        assert read_header(tmp_path / "a.stl").problem == "is a folder, not a file"
+@pytest.mark.parametrize("name", ["a" * 300, "a\0b", "\ud800"])
+def test_invalid_path_is_missing(tmp_path, name):
+    assert read_header(tmp_path / name).state == "missing"
 
-    def test_pipe(self, tmp_path):
-        os.mkfifo(tmp_path / "a.stl")
-        assert read_header(tmp_path / "a.stl").problem == "is a pipe, not a file"
 
-    def test_device(self, tmp_path):
-        (tmp_path / "a.stl").symlink_to("/dev/zero")
-        assert read_header(tmp_path / "a.stl").problem == "is a device, not a file"
-
-    def test_symbolic_link_cycle(self, tmp_path):
-        (tmp_path / "a.stl").symlink_to("a.stl")
-        assert read_header(tmp_path / "a.stl").state == "missing"
-
-    @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read all")
-    def test_no_permission(self, tmp_path):
-        (tmp_path / "a.stl").write_bytes(stl(1))
-        (tmp_path / "a.stl").chmod(0)
-        assert read_header(tmp_path / "a.stl").state == "closed"
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may read all")
+def test_file_without_permission_is_closed(tmp_path):
+    (tmp_path / "a.stl").write_bytes(stl(1))
+    (tmp_path / "a.stl").chmod(0)
+    assert read_header(tmp_path / "a.stl").state == "closed"

@@ -15,6 +15,8 @@ def test_arrays_are_in_the_order_of_the_joints(spec, tmp_path):
     # A joint without limits is unbounded.
     assert (robot.lower.tolist(), robot.upper.tolist()) == ([-np.inf, -1.0], [np.inf, 1.0])
     assert (robot.mjcf, robot.folder) == (tmp_path / "robot.xml", tmp_path)
+    assert (robot.spawn_height, robot.base_height_target, robot.leg_length) == (0.3, 0.28, 0.28)
+    assert Robot.from_spec(spec(**LEGGED, leg_length=0.4), tmp_path).leg_length == 0.4
 
 
 @pytest.mark.parametrize(

@@ -3,98 +3,80 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints, mimic_positions
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.description.model import Joint, Mimic, Source
+from tests.small_robots import URDF
+
+SOURCE = Source(file=URDF, line=1)
+NAMES = "ABCDEFGH"
 
 
-def chain(tmp_path, *mimics):
-    """Return a chain of prismatic joints jA, jB, ... with the given <mimic> elements."""
-    names = [f"j{letter}" for letter in "ABCDEFGH"[: len(mimics)]]
-    links = "".join(f'<link name="l{k}"/>' for k in range(len(mimics) + 1))
-    joints = "".join(
-        f'<joint name="{name}" type="prismatic"><parent link="l{k}"/><child link="l{k + 1}"/>'
-        f'<limit lower="-9" upper="9" effort="1" velocity="1"/>{mimic}</joint>'
-        for k, (name, mimic) in enumerate(zip(names, mimics, strict=True))
-    )
-    path = tmp_path / "robot.urdf"
-    path.write_text(f'<robot name="r">{links}{joints}</robot>')
-    return Facts(load_robot(path))
+def chain(*mimics):
+    """Return joints A, B, ... each of which mimics a joint (name, multiplier, offset) or none."""
+    made = []
+    for name, mimic in zip(NAMES, mimics, strict=False):
+        follows = mimic and Mimic(
+            source=SOURCE, joint=mimic[0], multiplier=mimic[1], offset=mimic[2]
+        )
+        made.append(
+            Joint(name=name, source=SOURCE, kind="prismatic", parent="", child="", mimic=follows)
+        )
+    return made
 
 
-def follows(joint, multiplier=1.0, offset=0.0):
-    return f'<mimic joint="{joint}" multiplier="{multiplier}" offset="{offset}"/>'
-
-
-def test_mimic_positions_of_chained_joints(tmp_path):
-    robot = chain(tmp_path, "", follows("jA", offset=0.5), follows("jB", -2))
-    assert mimic_positions(robot.joints, {"jA": 1.0}) == {"jB": 1.5, "jC": -3.0}
-    # In any order of the file.
-    backwards = chain(tmp_path, follows("jB", -2), follows("jC", offset=0.5), "")
-    assert [joint.name for joint in mimic_joints(backwards.joints)] == ["jB", "jA"]
-    assert mimic_positions(backwards.joints, {"jC": 1.0}) == {"jB": 1.5, "jA": -3.0}
-    assert body_poses(robot.bodies, {"jA": 1.0})[3][0, 3] == pytest.approx(1.0 + 1.5 - 3.0)
-    assert body_poses(backwards.bodies, {"jC": 1.0})[3][0, 3] == pytest.approx(1.0 + 1.5 - 3.0)
-
-
-def test_mimic_positions_broadcast(tmp_path):
-    robot = chain(tmp_path, follows("jB", -2), follows("jC", offset=0.5), "")
-    drawn = np.linspace(-1, 1, 5)
-    found = mimic_positions(robot.joints, {"jC": drawn, "jA": drawn})
-    np.testing.assert_allclose(found["jA"], -2 * (drawn + 0.5))
+def order(joints):
+    return "".join(joint.name for joint in mimic_joints(joints))
 
 
 @pytest.mark.parametrize(
-    "mimics",
+    ("mimics", "positions", "expected"),
     [
-        ("", "", follows("unknown", 2, 1)),
-        ("", "", follows("jC", 2, 1)),  # itself
-        (follows("jB"), follows("jC"), follows("jA", 2, 1)),  # a cycle
-        ("", "", follows("", 2, 1)),
+        pytest.param(
+            [None, ("A", 1, 0.5), ("B", -2, 0)], {"A": 1.0}, {"B": 1.5, "C": -3.0}, id="chain"
+        ),
+        pytest.param(
+            [("B", -2, 0), ("C", 1, 0.5), None], {"C": 1.0}, {"B": 1.5, "A": -3.0}, id="backwards"
+        ),
+        pytest.param([None, ("A", 2, 1)], {}, {"B": 1.0}, id="at zero"),
+        pytest.param([None, None, ("unknown", 2, 1)], {"C": 7.0}, {}, id="unknown"),
+        pytest.param([None, ("unknown", 2, 1), ("B", 2, 1)], {"B": 7.0}, {"C": 15.0}, id="below"),
+        pytest.param([None, None, ("C", 2, 1)], {"C": 7.0}, {}, id="itself"),
+        pytest.param([("B", 1, 0), ("C", 1, 0), ("A", 2, 1)], {"C": 7.0}, {}, id="cycle"),
+        pytest.param(
+            [("B", 1, 0), ("A", 1, 0), ("B", 2, 0)], {"A": 5.0, "B": 3.0}, {"C": 6.0}, id="tail"
+        ),
     ],
 )
-def test_mimic_joints_exclude_unknown_targets_and_cycles(tmp_path, mimics):
-    robot = chain(tmp_path, *mimics)
-    assert mimic_joints(robot.joints) == ()
-    assert mimic_positions(robot.joints, {"jC": 7.0}) == {}
-    assert body_poses(robot.bodies, {"jC": 7.0})[3][0, 3] == pytest.approx(7.0)
+def test_mimic_positions(mimics, positions, expected):
+    joints = chain(*mimics)
+    assert order(joints) == "".join(expected)
+    assert mimic_positions(joints, positions) == expected
 
 
-def test_mimic_positions_follow_joint_in_cycle(tmp_path):
-    robot = chain(tmp_path, follows("jB"), follows("jA"), follows("jB", 2))
-    assert mimic_positions(robot.joints, {"jA": 5.0, "jB": 3.0}) == {"jC": 6.0}
+def test_mimic_positions_broadcast():
+    drawn = np.linspace(-1, 1, 5)
+    found = mimic_positions(chain(("B", -2, 0), ("C", 1, 0.5), None), {"C": drawn, "A": drawn})
+    np.testing.assert_allclose(found["A"], -2 * (drawn + 0.5))
 
 
-def test_mimic_positions_ignore_fixed_targets(tmp_path):
-    robot = chain(tmp_path, "", follows("jA", 2, 1))
-    path = tmp_path / "robot.urdf"
-    path.write_text(path.read_text().replace('"prismatic"', '"fixed"', 1))
-    assert mimic_positions(Facts(load_robot(path)).joints, {"jA": 1.0}) == {}
-    assert len(robot.joints) == 2
-
-
-def test_mimic_positions_stay_finite(tmp_path):
-    robot = chain(tmp_path, "", *(follows(f"j{letter}", -9e29, 9e29) for letter in "ABCDEFG"))
+def test_mimic_positions_stay_finite():
+    joints = chain(None, *((name, -9e29, 9e29) for name in NAMES[:7]))
     for position in (1.0, np.array([1.0, -1e30])):
-        for found in mimic_positions(robot.joints, {"jA": position}).values():
-            assert np.isfinite(found).all()
+        for found in mimic_positions(joints, {"A": position}).values():
+            assert (np.abs(found) <= 1e30).all()
 
 
 @given(st.lists(st.integers(-1, 7), min_size=8, max_size=8), st.permutations(range(8)))
-def test_mimic_joints_come_after_their_targets(tmp_path_factory, leaders, order):
-    folder = tmp_path_factory.getbasetemp()
-    names = [f"j{letter}" for letter in "ABCDEFGH"]
-    mimics = ["" if k < 0 else follows(names[k], 2, 0.1) for k in leaders]
-    joints = chain(folder, *mimics).joints
-    found = mimic_joints([joints[k] for k in order])
-    placed = {joint.name: place for place, joint in enumerate(found)}
-    assert len(placed) == len(found)
-    for joint in found:
-        assert placed.get(joint.mimic.joint, -1) < placed[joint.name]
-    # Excluded joints lead back to themselves, or to an unknown joint.
+def test_mimic_joints_come_after_their_targets(leaders, shuffled):
+    joints = chain(*(None if k < 0 else (NAMES[k], 2, 0.1) for k in leaders))
+    found = order([joints[k] for k in shuffled])
+    assert len(set(found)) == len(found)
+    for name in found:
+        target = NAMES[leaders[NAMES.index(name)]]
+        assert found.find(target) < found.index(name)
+    # Excluded joints lead back to themselves.
     for k, leader in enumerate(leaders):
-        if leader >= 0 and names[k] not in placed:
+        if leader >= 0 and NAMES[k] not in found:
             path = [leader]
             while path[-1] != k:
                 path.append(leaders[path[-1]])

@@ -8,6 +8,8 @@ from hypothesis.extra.numpy import arrays
 from terrainkit_robots.analysis.inertia.physical import (
     box_inertia,
     gyration_radius,
+    is_in_range,
+    is_zero,
     nearest_physical,
     principal_moments,
     triangle_ratio,
@@ -45,23 +47,33 @@ def test_box_inertia_matches_mujoco():
     assert ours == pytest.approx(np.sort(model.body_inertia[1]))
 
 
-def test_nearest_physical_raises_small_moments():
-    nearest = nearest_physical(np.diag([0.25, 0.25, 1.0]))
-    assert np.diag(nearest) == pytest.approx([0.5, 0.5, 1.0], abs=1e-3)
-    assert np.count_nonzero(nearest - np.diag(np.diag(nearest))) == 0
+SOUND = np.array([[3.0, 0.2, 0.1], [0.2, 2.5, -0.3], [0.1, -0.3, 2.0]])
+DIAGONAL = np.diag([1.0, 1.2, 1.4])
 
 
-def test_nearest_physical_keeps_physical_inertia():
-    sound = symmetric(np.array([[3.0, 0.2, 0.1], [0.2, 2.5, -0.3], [0.1, -0.3, 2.0]]))
-    assert nearest_physical(sound) == pytest.approx(sound, abs=1e-12)
-
-
-def test_nearest_physical_negates_negative_inertia():
-    assert nearest_physical(-np.diag([1.0, 1.2, 1.4])) == pytest.approx(np.diag([1.0, 1.2, 1.4]))
-
-
-def test_nearest_physical_of_zero_is_none():
+@pytest.mark.parametrize(
+    ("inertia", "nearest"),
+    [
+        (SOUND, SOUND),
+        (-DIAGONAL, DIAGONAL),
+        # The second moments 0.5, 0.5 and -0.25 become 0.5, 0.5 and 0.0005.
+        (np.diag([0.25, 0.25, 1.0]), np.diag([0.5005, 0.5005, 1.0])),
+    ],
+    ids=["physical", "negative", "small moments"],
+)
+def test_nearest_physical(inertia, nearest):
+    assert nearest_physical(inertia) == pytest.approx(nearest, abs=1e-12)
     assert nearest_physical(np.zeros((3, 3))) is None
+
+
+@pytest.mark.parametrize(
+    ("element", "zero", "in_range"),
+    [(1e-15, True, True), (-1.1e-15, False, True), (-0.9e12, False, True), (-1e12, False, False)],
+)
+def test_elements_of_an_inertia_have_a_range(element, zero, in_range):
+    inertia = np.zeros((3, 3))
+    inertia[0, 1] = element
+    assert (is_zero(inertia), is_in_range(inertia)) == (zero, in_range)
 
 
 @given(arrays(np.float64, (3, 3), elements=numbers))

@@ -1,49 +1,41 @@
 import re
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.edits import EditedBytes
-from terrainkit_robots.mesh.mesh_cache import Meshes
+from tests.small_robots import facts, link
 
-QUADRUPED = Path(terrainkit_robots.__file__).parent / "description/bundled/quadruped/quadruped.xml"
+QUADRUPED = bundled.urdf_path("quadruped")
 THIGH = 'fullinertia="0.00584 0.0058 0.00103 8.72e-05 -0.000289 0.000808"'
 
-ARM = """<mujoco model="arm">
-  <worldbody>
-    <body name="base">
-      <geom type="box" size="0.1 0.1 0.05" mass="3"/>
-      <body name="tip" pos="0 0 0.1">
-        <joint name="turn" axis="0 1 0" range="-60 60"/>
-        <inertial pos="0 0 0.2" mass="1" {inertia}/>
-        <geom type="box" size="0.035 0.035 0.2" pos="0 0 0.2"/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>"""
+ARM = """<mujoco><worldbody><body name="base"><geom type="box" size="0.1 0.1 0.05" mass="3"/>
+  <body name="tip" pos="0 0 0.1">
+    <joint name="turn" axis="0 1 0" range="-60 60"/>
+    <inertial pos="0 0 0.2" mass="1" {}/>
+    <geom type="box" size="0.035 0.035 0.2" pos="0 0 0.2"/>
+  </body></body></worldbody></mujoco>"""
 
 
 @pytest.fixture
 def repaired(tmp_path):
     """Return the fixed inertia of a link, and the attributes that the fix sets or removes."""
 
-    def make(text, link):
+    def make(text, name="tip"):
         path = tmp_path / "robot.xml"
         path.write_text(text)
-        facts = Facts(load_robot(path), Meshes())
-        fix = facts.inertia_repair.fix(facts.tree.links[link])
-        assert fix is not None
+        robot = Facts(load_robot(path))
+        fix = robot.inertia_repair.fix(robot.tree.links[name])
         edited = EditedBytes(path.read_bytes())
         edited.apply(edited.prepare(fix.edits))
-        data = edited.result()
-        model = mujoco.MjModel.from_xml_string(data.decode())
-        body = model.body(link)
-        turn = np.zeros(9)
+        body, turn = (
+            mujoco.MjModel.from_xml_string(edited.result().decode()).body(name),
+            np.zeros(9),
+        )
         mujoco.mju_quat2Mat(turn, body.iquat)
         turn = turn.reshape(3, 3)
         return turn @ np.diag(body.inertia) @ turn.T, [edit.name for edit in fix.edits]
@@ -62,52 +54,51 @@ def repaired(tmp_path):
     ],
 )
 def test_fix_takes_inertia_of_mirror_image(repaired, axes, removed):
-    text = QUADRUPED.read_text()
-    sound = mujoco.MjModel.from_xml_string(text).body("FL_thigh")
+    text = QUADRUPED.with_suffix(".xml").read_text()
     assert THIGH in text
     broken = text.replace(THIGH, f'{axes} diaginertia="0.00584 -0.0058 0.00103"', 1)
     inertia, names = repaired(broken, "FL_thigh")
     assert names == ["fullinertia", "diaginertia", *removed]
-    np.testing.assert_allclose(np.linalg.eigvalsh(inertia), np.sort(sound.inertia), rtol=1e-4)
-    assert inertia[0, 1] == pytest.approx(8.72e-05)
-    assert inertia[0, 2] == pytest.approx(-0.000289)
-    assert inertia[1, 2] == pytest.approx(0.000808)
+    elements = [inertia[k] for k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    assert elements == pytest.approx(list(MIRRORED.values()), rel=1e-4)
 
 
-@pytest.mark.parametrize("axes", ["", 'quat="0.5 0.5 0.5 0.5"'])
-def test_fix_keeps_diagonal_inertia_diagonal(repaired, axes):
-    text = ARM.format(inertia=f'{axes} diaginertia="0.014 0.003 0.004"')
-    inertia, names = repaired(text, "tip")
-    assert names == ["diaginertia"]
+@pytest.mark.parametrize(
+    ("given", "changed"),
+    [
+        ('diaginertia="0.014 0.003 0.004"', ["diaginertia"]),
+        ('quat="0.5 0.5 0.5 0.5" diaginertia="0.014 0.003 0.004"', ["diaginertia"]),
+        ('fullinertia="0.009 0.009 0.002 0.01 0 0"', ["fullinertia"]),
+        ('fullinertia="0.014 0.003 0.004 0 0 0"', ["fullinertia"]),
+    ],
+)
+def test_fix_keeps_the_form_of_an_inertia(repaired, given, changed):
+    inertia, names = repaired(ARM.format(given))
+    assert names == changed
     moments = np.linalg.eigvalsh(inertia)
     assert moments[0] + moments[1] >= moments[2] * (1 - 1e-9)
 
 
 def test_fix_writes_rotated_box_in_full(repaired):
-    text = ARM.format(inertia='quat="1 0 0 1" diaginertia="0 0 0"')
-    inertia, names = repaired(text, "tip")
-    assert names == ["diaginertia"]
-    assert inertia[2, 2] < inertia[0, 0]
-    aslant = ARM.format(inertia='quat="0.9 0 0.3 0.1" diaginertia="0 0 0"')
-    again, names = repaired(aslant, "tip")
-    assert names == ["fullinertia", "diaginertia", "quat"]
-    np.testing.assert_allclose(again, inertia, rtol=1e-4, atol=1e-9)
+    # 1 kg / 12 times the squares of the sides of 0.07, 0.07 and 0.4 m, also in a frame aslant.
+    expected = np.diag([0.1649, 0.1649, 0.0098]) / 12
+    for axes, changed in (
+        ("1 0 0 1", ["diaginertia"]),
+        ("0.9 0 0.3 0.1", ["fullinertia", "diaginertia", "quat"]),
+    ):
+        inertia, names = repaired(ARM.format(f'quat="{axes}" diaginertia="0 0 0"'))
+        np.testing.assert_allclose(inertia, expected, rtol=1e-4, atol=1e-9)
+        assert names == changed
 
 
-def test_fix_keeps_full_inertia_full(repaired):
-    text = ARM.format(inertia='fullinertia="0.009 0.009 0.002 0.01 0 0"')
-    _, names = repaired(text, "tip")
-    assert names == ["fullinertia"]
-    diagonal = ARM.format(inertia='fullinertia="0.014 0.003 0.004 0 0 0"')
-    _, names = repaired(diagonal, "tip")
-    assert names == ["fullinertia"]
-
-
-def test_fix_of_derived_inertia_is_none(tmp_path):
-    path = tmp_path / "robot.xml"
-    path.write_text(ARM.format(inertia='diaginertia="1 1 1"'))
-    facts = Facts(load_robot(path), Meshes())
-    assert facts.inertia_repair.fix(facts.tree.links["base"]) is None
+def test_derived_and_missing_inertias_have_no_fix():
+    robot = facts(ARM.format('diaginertia="1 1 1"'))
+    assert robot.inertia_repair.fix(robot.tree.links["base"]) is None
+    bare = '<link name="b"><inertial><mass value="1"/></inertial></link>'
+    robot = facts(link("a", mass=None), bare)
+    for each in robot.model.links:
+        assert robot.inertia_repair.fix(each) is None
+        assert robot.inertia_repair.relative_change(each) == np.inf
 
 
 def urdf_fix(left, right=(), right_mass="1.152"):
@@ -118,19 +109,18 @@ def urdf_fix(left, right=(), right_mass="1.152"):
         right: Changed attributes of FR_thigh, its mirror image.
         right_mass: Mass of FR_thigh [kg].
     """
-    path = QUADRUPED.with_suffix(".urdf")
-    text = path.read_text()
-    for link, changes in (("FL_thigh", dict(left)), ("FR_thigh", dict(right))):
-        start = text.index(f'<link name="{link}">')
+    text = QUADRUPED.read_text()
+    for name, changes in (("FL_thigh", dict(left)), ("FR_thigh", dict(right))):
+        start = text.index(f'<link name="{name}">')
         end = text.index("</inertial>", start)
         block = text[start:end]
-        for name, value in changes.items():
-            block = re.sub(rf'{name}="[^"]*"', f'{name}="{value}"', block)
-        if link == "FR_thigh":
+        for key, value in changes.items():
+            block = re.sub(rf'{key}="[^"]*"', f'{key}="{value}"', block)
+        if name == "FR_thigh":
             block = block.replace('mass value="1.152"', f'mass value="{right_mass}"')
         text = text[:start] + block + text[end:]
-    facts = Facts(load_robot(path, contents={path: text.encode()}), Meshes())
-    fix = facts.inertia_repair.fix(facts.tree.links["FL_thigh"])
+    robot = facts(text)
+    fix = robot.inertia_repair.fix(robot.tree.links["FL_thigh"])
     taken = fix.description.removeprefix("Replace the inertia of link FL_thigh by ")
     return taken, {edit.name: float(edit.value) for edit in fix.edits}
 
@@ -170,11 +160,16 @@ def test_urdf_fix_takes_the_box_of_the_shapes_at_last(left):
     assert values == pytest.approx(BOX, rel=1e-3, abs=1e-9)
 
 
-def test_links_without_inertia_have_no_fix(tmp_path):
-    path = tmp_path / "robot.urdf"
-    bare = '<link name="b"><inertial><mass value="1"/></inertial></link>'
-    path.write_text(f'<robot name="r"><link name="a"/>{bare}</robot>')
-    facts = Facts(load_robot(path), Meshes())
-    for link in facts.model.links:
-        assert facts.inertia_repair.fix(link) is None
-        assert facts.inertia_repair.relative_change(link) == np.inf
+@pytest.mark.parametrize(
+    ("inertia", "change"),
+    [
+        ("1 1.2 1.4 0 0 0", 0.0),
+        # The second moments 0.5, 0.5 and -0.25 become 0.5, 0.5 and 0.0005: 0.2505 over 0.25.
+        ("0.25 0.25 1 0 0 0", 1.002),
+        ("-1 -1.2 -1.4 0 0 0", np.inf),
+    ],
+)
+def test_relative_change_of_a_fix(inertia, change):
+    robot = facts(link("a", inertia=inertia))
+    found = robot.inertia_repair.relative_change(robot.model.links[0])
+    assert found == pytest.approx(change, abs=1e-12)

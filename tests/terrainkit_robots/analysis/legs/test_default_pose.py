@@ -1,77 +1,54 @@
-import numpy as np
+from dataclasses import replace
+
 import pytest
 
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
-from terrainkit_robots.spec.robot_spec import RobotSpec
-
-SLIDE = """
-<robot name="r">
-  <link name="base"/><link name="one"/><link name="two"/>
-  <joint name="a" type="revolute"><parent link="base"/><child link="one"/><axis xyz="0 0 1"/>
-    <limit lower="0.5" upper="2.5" effort="1" velocity="1"/></joint>
-  <joint name="b" type="revolute"><parent link="one"/><child link="two"/><axis xyz="0 0 1"/>
-    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="a" multiplier="-2"/></joint>
-</robot>"""
+from tests.small_robots import joint, link
 
 
-def changed(spec, **values):
-    fields = {name: getattr(spec, name) for name in RobotSpec.__dataclass_fields__}
-    return RobotSpec(**(fields | values))
-
-
-def test_positions_of_spec_define_stance(bundled, gains):
+@pytest.mark.parametrize(
+    ("pose", "changed"),
+    [
+        ({".*_thigh_joint": 1.2, ".*_calf_joint": -2.4}, {"thigh": 1.2, "calf": -2.4}),
+        ({"FL_hip_joint": 0.2}, {"FL_hip": 0.2}),
+        ({"(": 1.0, "x": 2.0}, {}),  # matches nothing
+    ],
+)
+def test_positions_of_spec_define_stance(bundled, gains, pose, changed):
     plain = bundled("quadruped.urdf")
     spec = derive_spec(plain, gains=gains(plain), floating=True)
-    low = {".*_hip_joint": 0.1, ".*_thigh_joint": 1.2, ".*_calf_joint": -2.4}
-    facts = bundled("quadruped.urdf", spec=changed(spec, default_pose=low))
-    assert facts.default_pose["FL_thigh_joint"] == facts.stance.positions["FL_thigh_joint"] == 1.2
-    assert facts.stance.height < plain.stance.height - 0.1
-
-
-def test_positions_missing_in_spec_are_solved(bundled, gains):
-    plain = bundled("quadruped.urdf")
-    spec = derive_spec(plain, gains=gains(plain), floating=True)
-    facts = bundled("quadruped.urdf", spec=changed(spec, default_pose={"FL_hip_joint": 0.2}))
-    expected = dict(plain.default_pose) | {"FL_hip_joint": 0.2}
-    assert facts.default_pose == expected
-    nothing = bundled("quadruped.urdf", spec=changed(spec, default_pose={"(": 1.0, "x": 2.0}))
-    assert nothing.default_pose == plain.default_pose
-
-
-def test_positions_of_mimic_joints_follow_spec(robot, spec):
-    facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 1.0}))
-    assert facts.default_pose == {"a": 1.0, "b": -2.0}
-
-
-def test_positions_of_spec_may_exceed_limits(robot, spec):
-    facts = robot(SLIDE, spec=spec(joint_order=("a",), default_pose={"a": 3.0}))
-    assert facts.default_pose["a"] == 3.0
+    robot = bundled("quadruped.urdf", spec=replace(spec, default_pose=pose))
+    expected = {
+        name: next((q for part, q in changed.items() if part in name), position)
+        for name, position in plain.default_pose.items()
+    }
+    assert robot.default_pose == robot.stance.positions == expected
+    assert (robot.stance.height < plain.stance.height - 0.1) == ("thigh" in changed)
 
 
 @pytest.mark.parametrize("name", ["quadruped.urdf", "biped.xml"])
 def test_positions_of_derived_spec_equal_solved_pose(bundled, gains, name):
     plain = bundled(name)
-    facts = bundled(name, spec=derive_spec(plain, gains=gains(plain), floating=True))
-    np.testing.assert_allclose(
-        [facts.default_pose[name] for name in plain.default_pose],
-        list(plain.default_pose.values()),
-        atol=1e-5,
-    )
+    robot = bundled(name, spec=derive_spec(plain, gains=gains(plain), floating=True))
+    assert robot.default_pose == pytest.approx(plain.default_pose, abs=1e-5)
 
 
-CHAIN = """
-<robot name="r">
-  <link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
-  <joint name="jC" type="prismatic"><parent link="l0"/><child link="l1"/>
-    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="jB" multiplier="-2"/></joint>
-  <joint name="jB" type="prismatic"><parent link="l1"/><child link="l2"/>
-    <limit lower="-9" upper="9" effort="1" velocity="1"/><mimic joint="jA" offset="0.5"/></joint>
-  <joint name="jA" type="prismatic"><parent link="l2"/><child link="l3"/>
-    <limit lower="1" upper="2" effort="1" velocity="1"/></joint>
-</robot>"""
+MIMICS = ('joint="l2_joint" multiplier="-2"', 'joint="l3_joint" offset="0.5"')
+CHAIN = (
+    *(link(f"l{k}") for k in range(4)),
+    *(joint(f"l{k}", f"l{k + 1}", more=f"<mimic {mimic}/>") for k, mimic in enumerate(MIMICS)),
+    joint("l2", "l3", limits=(1, 2)),
+)
 
 
-def test_positions_of_chained_mimic_joints(robot, spec):
-    assert robot(CHAIN).default_pose == {"jA": 1.0, "jB": 1.5, "jC": -3.0}
-    specified = robot(CHAIN, spec=spec(joint_order=("jA",), default_pose={"jA": 2.0}))
-    assert specified.default_pose == {"jA": 2.0, "jB": 2.5, "jC": -5.0}
+@pytest.mark.parametrize(
+    ("pose", "expected"),
+    [
+        (None, {"l3_joint": 1.0, "l2_joint": 1.5, "l1_joint": -3.0}),
+        (2.0, {"l3_joint": 2.0, "l2_joint": 2.5, "l1_joint": -5.0}),
+        (3.0, {"l3_joint": 3.0, "l2_joint": 3.5, "l1_joint": -7.0}),  # beyond the limits
+    ],
+)
+def test_positions_of_mimic_joints_follow(robot, spec, pose, expected):
+    given = pose and spec(joint_order=("l3_joint",), default_pose={"l3_joint": pose})
+    assert robot(f'<robot name="r">{"".join(CHAIN)}</robot>', spec=given).default_pose == expected

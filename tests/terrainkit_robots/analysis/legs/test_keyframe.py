@@ -9,48 +9,59 @@ from terrainkit_robots.analysis.legs.keyframe import (
     keyframe_defect,
 )
 from terrainkit_robots.analysis.legs.standing_pose import solve_standing_pose
+from tests.small_robots import box, chain, facts, link
 
-LEG = {"hip": 0.0, "thigh": 0.9, "calf": -1.8}
+ROOTS = {"FL": (0.3, 0.2), "FR": (0.3, -0.2), "RL": (-0.3, 0.2), "leg": (-0.3, -0.2)}
 
 
-def quadruped(bundled, **changes):
-    """Return the quadruped with a keyframe that differs from its own, by FL_calf and so on."""
-    facts = bundled("quadruped.xml")
-    keyframe = {
-        f"{side}_{part}_joint": changes.get(f"{side}_{part}", changes.get(part, q))
-        for side in ("FL", "FR", "RL", "RR")
-        for part, q in LEG.items()
-    }
-    return Facts(replace(facts.model, keyframe=keyframe), facts.meshes)
+def table(knee=0.0, trunk_z=0.0, lift=0.0, com=0.0, joints=slice(None)):
+    """Return a quadruped with a keyframe of straight legs of 0.62 m.
+
+    Its trunk is a box of 0.1 m at `trunk_z`, one leg is raised by `lift`, and the center of mass is
+    `com` ahead of the middle.
+    """
+    legs = [
+        chain(name, f"{x} {y} {lift if name == 'leg' else 0}", (0.3, 0.3))
+        for name, (x, y) in ROOTS.items()
+    ]
+    trunk = link("trunk", box("0.1 0.1 0.1", f"0 0 {trunk_z}"), mass=1e7, center=f"{com} 0 0")
+    model = facts(trunk, *legs).model
+    positions = {f"{name}{k}_joint": k * knee for name in ROOTS for k in range(2)}
+    return Facts(replace(model, keyframe=dict(list(positions.items())[joints]))).leg_model
 
 
 @pytest.mark.parametrize(
     ("changes", "defect"),
     [
         ({}, ""),
-        ({"thigh": 2.6, "calf": -2.6}, "base lies on the ground"),
-        ({"FL_thigh": 1.2, "FL_calf": -2.5}, "FL_foot is 0.1"),
-        ({"thigh": -0.5, "calf": -1.0}, "the center of mass is 0.09"),
+        # At least 0.01 of the length above the ground.
+        ({"trunk_z": -0.5637}, ""),
+        ({"trunk_z": -0.5639}, "trunk lies on the ground"),
+        # At most 0.1 of the length above the ground.
+        ({"lift": 0.0619}, ""),
+        ({"lift": 0.0621}, "leg1 is 0.062 m above the ground"),
+        # At most 0.03 of the length outside of the feet at x = +-0.3.
+        ({"com": 0.3185}, ""),
+        ({"com": 0.3187}, "the center of mass is 0.019 m outside of the feet"),
+        ({"com": -0.3187}, "the center of mass is 0.019 m outside of the feet"),
     ],
 )
-def test_keyframe_defect_names_cause(bundled, changes, defect):
-    facts = quadruped(bundled, **changes)
-    found = keyframe_defect(facts.leg_model)
-    assert found.startswith(defect) if defect else not found
-    assert is_standing_keyframe(facts.leg_model) == (not defect)
+def test_keyframe_defect_names_cause(changes, defect):
+    robot = table(**changes)
+    assert keyframe_defect(robot) == defect
+    assert is_standing_keyframe(robot) == (not defect)
 
 
-def test_keyframe_that_does_not_stand_is_replaced(bundled):
-    crouching = quadruped(bundled, thigh=2.6, calf=-2.6)
-    without = Facts(replace(crouching.model, keyframe={}), crouching.meshes)
-    assert solve_standing_pose(crouching.leg_model) == solve_standing_pose(without.leg_model)
+def test_keyframe_is_the_standing_pose_unless_it_has_a_defect():
+    found = [solve_standing_pose(table(0.5, lift=lift))["FL1_joint"] for lift in (0.0, 0.08)]
+    assert found[0] == 0.5
+    assert found[1] == solve_standing_pose(table(lift=0.08, joints=slice(0)))["FL1_joint"] != 0.5
 
 
-def test_keyframe_without_all_joints_has_no_defect(bundled):
-    facts = bundled("quadruped.xml")
-    partial = Facts(replace(facts.model, keyframe={"FL_calf_joint": -2.6}), facts.meshes)
-    assert not keyframe_defect(partial.leg_model)
-    assert not is_standing_keyframe(partial.leg_model)
+def test_keyframe_without_all_joints_has_no_defect():
+    partial = table(lift=0.08, joints=slice(1, None))
+    assert not keyframe_defect(partial)
+    assert not is_standing_keyframe(partial)
 
 
 @pytest.mark.parametrize(

@@ -1,65 +1,32 @@
-from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.legs.limbs import is_branch
-from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.analysis.legs.limbs import Chain, is_branch
+from tests.small_robots import ball, chain, facts, joint, link
 
-FILE = Path("/robots/robot.urdf")
-
-
-def link(name, ball=None, mass=1.0, center="0 0 0"):
-    """Return a link, with a sphere of 0.02 m at `ball`."""
-    shape = ""
-    if ball is not None:
-        shape = (
-            f'<collision><origin xyz="{ball}"/><geometry><sphere radius="0.02"/></geometry>'
-            "</collision>"
-        )
-    return (
-        f'<link name="{name}"><inertial><origin xyz="{center}"/><mass value="{mass}"/>'
-        f'<inertia ixx="0.01" iyy="0.01" izz="0.01"/></inertial>{shape}</link>'
-    )
+LENGTHS = (0.3, 0.3)
+TRUNK = link("trunk", mass=10)
+ROUND = ".01 .01 .01 0 0 0"
 
 
-def joint(parent, child, xyz, kind="revolute", axis="0 1 0", more=""):
-    limit = '<limit lower="-1" upper="1" effort="9" velocity="9"/>' if kind != "continuous" else ""
-    return (
-        f'<joint name="{child}_joint" type="{kind}"><parent link="{parent}"/>'
-        f'<child link="{child}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>{limit}{more}</joint>'
-    )
-
-
-def limb(name, root, lengths=(0.3, 0.3), parent="trunk", kind="revolute"):
-    """Return a vertical limb at `root` with one joint for each length."""
-    parts, at = "", parent
-    for number, length in enumerate(lengths):
-        child = f"{name}{number}"
-        xyz = root if number == 0 else f"0 0 {-lengths[number - 1]}"
-        last = number == len(lengths) - 1
-        parts += link(child, f"0 0 {-length}" if last else None, center=f"0 0 {-length / 2}")
-        parts += joint(at, child, xyz, kind)
-        at = child
-    return parts
-
-
-def facts(*parts, trunk=None):
-    inner = (link("trunk", mass=10) if trunk is None else trunk) + "".join(parts)
-    text = f'<robot name="r">{inner}</robot>'
-    return Facts(load_robot(FILE, contents={FILE: text.encode()}))
+def robot(*parts, trunk=TRUNK):
+    return facts(trunk, *parts)
 
 
 def scores(robot):
     return {robot.bodies[limb.chain[-1]].name: limb.score for limb in robot.limbs}
 
 
-# Detection
+def at_corners(*names, lengths=LENGTHS, z=0):
+    """Return limbs at the corners of a rectangle: front left, front right, rear left and right."""
+    places = ["0.3 0.2", "0.3 -0.2", "-0.3 0.2", "-0.3 -0.2"]
+    return [chain(n, f"{at} {z}", lengths) for n, at in zip(names, places, strict=False)]
 
 
 def test_limb_of_two_joints():
-    (found,) = facts(limb("a", "1 2 0", (0.3, 0.2))).limbs
+    (found,) = robot(chain("a", "1 2 0", (0.3, 0.2))).limbs
     assert found.chain == (1, 2)
     assert [each.name for each in found.joints] == ["a0_joint", "a1_joint"]
     np.testing.assert_allclose(found.points, [[1, 2, 0], [1, 2, -0.3]])
@@ -68,39 +35,35 @@ def test_limb_of_two_joints():
 
 
 def test_limb_includes_fixed_links():
-    (found,) = facts(
-        limb("a", "0 0 0"), link("tip", "0 0 0"), joint("a1", "tip", "0 0 -0.4", "fixed")
-    ).limbs
+    tip = link("tip", ball(0.02)) + joint("a1", "tip", "0 0 -0.4", kind="fixed")
+    (found,) = robot(chain("a", "0 0 0", LENGTHS), tip).limbs
     assert len(found.chain) == 2
     np.testing.assert_allclose(found.tip, [0, 0, -0.72])
 
 
 def test_limb_without_shapes_ends_at_lowest_frame():
-    (found,) = facts(
-        link("a"),
-        link("b"),
-        link("tip"),
-        joint("trunk", "a", "0 0 0"),
-        joint("a", "b", "0 0 -0.3"),
-        joint("b", "tip", "0.1 0 -0.3", "fixed"),
-    ).limbs
+    tip = link("tip") + joint("a1", "tip", "0.1 0 -0.3", kind="fixed")
+    (found,) = robot(chain("a", "0 0 0", LENGTHS).replace(ball(0.02, "0 0 -0.3"), ""), tip).limbs
     np.testing.assert_allclose(found.tip, [0.1, 0, -0.6])
 
 
-def test_limb_needs_two_joints():
-    assert facts(limb("a", "0 0 0", (0.3,))).limbs == ()
+@pytest.mark.parametrize(("joints", "count"), [(0, 0), (1, 0), (2, 1), (32, 1), (33, 0)])
+def test_limb_has_2_to_32_joints(joints, count):
+    assert len(robot(chain("a", "0 0 0", (0.001,) * joints)).limbs) == count
 
 
-def test_limbs_of_trunk_are_empty():
-    assert facts().limbs == ()
-    assert Facts(load_robot(FILE, contents={FILE: b'<robot name="r"/>'})).limbs == ()
+def test_limbs_are_the_64_lowest_chains():
+    found = robot(*(chain(f"l{k}", f"{k * 0.01} 0 {k}", LENGTHS) for k in range(70)))
+    assert len(found.bodies) == 141
+    assert list(scores(found)) == [f"l{k}1" for k in range(64)]
+    assert facts("").limbs == ()
 
 
 def test_limb_ignores_mimic_joints():
+    parts = [link("a"), link("b", ball(0.02, "0 0 -0.3")), joint("trunk", "a")]
     follows = '<mimic joint="a_joint"/>'
-    parts = [link("a"), link("b", "0 0 -0.3"), joint("trunk", "a", "0 0 0")]
-    assert len(facts(*parts, joint("a", "b", "0 0 -0.3")).limbs) == 1
-    assert facts(*parts, joint("a", "b", "0 0 -0.3", more=follows)).limbs == ()
+    assert len(robot(*parts, joint("a", "b", "0 0 -0.3")).limbs) == 1
+    assert robot(*parts, joint("a", "b", "0 0 -0.3", more=follows)).limbs == ()
 
 
 @pytest.mark.parametrize(
@@ -113,7 +76,7 @@ def test_limb_ignores_mimic_joints():
     ],
 )
 def test_limb_counts_joints_with_motor_or_tendon(actuators, count):
-    text = (
+    found = facts(
         '<mujoco><worldbody><body name="a"><freejoint/><geom size="0.1"/><body name="b">'
         '<joint name="i" axis="0 1 0"/><geom size="0.1"/><body name="c" pos="0 0 -1">'
         '<joint name="j" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body></body></body>'
@@ -121,249 +84,195 @@ def test_limb_counts_joints_with_motor_or_tendon(actuators, count):
         '<joint joint="j" coef="1"/></fixed>'
         f"</tendon><actuator>{actuators}</actuator></mujoco>"
     )
-    file = Path("/robots/robot.xml")
-    assert len(Facts(load_robot(file, contents={file: text.encode()})).limbs) == count
+    assert len(found.limbs) == count
 
 
-def test_limb_does_not_bend_at_wheel():
-    # A turret and a steering column, each with a wheel below it.
-    parts = [link("a"), joint("trunk", "a", "0 0 0", axis="0 0 1"), link("b", "0 0 0")]
-    assert facts(*parts, joint("a", "b", "0 0 -0.3", "continuous")).limbs == ()
-    assert len(facts(*parts, joint("a", "b", "0 0 -0.3")).limbs) == 1
+# The radius of gyration is sqrt(0.03 / 2) = 0.1225 m, and half the diagonal of the ball 0.0346 m.
+@pytest.mark.parametrize(
+    ("kind", "center", "place", "is_wheel"),
+    [
+        ("continuous", "0 0 0", "0 0 0", True),
+        ("revolute", "0 0 0", "0 0 0", False),
+        ("continuous", "0 0.5 0", "0 0.5 0", True),  # along the axis
+        ("continuous", "0.0305 0 0", "0 0 0", True),
+        ("continuous", "0.0307 0 0", "0 0 0", False),
+        ("continuous", "0 0 0", "0 0 0.0172", True),
+        ("continuous", "0 0 0", "0 0 0.0174", False),
+    ],
+)
+def test_limb_does_not_bend_at_a_balanced_wheel(kind, center, place, is_wheel):
+    wheel = link("b", ball(0.02, place), center=center, inertia=ROUND)
+    column = link("a") + joint("trunk", "a", axis="0 0 1")
+    found = robot(column, wheel, joint("a", "b", "0 0 -0.3", kind=kind))
+    assert len(found.limbs) == (not is_wheel)
 
 
-def test_continuous_shank_is_no_wheel():
-    parts = limb("a", "0 0 0", kind="continuous")
-    assert len(facts(parts).limbs) == 1
+def test_wheel_may_have_no_mass_or_end_a_leg():
+    wheel = link("w", ball(0.02), mass=None)
+    column = link("a") + joint("trunk", "a", axis="0 0 1")
+    assert robot(column, wheel, joint("a", "w", "0 0 -0.3", kind="continuous")).limbs == ()
+    leg = chain("leg", "0 0 0", LENGTHS) + joint("leg1", "w", "0 0 -0.3", kind="continuous")
+    (limb,) = robot(leg, wheel).limbs
+    assert len(limb.joints) == 3
+    assert len(robot(chain("a", "0 0 0", LENGTHS, kind="continuous")).limbs) == 1
 
 
-def test_limb_may_end_in_wheel():
-    robot = facts(
-        limb("leg", "0 0 0"),
-        link("wheel", "0 0 0"),
-        joint("leg1", "wheel", "0 0 -0.3", "continuous"),
-    )
-    assert len(robot.limbs[0].joints) == 3
+ARMS = at_corners("x_leg", "y_leg", "z_arm", "w_arm")
+LEFT = chain("a", "0 0.2 0", LENGTHS)
 
 
-# Score
-
-FOUR = [("x", "0.3 0.2 0"), ("y", "0.3 -0.2 0"), ("z", "-0.3 0.2 0"), ("w", "-0.3 -0.2 0")]
-
-
-def test_score_of_mirrored_limbs_on_ground():
-    robot = facts(*(limb(name, root) for name, root in FOUR))
-    assert set(scores(robot).values()) == {1.5}
-
-
-def test_score_of_leg_names_adds_half():
-    robot = facts(*(limb(f"{name}_thigh", root) for name, root in FOUR))
-    assert set(scores(robot).values()) == {2.0}
-    assert all(each.has_leg_names for each in robot.limbs)
-
-
-def test_score_of_single_limb():
-    assert scores(facts(limb("a", "0 0 0"))) == {"a1": 1.0}
-    assert scores(facts(limb("leg", "0 0 0"))) == {"leg1": 1.5}
+@pytest.mark.parametrize(
+    ("parts", "expected"),
+    [
+        ([LEFT], {"a1": 1.0}),
+        ([chain("leg", "0 0 0", LENGTHS)], {"leg1": 1.5}),
+        (at_corners("x", "y"), {"x1": 1.5, "y1": 1.5}),
+        (at_corners("x", "-", "z")[::2], {"x1": 1.5, "z1": 1.5}),
+        (ARMS, {"x_leg1": 2.0, "y_leg1": 2.0, "z_arm1": 0.5, "w_arm1": 0.5}),
+        ([LEFT, chain("b", "0 -0.2 0", (0.2,) * 3)], {"a1": 1.5, "b2": 1.5}),
+        ([LEFT, chain("b", "0 -0.2 0", (0.15,) * 4)], {"a1": 1.0, "b3": 1.0}),
+    ],
+    ids=["one", "leg", "mirrored", "front and rear", "arms", "one more joint", "two more joints"],
+)
+def test_score(parts, expected):
+    assert scores(robot(*parts)) == expected
 
 
-def test_score_of_arms_is_low():
-    # Shorter than the legs and mirrored as well.
-    legs = [limb(name, root) for name, root in FOUR[:2]]
-    arms = [
-        limb(name, root, (0.2, 0.15)) for name, root in (("p", "0 0.3 0.4"), ("q", "0 -0.3 0.4"))
-    ]
-    found = scores(facts(*legs, *arms, trunk=link("trunk", "0 0 0.5")))
-    assert found == {"x1": 1.5, "y1": 1.5, "p1": 0.5, "q1": 0.5}
+@pytest.mark.parametrize(("error", "score"), [(0.0390, 1.5), (0.0395, 1.0)])
+def test_mirror_image_is_within_a_share_of_the_size(error, score):
+    # The robot is 0.04 m x (0.44 m + error) x 0.62 m, 0.785 m across. 5 % are 0.0392 m.
+    sides = [chain("a", "0 0.2 0", LENGTHS), chain("b", f"0 {-0.2 - error} 0", LENGTHS)]
+    assert scores(robot(*sides)) == {"a1": score, "b1": score}
 
 
-def test_score_of_arms_on_ground_depends_on_names():
-    legs = [limb(f"{name}_leg", root) for name, root in FOUR[:2]]
-    arms = [limb(f"{name}_arm", root) for name, root in FOUR[2:]]
-    found = scores(facts(*legs, *arms))
-    assert found == {"x_leg1": 2.0, "y_leg1": 2.0, "z_arm1": 0.5, "w_arm1": 0.5}
-
-
-def test_score_of_arms_above_wheels_is_low():
-    # The lowest limbs, but half a meter above the pedestal of the robot.
-    arms = [limb(name, root) for name, root in FOUR[:2]]
-    base = link("trunk", "0 0 -1.4")
-    assert set(scores(facts(*arms, trunk=base)).values()) == {0.5}
-
-
-def test_score_of_folded_legs_is_high():
-    # The belly is lower than the feet, but by less than half of the height.
-    legs = [limb(f"{name}_leg", root, (0.2, 0.1)) for name, root in FOUR]
-    belly = link("trunk", "0 0 -0.4")
-    assert set(scores(facts(*legs, trunk=belly)).values()) == {2.0}
-
-
-@pytest.mark.parametrize(("height", "score"), [(0.0, 1.5), (0.05, 1.5), (0.15, 1.0), (0.3, 0.5)])
+@pytest.mark.parametrize(
+    ("height", "score"), [(0.119, 1.5), (0.121, 1.0), (0.249, 1.0), (0.251, 0.5)]
+)
 def test_score_depends_on_height_of_foot(height, score):
     # The robot is 1 m high.
-    legs = [limb(name, root, (0.3, 0.28)) for name, root in FOUR[:2]]
-    short = [limb(name, f"{root[:-1]} {height}", (0.3, 0.28)) for name, root in FOUR[2:]]
-    robot = facts(*legs, *short, trunk=link("trunk", "0 0 0.38"))
-    assert scores(robot)["z1"] == score
+    low = at_corners("x", "y", lengths=(0.3, 0.28))
+    raised = at_corners("-", "-", "z", "w", lengths=(0.3, 0.28), z=height)[2:]
+    found = robot(*low, *raised, trunk=link("trunk", ball(0.02, "0 0 0.38")))
+    assert scores(found) == {"x1": 1.5, "y1": 1.5, "z1": score, "w1": score}
 
 
-def test_score_allows_one_missing_joint():
-    robot = facts(limb("a", "0 0.2 0", (0.3, 0.3)), limb("b", "0 -0.2 0", (0.2, 0.2, 0.2)))
-    assert scores(robot) == {"a1": 1.5, "b2": 1.5}
-
-
-def test_score_counts_front_and_rear_as_mirrored():
-    robot = facts(limb("a", "0.3 0 0"), limb("b", "-0.3 0 0"))
-    assert scores(robot) == {"a1": 1.5, "b1": 1.5}
+@pytest.mark.parametrize(("z", "score"), [(-1.219, 1.5), (-1.221, 0.5)])
+def test_arms_end_half_of_the_height_above_the_pedestal(z, score):
+    # The limbs end at -0.62 m, and the pedestal 0.02 m below z.
+    found = robot(*at_corners("x", "y"), trunk=link("trunk", ball(0.02, f"0 0 {z}")))
+    assert scores(found) == {"x1": score, "y1": score}
 
 
 def test_score_of_gripper_jaws_is_not_mirrored():
-    arm = limb("a", "0 0 0", (0.4, 0.4))
     jaws = [
-        link(name, "0 0 -0.1") + joint("a1", name, f"0 {y} -0.4")
+        link(name, ball(0.02, "0 0 -0.1")) + joint("a1", name, f"0 {y} -0.4")
         for name, y in (("p", 0.04), ("q", -0.04))
     ]
-    assert set(scores(facts(arm, *jaws)).values()) == {1.0}
+    assert scores(robot(chain("a", "0 0 0", (0.4, 0.4)), *jaws)) == {"p": 1.0, "q": 1.0}
 
 
 def test_score_of_fixed_base_is_lower():
-    world = '<link name="world"/>' + link("trunk", mass=10)
-    robot = facts(
-        joint("world", "trunk", "0 0 1", "fixed"),
-        *(limb(name, root) for name, root in FOUR),
-        trunk=world,
-    )
-    assert set(scores(robot).values()) == {1.0}
+    held = link("world", mass=None) + joint("world", "trunk", "0 0 1", kind="fixed") + TRUNK
+    assert scores(robot(*at_corners("x", "y"), trunk=held)) == {"x1": 1.0, "y1": 1.0}
 
 
-# Names
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "FL_thigh", "left_hip_yaw", "LF_KFE", "RightKnee", "l_foot", "toe_fr", "Leg1", "lower_leg",
-        "shank", "LLeg", "tibia", "coxa_rf", "left_sole", "hind_leg_shoulder_leg",
-    ],
-)  # fmt: skip
-def test_has_leg_names(name):
-    assert facts(limb(name, "0 0 0")).limbs[0].has_leg_names
+def test_score_of_fingers_is_lower():
+    hand = link("Palm") + joint("trunk", "Palm", kind="fixed")
+    assert scores(robot(*at_corners("x", "y"), hand)) == {"x1": 0.5, "y1": 0.5}
+    assert scores(robot(*at_corners("x_toe", "y_toe"), hand)) == {"x_toe1": 2.0, "y_toe1": 2.0}
 
 
 @pytest.mark.parametrize(
-    "name",
+    ("is_leg", "names"),
     [
-        "left_elbow", "link_3", "allegro_thumb", "TorsoLeft", "chip", "ship", "console", "wrist",
-        "finger_mcp", "wheel_mount", "front_shoulder", "allegro",
+        (
+            True,
+            "FL_thigh left_hip_yaw LF_KFE RightKnee l_foot toe_fr Leg1 lower_leg shank LLeg tibia "
+            "coxa_rf left_sole hind_leg_shoulder_leg",
+        ),
+        (
+            False,
+            "left_elbow link_3 allegro_thumb TorsoLeft chip ship console wrist finger_mcp "
+            "wheel_mount front_shoulder allegro",
+        ),
     ],
-)  # fmt: skip
-def test_has_leg_names_is_false_for_others(name):
-    assert not facts(limb(name, "0 0 0")).limbs[0].has_leg_names
+)
+def test_has_leg_names(is_leg, names):
+    for name in names.split():
+        (limb,) = robot(chain(name, "0 0 0", LENGTHS)).limbs
+        assert limb.has_leg_names == is_leg, name
 
 
 @pytest.mark.parametrize("name", ["armature", "handle", "proprioception"])
 def test_score_ignores_words_within_words(name):
-    assert scores(facts(limb(name, "0 0 0"))) == {f"{name}1": 1.0}
+    assert scores(robot(chain(name, "0 0 0", LENGTHS))) == {f"{name}1": 1.0}
 
 
-def test_has_leg_names_takes_majority():
-    # An arm on a link named hip is an arm, and a leg on a shoulder is a leg.
-    def chain(first, second):
-        return facts(
-            link(first), joint("trunk", first, "0 0 0"), limb(second, "0 0 -0.1", parent=first)
-        ).limbs[0]
-
-    assert not chain("hip", "elbow").has_leg_names
-    assert chain("shoulder", "foot").has_leg_names
-
-
-def test_shank_without_center_of_mass_is_no_wheel():
-    robot = facts(
-        link("thigh", center="0 0 -0.1"),
-        joint("trunk", "thigh", "0 0 0"),
-        link("shank", "0 0 -0.2"),
-        joint("thigh", "shank", "0 0 -0.2", "continuous"),
-    )
-    assert [len(limb.joints) for limb in robot.limbs] == [2]
+@pytest.mark.parametrize(
+    ("first", "second", "is_leg", "score"),
+    [("hip", "elbow", False, 0.0), ("shoulder", "foot", True, 1.5), ("hip", "part", True, 1.5)],
+)
+def test_names_of_a_limb_take_the_majority(first, second, is_leg, score):
+    above = link(first) + joint("trunk", first)
+    (limb,) = robot(above, chain(second, "0 0 -0.1", LENGTHS, first)).limbs
+    assert (limb.has_leg_names, limb.score) == (is_leg, score)
 
 
-def test_score_of_fingers_is_lower():
-    fingers = [limb(name, root) for name, root in FOUR]
-    trunk = link("trunk", mass=10)
-    assert set(scores(facts(*fingers, trunk=trunk)).values()) == {1.5}
-    hand = '<joint name="j" type="fixed"><parent link="trunk"/><child link="palm"/></joint>'
-    assert set(scores(facts(*fingers, link("palm"), hand, trunk=trunk)).values()) == {0.5}
-
-
-# Limbs that share joints
-
-
-def test_is_branch_of_toes():
-    robot = facts(
-        limb("a", "0 0 0", (0.4, 0.4)),
-        *(
-            link(t, "0 0 -0.02") + joint("a1", t, f"{x} 0 -0.4")
-            for t, x in (("p", 0.1), ("q", -0.05))
-        ),
-    )
+def branches(robot):
     one, other = robot.limbs
-    assert is_branch(one, other, 1.0)
-    assert is_branch(other, one, 1.0)
+    assert is_branch(one, other, 1.0) == is_branch(other, one, 1.0)
+    return is_branch(one, other, 1.0)
 
 
-def test_is_branch_is_false_below_waist():
+def test_legs_below_a_waist_are_no_branches():
     waist = link("w") + joint("trunk", "w", "0 0 -0.1", axis="0 0 1")
-    robot = facts(waist, limb("a", "0 0.1 0", parent="w"), limb("b", "0 -0.1 0", parent="w"))
-    one, other = robot.limbs
-    assert not is_branch(one, other, 1.0)
-    assert scores(robot) == {"a1": 1.5, "b1": 1.5}
+    legs = [chain(n, f"0 {y} 0", LENGTHS, "w") for n, y in (("a", 0.1), ("b", -0.1))]
+    found = robot(waist, *legs)
+    assert not branches(found)
+    assert scores(found) == {"a1": 1.5, "b1": 1.5}
 
 
-def test_is_branch_is_false_behind_spine():
-    spine, at = "", "trunk"
-    for k in range(8):
-        spine += link(f"s{k}") + joint(at, f"s{k}", "-0.05 0 0", axis="0 0 1")
-        at = f"s{k}"
-    robot = facts(
-        spine, limb("a", "0 0.1 0", (0.3, 0.3, 0.1), at), limb("b", "0 -0.1 0", (0.3, 0.3, 0.1), at)
-    )
-    one, other = robot.limbs
-    assert not is_branch(one, other, 1.0)
+def test_legs_behind_a_spine_are_no_branches():
+    spine = chain("s", "0 0 0", (0.05,) * 8, axes=["0 0 1"] * 8)
+    legs = [chain(n, f"0 {y} 0", (0.3, 0.3, 0.1), "s7") for n, y in (("a", 0.1), ("b", -0.1))]
+    assert not branches(robot(spine, *legs))
 
 
-def test_is_branch_of_closed_loop_rod():
+def test_rod_of_a_closed_loop_is_a_branch():
     # It is beside the knee, below two of the four joints of the leg.
-    robot = facts(
-        limb("a", "0 0 0", (0.05, 0.05, 0.4, 0.4)),
-        link("rod"),
-        link("rod1", "0 0 -0.6"),
-        joint("a1", "rod", "0.05 0 -0.05"),
-        joint("rod", "rod1", "0 0 -0.05"),
-    )
-    one, other = robot.limbs
-    assert is_branch(one, other, 1.0)
+    rod = link("rod") + link("rod1", ball(0.02, "0 0 -0.6"))
+    rod += joint("a1", "rod", "0.05 0 -0.05") + joint("rod", "rod1", "0 0 -0.05")
+    assert branches(robot(chain("a", "0 0 0", (0.05, 0.05, 0.4, 0.4)), rod))
 
 
-def test_is_branch_needs_shared_joints():
-    one, other = facts(limb("a", "0 0 0"), limb("b", "0 0.01 0")).limbs
-    assert not is_branch(one, other, 1.0)
+HINGES = [SimpleNamespace(kind="revolute") for _ in range(6)]
 
 
-# Size
+def limb(*joints, y=0.0, shared=0.4):
+    """Return a limb of 1 m whose second joint is `shared` below the first one."""
+    points = np.array([[0, 0, 0], *[[0, 0, -shared]] * (len(joints) - 1)])
+    parts = tuple(HINGES[k] for k in joints)
+    return Chain(chain=(), joints=parts, points=points, tip=np.array([0, y, -1.0]))
 
 
-def test_limbs_of_snake_are_empty():
-    assert facts(limb("a", "0 0 0", (0.01,) * 40)).limbs == ()
+def sliding(*joints, shared):
+    """Return a limb that ends in a slide beside it, which has no length."""
+    made = limb(*joints, shared=shared)
+    parts, points = (*made.joints, SimpleNamespace(kind="prismatic")), [*made.points, [9, 9, 9]]
+    return Chain(chain=(), joints=parts, points=np.array(points), tip=made.tip)
 
 
-def test_limbs_of_many_chains_are_limited():
-    parts = [limb(f"l{k}", f"{k * 0.01} 0 0") for k in range(600)]
-    robot = facts(*parts)
-    assert len(robot.bodies) == 1201
-    assert len(robot.limbs) == 64
-
-
-def test_limbs_of_long_chain_are_empty():
-    robot = facts(limb("a", "0 0 0", (0.001,) * 3000))
-    assert len(robot.bodies) == 3001
-    assert robot.limbs == ()
+@pytest.mark.parametrize(
+    ("one", "other", "expected"),
+    [
+        (limb(0, 1, y=0.1), limb(2, 3, y=0.1), False),  # no shared joint
+        (limb(0, 1, y=0.1), limb(0, 2, y=-0.1), False),  # mirrored
+        (limb(0, 1, y=0.1), limb(0, 2, y=0.2), True),
+        (limb(0, 1, 2, y=0.1), limb(0, 3, 4, y=0.2), False),  # one of three joints
+        (limb(0, 1, 2, y=0.1), limb(0, 3, y=0.2), True),
+        (sliding(0, 1, shared=0.49), sliding(0, 2, shared=0.49), False),  # of the length
+        (sliding(0, 1, shared=0.49), sliding(0, 2, shared=0.51), True),
+    ],
+)
+def test_is_branch(one, other, expected):
+    assert is_branch(one, other, 1.0) == expected

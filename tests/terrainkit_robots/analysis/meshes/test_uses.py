@@ -15,7 +15,7 @@ from terrainkit_robots.analysis.meshes.uses import (
     rename_edits,
     replace_edits,
 )
-from terrainkit_robots.description.fix import SetAttribute, WriteFile
+from terrainkit_robots.description.fix import WriteFile
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
@@ -46,10 +46,8 @@ def robot(tmp_path):
 
 
 def test_mesh_uses_of_every_link(robot):
-    uses = [
-        (use.link.name, use.mesh.filename, use.is_collision) for use in mesh_uses(robot().model)
-    ]
-    assert uses == [
+    uses = mesh_uses(robot().model)
+    assert [(use.link.name, use.mesh.filename, use.is_collision) for use in uses] == [
         ("a", "./m/foot.stl", True),
         ("a", "m/foot.stl", False),
         ("b", "m/foot.stl", True),
@@ -59,45 +57,39 @@ def test_mesh_uses_of_every_link(robot):
 
 def test_meshes_by_name_groups_equal_names(robot):
     used = meshes_by_name(robot().model, Meshes())
-    assert [(u.name, len(u.uses), u.source.line) for u in used] == [
-        ("./m/foot.stl", 1, 4),
-        ("m/foot.stl", 2, 3),
-        ("m/hand.stl", 1, 8),
+    assert [(u.label, len(u.uses), u.source.line, u.strict, is_missing(u)) for u in used] == [
+        ("./m/foot.stl (collision mesh of a)", 1, 4, True, False),
+        ("m/foot.stl (collision mesh of b)", 2, 3, True, False),
+        ("m/hand.stl (visual mesh of b)", 1, 8, False, True),
     ]
-    assert [u.strict for u in used] == [True, True, False]
-    assert [is_missing(u) for u in used] == [False, False, True]
 
 
 def test_meshes_by_file_skips_missing_files(robot):
     (used,) = meshes_by_file(robot().model, Meshes())
-    assert used.name == "m/foot.stl"
-    assert used.source.line == 3
-    assert len(used.uses) == 3
+    assert (used.name, used.source.line, len(used.uses)) == ("m/foot.stl", 3, 3)
     assert used.role == "collision mesh of a, b"
     assert [use.link.name for use in used.collisions] == ["a", "b"]
 
 
+def replaced(robot, suffix="_hull.stl"):
+    """Return the edits that replace the only mesh file."""
+    (used,) = meshes_by_file(robot.model, robot.meshes)
+    return replace_edits(robot.model, robot.meshes, used.uses, suffix, lambda: b"hull")
+
+
 def test_replace_edits_change_every_use(robot):
-    facts = robot()
-    (used,) = meshes_by_file(facts.model, facts.meshes)
-    write, *edits = replace_edits(
-        facts.model, facts.meshes, used.uses, "_hull.stl", lambda: b"hull"
-    )
+    write, *edits = replaced(robot())
     assert isinstance(write, WriteFile)
-    assert write.path.name == "foot_hull.stl"
-    assert write.content() == b"hull"
-    assert [edit.source.line for edit in edits] == [3, 4, 7]
-    assert {(e.name, e.value) for e in edits if isinstance(e, SetAttribute)} == {
-        ("filename", "m/foot_hull.stl")
-    }
+    assert (write.path.name, write.content()) == ("foot_hull.stl", b"hull")
+    assert [(edit.source.line, edit.name, edit.value) for edit in edits] == [
+        (line, "filename", "m/foot_hull.stl") for line in (3, 4, 7)
+    ]
 
 
 def test_replace_edits_keep_existing_files(robot, tmp_path):
-    facts = robot()
+    given = robot()
     (tmp_path / "m/foot_hull.stl").write_bytes(b"somebody's")
-    (used,) = meshes_by_file(facts.model, facts.meshes)
-    write, *_ = replace_edits(facts.model, facts.meshes, used.uses, "_hull.stl", bytes)
-    assert write.path.name == "foot_hull_2.stl"
+    assert replaced(given)[0].path.name == "foot_hull_2.stl"
 
 
 def test_relative_name_of_mesh(robot, tmp_path):
@@ -122,25 +114,18 @@ def test_replace_edits_of_mjcf_are_relative_to_meshdir(robot):
       <asset><mesh name="f" file="foot.stl"/></asset>
       <worldbody><body name="a"><freejoint/><geom type="mesh" mesh="f" mass="1"/></body></worldbody>
     </mujoco>"""
-    facts = robot(text, "robot.xml")
-    (used,) = meshes_by_file(facts.model, facts.meshes)
-    assert used.strict
-    write, edit = replace_edits(facts.model, facts.meshes, used.uses, "_hull.stl", bytes)
-    assert write.path.name == "foot_hull.stl"
-    assert (edit.name, edit.value) == ("file", "foot_hull.stl")
+    write, edit = replaced(robot(text, "robot.xml"))
+    assert (write.path.name, edit.name, edit.value) == ("foot_hull.stl", "file", "foot_hull.stl")
 
 
-def test_replace_edits_of_xacro_are_none(robot):
-    facts = Facts(replace(robot().model, kind="xacro"))
-    (used,) = meshes_by_file(facts.model, facts.meshes)
-    assert rename_edits(facts.model, used.uses, "x") is None
-    assert replace_edits(facts.model, facts.meshes, used.uses, ".stl", bytes) is None
-
-
-def test_replace_edits_of_malformed_file_are_none(robot):
-    facts = robot(TWO_LINKS.replace("</robot>", ""))
-    (used,) = meshes_by_file(facts.model, facts.meshes)
-    assert replace_edits(facts.model, facts.meshes, used.uses, ".stl", bytes) is None
+def test_replace_edits_of_xacro_and_malformed_files_are_none(robot):
+    given = robot()
+    expanded = Facts(replace(given.model, kind="xacro"))
+    (used,) = meshes_by_file(expanded.model, expanded.meshes)
+    assert rename_edits(expanded.model, used.uses, "x") is None
+    assert replaced(expanded) is None
+    given.model.file.write_text(TWO_LINKS.replace("</robot>", ""))
+    assert replaced(Facts(load_robot(given.model.file))) is None
 
 
 @pytest.mark.parametrize(

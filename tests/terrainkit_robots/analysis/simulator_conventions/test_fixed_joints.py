@@ -1,6 +1,5 @@
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     KEEP_LINK_OPTIONS,
     SIMULATORS,
@@ -9,73 +8,65 @@ from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     merged_joints,
 )
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import load_robot
+from tests.small_robots import chain, facts, joint, link, mjcf, tree_text
 
 
-def merged_tree(facts, simulator):
-    merged = merged_joints(facts.fixed_joints, simulator)
-    return merge_joints(facts.tree, facts.bodies, merged)
+def merged_tree(robot, simulator):
+    merged = merged_joints(robot.fixed_joints, simulator)
+    return merge_joints(robot.tree, robot.bodies, merged)
 
 
-def body_of(facts, simulator):
-    return dict(merged_tree(facts, simulator).body_of)
+def merged_feet(robot):
+    return find_merged_feet(robot.tree, robot.bodies, robot.legs, robot.fixed_joints)
 
 
-def merged_feet(facts):
-    return find_merged_feet(facts.tree, facts.bodies, facts.legs, facts.fixed_joints)
+@pytest.mark.parametrize(
+    ("simulator", "bodies"),
+    [("MuJoCo", "baaaa"), ("Genesis", "baaaa"), ("Isaac Gym", "baatt"), ("Isaac Lab", "baatt")],
+)
+def test_attribute_keeps_a_link_where_it_is_read(simulator, bodies):
+    # Links that are fixed to a link that is kept are merged into that.
+    robot = facts(tree_text("ja: b > a", "jm!: a > m", "jt!*: m > t", "jc!: t > c"))
+    assert [joint.name for joint in robot.fixed_joints] == ["jm", "jt", "jc"]
+    found = merged_tree(robot, simulator)
+    assert (found.base, found.body_of) == ("b", dict(zip("bamtc", bodies, strict=True)))
 
 
-def test_merge_joints_depends_on_simulator(urdf):
-    # tip is kept where the attribute is read; links fixed to it are then merged into it.
-    facts = urdf("ja: b > a", "jm!: a > mid", "jt!*: mid > tip", "jc!: tip > cap")
-    assert [joint.name for joint in facts.fixed_joints] == ["jm", "jt", "jc"]
-    for simulator in ("MuJoCo", "Genesis"):
-        assert body_of(facts, simulator) == {"b": "b", "a": "a", "mid": "a", "tip": "a", "cap": "a"}
-    for simulator in ("Isaac Gym", "Isaac Lab"):
-        kept = {"b": "b", "a": "a", "mid": "a", "tip": "tip", "cap": "tip"}
-        assert body_of(facts, simulator) == kept
-
-
-def test_merge_joints_replaces_link_by_children(urdf):
-    facts = urdf("ja: b > a", "jm!: b > m", "jz: b > z", "jx: m > x", "jy: m > y")
-    tree = merged_tree(facts, "MuJoCo")
+def test_children_of_a_merged_link_take_its_place():
+    robot = facts(tree_text("ja: b > a", "jm!: b > m", "jz: b > z", "jx: m > x", "jy: m > y"))
+    tree = merged_tree(robot, "MuJoCo")
     assert [joint.name for joint in tree.child_joints["b"]] == ["ja", "jx", "jy", "jz"]
 
 
-def test_merge_joints_keeps_mjcf_bodies(mjcf):
+def test_bodies_of_mjcf_are_kept():
     geom = '<geom size="0.1" mass="1"/>'
-    facts = mjcf(f'<body name="b"><freejoint/>{geom}<body name="f">{geom}</body></body>')
-    assert facts.fixed_joints == ()
-    assert body_of(facts, "Genesis") == {"b": "b", "f": "f"}
+    robot = mjcf(f'<body name="b"><freejoint/>{geom}<body name="f">{geom}</body></body>')
+    assert robot.fixed_joints == ()
+    assert merged_tree(robot, "Genesis").body_of == {"b": "b", "f": "f"}
 
 
-@pytest.mark.parametrize("name", ["quadruped.urdf", "quadruped.xml"])
-def test_merged_feet_of_bundled_quadruped(name):
-    merges = merged_feet(Facts(load_robot(bundled.urdf_path("quadruped").with_name(name))))
-    if name.endswith("xml"):
-        assert merges == ()
-        return
+@pytest.mark.parametrize(
+    ("old", "simulators"),
+    [("", ["MuJoCo", "Genesis"]), ('dont_collapse="true"', SIMULATORS)],
+)
+def test_merged_feet_of_bundled_quadruped(old, simulators):
+    merges = merged_feet(facts(bundled.urdf_path("quadruped").read_text().replace(old, "")))
     assert [each.foot for each in merges] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
-    assert all(each.joint.dont_collapse for each in merges)
-    assert dict(merges[0].merged_body) == {"MuJoCo": "FL_calf", "Genesis": "FL_calf"}
+    for each in merges:
+        calf = each.foot.replace("foot", "calf")
+        assert each.merged_body == dict.fromkeys(simulators, calf)
+        assert each.joint.child == each.foot
 
 
-def test_merged_feet_without_attribute(tmp_path):
-    text = bundled.urdf_path("quadruped").read_text().replace('dont_collapse="true"', "")
-    (tmp_path / "robot.urdf").write_text(text)
-    merges = merged_feet(Facts(load_robot(tmp_path / "robot.urdf")))
-    assert {simulator for each in merges for simulator in each.merged_body} == set(SIMULATORS)
-
-
-def test_merged_feet_of_separate_bodies_is_empty():
-    assert merged_feet(Facts(load_robot(bundled.urdf_path("biped")))) == ()
+def test_feet_without_shapes_or_of_separate_bodies_are_not_merged(bundled):
+    legs = [chain(name, f"0 {y} 0", (0.3, 0.3)) for name, y in (("a_leg", 0.1), ("b_leg", -0.1))]
+    for each in ("a", "b"):
+        legs += [link(f"{each}_foot"), joint(f"{each}_leg1", f"{each}_foot", kind="fixed")]
+    robot = facts(link("trunk"), *legs)
+    assert len(robot.legs) == 2
+    for unmerged in (robot, bundled("biped.urdf"), bundled("quadruped.xml"), facts("")):
+        assert merged_feet(unmerged) == ()
 
 
 def test_keep_link_options_cover_every_simulator():
     assert list(KEEP_LINK_OPTIONS) == list(SIMULATORS)
-
-
-def test_merged_feet_without_links(tmp_path):
-    (tmp_path / "robot.urdf").write_text('<robot name="r"/>')
-    facts = Facts(load_robot(tmp_path / "robot.urdf"))
-    assert merged_feet(facts) == ()

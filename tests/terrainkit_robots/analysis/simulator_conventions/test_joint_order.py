@@ -1,36 +1,34 @@
-from pathlib import Path
+import re
+from itertools import pairwise
 
 import mujoco
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from lxml import etree
 
-from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from tests.small_robots import facts, floating, mjcf, tree_text
 
-SHARED = [
-    "a1/urdf/a1.urdf",
-    "go2/urdf/go2.urdf",
-    "h1/urdf/h1.urdf",
-    "cassie/urdf/cassie.urdf",
-    "anymal_c/urdf/anymal_c.urdf",
-    "g1/g1_29dof.urdf",
-]
+GEOM = '<geom size="0.1" mass="1"/>'
 
 
-def orders(facts):
-    return {order.simulator: order for order in facts.simulator_orders}
+def urdf(*joints):
+    return facts(tree_text(*joints))
 
 
-def joints(facts):
-    return {name: " ".join(order.joints) for name, order in orders(facts).items()}
+def orders(robot):
+    return {order.simulator: order for order in robot.simulator_orders}
 
 
-def bodies(facts):
-    return {name: " ".join(order.bodies) for name, order in orders(facts).items()}
+def joints(robot):
+    return {name: " ".join(order.joints) for name, order in orders(robot).items()}
+
+
+def bodies(robot):
+    return {name: " ".join(order.bodies) for name, order in orders(robot).items()}
+
+
+def certain(robot):
+    return [name for name, order in orders(robot).items() if order.certain]
 
 
 # By hand. b is the parent of c, a and F; F of x3, x1 and G; G of y1.
@@ -48,38 +46,33 @@ TREE = (
 )
 
 
-def test_simulator_orders_by_hand(urdf):
-    facts = urdf(*TREE)
-    assert " ".join(facts.file_order) == "jc jz jx3 jx1 jy1 ja jk"
-    assert joints(facts) == {
+def test_simulator_orders_by_hand():
+    robot = urdf(*TREE)
+    assert " ".join(robot.file_order) == "jc jz jx3 jx1 jy1 ja jk"
+    assert joints(robot) == {
         "MuJoCo": "jc jk jx3 jy1 jx1 ja jz",  # the child of G replaces G, before x1
         "Isaac Gym": "ja jz jc jk jx1 jx3 jy1",
         "Isaac Lab": "ja jc jx1 jx3 jy1 jz jk",
         "Genesis": "jc jk jx3 jx1 jy1 ja jz",  # as genesis-world 1.4.5 lists this tree
     }
-    assert bodies(facts) == {
+    assert bodies(robot) == {
         "MuJoCo": "b c k x3 y1 x1 a z",
         "Isaac Gym": "b a z c k x1 x3 y1",
         "Isaac Lab": "b a c x1 x3 y1 z k",
         "Genesis": "b c k x3 x1 y1 a z",
     }
-    assert {name: order.certain for name, order in orders(facts).items()} == {
-        "MuJoCo": True,
-        "Isaac Gym": False,
-        "Isaac Lab": False,
-        "Genesis": True,
-    }
+    assert certain(robot) == ["MuJoCo", "Genesis"]
+    assert [order.key for order in robot.simulator_orders] == [
+        "mujoco", "isaac_gym", "isaac_lab", "genesis",
+    ]  # fmt: skip
+    reasons = {name: order.reason for name, order in orders(robot).items()}
+    assert reasons["MuJoCo"] == "depth first, siblings in the order of their joints in the file"
+    assert reasons["Isaac Lab"].endswith("up to Isaac Sim 5.1; compare with robot.joint_names")
+    assert "siblings by the name of the joint, as in the lists published" in reasons["Isaac Gym"]
 
 
-def test_simulator_order_matches_mujoco_compiler(urdf):
-    facts = urdf(*TREE)
-    compiled = compile_urdf(facts.model.file.read_text())
-    assert compiled == (orders(facts)["MuJoCo"].joints, orders(facts)["MuJoCo"].bodies)
-
-
-def test_simulator_orders_with_kept_link(urdf):
-    facts = urdf("jb: b > a", "jF!*: a > F", "jc: F > c")
-    assert bodies(facts) == {
+def test_kept_link_is_a_body():
+    assert bodies(urdf("jb: b > a", "jF!*: a > F", "jc: F > c")) == {
         "MuJoCo": "b a c",
         "Isaac Gym": "b a F c",
         "Isaac Lab": "b a F c",
@@ -87,180 +80,131 @@ def test_simulator_orders_with_kept_link(urdf):
     }
 
 
-def test_simulator_orders_are_certain_if_unique(urdf):
-    facts = urdf("ja: b > a", "jc: b > c", "jd: a > d", "je: c > e")
-    assert all(order.certain for order in facts.simulator_orders)
-    assert joints(facts)["Isaac Lab"] == "ja jc jd je"
-    assert joints(facts)["Isaac Gym"] == "ja jd jc je"
+@pytest.mark.parametrize(
+    ("tree", "gym", "lab", "uncertain"),
+    [
+        pytest.param(
+            ["ja: b > a", "jc: b > c", "jd: a > d", "je: c > e"],
+            "ja jd jc je",
+            "ja jc jd je",
+            [],
+            id="unique",
+        ),
+        # If merged, c is a sibling of a; otherwise it is one level below, after d.
+        pytest.param(
+            ["ja: b > a", "jb!: b > bb", "jc: bb > c", "jd: a > d"],
+            "ja jd jc",
+            "ja jc jd",
+            ["Isaac Lab"],
+            id="fixed joint",
+        ),
+        # In the file, - sorts before 1. In USD it becomes _ and sorts after 1.
+        pytest.param(["a1: b > p", "a-z: b > q"], "a1 a-z", "a1 a-z", [], id="names in USD"),
+        # By the names of the links, q is after p.
+        pytest.param(
+            ["a1: b > q", "a2: b > p"], "a1 a2", "a1 a2", ["Isaac Gym"], id="names of links"
+        ),
+        pytest.param(
+            ["a2: b > p", "a1: b > q"],
+            "a1 a2",
+            "a1 a2",
+            ["Isaac Gym", "Isaac Lab"],
+            id="order of the file",
+        ),
+        pytest.param(
+            ["ja: b > a", "jc: b > c", "jd: a > c"],
+            "ja jc",
+            "ja jc",
+            ["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"],
+            id="rejected joint",
+        ),
+    ],
+)
+def test_orders_are_certain_if_all_variants_agree(tree, gym, lab, uncertain):
+    robot = urdf(*tree)
+    assert (joints(robot)["Isaac Gym"], joints(robot)["Isaac Lab"]) == (gym, lab)
+    assert [name for name, order in orders(robot).items() if not order.certain] == uncertain
 
 
-def test_simulator_order_with_fixed_joint_is_uncertain(urdf):
-    # If merged, c is a sibling of a; otherwise it is one level below, after d.
-    facts = urdf("ja: b > a", "jb!: b > bb", "jc: bb > c", "jd: a > d")
-    assert joints(facts)["Isaac Lab"] == "ja jc jd"
-    assert not orders(facts)["Isaac Lab"].certain
-    assert orders(facts)["Isaac Gym"].certain
+def test_orders_with_an_unknown_type_of_joint_are_uncertain():
+    robot = facts(tree_text("ja: b > a").replace('"revolute"', '"hinge"'))
+    assert {order.reason for order in robot.simulator_orders} == {"a joint has an unknown type"}
+    assert certain(robot) == []
 
 
-def test_simulator_orders_sort_usd_names(urdf):
-    # In the file, - sorts before 1. In USD it becomes _ and sorts after 1.
-    facts = urdf("a1: b > p", "a-z: b > q")
-    assert joints(facts)["Isaac Gym"] == "a1 a-z"
-    assert not orders(urdf("left_10: b > p", "left_1_: b > q", "left_09: b > r"))[
-        "Isaac Gym"
-    ].certain
-
-
-def test_simulator_orders_of_mjcf(mjcf):
-    geom = '<geom size="0.1" mass="1"/>'
-    facts = mjcf(
-        f'<body name="b"><freejoint/>{geom}'
-        f'<body name="z"><joint name="jz"/>{geom}'
-        f'<body name="fixed">{geom}<body name="y"><joint name="jy"/>{geom}</body></body></body>'
-        f'<body name="a"><joint name="ja"/>{geom}</body></body>'
+def test_simulator_orders_of_mjcf():
+    robot = mjcf(
+        f'<body name="b"><freejoint/>{GEOM}'
+        f'<body name="z"><joint name="jz"/>{GEOM}'
+        f'<body name="fixed">{GEOM}<body name="y"><joint name="jy"/>{GEOM}</body></body></body>'
+        f'<body name="a"><joint name="ja"/>{GEOM}</body></body>'
     )
-    assert joints(facts) == {
+    assert joints(robot) == {
         "MuJoCo": "jz jy ja",
         "Isaac Gym": "jz jy ja",
         "Isaac Lab": "jz ja jy",
         "Genesis": "jz jy ja",
     }
-    assert bodies(facts)["MuJoCo"] == "b z fixed y a"
-    assert not orders(facts)["Isaac Gym"].certain
+    assert bodies(robot)["MuJoCo"] == "b z fixed y a"
+    assert certain(robot) == ["MuJoCo", "Genesis"]
+    assert "siblings as in the file; compare" in orders(robot)["Isaac Lab"].reason
 
 
-def test_simulator_orders_of_multi_joint_bodies(mjcf):
-    geom = '<geom size="0.1" mass="1"/>'
+def test_simulator_orders_of_multi_joint_bodies():
     two = '<joint name="j1" axis="1 0 0"/><joint name="j2"/>'
-    facts = mjcf(f'<body name="b"><freejoint/>{geom}<body name="a">{two}{geom}</body></body>')
-    found = orders(facts)
-    assert found["MuJoCo"].joints == ("j1", "j2")
-    assert found["MuJoCo"].bodies == ("b", "a")
-    assert [name for name, order in found.items() if order.certain] == ["MuJoCo", "Genesis"]
+    robot = mjcf(f'<body name="b"><freejoint/>{GEOM}<body name="a">{two}{GEOM}</body></body>')
+    assert (joints(robot)["MuJoCo"], bodies(robot)["MuJoCo"]) == ("j1 j2", "b a")
+    assert certain(robot) == ["MuJoCo", "Genesis"]
 
 
-# Published orders. The files list the legs in another order: A1 with FR first, ANYmal C as LF, RF,
-# LH, RH.
+def test_simulator_orders_without_links():
+    assert {(o.joints, o.bodies) for o in facts("").simulator_orders} == {((), ())}
 
 
-@pytest.mark.parametrize(
-    ("name", "legs", "parts"),
-    [
-        (
-            "a1/urdf/a1.urdf",
-            ["FL", "FR", "RL", "RR"],
-            ["_hip_joint", "_thigh_joint", "_calf_joint"],
-        ),
-        ("anymal_c/urdf/anymal_c.urdf", ["LF", "LH", "RF", "RH"], ["_HAA", "_HFE", "_KFE"]),
-    ],
-)
-def test_isaac_orders_match_published_lists(robot_file, name, legs, parts):
-    found = orders(Facts(load_robot(robot_file(name))))
-    assert found["Isaac Gym"].joints == tuple(leg + part for leg in legs for part in parts)
-    assert found["Isaac Lab"].joints == tuple(leg + part for part in parts for leg in legs)
-    assert not found["Isaac Lab"].certain  # an importer that keeps the order of the file differs
-    assert "robot.joint_names" in found["Isaac Lab"].reason
+# Published orders. The file of A1 lists its legs in another order, with FR first.
 
 
-def test_isaac_lab_order_matches_published_g1(robot_file):
-    order = orders(Facts(load_robot(robot_file("g1/g1_29dof.urdf"))))["Isaac Lab"]
-    assert order.certain
-    assert order.joints[:9] == (
-        "left_hip_pitch_joint",
-        "right_hip_pitch_joint",
-        "waist_yaw_joint",
-        "left_hip_roll_joint",
-        "right_hip_roll_joint",
-        "waist_roll_joint",
-        "left_hip_yaw_joint",
-        "right_hip_yaw_joint",
-        "waist_pitch_joint",
+def test_isaac_orders_match_published_lists_of_a1():
+    parts = ("hip", "thigh", "calf")
+    tree = []
+    for leg in ("FR", "FL", "RR", "RL"):
+        links = ["trunk", *(f"{leg}_{part}" for part in parts)]
+        tree += [f"{child}_joint: {parent} > {child}" for parent, child in pairwise(links)]
+    robot = urdf(*tree)
+    legs = ("FL", "FR", "RL", "RR")
+    assert orders(robot)["Isaac Gym"].joints == tuple(
+        f"{leg}_{part}_joint" for leg in legs for part in parts
     )
+    assert orders(robot)["Isaac Lab"].joints == tuple(
+        f"{leg}_{part}_joint" for part in parts for leg in legs
+    )
+    assert certain(robot) == ["MuJoCo", "Genesis"]
 
 
-# Compared with MuJoCo
-
-
-def compile_urdf(text):
-    """Return the compiled joints and bodies of a URDF, with the same inertial for all links."""
-    root = etree.fromstring(text.encode())
-    for link in root.iterchildren("link"):
-        for part in list(link):
-            link.remove(part)
-        inertial = etree.SubElement(link, "inertial")
-        etree.SubElement(inertial, "mass", value="1")
-        etree.SubElement(inertial, "inertia", ixx="1", iyy="1", izz="1", ixy="0", ixz="0", iyz="0")
-    for other in list(root):
-        if other.tag not in ("link", "joint"):
-            root.remove(other)
-    children = {child.get("link") for child in root.iterfind("joint/child")}
-    base = next(name for e in root.iterchildren("link") if (name := e.get("name")) not in children)
-    etree.SubElement(root, "link", name="tested_world")
-    joint = etree.SubElement(root, "joint", name="tested_float", type="floating")
-    etree.SubElement(joint, "parent", link="tested_world")
-    etree.SubElement(joint, "child", link=base)
-    return listed(mujoco.MjModel.from_xml_string(etree.tostring(root).decode()))
-
-
-def listed(model):
+def check(robot, model):
     moving = [int(kind) for kind in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)]
-    names = [model.joint(i).name for i in range(model.njnt) if model.jnt_type[i] in moving]
-    return tuple(names), tuple(model.body(i).name for i in range(1, model.nbody))
-
-
-def check(path, compiled):
-    order = orders(Facts(load_robot(path)))["MuJoCo"]
-    assert (order.joints, order.bodies) == compiled
+    joints = [model.joint(i).name for i in range(model.njnt) if model.jnt_type[i] in moving]
+    order = orders(robot)["MuJoCo"]
+    assert list(order.joints) == joints
+    assert list(order.bodies) == [model.body(i).name for i in range(1, model.nbody)]
     assert order.certain
 
 
-@pytest.mark.parametrize("name", SHARED)
-def test_mujoco_order_of_published_robot(robot_file, name):
-    path = robot_file(name)
-    check(path, compile_urdf(path.read_text()))
+def check_urdf(text):
+    robot = facts(text)
+    text = re.sub("<mujoco>.*?</mujoco>", "", text, flags=re.DOTALL)
+    check(robot, mujoco.MjModel.from_xml_string(floating(text, robot.bodies[0].top.name)))
+
+
+def test_mujoco_order_of_a_tree():
+    check_urdf(tree_text(*TREE))
+    check_urdf(tree_text("j1: a > b", "j2!: a > c", "j3: c > d", "j4!: c > e", "j5: e > f"))
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])
 def test_mujoco_order_of_bundled_robot(name):
     path = bundled.urdf_path(name)
-    check(path, compile_urdf(path.read_text()))
+    check_urdf(path.read_text())
     model = path.with_suffix(".xml")
     with quiet_mujoco():
-        check(model, listed(mujoco.MjModel.from_xml_path(str(model))))
-
-
-@st.composite
-def trees(draw):
-    """Return the joints of a tree, shuffled: parent, child and whether it is fixed."""
-    count = draw(st.integers(2, 12))
-    ends = [
-        (draw(st.integers(0, child - 1)), child, draw(st.booleans())) for child in range(1, count)
-    ]
-    return draw(st.permutations(ends))
-
-
-@settings(deadline=None, max_examples=50)
-@given(trees())
-def test_mujoco_order_of_random_tree(tmp_path_factory, ends):
-    text = "<robot name='r'>" + "".join(f"<link name='l{k}'/>" for k in range(len(ends) + 1))
-    for parent, child, fixed in ends:
-        text += (
-            f"<joint name='j{child}' type='{'fixed' if fixed else 'continuous'}'>"
-            f"<parent link='l{parent}'/><child link='l{child}'/><axis xyz='0 0 1'/></joint>"
-        )
-    path = tmp_path_factory.getbasetemp() / "any.urdf"
-    path.write_text(text + "</robot>")
-    check(path, compile_urdf(path.read_text()))
-
-
-def test_simulator_orders_without_links(tmp_path):
-    path = Path(tmp_path / "robot.urdf")
-    path.write_text('<robot name="r"/>')
-    assert all(
-        order.joints == order.bodies == () for order in Facts(load_robot(path)).simulator_orders
-    )
-
-
-def test_simulator_orders_of_broken_tree_are_uncertain(urdf):
-    facts = urdf("ja: b > a", "jc: b > c", "jd: a > c")
-    assert not any(order.certain for order in facts.simulator_orders)
+        check(facts(model.read_text()), mujoco.MjModel.from_xml_path(str(model)))

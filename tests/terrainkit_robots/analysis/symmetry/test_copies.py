@@ -1,36 +1,23 @@
-from pathlib import Path
-
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import load_robot
-
-FILE = Path("/robots/robot.urdf")
+from tests.small_robots import ball, facts, joint, link
 
 
-def arm(side, y, **changed):
+def arm(side, y, mass=2, center=0.1, ixx=0.01, length=0.3, upper=1, radius=0.05, axis="0 1 0"):
     """Return an arm of two links that is mounted at `y`."""
-    given = {"mass": 2, "center": 0.1, "ixx": 0.01, "length": 0.3, "upper": 1, "radius": 0.05}
-    given |= changed
-    text = ""
-    for k, (parent, xyz) in enumerate((("trunk", f"0 {y} 0"), (f"{side}_0", "0.3 0 0.1"))):
-        origin = xyz.replace("0.3", str(given["length"]))
-        text += (
-            f'<link name="{side}_{k}"><inertial><origin xyz="0 {given["center"]} 0"/>'
-            f'<mass value="{given["mass"]}"/><inertia ixx="{given["ixx"]}" iyy="0.02" izz="0.02" '
-            'ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry>'
-            f'<sphere radius="{given["radius"]}"/></geometry></collision></link>'
-            f'<joint name="{side}_joint_{k}" type="revolute"><parent link="{parent}"/>'
-            f'<child link="{side}_{k}"/><origin xyz="{origin}"/><axis xyz="0 1 0"/>'
-            f'<limit lower="-1" upper="{given["upper"]}" effort="9" velocity="5"/></joint>'
-        )
-    return text
+    part = {"mass": mass, "center": f"0 {center} 0", "inertia": f"{ixx} 0.02 0.02 0 0 0"}
+    limits = (-1, upper)
+    return (
+        link(f"{side}_0", ball(radius), **part)
+        + joint("trunk", f"{side}_0", f"0 {y} 0", limits=limits)
+        + link(f"{side}_1", ball(radius), **part)
+        + joint(f"{side}_0", f"{side}_1", f"{length} 0 0.1", axis, limits=limits)
+    )
 
 
 def copies(**changed):
-    text = f'<link name="trunk"/>{arm("left", 0.2)}{arm("right", -0.2, **changed)}'
-    robot = load_robot(FILE, contents={FILE: f'<robot name="r">{text}</robot>'.encode()})
-    return [pair.left.body.name for pair in Facts(robot).copied_pairs]
+    robot = facts(link("trunk"), arm("left", 0.2), arm("right", -0.2, **changed))
+    return [pair.left.body.name for pair in robot.copied_pairs]
 
 
 def test_equal_arms_are_copies_wherever_they_are_mounted():
@@ -51,6 +38,11 @@ def test_arms_that_differ_by_more_than_rounding_are_no_copies(name, rounded, oth
     assert copies(**{name: other}) == []
 
 
-@pytest.mark.parametrize(("name", "value"), [("upper", 1.1), ("radius", 0.06)])
+@pytest.mark.parametrize(("name", "value"), [("upper", 1.1), ("radius", 0.06), ("axis", "0 0 1")])
 def test_arms_with_other_limits_or_shapes_are_no_copies(name, value):
     assert copies(**{name: value}) == []
+
+
+def test_one_equal_body_is_no_copy():
+    arms = [link(n) + joint("trunk", n, f"0 {y} 0") for n, y in (("left", 0.2), ("right", -0.2))]
+    assert facts(link("trunk"), *arms).copied_pairs == ()

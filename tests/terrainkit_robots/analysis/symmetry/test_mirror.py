@@ -1,4 +1,4 @@
-from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -6,141 +6,71 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.symmetry.mirror import Mirror, swap_sides
+from terrainkit_robots.analysis.symmetry.mirror import (
+    Mirror,
+    _plane_normal,
+    _plane_offset,
+    side_words,
+    swap_sides,
+)
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import load_robot
+from tests import small_robots
 from tests.robots import BUNDLED
+from tests.small_robots import chain, facts, joint, link
 
-FILE = Path("/robots/robot.urdf")
-PAIRS = {
-    "a1/urdf/a1.urdf": 6,
-    "go2/urdf/go2.urdf": 6,
-    "go2_mjcf/go2.xml": 6,
-    "h1/urdf/h1.urdf": 5,
-    "h1/h1.xml": 5,
-    "g1/g1_29dof.urdf": 13,
-    "g1/g1_29dof.xml": 13,
-    "anymal_c/urdf/anymal_c.urdf": 6,
-    "cassie/urdf/cassie.urdf": 6,
-    **dict.fromkeys(BUNDLED, 6),
-}
-every_robot = pytest.mark.parametrize("name", PAIRS)
+Y = "0 1 0"
+LEFT_RIGHT = "left_a right_a 1; left_b right_b 1"
 
 
-def load(name, robot_file):
-    return Facts(load_robot(robot_file(name)))
-
-
-def facts(*joints):
+def robot(*joints):
     """Return a robot of joints (parent, child, xyz, axis, kind); the trunk is called `trunk`."""
-    links = ["trunk", *(child for _, child, *_ in joints)]
-    text = "".join(f'<link name="{name}"/>' for name in links)
-    for number, (parent, child, xyz, axis, *kind) in enumerate(joints):
-        text += (
-            f'<joint name="j{number}" type="{kind[0] if kind else "continuous"}">'
-            f'<parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}"/>'
-            f'<axis xyz="{axis}"/></joint>'
-        )
-    return Facts(load_robot(FILE, contents={FILE: f'<robot name="r">{text}</robot>'.encode()}))
+    links = [link(name, mass=None) for name in ("trunk", *(child for _, child, *_ in joints))]
+    made = [joint(*each[:4], *(each[4:] or ("continuous",))) for each in joints]
+    return facts(*links, *made)
+
+
+def on_trunk(text):
+    """Return a robot of bodies on the trunk, such as `left 0 1 0; right 0 -1 0 prismatic`."""
+    bodies = [each.split() for each in text.split(";")]
+    return robot(*(("trunk", name, f"{x} {y} {z}", Y, *kind) for name, x, y, z, *kind in bodies))
 
 
 def pairs(robot):
-    return [
-        (robot.bodies[p.left].name, robot.bodies[p.right].name, p.sign) for p in robot.mirror.pairs
-    ]
-
-
-# Names
-
-
-def test_link_of_a_chain_is_no_mirror_image():
-    chain = facts(
-        ("trunk", "link_s", "0 0.1 0.1", "0 0 1"),
-        ("link_s", "link_l", "0 0.2 0.1", "0 1 0"),
-        ("link_l", "link_u", "0 0 0.3", "0 1 0"),
-        ("link_u", "link_r", "0 -0.1 0.1", "1 0 0"),
-    )
-    assert pairs(chain) == []
-
-
-@pytest.mark.parametrize(
-    ("kind", "sign"), [("continuous", 1), ("prismatic", 0), ("fixed", None), ("planar", 0)]
-)
-def test_joints_of_two_kinds_do_not_mirror_each_other(kind, sign):
-    arms = facts(
-        ("trunk", "left_arm", "0 0.2 0", "0 1 0"), ("trunk", "right_arm", "0 -0.2 0", "0 1 0", kind)
-    )
-    expected = [] if sign is None else [("left_arm", "right_arm", sign)]
-    assert pairs(arms) == expected
-
-
-def test_side_without_a_counterpart_has_no_mirror_image():
-    one_arm = facts(
-        ("trunk", "left_arm", "0 0.2 0", "0 1 0"), ("trunk", "neck", "0 0 0.3", "0 0 1")
-    )
-    assert pairs(one_arm) == []
-
-
-def test_lone_letter_is_a_side_at_the_same_depth():
-    arms = facts(
-        ("trunk", "link_l", "0 0.1 0.1", "0 0 1"), ("trunk", "link_r", "0.1 -0.2 0.1", "0 0 1")
-    )
-    assert pairs(arms) == [("link_l", "link_r", -1)]
-    chain = facts(
-        ("trunk", "link_l", "0 0.1 0.1", "0 0 1"),
-        ("trunk", "link_t", "0 0 0.3", "0 1 0"),
-        ("link_t", "link_r", "0 -0.2 0.1", "1 0 0"),
-    )
-    assert pairs(chain) == []
+    bodies = robot.bodies
+    found = [(bodies[p.left].name, bodies[p.right].name, p.sign) for p in robot.mirror.pairs]
+    return "; ".join(f"{left} {right} {sign}" for left, right, sign in found)
 
 
 @pytest.mark.parametrize(
     ("name", "other"),
     [
-        ("left_knee", "right_knee"),
-        ("LeftKnee", "RightKnee"),
-        ("LEFT_KNEE", "RIGHT_KNEE"),
-        ("knee_left", "knee_right"),
-        ("FL_calf", "FR_calf"),
-        ("RL_calf", "RR_calf"),
-        ("LF_KFE", "RF_KFE"),
-        ("LH_KFE", "RH_KFE"),
-        ("lf_foot", "rf_foot"),
-        ("hl.hx", "hr.hx"),
-        ("l_knee", "r_knee"),
-        ("knee_l", "knee_r"),
-        ("leg_left_6_link", "leg_right_6_link"),
-        ("L_hip", "R_hip"),
-        ("FLHip", "FRHip"),
-        ("LLeg_knee", "RLeg_knee"),
-        ("fl1", "fr1"),
-        ("left/hip", "right/hip"),
+        ("left_knee", "right_knee"), ("LeftKnee", "RightKnee"), ("LEFT_KNEE", "RIGHT_KNEE"),
+        ("knee_left", "knee_right"), ("FL_calf", "FR_calf"), ("RL_calf", "RR_calf"),
+        ("LF_KFE", "RF_KFE"), ("LH_KFE", "RH_KFE"), ("lf_foot", "rf_foot"), ("hl.hx", "hr.hx"),
+        ("l_knee", "r_knee"), ("knee_l", "knee_r"), ("L_hip", "R_hip"), ("FLHip", "FRHip"),
+        ("leg_left_6_link", "leg_right_6_link"), ("LLeg_knee", "RLeg_knee"), ("fl1", "fr1"),
+        ("left/hip", "right/hip"), ("bl_a", "br_a"), ("lb_a", "rb_a"), ("lm_a", "rm_a"),
+        ("ml_a", "mr_a"), ("LArm", "RArm"),
     ],
-)
+)  # fmt: skip
 def test_swap_sides_exchanges_left_and_right(name, other):
-    assert swap_sides(name) == other
-    assert swap_sides(other) == name
+    assert (swap_sides(name), swap_sides(other)) == (other, name)
 
 
 @pytest.mark.parametrize(
     "name",
     [
-        "trunk",
-        "",
-        "calf",
-        "roll",
-        "pelvis",
-        "leftover",
-        "upright",
-        "bright",
-        "link_3",
-        "shelf",
+        "trunk", "", "calf", "roll", "pelvis", "leftover", "upright", "bright", "link_3", "shelf",
         "4",
     ],
-)
+)  # fmt: skip
 def test_swap_sides_keeps_names_without_side(name):
     assert swap_sides(name) == name
+    assert side_words(name) == []
+
+
+def test_side_words_are_as_written():
+    assert side_words("FL_calf_Left_2r") == ["FL", "Left", "r"]
 
 
 @given(st.text(max_size=20))
@@ -148,201 +78,173 @@ def test_swap_sides_is_an_involution(name):
     assert swap_sides(swap_sides(name)) == name
 
 
-# Planes
-
-
 def test_image_of_vectors():
     mirror = Mirror(normal=np.array([0.0, 1.0, 0.0]), pairs=())
-    assert mirror.image(np.array([1.0, 2.0, 3.0])).tolist() == [1, -2, 3]
     both = np.array([[1.0, 2.0, 3.0], [0.0, -1.0, 0.0]])
     assert mirror.image(both).tolist() == [[1, -2, 3], [0, 1, 0]]
-    assert mirror.image(mirror.image(both)).tolist() == both.tolist()
+    assert mirror.image(both[0]).tolist() == (mirror.reflection @ both[0]).tolist() == [1, -2, 3]
 
 
-@every_robot
-def test_mirror_of_published_robots(name, robot_file):
-    robot = load(name, robot_file)
-    assert robot.mirror.normal.tolist() == [0, 1, 0]
-    assert len(robot.mirror.pairs) == PAIRS[name]
-    for pair in robot.mirror.pairs:
-        assert robot.bodies[pair.left].zero_pose[1, 3] > robot.bodies[pair.right].zero_pose[1, 3]
-        assert swap_sides(robot.bodies[pair.left].name) == robot.bodies[pair.right].name
-
-
-@every_robot
-def test_mirror_signs_give_mirrored_poses(name, robot_file):
+@pytest.mark.parametrize("name", BUNDLED)
+def test_mirror_of_bundled_robots(name, bundled):
     # Each pair has equal or opposite positions, according to its sign; all others are at zero.
-    robot = load(name, robot_file)
+    robot = bundled(name)
+    mirror, bodies = robot.mirror, robot.bodies
+    assert (mirror.normal.tolist(), len(mirror.pairs), mirror.offset) == ([0, 1, 0], 6, 0)
     rng = np.random.default_rng(0)
-    for _ in range(5):
-        positions = {}
-        for pair in robot.mirror.pairs:
-            left, right = (robot.bodies[i].joint for i in (pair.left, pair.right))
-            assert pair.sign in (1, -1)
-            positions[left.name] = rng.uniform(-0.5, 0.5)
-            positions[right.name] = pair.sign * positions[left.name]
-        poses = body_poses(robot.bodies, positions)
-        for pair in robot.mirror.pairs:
-            image = robot.mirror.image(poses[pair.left][:3, 3])
-            np.testing.assert_allclose(image, poses[pair.right][:3, 3], atol=2e-3)
-
-
-def test_image_body_returns_index_and_sign(robot_file):
-    robot = load("go2/urdf/go2.urdf", robot_file)
-    index = {body.top.name: body.index for body in robot.bodies}
-    assert robot.mirror.image_body(index["FL_hip"]) == (index["FR_hip"], -1)
-    assert robot.mirror.image_body(index["FR_hip"]) == (index["FL_hip"], -1)
-    assert robot.mirror.image_body(index["RL_calf"]) == (index["RR_calf"], 1)
-    assert robot.mirror.image_body(0) is None
-
-
-# Pairs, by hand
+    positions = {}
+    for pair in mirror.pairs:
+        left, right = bodies[pair.left], bodies[pair.right]
+        assert left.zero_pose[1, 3] > right.zero_pose[1, 3]
+        assert swap_sides(left.name) == right.name
+        assert mirror.image_body(pair.left) == (pair.right, pair.sign)
+        assert mirror.image_body(pair.right) == (pair.left, pair.sign)
+        assert mirror.image_index[pair.left] == pair.right
+        positions[left.joint.name] = rng.uniform(-0.5, 0.5)
+        positions[right.joint.name] = pair.sign * positions[left.joint.name]
+    assert mirror.image_body(0) is None
+    poses = body_poses(bodies, positions)
+    for pair in mirror.pairs:
+        image = mirror.image(poses[pair.left][:3, 3])
+        np.testing.assert_allclose(image, poses[pair.right][:3, 3], atol=2e-3)
 
 
 @pytest.mark.parametrize(
-    ("axis", "other", "sign"),
+    ("axis", "other", "kind", "sign"),
     [
         # Roll and yaw are negated by the reflection, pitch is not.
-        ("0 1 0", "0 1 0", 1),
-        ("0 1 0", "0 -1 0", -1),
-        ("1 0 0", "1 0 0", -1),
-        ("1 0 0", "-1 0 0", 1),
-        ("0 0 1", "0 0 1", -1),
-        ("0 0 1", "0 0 -1", 1),
-        ("1 0 0", "0 1 0", 0),
-        ("1 1 0", "-1 1 0", 1),
+        ("0 1 0", "0 1 0", "continuous", 1),
+        ("0 1 0", "0 -1 0", "continuous", -1),
+        ("1 0 0", "1 0 0", "continuous", -1),
+        ("1 0 0", "-1 0 0", "continuous", 1),
+        ("0 0 1", "0 0 1", "continuous", -1),
+        ("0 0 1", "0 0 -1", "continuous", 1),
+        ("1 0 0", "0 1 0", "continuous", 0),
+        ("1 1 0", "-1 1 0", "continuous", 1),
+        ("0 1 0", "0 0.71 0.70", "continuous", 1),  # a cosine of 0.7 and more is aligned
+        ("0 1 0", "0 0.69 0.72", "continuous", 0),
+        ("0 1 0", "0 -1 0", "prismatic", 1),
+        ("0 1 0", "0 1 0", "prismatic", -1),
+        ("1 0 0", "1 0 0", "prismatic", 1),
+        ("0 0 1", "0 0 -1", "prismatic", -1),
+        ("0 1 0", "0 1 0", "planar", 0),
     ],
 )
-def test_mirror_sign_of_hinges(axis, other, sign):
-    robot = facts(("trunk", "left", "0 1 0", axis), ("trunk", "right", "0 -1 0", other))
-    assert pairs(robot) == [("left", "right", sign)]
+def test_sign_of_mirrored_joints(axis, other, kind, sign):
+    left, right = ("trunk", "left", "0 1 0"), ("trunk", "right", "0 -1 0")
+    assert pairs(robot((*left, axis, kind), (*right, other, kind))) == f"left right {sign}"
 
 
 @pytest.mark.parametrize(
-    ("axis", "other", "sign"),
+    ("bodies", "expected"),
     [
-        ("0 1 0", "0 -1 0", 1),
-        ("0 1 0", "0 1 0", -1),
-        ("1 0 0", "1 0 0", 1),
-        ("0 0 1", "0 0 -1", -1),
+        ("x 0.1 1 0; q 0.1 -1 0", "x q 1"),
+        ("l_a 0.1 1 0; r_a 0.5 -1 0", "l_a r_a 1"),  # by name
+        # The names confuse left and right; the positions are decisive.
+        ("l_a 1 1 0; r_a -1 -1 0; x 1 -1 0; y -1 1 0", "l_a x 1; y r_a 1"),
+        # At equal positions, the names are.
+        ("left_a 0 1 0; left_b 0 1 0; right_b 0 -1 0; right_a 0 -1 0", LEFT_RIGHT),
+        ("a 0 1 0; b 0.01 -1 0; c 0.005 -1 0", "a c 1"),  # the closest
+        ("l0 0 1 0; l1 0 1 0; l2 0 1 0; r0 0 -1 0; r1 0 -1 0", "l0 r0 1; l1 r1 1"),
+        ("head 1 0 0; tail -1 0 0", ""),  # in the plane
+        ("left_arm 0 0.2 0; neck 0 0 0.3", ""),
+        ("arm 0 1 0", ""),
+        # On one side.
+        ("l_a 0 1 0; r_a 0 2 0", ""),
+        ("l_a 0 2 0; r_a 0 1 0", "l_a r_a 1"),
+        # Of other types.
+        ("a 0 1 0; b 0 -1 0 prismatic", ""),
+        ("left 0 1 0; right 0 -1 0 prismatic", "left right 0"),
+        ("left 0 1 0; right 0 -1 0 planar", "left right 0"),
+        ("left 0 1 0; right 0 -1 0 fixed", ""),
+        # The robot is 2 m across, and the tolerance 0.04 m.
+        ("a 0 1 0; b 0.0398 -1 0", "a b 1"),
+        ("a 0 1 0; b 0.0402 -1 0", ""),
     ],
 )
-def test_mirror_sign_of_slides(axis, other, sign):
-    robot = facts(
-        ("trunk", "left", "0 1 0", axis, "prismatic"),
-        ("trunk", "right", "0 -1 0", other, "prismatic"),
-    )
-    assert pairs(robot) == [("left", "right", sign)]
+def test_pairs_of_bodies_on_the_trunk(bodies, expected):
+    assert pairs(on_trunk(bodies)) == expected
 
 
-def test_mirror_pairs_by_position():
-    robot = facts(("trunk", "x", "0.1 1 0", "0 1 0"), ("trunk", "q", "0.1 -1 0", "0 1 0"))
-    assert pairs(robot) == [("x", "q", 1)]
+L_ARM = ("trunk", "link_l", "0 0.1 0.1", "0 0 1")
 
 
-def test_mirror_pairs_by_name():
-    robot = facts(("trunk", "l_a", "0.1 1 0", "0 1 0"), ("trunk", "r_a", "0.5 -1 0", "0 1 0"))
-    assert pairs(robot) == [("l_a", "r_a", 1)]
-
-
-def test_mirror_prefers_position_over_name():
-    # The names confuse left and right; the positions are decisive.
-    robot = facts(
-        ("trunk", "l_a", "1 1 0", "0 1 0"),
-        ("trunk", "r_a", "-1 -1 0", "0 1 0"),
-        ("trunk", "x", "1 -1 0", "0 1 0"),
-        ("trunk", "y", "-1 1 0", "0 1 0"),
-    )
-    assert pairs(robot) == [("l_a", "x", 1), ("y", "r_a", 1)]
-
-
-def test_mirror_resolves_ties_by_name():
-    robot = facts(
-        ("trunk", "left_a", "0 1 0", "0 1 0"),
-        ("trunk", "left_b", "0 1 0", "0 1 0"),
-        ("trunk", "right_b", "0 -1 0", "0 1 0"),
-        ("trunk", "right_a", "0 -1 0", "0 1 0"),
-    )
-    assert {(left, right) for left, right, _ in pairs(robot)} == {
-        ("left_a", "right_a"),
-        ("left_b", "right_b"),
-    }
-
-
-def test_mirror_excludes_bodies_in_the_plane():
-    assert (
-        pairs(facts(("trunk", "head", "1 0 0", "0 1 0"), ("trunk", "tail", "-1 0 0", "0 1 0")))
-        == []
-    )
-
-
-def test_mirror_excludes_single_body():
-    assert pairs(facts(("trunk", "arm", "0 1 0", "0 1 0"))) == []
-
-
-def test_mirror_excludes_bodies_on_one_side():
-    assert (
-        pairs(facts(("trunk", "l_a", "0 1 0", "0 1 0"), ("trunk", "r_a", "0 2 0", "0 1 0"))) == []
-    )
-
-
-def test_mirror_excludes_other_joint_types():
-    robot = facts(("trunk", "a", "0 1 0", "0 1 0"), ("trunk", "b", "0 -1 0", "0 1 0", "prismatic"))
-    assert pairs(robot) == []
-
-
-def test_mirror_pairs_each_body_once():
-    robot = facts(
-        *(("trunk", f"l{k}", "0 1 0", "0 1 0") for k in range(3)),
-        *(("trunk", f"r{k}", "0 -1 0", "0 1 0") for k in range(2)),
-    )
-    used = [name for pair in pairs(robot) for name in pair[:2]]
-    assert len(used) == len(set(used)) == 4
+@pytest.mark.parametrize(
+    ("joints", "expected"),
+    [
+        ([L_ARM, ("trunk", "link_r", "0.1 -0.2 0.1", "0 0 1")], "link_l link_r -1"),
+        # At other depths.
+        ([L_ARM, ("trunk", "t", "0 0 0.3", Y), ("t", "link_r", "0 -0.2 0.1", "1 0 0")], ""),
+        # Links L and R of one chain.
+        ([L_ARM, ("link_l", "u", "0 0 0.3", Y), ("u", "link_r", "0 -0.3 0.1", "1 0 0")], ""),
+        ([L_ARM, ("link_l", "link_r", "0 -0.3 0.1", "1 0 0")], ""),
+    ],
+)
+def test_lone_letter_is_a_side_at_the_same_depth(joints, expected):
+    assert pairs(robot(*joints)) == expected
 
 
 def test_mirror_of_robot_along_y_is_x():
-    legs = []
-    for name, x, y in (("fl", -0.2, 0.3), ("fr", 0.2, 0.3), ("hl", -0.2, -0.3), ("hr", 0.2, -0.3)):
-        legs += [
-            ("trunk", f"{name}_thigh_leg", f"{x} {y} 0", "1 0 0", "revolute"),
-            (f"{name}_thigh_leg", f"{name}_foot", "0 0 -0.3", "1 0 0", "revolute"),
-            (f"{name}_foot", f"{name}_tip", "0 0 -0.3", "1 0 0", "fixed"),
-        ]
-    robot = facts(*legs)
-    assert len(robot.legs) == 4
-    assert robot.mirror.normal.tolist() == [1, 0, 0]
-    assert len(robot.mirror.pairs) == 4
-
-
-def test_mirror_offset_of_lateral_trunk_frame():
-    # The frame of the trunk is at a sensor on its side.
-    path = bundled.urdf_path("quadruped")
-    plain = Facts(load_robot(path))
-    trunk = plain.bodies[0].top.name
-    text = path.read_text().replace(
-        "</robot>",
-        '<link name="sensor"/><joint name="mounted" type="fixed"><parent link="sensor"/>'
-        f'<child link="{trunk}"/><origin xyz="0 0.1 0"/></joint></robot>',
-    )
-    robot = Facts(load_robot(FILE, contents={FILE: text.encode()}))
-    assert robot.bodies[0].top.name == "sensor"
-    assert robot.mirror.offset == pytest.approx(0.1)
-    assert plain.mirror.offset == 0
-    assert pairs(robot) == pairs(plain)
-    assert robot.stance.positions == pytest.approx(plain.stance.positions, abs=1e-6)
-
-
-def test_mirror_without_joints():
-    assert facts().mirror.pairs == ()
-    assert Facts(load_robot(FILE, contents={FILE: b'<robot name="r"/>'})).mirror.pairs == ()
-
-
-def test_mirror_of_thousands_of_bodies():
-    joints = [
-        ("trunk", f"{side}{k}", f"{k * 1e-3} {y} 0", "0 1 0")
-        for k in range(1000)
-        for side, y in (("l", 1), ("r", -1))
+    axes = ["1 0 0"] * 2
+    legs = [
+        chain(name, f"{x} {y} 0", (0.3, 0.3), axes=axes)
+        for name, x, y in (("a", -0.2, 0.3), ("b", 0.2, 0.3), ("c", -0.2, -0.3), ("d", 0.2, -0.3))
     ]
-    robot = facts(*joints)
-    assert robot.limbs == ()
-    assert len(robot.mirror.pairs) == 1000
+    found = facts(link("trunk"), *legs)
+    assert len(found.legs) == 4
+    assert found.mirror.normal.tolist() == [1, 0, 0]
+    assert pairs(found) == "b0 a0 1; b1 a1 1; d0 c0 1; d1 c1 1"
+
+
+@pytest.mark.parametrize(
+    ("pitches", "normal"),
+    [
+        ([], [0, 1, 0]),
+        ([(1, 0)] * 2, [1, 0, 0]),
+        ([(1, 0), (0, 1)], [0, 1, 0]),
+        ([(1, 0), (1, 0), (0, 1)], [1, 0, 0]),
+        ([(0.88, 0.47)] * 2, [1, 0, 0]),
+        ([(0.86, 0.51)] * 2, [0, 1, 0]),  # radial, as a spider's
+        ([(1, 0), (1, 0), (0.51, 0.86)], [0, 1, 0]),
+        ([(1, 0), (1, 0), (0.49, 0.87)], [1, 0, 0]),
+    ],
+)
+def test_plane_is_across_most_legs(pitches, normal):
+    legs = [SimpleNamespace(pitch=np.array([*pitch, 0])) for pitch in pitches]
+    assert _plane_normal(legs).tolist() == normal
+
+
+@pytest.mark.parametrize(
+    ("starts", "trunk", "offset"),
+    [
+        ((0.2, 0.0), 0.1, 0.1),
+        ((0.2, 0.0), 0.21, 0.0),  # not closer to the legs than half of its distance
+        ((0.2, 0.0), 0.19, 0.1),
+        ((0.2, 0.0), 0.07, 0.1),
+        ((0.2, 0.0), 0.06, 0.0),
+        ((0.2, 0.1, 0.0), 0.1, 0.1),
+        ((5.0, 0.2, 0.0, 0.1), 0.15, pytest.approx(0.15)),  # one leg is misplaced
+        ((0.2,), 0.2, 0.0),
+        ((), 0.2, 0.0),
+    ],
+)
+def test_plane_is_amid_the_legs_if_the_trunk_is_too(starts, trunk, offset):
+    legs = [SimpleNamespace(limb=SimpleNamespace(points=np.array([[1, y, 2]]))) for y in starts]
+    bodies = [SimpleNamespace(center=np.array([3, trunk, 4]))]
+    assert _plane_offset(legs, bodies, np.array([0.0, 1.0, 0.0])) == offset
+
+
+def test_mirror_of_a_trunk_whose_frame_is_at_its_side():
+    text = bundled.urdf_path("quadruped").read_text()
+    plain = facts(text)
+    sensor = '<link name="sensor"/>' + joint("sensor", "base", "0 0.1 0", kind="fixed")
+    moved = small_robots.facts(text.replace("</robot>", f"{sensor}</robot>"))
+    assert (plain.mirror.offset, moved.mirror.offset) == (0, pytest.approx(0.1))
+    assert pairs(moved) == pairs(plain)
+    assert moved.stance.positions == pytest.approx(plain.stance.positions, abs=1e-6)
+
+
+def test_mirror_of_none_and_of_thousands_of_bodies():
+    assert robot().mirror.pairs == facts("").mirror.pairs == ()
+    many = [f"l{k} {k * 1e-3} 1 0; r{k} {k * 1e-3} -1 0" for k in range(1000)]
+    assert pairs(on_trunk("; ".join(many))) == "; ".join(f"l{k} r{k} 1" for k in range(1000))

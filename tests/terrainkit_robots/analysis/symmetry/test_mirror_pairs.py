@@ -1,0 +1,84 @@
+import numpy as np
+import pytest
+
+from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
+    com_error,
+    has_valid_masses,
+    is_merged,
+    max_com_error,
+)
+from tests.small_robots import facts, joint, link
+
+ROUND = ".01 .01 .04 0 0 0"
+
+
+def arms(left="left", right="right", center="0 -0.1 0", mass=1, more=""):
+    """Return the only pair of arms, of which the left one has its center of mass at y = 0.1."""
+    parts = [link("trunk"), link(left, center="0 0.1 0", inertia=ROUND)]
+    parts += [link(right, center=center, mass=mass, inertia=ROUND), more]
+    joints = [joint("trunk", left, "0.1 0.2 0"), joint("trunk", right, "0.1 -0.2 0")]
+    robot = facts(*parts, *joints)
+    return robot, *robot.mirror_pairs
+
+
+def test_sides_of_a_pair():
+    _, pair = arms()
+    assert pair.indices == {1, 2}
+    assert pair.sign == 1
+    for side, y in ((pair.left, 1), (pair.right, -1)):
+        places = [side.point, side.axis, side.offset, side.arm]
+        expected = [[0.1, 0.2 * y, 0], [0, 1, 0], [0.1, 0.2 * y, 0], [0, 0.1 * y, 0]]
+        np.testing.assert_allclose(places, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "count"), [("left", "right", 1), ("l_a", "r_b", 0), ("x", "y", 0)]
+)
+def test_pairs_outside_of_legs_have_mirrored_names(left, right, count):
+    assert len(arms(left, right)[1:]) == count
+
+
+def test_center_of_mass_is_compared_with_its_mirror_image():
+    # The radius of gyration is 0.2 m of the left arm, and 0.1 m of the heavier right one.
+    robot, pair = arms(center="0.003 -0.104 0", mass=4)
+    assert com_error(robot.mirror, pair) == pytest.approx(0.005)
+    assert max_com_error(pair) == pytest.approx(0.002 + 0.1 * 0.1)
+
+
+@pytest.mark.parametrize(("mass", "is_valid"), [(1, True), (0, False), (-1, False), ("x", False)])
+def test_masses_of_a_pair_are_positive(mass, is_valid):
+    assert has_valid_masses(arms(mass=mass)[1]) == is_valid
+
+
+@pytest.mark.parametrize(("mass", "merged"), [(1, True), (0, False), (None, False)])
+def test_body_of_two_links_with_mass_is_merged(mass, merged):
+    part = link("part", mass=mass) + joint("left", "part", kind="fixed")
+    assert is_merged(arms(more=part)[1]) == merged
+
+
+# Of the left, right, rear left and rear right thigh.
+@pytest.mark.parametrize(
+    ("values", "first"),
+    [
+        ((2, 1, 1, 1), "FL"),
+        ((1, 2, 1, 1), "FR"),
+        ((1, 1, 1, 1), "FR"),
+        ((-1, 1, 1, 1), "FL"),  # a sign costs 0.01 times the difference
+        ((-1, 1.019, 1, 1), "FL"),
+        ((-1, 1.021, 1, 1), "FR"),
+        ((None, 2, 1, 1), "FL"),
+        ((1, None, 1, 1), "FR"),
+        ((1, 2, None, 2), "FR"),
+        ((2, 1, 1, None), "FL"),
+    ],
+)
+def test_outlier_differs_from_the_other_leg_of_its_side(bundled, values, first):
+    robot = bundled("quadruped.urdf")
+    table = dict(zip(("FL_thigh", "FR_thigh", "RL_thigh", "RR_thigh"), values, strict=True))
+    pair = next(p for p in robot.mirror_pairs if p.left.body.name == "FL_thigh")
+
+    def value(body):
+        return None if table[body.name] is None else np.array([table[body.name]])
+
+    sides = [side.body.name for side in robot.outlier_first(pair, value)]
+    assert sides == [f"{first}_thigh", "FR_thigh" if first == "FL" else "FL_thigh"]
