@@ -90,7 +90,8 @@ def checked_geometry(geometry: object, grid: Grid) -> PatchGeometry:
         raise ConfigError(f"got {type(geometry).__name__}; expected a PatchGeometry")
     friction, goals = real_array(geometry.friction), real_array(geometry.goals)
     pose = real_array([*geometry.spawn, geometry.heading, geometry.spawn_radius])
-    goal_values = np.where(np.isnan(goals) & _MAY_BE_NAN, 0, goals)
+    has_columns = goals.shape[1:] == _MAY_BE_NAN.shape
+    goal_values = np.where(np.isnan(goals) & _MAY_BE_NAN, 0, goals) if has_columns else goals
     numbers = {
         "friction": (np.where(friction < 0, np.nan, friction), grid.shape),
         "goals": (goal_values, (min(len(goals), MAX_GOALS), 4)),

@@ -15,9 +15,7 @@ every_terrain = pytest.mark.parametrize(
     "sub_terrain", presets.get_preset("all"), ids=lambda sub_terrain: sub_terrain.name
 )
 every_grid = pytest.mark.parametrize(
-    ("patch_size", "cell"),
-    [((8.0, 8.0), 0.1), ((8.0, 4.0), 0.05)],
-    ids=["8x8", "8x4 fine"],
+    ("patch_size", "cell"), [((8.0, 8.0), 0.1), ((8.0, 4.0), 0.05)], ids=["8x8", "8x4 fine"]
 )
 coarse = pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
 

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from terrainkit.curriculum import CommandProgress
+from terrainkit.errors import ConfigError
 
 DT = 0.1
 """Length of a step [s]."""
@@ -37,39 +38,67 @@ class Walk:
         return float(ended[0])
 
 
+AHEAD, BACK, STAND, LEFT = (1.0, 0.0), (-1.0, 0.0), (0.0, 0.0), (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("legs", "share"),
+    [
+        pytest.param([(5, BACK)], 1, id="crossing as commanded"),
+        pytest.param([(4.1, AHEAD)], 1, id="just crossing"),
+        pytest.param([(3.9, AHEAD)], np.nan, id="commanded to stop short"),
+        pytest.param([(5, AHEAD, (0.79, 0.0))], 0.79, id="just too slow"),
+        pytest.param([(20, AHEAD, (0.21, 0.0))], 1, id="crossing slowly"),
+        pytest.param([(12, (0.5, 0.0), (0.3, 0.0))], 0.6, id="slower than commanded"),
+        pytest.param([(3, AHEAD), (17, AHEAD, STAND)], 3 / 20, id="standing at an obstacle"),
+        pytest.param([(10, (0.5, 0.0), LEFT)], 0, id="drifting sideways"),
+        pytest.param([(10, (0.5, 0.0), BACK)], 0, id="walking against the command"),
+        pytest.param(2 * [(3, AHEAD), (3, BACK)], np.nan, id="back and forth as commanded"),
+        pytest.param([(5, AHEAD), (5, BACK)], 1, id="crossing and back as commanded"),
+        pytest.param([(20, STAND)], np.nan, id="standing as commanded"),
+        pytest.param([(2, AHEAD, (0.51, 0.0))], np.nan, id="half of a short command"),
+        pytest.param([(2, AHEAD, (0.49, 0.0))], 0.49, id="ignoring a short command"),
+        pytest.param([(4 * np.pi, AHEAD, AHEAD, 1.0)], np.nan, id="circle as commanded"),
+    ],
+)
+def test_share_of_a_walk(legs, share):
+    walk = Walk(yaw=-2.0)
+    for leg in legs:
+        walk.go(*leg)
+    assert walk.share() == pytest.approx(share, nan_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("leg", "left_map", "share"),
+    [
+        ((3, AHEAD), False, 0),
+        ((5, AHEAD), False, 1),
+        ((20, STAND), False, 0),
+        ((2, AHEAD), True, 1),
+        ((2, AHEAD, (0.51, 0.0)), True, 1),
+        ((2, AHEAD, (0.49, 0.0)), True, 0),
+        ((2, AHEAD, LEFT), True, 0),
+    ],
+)
+def test_fall_fails_before_crossing_or_leaving_the_map(leg, left_map, share):
+    assert Walk().go(*leg).share(fallen=True, left_map=left_map) == share
+
+
 def test_progress_of_straight_walk_is_integrated():
-    walk = Walk(yaw=0.7).go(3, (0.6, 0.8))
-    assert walk.progress.along == pytest.approx(3)
-    assert walk.progress.commanded == pytest.approx(3)
-    assert walk.progress.max_distance == pytest.approx(3)
-    assert walk.progress.target_max_distance == pytest.approx(3)
-    expected = [3 * np.cos(0.7 + np.arctan2(0.8, 0.6)), 3 * np.sin(0.7 + np.arctan2(0.8, 0.6))]
-    assert walk.progress.target[0] == pytest.approx(expected)
-
-
-def test_crossing_as_commanded_succeeds():
-    assert Walk(yaw=-2.0).go(5, (-1.0, 0.0)).share() == 1
-
-
-def test_slow_crossing_succeeds():
-    assert Walk().go(20, (1.0, 0.0), (0.21, 0.0)).share() == 1
-
-
-def test_slower_walk_is_a_share():
-    assert Walk().go(12, (0.5, 0.0), (0.3, 0.0)).share() == pytest.approx(0.6)
-
-
-def test_standing_before_an_obstacle_fails():
-    walk = Walk().go(3, (1.0, 0.0)).go(17, (1.0, 0.0), (0.0, 0.0))
-    assert walk.share() == pytest.approx(3 / 20)
-
-
-def test_drifting_sideways_fails():
-    assert Walk().go(10, (0.5, 0.0), (0.0, 1.0)).share() == 0
-
-
-def test_walking_against_the_command_fails():
-    assert Walk().go(10, (0.5, 0.0), (-1.0, 0.0)).share() == 0
+    progress = Walk(yaw=0.7).go(3, (0.6, 0.8)).progress
+    angle = 0.7 + np.arctan2(0.8, 0.6)
+    expected = {
+        "start": [10, 20],
+        "position": [10 + 3 * np.cos(angle), 20 + 3 * np.sin(angle)],
+        "command": [0.6, 0.8],
+        "yaw": 0.7,
+        "target": [3 * np.cos(angle), 3 * np.sin(angle)],
+        **dict.fromkeys(("along", "commanded", "max_distance", "target_max_distance"), 3),
+    }
+    found = progress.state_dict()
+    assert found.keys() == expected.keys()
+    for name, value in expected.items():
+        assert found[name][0] == pytest.approx(value), name
 
 
 def test_sliding_gains_no_more_than_the_command():
@@ -78,62 +107,16 @@ def test_sliding_gains_no_more_than_the_command():
     assert walk.progress.max_distance == pytest.approx(0.5)
 
 
-def test_swaying_loses_nothing():
-    walk = Walk()
-    for _ in range(50):
-        walk.go(0.1, (0.2, 0.0), (0.5, 0.0)).go(0.1, (0.2, 0.0), (-0.1, 0.0))
-    assert walk.progress.along == pytest.approx(2.0, abs=0.06)
-
-
 def test_uncommanded_circle_fails():
     """It follows the velocity command in its own frame, but not the straight line."""
-    walk = Walk().go(4 * np.pi, (1.0, 0.0), yaw_rate=0.0, turn=1.0)
-    assert walk.share() < 0.1
-
-
-def test_commanded_circle_says_nothing():
-    walk = Walk().go(4 * np.pi, (1.0, 0.0), yaw_rate=1.0)
-    assert walk.progress.along == pytest.approx(4 * np.pi, rel=0.01)
-    assert np.isnan(walk.share())
-
-
-def test_back_and_forth_as_commanded_says_nothing():
-    walk = Walk().go(3, (1.0, 0.0)).go(3, (-1.0, 0.0)).go(3, (1.0, 0.0)).go(3, (-1.0, 0.0))
-    assert np.isnan(walk.share())
-
-
-def test_crossing_and_back_as_commanded_succeeds():
-    assert Walk().go(5, (1.0, 0.0)).go(5, (-1.0, 0.0)).share() == 1
-
-
-def test_standing_as_commanded_says_nothing():
-    assert np.isnan(Walk().go(20, (0.0, 0.0)).share())
-
-
-def test_ignoring_a_short_command_fails():
-    assert Walk().go(2, (1.0, 0.0), (0.1, 0.0)).share() == pytest.approx(0.1)
-
-
-@pytest.mark.parametrize(("seconds", "share"), [(3, 0), (5, 1)])
-def test_fall_fails_before_crossing(seconds, share):
-    assert Walk().go(seconds, (1.0, 0.0)).share(fallen=True) == share
-
-
-def test_fall_while_standing_fails():
-    assert Walk().go(20, (0.0, 0.0)).share(fallen=True) == 0
-
-
-@pytest.mark.parametrize(("velocity", "share"), [((1.0, 0.0), 1), ((0.0, 1.0), 0)])
-def test_leaving_the_map_as_commanded_succeeds(velocity, share):
-    walk = Walk().go(2, (1.0, 0.0), velocity)
-    assert walk.share(fallen=True, left_map=True) == share
+    assert Walk().go(4 * np.pi, AHEAD, turn=1.0).share() < 0.1
 
 
 def test_small_yaw_errors_do_not_add_up():
     """A new linear command starts at the yaw of the robot."""
     walk = Walk()
     for k in range(10):
-        walk.go(2, (0.5 + 0.01 * k, 0.0), yaw_rate=0.0, turn=0.1)
+        walk.go(2, (0.5 + 0.01 * k, 0.0), turn=0.1)
     assert walk.progress.along / walk.progress.commanded > 0.95
 
 
@@ -164,9 +147,24 @@ def test_state_round_trip():
     state = walk.progress.state_dict()
     other.progress.load_state_dict(state)
     other.pos, other.yaw = walk.pos, walk.yaw
-    for each in (walk, other):
-        each.go(2, (0.5, 0.2), yaw_rate=0.3)
-    assert {k: v.tolist() for k, v in vars(walk.progress).items()} == {
-        k: v.tolist() for k, v in vars(other.progress).items()
-    }
+    one, same = (
+        {name: array.tolist() for name, array in vars(each.progress).items()}
+        for each in (walk.go(2, (0.5, 0.2), yaw_rate=0.3), other.go(2, (0.5, 0.2), yaw_rate=0.3))
+    )
+    assert one == same
     assert state["along"] != walk.progress.along
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"yaw": np.zeros(2)}, r"^yaw of the progress: got shape \(2,\); expected shape \(1,\)"),
+        ({"yaw": None}, r"^yaw of the progress: got nothing; expected shape \(1,\)"),
+    ],
+)
+def test_state_of_other_robots_is_rejected(changed, message):
+    progress = CommandProgress.zeros(1)
+    state = {**progress.state_dict(), "along": np.ones(1), **changed}
+    with pytest.raises(ConfigError, match=message):
+        progress.load_state_dict({name: each for name, each in state.items() if each is not None})
+    assert progress.along.tolist() == [0]

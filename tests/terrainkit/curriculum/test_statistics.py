@@ -18,13 +18,6 @@ def test_statistics_are_recorded_by_patch():
     assert np.isnan(statistics.success).sum() == 5
 
 
-def test_statistics_without_returns():
-    statistics = PatchStatistics.empty(1, 1)
-    statistics.record(np.array([0]), np.array([1.0]))
-    assert statistics.success.item() == 1
-    assert np.isnan(statistics.returns).all()
-
-
 def test_add_to_means_weights_each_value():
     means = np.array([[0.5, np.nan, 0.25]])
     add_to_means(means, np.array([0, 0, 1]), np.array([1.0, 0.0, 0.75]), decay=0.5)
@@ -32,16 +25,6 @@ def test_add_to_means_weights_each_value():
     assert means.tolist() == [[0.5, 0.75, 0.25]]
     add_to_means(means, np.array([0, 0]), np.array([1.0, 1.0]), decay=0.5)
     assert means[0, 0] == pytest.approx(0.25 * 0.5 + 0.75)
-
-
-def test_add_to_means_follows_a_change():
-    rng, means = np.random.default_rng(0), np.full((1, 1), np.nan)
-    for chance in (0.2, 0.8):
-        rates = []
-        for _ in range(400):
-            add_to_means(means, np.array([0]), [rng.random() < chance], decay=0.95)
-            rates.append(means.item())
-        assert np.mean(rates[100:]) == pytest.approx(chance, abs=0.05)
 
 
 def test_picture_colors_cells_by_success():

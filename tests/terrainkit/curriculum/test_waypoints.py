@@ -38,7 +38,8 @@ def test_waypoints_goals_are_reached_in_their_order():
 
 
 def test_waypoints_robot_without_goals_never_arrives():
-    waypoints = make([NONE, NONE])
+    waypoints = Waypoints.make(1, 2, 0.4)
+    assert (waypoints.goals.shape, waypoints.radius) == ((1, 2, 2), 0.4)
     assert not waypoints.update(np.zeros((1, 2))).any()
     assert np.isnan(waypoints.progress).all()
     got = waypoints.commands(np.zeros((1, 2)), np.zeros(1), 1.0, 1.0, (-1.0, 1.0))

@@ -23,15 +23,6 @@ def test_sample_maze_reaches_the_exit_from_every_cell():
         assert (np.abs(np.diff(path, axis=0)).sum(axis=1) == 1).all()
 
 
-def test_sample_maze_opens_a_fraction_of_the_walls():
-    closed, opened, free = (
-        sample_maze((40, 40), part, np.random.default_rng(0)).walls_x[1:-1].sum()
-        for part in (0.0, 0.3, 1.0)
-    )
-    assert opened / closed == pytest.approx(0.7, abs=0.03)
-    assert free == 0
-
-
 def test_maze_layout_path_goes_around_walls():
     # Two cells along x and two along y; the only way from (0, 0) leads over (0, 1).
     maze = MazeLayout(

@@ -11,26 +11,8 @@ def node_grid(*, spacing=0.2, amplitude=0.05, step=0.005):
     return ValueNoise(spacing=spacing, amplitude=amplitude, step=step)
 
 
-def noise(*, seed=0, grid=PLOT, **fields):
-    return node_grid(**fields).heights(grid, np.random.default_rng(seed))
-
-
-def test_value_noise_has_the_grid_shape():
-    assert noise().shape == (60, 40)
-
-
-@pytest.mark.parametrize("step", [0.0, 0.005, 0.02, 0.05])
-def test_value_noise_is_within_amplitude(step):
-    heights = noise(step=step)
-    assert np.abs(heights).max() <= 0.05 + 1e-12
-    assert heights.min() < -0.02
-    assert heights.max() > 0.02
-
-
-def test_value_noise_is_a_multiple_of_the_step():
-    # With a node at every corner of a cell, a sample is the mean of four nodes.
-    quarters = noise(spacing=0.1, step=0.02) / (0.02 / 4)
-    assert quarters == pytest.approx(np.round(quarters), abs=1e-9)
+def noise(*, grid=PLOT, **fields):
+    return node_grid(**fields).heights(grid, np.random.default_rng(0))
 
 
 def test_value_noise_tiny_step_is_continuous():
@@ -53,15 +35,8 @@ def test_value_noise_amplitude_is_whole_steps(amplitude, step, largest):
     grid = Grid(shape=(200, 200), cell=0.1)
     assert node_grid(amplitude=amplitude, step=step).realized(grid)["amplitude"] == largest
     heights = noise(spacing=0.1, amplitude=amplitude, step=step, grid=grid)
-    assert np.abs(heights).max() <= largest + 1e-9
-    assert np.abs(heights).max() >= 0.9 * largest
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_value_noise_is_linear_between_nodes(axis):
-    heights = noise(spacing=6.0, step=0.0)
-    assert np.abs(np.diff(heights, axis=axis)).max() > 1e-6
-    assert np.abs(np.diff(heights, 2, axis=axis)).max() < 1e-12
+    assert -largest - 1e-9 <= heights.min() <= -0.9 * largest
+    assert 0.9 * largest <= heights.max() <= largest + 1e-9
 
 
 def test_value_noise_has_whole_intervals():
@@ -89,24 +64,3 @@ def test_value_noise_has_whole_intervals():
 def test_value_noise_realized_spacing(shape, cell, asked, built):
     grid = Grid(shape=shape, cell=cell)
     assert node_grid(spacing=asked).realized(grid)["spacing"] == built
-
-
-def test_value_noise_amplitude_scales_the_pattern():
-    assert noise(amplitude=0.1, step=0.0) == pytest.approx(2 * noise(amplitude=0.05, step=0.0))
-
-
-@pytest.mark.parametrize(("amplitude", "step"), [(0.0, 0.0), (0.1, 0.0), (0.1, 0.005)])
-def test_value_noise_draws_are_independent_of_amplitude(amplitude, step):
-    rng, other = np.random.default_rng(3), np.random.default_rng(3)
-    node_grid().heights(PLOT, rng)
-    node_grid(amplitude=amplitude, step=step).heights(PLOT, other)
-    assert rng.random() == other.random()
-
-
-def test_value_noise_without_amplitude_is_level():
-    assert not noise(amplitude=0.0).any()
-
-
-def test_value_noise_is_seeded():
-    assert (noise(seed=1) == noise(seed=1)).all()
-    assert (noise(seed=1) != noise(seed=2)).any()

@@ -1,6 +1,5 @@
 import pytest
 
-from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrains.continuous_ramps import ContinuousRamps
 
@@ -12,12 +11,3 @@ def test_ramp_cells_are_centered_across_the_lane():
     assert lower.ravel() == pytest.approx([12.0, -1.5, 12.0, 0.0, 14.0, -1.5, 14.0, 0.0])
     assert i.tolist() == [0, 0, 1, 1]
     assert j.tolist() == [0, 1, 0, 1]
-
-
-@pytest.mark.parametrize("size", [(5.1, 1.0), (1.0, 4.1)])
-def test_ramp_cells_rejects_elements_that_do_not_fit(size):
-    ramps = ContinuousRamps(start=2.0, end=1.0, length=size[0], width=size[1])
-    with pytest.raises(
-        ConfigError, match=r"continuous_ramps: got elements of .* expected elements that fit"
-    ):
-        ramps._cells(Grid(shape=(80, 40), cell=0.1))

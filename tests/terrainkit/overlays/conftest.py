@@ -24,3 +24,17 @@ def geometry():
         return PatchGeometry(**flat | values)
 
     return make
+
+
+@pytest.fixture
+def peak(geometry):
+    """Return a function that makes a patch with a peak, and with a goal and the spawn beside it."""
+
+    def make(shape=(40, 40)):
+        heights = np.zeros(shape, np.float32)
+        heights[2, 5] = 1.0
+        return geometry(
+            shape, heights=heights, goals=np.array([[11, 21, 0, 0.0]]), spawn=(11.0, 21.0)
+        )
+
+    return make

@@ -25,8 +25,10 @@ HASHES = {
 
 
 @pytest.mark.parametrize("name", HASHES)
-def test_suite_has_its_hash_and_is_valid(name):
+def test_suite_has_its_hash_and_every_parameter_and_is_valid(name):
     terrain_map = terrainkit.generate_suite(name)
+    for sub_terrain in terrain_map.config.terrains:
+        assert list(sub_terrain.parameters) == list(parameters_of(sub_terrain.terrain_class))
     assert terrainkit.suite_hash(terrain_map) == HASHES[name]
     assert validate(terrain_map) == []
     assert terrain_map.terrain_types.tolist() == [[*range(terrain_map.config.cols)]] * 10
@@ -35,12 +37,6 @@ def test_suite_has_its_hash_and_is_valid(name):
 def test_suite_names_are_those_with_a_hash():
     assert list(terrainkit.suite_names()) == list(HASHES)
     assert {name: terrainkit.get_suite(name).sha256 for name in HASHES} == HASHES
-
-
-@pytest.mark.parametrize("name", HASHES)
-def test_suite_has_a_value_for_every_parameter(name):
-    for sub_terrain in terrainkit.get_suite(name).config.terrains:
-        assert list(sub_terrain.parameters) == list(parameters_of(sub_terrain.terrain_class))
 
 
 @pytest.mark.parametrize("name", ["basics-2", "response-1", ""])
@@ -65,9 +61,7 @@ def test_response_scales_differ_by_a_factor(scale, factor):
 
 def test_generate_suite_rejects_a_map_with_another_hash(monkeypatch):
     monkeypatch.setitem(suites.suite._SHA256, "natural-1", "0" * 64)
-    with pytest.raises(
-        TerrainkitError, match=r"suite natural-1: got a map with SHA-256 5.*; expec"
-    ):
+    with pytest.raises(TerrainkitError, match="suite natural-1: got a map with SHA-256 5"):
         terrainkit.generate_suite("natural-1")
 
 

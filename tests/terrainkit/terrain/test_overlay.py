@@ -33,10 +33,8 @@ def test_overlay_defaults_are_ranges():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"height": (0.1, -1)}, r"lift\.height: got -1; expected a number from 0"),
         ({"height": (1, 2, 3)}, r"lift\.height: got \[1, 2, 3\]; expected one value or a pair"),
         ({"mode": ("up", "down")}, r"lift\.mode: got \['up', 'down'\]; expected one value"),
-        ({"mode": "left"}, r"lift\.mode: got 'left'; expected one of: up, down"),
     ],
 )
 def test_overlay_parameters_are_checked(given, message):
@@ -47,10 +45,8 @@ def test_overlay_parameters_are_checked(given, message):
 def test_own_overlay_is_applied_to_every_row():
     flat = SubTerrain(terrain="flat", overlays=(Lift(), Lift(height=1.0)))
     terrain_map = generate(MapConfig(rows=3, cols=1, border=0.0, terrains=(flat,)))
-    heights = [terrain_map.patch(row, 0).heights for row in range(3)]
-    assert [np.unique(each).tolist() for each in heights] == [
-        [np.float32(1.1)], [np.float32(1.3)], [np.float32(1.5)],
-    ]  # fmt: skip
+    heights = np.stack([terrain_map.patch(row, 0).heights for row in range(3)])
+    assert heights == pytest.approx(np.full((80, 80, 3), [1.1, 1.3, 1.5]).T)
     assert terrain_map.env_origins[:, 0, 2] == pytest.approx([1.1, 1.3, 1.5])
     assert terrain_map.parameters[1, 0].requested["overlays[0].height"] == pytest.approx(0.3)
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import parameter
+from terrainkit.terrain.parameter import Parameter
 from terrainkit.terrains.flat import Flat
 
 
@@ -20,47 +21,53 @@ class Hurdle(Flat):
     landing: float = parameter.platform(3.0)
     grade: float = parameter.scalar(0.4)
     spacing: float = parameter.scalar(0.2, allow_zero=False)
+    bar: float = parameter.size(0.1)
     number: int = parameter.count(4)
+    rungs: int = parameter.count(12, 1)
     inverted: bool = parameter.switch()
+    surface: str = parameter.text("rubber")
+    profile: str = parameter.choice("straight", "curved")
+    turns: int = parameter.choice(1, 2, 4)
+    offset: tuple[float, float, float] = parameter.vector((0, 0, -1))
 
 
 HURDLE = parameter.parameters_of(Hurdle)
+GRID = Grid(shape=(80, 40), cell=0.1)
+OTHERS = {"surface": "a:b, c", "profile": "curved", "turns": 4, "offset": (1, 2, 3)}
+EASY = {
+    "rise": 0.1, "width": 0.2, "gap": 0.0, "landing": 3.0, "grade": 0.4, "spacing": 0.2, "bar": 0.1,
+    "number": 4, "rungs": 12, "inverted": False, "surface": "rubber", "profile": "straight",
+    "turns": 1, "offset": (0.0, 0.0, -1.0),
+}  # fmt: skip
 
 
-def test_parameters_of_keeps_field_order():
-    assert list(HURDLE) == [
-        "rise", "width", "gap", "landing", "grade", "spacing", "number", "inverted",
-    ]  # fmt: skip
+@pytest.mark.parametrize(
+    ("difficulty", "ranges"),
+    [
+        (0.0, {}),
+        (0.5, {"rise": 0.25, "gap": 0.5, "rungs": 6}),
+        (1.0, {"rise": 0.4, "gap": 1.0, "rungs": 1}),
+    ],
+)
+def test_parameter_ranges_are_linear_in_field_order(difficulty, ranges):
+    found = Hurdle.at(difficulty).requested()
+    assert list(found) == list(EASY)
+    assert found == EASY | ranges
+    assert {name: type(value) for name, value in found.items()} == {
+        name: type(value) for name, value in EASY.items()
+    }
+    assert Hurdle.at(difficulty, {"rungs": (12, 1)}) == Hurdle.at(difficulty)
 
 
 def test_parameter_default_is_the_hard_end():
-    hurdle = Hurdle()
-    assert hurdle.rise == 0.4
-    assert hurdle.width == 0.2
-    assert hurdle.gap == 1.0
+    assert Hurdle() == Hurdle.at(1.0)
 
 
-@pytest.mark.parametrize(("difficulty", "rise"), [(0.0, 0.1), (0.5, 0.25), (1.0, 0.4)])
-def test_parameter_range_is_linear(difficulty, rise):
-    assert HURDLE["rise"].at(difficulty) == pytest.approx(rise)
-
-
-def test_parameter_count_and_switch_are_constant():
-    assert HURDLE["number"].at(0.3) == 4
-    assert isinstance(HURDLE["number"].at(0.3), int)
-    assert HURDLE["inverted"].at(0.3) is False
-
-
-@pytest.mark.parametrize(("difficulty", "number"), [(0.0, 12), (0.5, 6), (0.6, 5), (1.0, 1)])
-def test_parameter_count_range_is_rounded(difficulty, number):
-    @dataclass(frozen=True, kw_only=True)
-    class Star(Flat):
-        number: int = parameter.count(12, 1)
-
-    built = Star.at(difficulty)
-    assert built.number == number
-    assert isinstance(built.number, int)
-    assert Star.at(difficulty, {"number": (12, 1)}) == built
+def test_parameters_of_other_types_are_kept():
+    hurdle = Hurdle.at(0.5, OTHERS)
+    assert OTHERS.items() <= hurdle.requested().items()
+    assert OTHERS.items() <= hurdle.realized(GRID).items()
+    assert type(hurdle.offset[0]) is float
 
 
 @settings(deadline=None, derandomize=True)
@@ -73,8 +80,10 @@ def test_at_difficulty_is_exact_at_both_ends(easy, hard, d):
     assert min(easy, hard) - margin <= between <= max(easy, hard) + margin
 
 
-def test_at_difficulty_of_single_value():
+def test_at_difficulty_rounds_integers_and_keeps_equal_ends():
+    assert [parameter.at_difficulty((12, 1), d) for d in (0.4, 0.6, 0.9)] == [8, 5, 2]
     assert parameter.at_difficulty(0.3, 0.7) == 0.3
+    assert {parameter.at_difficulty((0.31, 0.31), k / 9) for k in range(10)} == {0.31}
 
 
 @pytest.mark.parametrize(
@@ -92,118 +101,116 @@ def test_at_difficulty_of_single_value():
     ],
 )
 def test_parameter_realized_snaps_to_cells(name, value, realized):
-    assert HURDLE[name].realized(value, Grid(shape=(80, 40), cell=0.1)) == realized
+    assert HURDLE[name].realized(value, GRID) == realized
 
 
-def test_parameter_platform_may_be_a_pair():
-    assert HURDLE["landing"].realized(3.0, Grid(shape=(80, 51), cell=0.1)) == (3.0, 3.1)
+def test_realized_length_is_shorter_where_ground_slopes_away():
+    grid = Grid(shape=(80, 51), cell=0.1)
+    for snap, slopes_away, realized in (
+        ("cells", True, 1.95),
+        ("centered", True, (1.9, 2.0)),
+        ("centered", False, (2.0, 2.1)),
+    ):
+        length = Parameter(easy=1.0, hard=1.0, snap=snap, slopes_away=slopes_away)
+        assert length.realized(2.0, grid) == realized
+
+
+@pytest.mark.parametrize(
+    ("declared", "allowed"),
+    [
+        ({}, 0.1),  # 5 %
+        ({"tolerance": 0.2}, 0.2),
+        ({"tolerance": 0.01}, 0.1),
+        ({"snap": "cells"}, 0.05),
+        ({"snap": "centered"}, 0.1),
+        ({"snap": "cells", "slopes_away": True}, 0.1),
+        ({"snap": "centered", "slopes_away": True}, 0.2),
+    ],
+)
+def test_parameter_deviates_by_more_than_snapping(declared, allowed):
+    known = Parameter(easy=1.0, hard=1.0, **declared)
+    for sign in (-1, 1):
+        within, beyond = 2.0 + sign * allowed, 2.0 + sign * (allowed + 1e-5)
+        assert not known.deviates(2.0, within, 0.1)
+        assert known.deviates(2.0, beyond, 0.1)
+        assert not known.deviates(2.0, (within, 2.0), 0.1)
+        assert known.deviates(2.0, (beyond, 2.0), 0.1)
+        assert known.deviates(2.0, (2.0, beyond), 0.1)
+
+
+def test_parameter_that_became_zero_deviates_in_spite_of_its_tolerance():
+    known = Parameter(easy=1.0, hard=1.0, tolerance=0.5)
+    assert not known.deviates(0.4, 0.1, 0.1)
+    assert known.deviates(0.4, 0.0, 0.1)
+    assert known.deviates(0.4, (0.4, 0.0), 0.1)
+
+
+def test_parameter_of_other_type_deviates_if_it_differs():
+    text, vector = HURDLE["surface"], HURDLE["offset"]
+    cases = [("a", "a"), ("a", "b"), ("", "b")]
+    assert [text.deviates(*each, 0.1) for each in cases] == [False, True, False]
+    assert vector.deviates((1.0, 2.0, 3.0), (1.0, 2.0, 3.5), 0.1)
 
 
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("rise", -0.1, r"hurdle\.rise: got -0\.1; expected a number from 0 to 1000000"),
-        ("rise", 1.1e6, r"hurdle\.rise: got 1100000\.0; expected a number from 0 to 1000000"),
-        ("rise", math.nan, r"hurdle\.rise: got nan; expected a number from 0 to 1000000"),
-        ("rise", math.inf, r"hurdle\.rise: got inf; expected a number from 0 to 1000000"),
-        ("rise", "high", r"hurdle\.rise: got 'high'; expected a number"),
-        ("rise", True, r"hurdle\.rise: got True; expected a number"),
-        ("rise", None, r"hurdle\.rise: got None; expected a number"),
-        ("width", 0.0, r"hurdle\.width: got 0\.0; expected a number > 0 and <= 1000000"),
-        ("landing", 0, r"hurdle\.landing: got 0; expected a number > 0 and <= 1000000"),
-        ("spacing", 0.0, r"hurdle\.spacing: got 0\.0; expected a number > 0 and <= 1000000"),
-        ("number", 0, r"hurdle\.number: got 0; expected an integer > 0 and <= 10000"),
-        ("number", 10_001, r"hurdle\.number: got 10001; expected an integer > 0 and <= 10000"),
-        pytest.param("number", 10**400, r"hurdle\.number: got an integer beyond", id="10**400"),
-        ("number", 4.0, r"hurdle\.number: got 4\.0; expected an integer"),
-        ("number", True, r"hurdle\.number: got True; expected an integer"),
-        ("inverted", 1, r"hurdle\.inverted: got 1; expected true or false"),
+        ("rise", -0.1, r"got -0\.1; expected a number from 0 to 1000000"),
+        ("rise", 1000000.1, r"got 1000000\.1; expected a number from 0 to 1000000"),
+        ("rise", math.nan, r"got nan; expected a number from 0 to 1000000"),
+        ("rise", math.inf, r"got inf; expected a number from 0 to 1000000"),
+        ("rise", "high", r"got 'high'; expected a number"),
+        ("rise", True, r"got True; expected a number"),
+        ("rise", None, r"got None; expected a number"),
+        ("width", 0.0, r"got 0\.0; expected a number > 0 and <= 1000000"),
+        ("landing", 0, r"got 0; expected a number > 0 and <= 1000000"),
+        ("spacing", 0.0, r"got 0\.0; expected a number > 0 and <= 1000000"),
+        ("bar", 0.0, r"got 0\.0; expected a number > 0 and <= 1000000"),
+        ("number", 0, r"got 0; expected an integer > 0 and <= 10000"),
+        ("number", 10_001, r"got 10001; expected an integer > 0 and <= 10000"),
+        pytest.param("number", 10**400, r"got an integer beyond", id="10**400"),
+        ("number", 4.0, r"got 4\.0; expected an integer"),
+        ("number", True, r"got True; expected an integer"),
+        ("number", (1, 4), r"got \[1, 4\]; expected one value$"),
+        ("rungs", (1, 0), r"got 0; expected an integer > 0"),
+        ("inverted", 1, r"got 1; expected true or false"),
+        ("surface", 3, r"got 3; expected a string of at most 200 characters$"),
+        ("surface", 201 * "x", "expected a string of at most 200 characters"),
+        ("surface", ("a", "b"), r"got \['a', 'b'\]; expected one value$"),
+        ("profile", "curvd", "expected one of: straight, curved; did you mean 'curved'"),
+        ("turns", 3, r"got 3; expected one of: 1, 2, 4"),
+        ("turns", True, r"got True; expected one of: 1, 2, 4"),
+        ("offset", (1, 2), r"got \[1, 2\]; expected 3 values, each a number"),
+        ("offset", (1, 2, math.nan), "expected 3 values, each a number"),
+        ("offset", (1, 2, -1000000.1), "expected 3 values, each a number"),
+        ("offset", 1, r"got 1; expected 3 values"),
     ],
 )
-def test_convert_parameter_rejects_invalid_values(name, value, message):
-    with pytest.raises(ConfigError, match=message):
-        parameter.convert_parameter("hurdle", name, value, HURDLE[name])
+def test_parameter_rejects_invalid_values(name, value, message):
+    with pytest.raises(ConfigError, match=rf"hurdle\.{name}: .*{message}"):
+        Hurdle.at(0.5, {name: value})
 
 
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         ("rise", 0),
-        ("rise", parameter.MAX_VALUE),
+        ("rise", 1e6),
         ("gap", 0.0),
         ("grade", 0.0),
         ("number", 1),
         ("number", 10_000),
-        ("inverted", True),
-        ("rise", np.float32(0.1)),
+        ("surface", 200 * "x"),
+        ("offset", (1e6, -1e6, 0)),
+        ("rise", np.float32(0.5)),
         ("number", np.int64(4)),
         ("inverted", np.True_),
     ],
 )
-def test_convert_parameter_accepts_limits_and_numpy_scalars(name, value):
-    parameter.convert_parameter("hurdle", name, value, HURDLE[name])
-
-
-def test_realized_length_is_shorter_where_ground_slopes_away():
-    grid = Grid(shape=(80, 51), cell=0.1)
-    length = parameter.Parameter(easy=1.0, hard=1.0, snap="cells", slopes_away=True)
-    square = parameter.Parameter(easy=1.0, hard=1.0, snap="centered", slopes_away=True)
-    assert length.realized(2.0, grid) == 1.95
-    assert square.realized(2.0, grid) == (1.9, 2.0)
-    assert not square.deviates(2.0, (1.9, 1.8), 0.1)
-    assert square.deviates(2.0, (1.9, 1.7), 0.1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ramp(Flat):
-    surface: str = parameter.text("rubber")
-    profile: str = parameter.choice("straight", "curved")
-    turns: int = parameter.choice(1, 2, 4)
-    offset: tuple[float, float, float] = parameter.vector((0, 0, -1))
-
-
-GRID = Grid(shape=(80, 80), cell=0.1)
-RAMP = parameter.parameters_of(Ramp)
-
-
-@pytest.mark.parametrize("difficulty", [0.0, 0.5, 1.0])
-def test_parameter_of_other_type_is_constant(difficulty):
-    ramp = Ramp.at(difficulty)
-    assert ramp.requested() == {
-        "surface": "rubber", "profile": "straight", "turns": 1, "offset": (0.0, 0.0, -1.0),
-    }  # fmt: skip
-    assert ramp.realized(GRID) == ramp.requested()
-    given = {"surface": "a:b, c", "profile": "curved", "turns": 4, "offset": (1, 2, 3)}
-    assert Ramp.at(difficulty, given).requested() == given
-    assert type(Ramp.at(difficulty, given).offset[0]) is float
-
-
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"surface": 3}, r"ramp\.surface: got 3; expected a string of at most 200 characters$"),
-        ({"surface": 201 * "x"}, "expected a string of at most 200 characters"),
-        ({"surface": ("a", "b")}, r"ramp\.surface: got \['a', 'b'\]; expected one value$"),
-        ({"profile": "curvd"}, "expected one of: straight, curved; did you mean 'curved'"),
-        ({"turns": 3}, r"ramp\.turns: got 3; expected one of: 1, 2, 4"),
-        ({"turns": True}, r"ramp\.turns: got True; expected one of: 1, 2, 4"),
-        (
-            {"offset": (1, 2)},
-            r"ramp\.offset: got \[1, 2\]; expected 3 values, each a number",
-        ),
-        ({"offset": (1, 2, math.nan)}, "expected 3 values, each a number"),
-        ({"offset": 1}, r"ramp\.offset: got 1; expected 3 values"),
-    ],
-)
-def test_parameter_of_other_type_is_checked(given, message):
-    with pytest.raises(ConfigError, match=message):
-        Ramp.at(0.5, given)
-
-
-def test_parameter_of_other_type_deviates_if_it_differs():
-    assert not RAMP["surface"].deviates("a", "a", 0.1)
-    assert RAMP["surface"].deviates("a", "b", 0.1)
-    assert RAMP["offset"].deviates((1.0, 2.0, 3.0), (1.0, 2.0, 3.5), 0.1)
+def test_parameter_accepts_limits_and_numpy_scalars(name, value):
+    found = getattr(Hurdle.at(0.5, {name: value}), name)
+    assert found == value
+    assert type(found) is type(EASY[name])
 
 
 @pytest.mark.parametrize(
