@@ -1,6 +1,9 @@
-"""Limits of a robot whose demands are easy to work out by hand."""
+"""Limits of a robot whose demands are easy to work out by hand, and open ground for it."""
+
+import numpy as np
 
 from terrainkit.feasibility import RobotLimits
+from terrainkit.feasibility.columns import Columns
 
 LIMITS = RobotLimits(
     step_up=0.2,
@@ -12,3 +15,11 @@ LIMITS = RobotLimits(
     standing_height=0.6,
     crouched_height=0.3,
 )
+
+
+def columns_of(heights, ceiling=np.inf):
+    """Return columns of 0.1 m with these floors, shape (nx, ny) or (nx, ny, m)."""
+    floor = np.array(heights, float)
+    floor = floor[..., None] if floor.ndim == 2 else floor
+    ceiling = np.broadcast_to(ceiling, floor.shape).copy()
+    return Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)

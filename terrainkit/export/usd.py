@@ -114,16 +114,20 @@ def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> No
             prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
             prim.CreateSizeAttr(2.0)
         elif k < len(shapes):
+            # Colliders do not support a cylinder with another scale along its axis.
+            half_size = Gf.Vec3f(*shapes[k, 3:6].tolist())
             prim = UsdGeom.Cylinder.Define(usd_stage, path)
-            prim.CreateExtentAttr([Gf.Vec3f(-1.0), Gf.Vec3f(1.0)])
-            prim.CreateHeightAttr(2.0)
+            prim.CreateExtentAttr([-half_size, half_size])
+            prim.CreateRadiusAttr(half_size[0])
+            prim.CreateHeightAttr(2 * half_size[2])
         else:
             prim = _add_mesh(usd_stage, path, next(hulls))
         if k < len(shapes):
             pose = shapes[k].tolist()
             prim.AddTranslateOp().Set(Gf.Vec3d(*pose[:3]))
             prim.AddOrientOp().Set(Gf.Quatf(*pose[6:]))
-            prim.AddScaleOp().Set(Gf.Vec3f(*pose[3:6]))
+            if k < len(solids.boxes):
+                prim.AddScaleOp().Set(Gf.Vec3f(*pose[3:6]))
         if not solids.visible[k]:
             prim.CreatePurposeAttr(UsdGeom.Tokens.guide)
         if solids.collides[k]:

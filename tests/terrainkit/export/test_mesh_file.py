@@ -1,8 +1,5 @@
-import dataclasses
 import json
 import struct
-import subprocess
-import sys
 import tracemalloc
 
 import numpy as np
@@ -11,166 +8,113 @@ import trimesh
 
 from terrainkit import TerrainMap
 from terrainkit.errors import ExportError, TerrainkitWarning
-from terrainkit.export.mesh_file import _FACES_PER_BLOCK
-from terrainkit.geometry.solids import Solids
-
-SUFFIXES = (".stl", ".ply", ".obj", ".glb")
+from terrainkit.export import mesh_file
+from terrainkit.geometry.mesh.tri_mesh import TriMesh
 
 lossy = pytest.mark.filterwarnings("ignore:a mesh file has")
-every_suffix = pytest.mark.parametrize("suffix", SUFFIXES)
+every_suffix = pytest.mark.parametrize("suffix", mesh_file.SUFFIXES)
 
 
-def saved(terrain_map, folder, suffix, **options):
-    return trimesh.load_mesh(terrain_map.save(folder / f"map{suffix}", **options))
+@lossy
+@every_suffix
+@pytest.mark.parametrize("options", [{}, {"full": True}, {"closed": True}, {"y_up": True}], ids=str)
+def test_mesh_file_has_the_triangles_of_the_map(request, tmp_path, monkeypatch, suffix, options):
+    monkeypatch.setattr(mesh_file, "_FACES_PER_BLOCK", 100)
+    terrain_map = request.getfixturevalue("solid_map" if options else "terrain_map")
+    path = terrain_map.save(tmp_path / f"map{suffix}", **options)
+    mesh = terrain_map.mesh(merged="full" not in options, closed="closed" in options)
+    x, y, z = mesh.vertices.T
+    vertices = np.column_stack([x, z, -y] if "y_up" in options else [x, y, z])
+    found = trimesh.load_mesh(path, process=False)
+    tolerance = 6e-7 if suffix == ".obj" else 0
+    np.testing.assert_allclose(found.triangles, vertices[mesh.triangles], rtol=0, atol=tolerance)
 
 
-def peak_memory(terrain_map, path):
-    """Return the peak memory of writing a map [bytes], after all imports."""
-    terrain_map.save(path)
-    tracemalloc.start()
-    try:
+def test_stl_has_normals_except_of_faces_without_area(tmp_path):
+    vertices = np.array([[0, 0, 0], [3, 0, 0], [0, 0, 4], [6, 0, 0]], np.float32)
+    mesh = TriMesh(vertices=vertices, triangles=np.array([[0, 1, 2], [0, 1, 3]], np.int32))
+    mesh_file.write_stl(mesh, tmp_path / "a.stl")
+    data = (tmp_path / "a.stl").read_bytes()
+    assert data[:84] == b"terrain, in meters".ljust(80) + bytes([2, 0, 0, 0])
+    faces = np.frombuffer(data[84:], mesh_file._STL_FACE)
+    assert faces["normal"].tolist() == [[0, -1, 0], [0, 0, 0]]
+    assert faces["corners"].tolist() == vertices[mesh.triangles].tolist()
+    assert not faces["attribute"].any()
+
+
+def test_glb_is_a_scene_with_the_friction_as_extras(terrain_map, tmp_path):
+    data = terrain_map.save(tmp_path / "map.glb").read_bytes()
+    mesh = terrain_map.mesh()
+    (vertices, _), (triangles, _) = mesh.vertices.shape, mesh.triangles.shape
+    magic, version, total, length, kind = struct.unpack("<4sIII4s", data[:20])
+    assert (magic, version, total, kind) == (b"glTF", 2, len(data), b"JSON")
+    assert json.loads(data[20 : 20 + length]) == {
+        "asset": {"version": "2.0", "generator": "terrainkit"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "terrain", "mesh": 0}],
+        "meshes": [
+            {
+                "extras": {"static_friction": 0.8, "dynamic_friction": 0.6, "restitution": 0.1},
+                "primitives": [{"attributes": {"POSITION": 0}, "indices": 1}],
+            }
+        ],
+        "accessors": [
+            {
+                "bufferView": 0,
+                "componentType": 5126,
+                "count": vertices,
+                "type": "VEC3",
+                "min": mesh.vertices.min(axis=0).tolist(),
+                "max": mesh.vertices.max(axis=0).tolist(),
+            },
+            {"bufferView": 1, "componentType": 5125, "count": 3 * triangles, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 12 * vertices, "target": 34962},
+            {
+                "buffer": 0,
+                "byteOffset": 12 * vertices,
+                "byteLength": 12 * triangles,
+                "target": 34963,
+            },
+        ],
+        "buffers": [{"byteLength": 12 * (vertices + triangles)}],
+    }
+    assert length % 4 == 0
+    last = struct.pack("<I4s", 12 * (vertices + triangles), b"BIN\0")
+    assert data[20 + length :] == last + mesh.vertices.tobytes() + mesh.triangles.tobytes()
+
+
+def test_glb_header_limits_size(terrain_map, tmp_path, monkeypatch):
+    path = terrain_map.save(tmp_path / "map.glb")
+    size = path.stat().st_size
+    monkeypatch.setattr(mesh_file, "_MAX_GLB_BYTES", size)
+    terrain_map.save(path, overwrite=True)
+    monkeypatch.setattr(mesh_file, "_MAX_GLB_BYTES", size - 1)
+    message = f"a .glb file: got {size} bytes; expected at most {size - 1}; use .ply"
+    with pytest.raises(ExportError, match=message):
         terrain_map.save(path, overwrite=True)
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-
-
-def points(terrain_map):
-    grid = terrain_map.grid
-    return np.random.default_rng(0).uniform(grid.lower, grid.upper, size=(1000, 2))
-
-
-@every_suffix
-@pytest.mark.parametrize("merged", [True, False])
-def test_mesh_file_matches_the_ground(ray_down, terrain_map, tmp_path, suffix, merged):
-    mesh = saved(terrain_map, tmp_path, suffix, full=not merged)
-    assert len(mesh.faces) == len(terrain_map.mesh(merged=merged).triangles)
-    xy = points(terrain_map)
-    found = ray_down(mesh.vertices, mesh.faces, xy)
-    np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
-
-
-@every_suffix
-def test_mesh_file_is_in_the_map_frame(terrain_map, tmp_path, suffix):
-    bounds = saved(terrain_map, tmp_path, suffix).bounds
-    np.testing.assert_allclose(bounds[:, :2], [[-1.2, -1.2], [17.2, 13.2]], atol=1e-5)
-    heights = terrain_map.heights
-    np.testing.assert_allclose(bounds[:, 2], [heights.min(), heights.max()], atol=1e-5)
-
-
-@every_suffix
-@pytest.mark.parametrize("merged", [True, False])
-def test_mesh_file_closed_is_a_solid(ray_down, terrain_map, tmp_path, suffix, merged):
-    mesh = saved(terrain_map, tmp_path, suffix, full=not merged, closed=True)
-    assert mesh.is_watertight
-    assert mesh.is_winding_consistent
-    assert mesh.volume > 0
-    xy = points(terrain_map)
-    found = ray_down(mesh.vertices, mesh.faces, xy)
-    np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
-
-
-@every_suffix
-def test_mesh_file_y_up_rotates_about_x(ray_down, terrain_map, tmp_path, suffix):
-    mesh = saved(terrain_map, tmp_path, suffix, closed=True, y_up=True)
-    assert mesh.volume > 0  # turned, not mirrored
-    # x stays, z is up as y, and y comes out of the picture as -z.
-    x, up, toward = np.asarray(mesh.vertices).T
-    xy = points(terrain_map)
-    found = ray_down(np.column_stack([x, -toward, up]), mesh.faces, xy)
-    np.testing.assert_allclose(found, terrain_map.height(xy), atol=1e-3)
-
-
-@pytest.mark.parametrize("suffix", [".ply", ".glb"])
-def test_mesh_file_is_exact(terrain_map, tmp_path, suffix):
-    path = terrain_map.save(tmp_path / f"map{suffix}")
-    read, mesh = trimesh.load_mesh(path, process=False), terrain_map.mesh()
-    assert read.vertices.astype(np.float32).tobytes() == mesh.vertices.tobytes()
-    assert read.faces.astype(np.int32).tobytes() == mesh.triangles.tobytes()
-
-
-def test_mesh_file_stl_is_exact(terrain_map, tmp_path):
-    path = terrain_map.save(tmp_path / "map.stl", full=True)
-    read, mesh = trimesh.load_mesh(path, process=False), terrain_map.mesh(merged=False)
-    assert len(mesh.triangles) > _FACES_PER_BLOCK
-    corners = mesh.vertices[mesh.triangles]
-    assert read.triangles.astype(np.float32).tobytes() == corners.tobytes()
-    # An independent computation of the normals that the file holds.
-    np.testing.assert_allclose(trimesh.triangles.normals(corners)[0], read.face_normals, atol=1e-5)
-
-
-@every_suffix
-def test_mesh_file_does_not_import_trimesh(tmp_path, suffix):
-    script = (
-        "import sys, terrainkit as t\n"
-        "t.generate(t.MapConfig(rows=1, cols=3, preset='stairs')).save(sys.argv[1])\n"
-        "assert 'trimesh' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", script, str(tmp_path / f"map{suffix}")], check=True)
 
 
 @every_suffix
 def test_mesh_file_is_written_in_blocks(terrain_map, tmp_path, suffix, monkeypatch):
     mesh = terrain_map.mesh()
     monkeypatch.setattr(TerrainMap, "mesh", lambda *_, **__: mesh)
-    monkeypatch.setattr("terrainkit.export.mesh_file._FACES_PER_BLOCK", 256)
+    monkeypatch.setattr(mesh_file, "_FACES_PER_BLOCK", 256)
     # Besides the mesh, writing needs a small part of its memory.
     views = mesh.vertices.nbytes + mesh.triangles.nbytes
-    assert peak_memory(terrain_map, tmp_path / f"map{suffix}") < views / 2
+    path = terrain_map.save(tmp_path / f"map{suffix}")  # after all imports
+    tracemalloc.start()
+    terrain_map.save(path, overwrite=True)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < views / 2
 
 
-def test_mjcf_is_written_in_rows(terrain_map, tmp_path):
-    path = tmp_path / "map.xml"
-    peak = peak_memory(terrain_map, path)
-    assert peak < 2.5 * (terrain_map.heights.nbytes + path.stat().st_size)
-
-
-def test_mesh_file_glb_header_limits_size(terrain_map, tmp_path, monkeypatch):
-    monkeypatch.setattr("terrainkit.export.mesh_file._MAX_GLB_BYTES", 1000)
-    path = tmp_path / "map.glb"
-    with pytest.raises(ExportError, match=r"a \.glb file: got \d+ bytes; expected at most 1000;"):
-        terrain_map.save(path)
-    assert not path.exists()
-
-
-def test_mesh_file_glb_has_friction_extras(terrain_map, tmp_path):
-    data = terrain_map.save(tmp_path / "map.glb").read_bytes()
-    # A header of 12 bytes, then the length and the kind of the first chunk, which is JSON.
-    (length,) = struct.unpack("<I", data[12:16])
-    (mesh,) = json.loads(data[20 : 20 + length])["meshes"]
-    contact = {"static_friction": 0.8, "dynamic_friction": 0.6, "restitution": 0.1}
-    assert contact.items() <= mesh["extras"].items()
-
-
-@lossy
-@every_suffix
-def test_mesh_file_has_the_solids_that_collide(solid_map, tmp_path, suffix):
-    mesh = saved(solid_map, tmp_path, suffix, closed=True)
-    assert mesh.is_watertight
-    assert mesh.is_winding_consistent
-    ground = dataclasses.replace(solid_map, solids=Solids.empty()).mesh(closed=True)
-    plain = trimesh.Trimesh(ground.vertices, ground.triangles, process=False)
-    # The box is free of the ground. The cylinder stands 0.1 m in it, the hull on it.
-    box, cylinder = 0.5 * 2 * 0.2, np.pi * 0.2**2 * 0.7
-    hull = trimesh.convex.convex_hull(solid_map.solids.hull_vertices).volume
-    assert mesh.volume - plain.volume == pytest.approx(box + cylinder + hull, rel=1e-2)
-
-
-@lossy
-@every_suffix
-def test_mesh_file_open_has_ground_and_solids(solid_map, tmp_path, suffix):
-    mesh = saved(solid_map, tmp_path, suffix)
-    assert len(mesh.faces) == len(solid_map.mesh().triangles)
-    assert mesh.bounds[1, 2] == pytest.approx(0.7, abs=1e-6)
-
-
-@lossy
-def test_mesh_file_warns_about_several_frictions(solid_map, tmp_path):
-    with pytest.warns(TerrainkitWarning, match=r"a mesh file has one friction, 1: .*; use \.npz"):
+def test_mesh_file_warns_about_frictions_and_visibility(solid_map, tmp_path):
+    with pytest.warns(TerrainkitWarning) as caught:
         solid_map.save(tmp_path / "map.stl")
-
-
-@lossy
-def test_mesh_file_warns_about_visibility_of_solids(solid_map, tmp_path):
-    with pytest.warns(TerrainkitWarning, match=r"solids that collide, visible or not: 2 solids"):
-        solid_map.save(tmp_path / "map.stl")
+    visibility, friction = (str(each.message) for each in caught)
+    assert "solids that collide, visible or not: 2 solids are only one of both" in visibility
+    assert friction.startswith("a mesh file has one friction, 1: ")

@@ -1,7 +1,6 @@
 import dataclasses
-import os
-import re
-from pathlib import Path
+import io
+from xml.etree import ElementTree as ET
 
 import mujoco
 import numpy as np
@@ -9,17 +8,20 @@ import pytest
 from scipy.ndimage import binary_dilation
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.errors import ConfigError
+from terrainkit.export import mjcf
 from terrainkit.geometry.walls import wall_edges
 from terrainkit.overlays.friction_patches import FrictionPatches
-
-ROOT = Path(__file__).parents[3]
-ROBOTS = Path(os.environ.get("TERRAINKIT_ROBOTS", ROOT.parent / "shared" / "robots"))
-GO2 = ROBOTS / "go2_mjcf" / "go2.xml"
+from tests.terrainkit.maps import plot
 
 every_collision = pytest.mark.parametrize("collision", ["hfield", "boxes"])
 AROUND = np.ones((3, 3), dtype=bool)
 UP = np.array([0.0, 0.0, 1.0])
+
+
+def written(terrain_map, collision="hfield"):
+    file = io.StringIO()
+    mjcf.write_model(terrain_map, file, collision)
+    return ET.fromstring(file.getvalue())
 
 
 def loaded(terrain_map, folder, **options):
@@ -28,14 +30,15 @@ def loaded(terrain_map, folder, **options):
 
 
 def ray_cast(model, xy):
-    data = mujoco.MjData(model)
+    """Return the height of the highest geom at each point [m], and its friction."""
+    data, geom, high = mujoco.MjData(model), np.zeros(1, dtype=np.int32), 50.0
     mujoco.mj_kinematics(model, data)
-    geom = np.zeros(1, dtype=np.int32)
-    high = 50.0
-    distances = [
-        mujoco.mj_ray(model, data, np.array([x, y, high]), -UP, None, 1, -1, geom) for x, y in xy
-    ]
-    return high - np.array(distances)
+    heights, friction = [], []
+    for x, y in xy:
+        start = np.array([x, y, high])
+        heights.append(high - mujoco.mj_ray(model, data, start, -UP, None, 1, -1, geom))
+        friction.append(model.geom_friction[geom[0], 0])
+    return np.array(heights), np.array(friction)
 
 
 def points_in(terrain_map, cells, count=1000):
@@ -56,300 +59,287 @@ def away_from_walls(terrain_map):
     return ~binary_dilation(beside, AROUND)
 
 
-@pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
-def test_mjcf_hfield_matches_away_from_walls(terrain_map, tmp_path, collision):
-    model = loaded(terrain_map, tmp_path, collision=collision)
-    xy = points_in(terrain_map, away_from_walls(terrain_map))
-    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+def assert_same_ground(model, terrain_map, cells=None):
+    xy = points_in(terrain_map, away_from_walls(terrain_map) if cells is None else cells)
+    np.testing.assert_allclose(ray_cast(model, xy)[0], terrain_map.height(xy), atol=1e-3)
 
 
-@pytest.mark.parametrize("border", [1.0, "sloped"])
-def test_mjcf_hfield_matches_an_edited_border(level_map, tmp_path, border):
-    heights = level_map.heights.copy()
-    ground = 0.1 * level_map.grid.axis(0)[:, None] if border == "sloped" else border
-    heights += np.float32(ground)
-    terrain_map = dataclasses.replace(level_map, heights=heights)
-    model = loaded(terrain_map, tmp_path, collision="hfield")
-    xy = points_in(terrain_map, away_from_walls(terrain_map))
-    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+# ---- the text ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("collision", ["boxes", "auto"])
-def test_mjcf_boxes_match_up_to_walls(level_map, tmp_path, collision):
-    model = loaded(level_map, tmp_path, collision=collision)
-    xy = points_in(level_map, np.ones(level_map.heights.shape, dtype=bool))
-    np.testing.assert_allclose(ray_cast(model, xy), level_map.height(xy), atol=1e-3)
+def test_mjcf_sets_every_attribute_of_its_class(terrain_map):
+    root = written(terrain_map)
+    (geom,), (site,) = root.iterfind("default/default/geom"), root.iterfind("default/default/site")
+    assert geom.attrib == {
+        "contype": "1",
+        "conaffinity": "1",
+        "condim": "3",
+        "group": "0",
+        "priority": "0",
+        "friction": "0.8 0.005 0.0001",
+        "solmix": "1",
+        "solref": "0.02 1",
+        "solimp": "0.9 0.95 0.001 0.5 2",
+        "margin": "0",
+        "gap": "0",
+        "rgba": "0.55 0.55 0.52 1",
+    }
+    assert site.attrib == {
+        "type": "box",
+        "size": "0.15 0.03 0.03",
+        "group": "0",
+        "rgba": "0.2 0.4 0.8 1",
+    }
+    assert {each.get("name"): each.get("data") for each in root.iterfind("custom/numeric")} == {
+        "terrain_static_friction": "0.8",
+        "terrain_dynamic_friction": "0.6",
+        "terrain_restitution": "0.1",
+    }
 
 
-def test_mjcf_boxes_match_beside_hfield(terrain_map, tmp_path):
-    model = loaded(terrain_map, tmp_path, collision="boxes")
-    # The heightfield that holds what is not level leans over the cells next to it.
-    xy = points_in(terrain_map, ~binary_dilation(~terrain_map.boxes().covered, AROUND))
-    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
-
-
-@pytest.mark.parametrize("centered", [False, True])
-@pytest.mark.parametrize("border", [0.0, 0.1, 0.2, 0.3, 2.0])
-@every_collision
-def test_mjcf_ground_extends_to_the_border(tmp_path, border, centered, collision):
-    slope = SubTerrain(terrain="slope", parameters={"grade": 0.3, "landing": 1.0})
-    pit = SubTerrain(terrain="pit", parameters={"side": 0.5})
-    config = MapConfig(
-        rows=1,
-        cols=2,
-        patch_size=(3.0, 2.0),
-        border=border,
-        centered=centered,
-        spawn_radius=0.1,
-        terrains=(slope, pit),
+def test_mjcf_heightfield_by_hand():
+    """Units of 0.1 mm above the lowest sample; the first row has the largest y."""
+    terrain_map = plot([[0.0, 0.0, 0.0], [0.0, 0.0, 0.05], [0.03] * 3, [-0.02, 0.0, 0.0]])
+    root = written(terrain_map)
+    (hfield,), (geom,) = root.iterfind("asset/hfield"), root.iterfind("worldbody/geom")
+    # Two samples more on each side repeat the edge.
+    low, middle, high = (
+        [200, 200, 200, y, 500, last, last, last] for y, last in ((200, 0), (200, 200), (700, 200))
     )
-    terrain_map = generate(config)
-    model = loaded(terrain_map, tmp_path, collision=collision)
-    xy = points_in(terrain_map, away_from_walls(terrain_map))
-    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+    rows = np.array(hfield.attrib.pop("elevation").split(), int).reshape(7, 8).tolist()
+    assert rows == [high] * 3 + [middle] + [low] * 3
+    size = "0.35 0.3 0.07 1"  # halves of 7 x 6 cells, 0.05 + 0.02 m, and a meter below
+    assert hfield.attrib == {"name": "terrain", "nrow": "7", "ncol": "8", "size": size}
+    pos = "0.2 0.15 -0.02"
+    assert geom.attrib == {"class": "terrain", "type": "hfield", "hfield": "terrain", "pos": pos}
+    heights, inner = terrain_map.heights, (slice(3, 6), slice(2, 4))
+    part = (slice(0, 8), slice(0, 7))
+    assert mjcf.hfield_elevation(heights, part)[::-1].tolist() == rows
+    assert mjcf.hfield_elevation(heights, inner).tolist() == [[200, 500, 0], [200, 500, 200]]
+    assert mjcf.hfield_size(heights, inner, 0.1) == pytest.approx((0.1, 0.05, 0.05, 1))
 
 
-def test_mjcf_hfield_rows_are_along_y(terrain_map, tmp_path):
-    model = loaded(terrain_map, tmp_path, collision="hfield")
-    # 3 patches of 40 cells along y, 2 of 80 along x, and 2 samples of the border on each side.
-    assert model.hfield_nrow.tolist() == [3 * 40 + 4]
-    assert model.hfield_ncol.tolist() == [2 * 80 + 4]
-    half_x, half_y, _, _ = model.hfield_size[0]
-    assert [half_x, half_y] == pytest.approx([163 * 0.1 / 2, 123 * 0.1 / 2])
+def test_mjcf_level_border_is_boxes_around_the_heightfield():
+    heights = np.zeros((14, 13))
+    heights[6, 6] = -0.02
+    (*boxes, _), pos = written(plot(heights, border=0.5)).iterfind("worldbody/geom"), "pos size"
+    # The heightfield ends 0.15 m beyond the patch of 0.4 m x 0.3 m; boxes are 1 m deep.
+    assert [[each.get(name) for name in pos.split()] for each in boxes] == [
+        ["-0.325 0.15 -0.51", "0.175 0.65 0.51"],
+        ["0.725 0.15 -0.51", "0.175 0.65 0.51"],
+        ["0.2 -0.325 -0.51", "0.35 0.175 0.51"],
+        ["0.2 0.625 -0.51", "0.35 0.175 0.51"],
+    ]
 
 
-def test_mjcf_auto_uses_complete_boxes(level_map, terrain_map, tmp_path):
-    assert loaded(level_map, tmp_path).nhfield == 0
-    (tmp_path / "terrain.xml").unlink()
-    model = loaded(terrain_map, tmp_path)
-    assert model.nhfield == 1
-    assert model.ngeom == 1 + 4  # and the border
+@pytest.mark.parametrize(
+    ("border", "sample", "number"),
+    [(0.0, None, 1), (0.1, None, 1), (0.2, None, 5)]
+    + [(0.5, sample, 1) for sample in ((0, 5), (-1, 5), (5, 0), (5, -1))],
+)
+def test_mjcf_narrow_or_uneven_border_belongs_to_the_heightfield(border, sample, number):
+    heights = np.zeros(np.round([4 + 20 * border, 3 + 20 * border]).astype(int))
+    heights[sample or (2, 2)] = 0.01 if sample else 0.0
+    assert len(written(plot(heights, border)).findall("worldbody/geom")) == number
 
 
-def test_mjcf_hfields_cover_patches_with_slopes(tmp_path):
-    slope = ("pyramid_slope", {"platform": 1.0, "grade": 0.2})
-    parts = [slope, ("pit", {"side": 1.0, "depth": 0.5}), slope, slope]
-    config = MapConfig(
-        rows=1,
-        cols=4,
-        patch_size=(4.0, 3.0),
-        border=1.0,
-        spawn_radius=0.1,
-        terrains=tuple(
-            SubTerrain(terrain=terrain, name=str(k), parameters=given)
-            for k, (terrain, given) in enumerate(parts)
-        ),
+def test_mjcf_has_a_geom_per_solid_and_a_site_per_goal(solid_map):
+    *_, board, other, post, hull = written(solid_map).iterfind("worldbody/geom")
+    assert board.attrib == {
+        "class": "terrain",
+        "type": "box",
+        "pos": "1 6 0.5",
+        "size": "0.25 1 0.1",
+        "quat": "0.988771 0 0 0.149438",  # half of 0.3 rad
+        "friction": "0.3 0.005 0.0001",
+        "priority": "2",
+    }
+    assert other.attrib.items() >= {("contype", "0"), ("conaffinity", "0"), ("pos", "5 6 0.5")}
+    assert post.attrib.items() >= {("size", "0.2 0.4"), ("type", "cylinder"), ("group", "3")}
+    assert hull.attrib == {"class": "terrain", "type": "mesh", "mesh": "solid_0"}
+    names = ("friction", "priority", "contype", "group")
+    assert [each.get(name) for each in (other, post) for name in names] == [
+        *(None, None, "0", None),
+        *(None, None, None, "3"),
+    ]
+    sites = [each.attrib for each in written(solid_map).iterfind("worldbody/site")]
+    half = "0.877583 0 0 0.479426"  # the cosine and the sine of 0.5
+    assert sites == [
+        {"name": "goal_0_1_0", "class": "terrain", "pos": "3 6 0", "quat": "1 0 0 0"},
+        {"name": "goal_0_1_1", "class": "terrain", "pos": "5.5 6 0", "quat": half},
+    ]
+
+
+# ---- the choice of boxes and heightfields ------------------------------------------------------
+
+
+@pytest.mark.parametrize(("number", "is_boxes"), [(198, True), (199, False)])
+def test_mjcf_auto_uses_up_to_100_boxes(number, is_boxes):
+    """Every other row is a box, on one box below."""
+    walls = np.zeros((number, 4))
+    walls[::2] = 0.5
+    assert (mjcf.collision_boxes(plot(walls), "auto") is not None) == is_boxes
+
+
+def test_mjcf_auto_uses_twice_as_many_boxes_as_heightfields():
+    terrain_map = plot(np.zeros((106, 4)), static_friction=0.8)
+    friction = np.full((106, 4), 0.8, np.float32)
+    friction[::2] = 0.3
+    striped = dataclasses.replace(terrain_map, friction=friction)
+    assert len(mjcf.collision_boxes(striped, "auto").centers) == 106
+
+
+@pytest.mark.parametrize("row", range(11))
+def test_mjcf_auto_finds_a_slope_between_any_two_rows(monkeypatch, row):
+    monkeypatch.setattr(mjcf, "_ROWS_PER_BAND", 4)
+    heights = np.zeros((12, 4))
+    heights[row + 1 :] = 0.05
+    assert mjcf.collision_boxes(plot(heights), "auto") is None
+    assert mjcf.collision_boxes(plot(10 * heights), "auto") is not None  # a wall
+
+
+def course(*terrains, **config):
+    """Return a map with a pyramid of slopes (S), a pit (P) or a straight slope (/) per column."""
+    parts = {
+        "S": ("pyramid_slope", {"platform": 1.0, "grade": 0.2}),
+        "P": ("pit", {"side": 0.5, "depth": 0.5}),
+        "/": ("slope", {"grade": 0.3, "landing": 1.0}),
+    }
+    made = tuple(
+        SubTerrain(terrain=parts[each][0], name=str(k), parameters=parts[each][1])
+        for k, each in enumerate(terrains)
     )
-    model = loaded(generate(config), tmp_path, collision="boxes")
-    assert model.nhfield == 2
-    # Columns 0, and 2 to 3. A part ends one sample beyond its patches, two in the border.
-    assert model.hfield_ncol.tolist() == [40 + 4] * 2
-    assert model.hfield_nrow.tolist() == [2 + 30 + 1, 1 + 60 + 2]
-    y = model.geom_pos[model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD, 1]
-    assert y.tolist() == pytest.approx([(-0.15 + 3.05) / 2, (5.95 + 12.15) / 2])
+    return generate(MapConfig(cols=len(made), spawn_radius=0.1, terrains=made, **config))
+
+
+def test_mjcf_hfields_cover_patches_with_slopes():
+    terrain_map = course(*"SPSS", rows=1, patch_size=(4.0, 3.0), border=1.0)
+    model = mjcf.make_model(terrain_map, "boxes")
+    spans = [(x.start, x.stop, y.start, y.stop) for (x, y), _ in model.hfields.values()]
+    # Columns 0, and 2 to 3. A part ends one sample beyond its patches, two in the border, and
+    # counts from two samples before the map.
+    assert spans == [(10, 54, 10, 43), (10, 54, 71, 134)]
+    y = [each["pos"][1] for each in model.geoms() if each["type"] == "hfield"]
+    assert y == pytest.approx([(-0.15 + 3.05) / 2, (5.95 + 12.15) / 2])
 
 
 def test_mjcf_divides_long_heightfields_beside_boxes(tmp_path):
-    slope = SubTerrain(terrain="pyramid_slope", parameters={"platform": 1.0, "grade": 0.2})
-    pit = SubTerrain(terrain="pit", parameters={"side": 1.0, "depth": 0.5})
-    terrain_map = generate(
-        MapConfig(
-            rows=8,
-            cols=2,
-            patch_size=(4.0, 4.0),
-            border=1.0,
-            spawn_radius=0.1,
-            terrains=(slope, pit),
-        )
-    )
+    terrain_map = course(*"SP", rows=8, patch_size=(4.0, 4.0), border=1.0)
     model = loaded(terrain_map, tmp_path, collision="boxes")
     # 32 m and two samples on both sides, in two parts that share a sample: 324 = 162 + 163 - 1.
     assert model.hfield_ncol.tolist() == [162, 163]
     half = model.hfield_size[:, 0]
     x = model.geom_pos[model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD, 0]
     assert x[0] + half[0] == pytest.approx(x[1] - half[1])
-    xy = points_in(terrain_map, away_from_walls(terrain_map))
-    np.testing.assert_allclose(ray_cast(model, xy), terrain_map.height(xy), atol=1e-3)
+    assert_same_ground(model, terrain_map)
 
 
-def test_mjcf_hfield_of_the_largest_heights(level_map, tmp_path):
-    heights = np.full(level_map.heights.shape, -1e6, np.float32)
-    heights[level_map.config.patch_cells(0, 0)] = 1e6
-    path = level_map.edited(heights=heights).save(tmp_path / "map.xml", collision="hfield")
-    model = mujoco.MjModel.from_xml_path(str(path))
-    assert model.hfield_size[0, 2] == pytest.approx(2e6)
-    assert sorted({*model.hfield_data.tolist()}) == [0, 1]
+def test_mjcf_surface_has_boxes_and_the_heightfield_below_them():
+    """Samples are lowered where boxes cover all cells around, which those at the slope do not."""
+    heights = np.zeros((10, 4))
+    heights[4:9], heights[9] = 0.05, 1.0
+    surface = mjcf.collision_surface(plot(heights), "boxes")
+    lowered = [-0.5, -0.5, 0, 0, 0.05, 0.05, -0.5, -0.5, -0.5, -0.5]
+    assert surface.heights[:, 1] == pytest.approx(lowered)
+    tops = [0, 0, 0, -np.inf, -np.inf, 0.05, 0.05, 0.05, 0.05, 1.0]
+    assert surface.box_tops[:, 1] == pytest.approx(tops)
+    assert mjcf.collision_surface(plot(heights), "hfield").box_tops is None
 
 
-def test_mjcf_flat_map_is_one_box(tmp_path):
-    flat = generate(MapConfig(rows=2, cols=1, terrains=(SubTerrain(terrain="flat"),)))
-    model = loaded(flat, tmp_path)
-    assert model.ngeom == 1
-    assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
+@pytest.mark.parametrize(("scan", "heights"), [(False, [0.6, 0, 0.7]), (True, [0.6, 0.6, 0])])
+def test_mjcf_surface_has_solids_that_collide_or_are_visible(solid_map, scan, heights):
+    """The board, the board that does not collide, and the hidden post."""
+    surface = mjcf.collision_surface(solid_map, "hfield")
+    x, y = np.array([1, 5, 2], np.float32), np.full(3, 6, np.float32)
+    assert surface.height(x, y, scan=scan) == pytest.approx(heights)
 
 
-def test_mjcf_flat_map_as_hfield(tmp_path):
-    flat = generate(MapConfig(rows=1, cols=1, terrains=(SubTerrain(terrain="flat"),)))
-    model = loaded(flat, tmp_path, collision="hfield")
-    assert ray_cast(model, [(1.0, 2.0), (-24.9, 32.9)]).tolist() == pytest.approx([0.0, 0.0])
+# ---- the ground in MuJoCo ----------------------------------------------------------------------
 
 
-@every_collision
-def test_mjcf_geoms_belong_to_the_world(terrain_map, tmp_path, collision):
+@pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
+def test_mjcf_has_the_same_ground_away_from_walls(terrain_map, tmp_path, collision):
     model = loaded(terrain_map, tmp_path, collision=collision)
-    assert model.nbody == 1
-    assert model.nv == 0
+    assert_same_ground(model, terrain_map)
+    assert (model.nbody, model.nv) == (1, 0)
+    assert set(model.geom_friction[:, 0]) == {0.8}
+    if collision == "boxes":
+        # The heightfield that holds what is not level leans over the cells next to it.
+        covered = terrain_map.boxes().covered
+        assert_same_ground(model, terrain_map, ~binary_dilation(~covered, AROUND))
+    else:
+        assert model.ngeom == 1 + 4  # and the border
 
 
+@pytest.mark.parametrize("collision", ["boxes", "auto"])
+def test_mjcf_boxes_match_up_to_walls(level_map, tmp_path, collision):
+    model = loaded(level_map, tmp_path, collision=collision)
+    assert model.nhfield == 0
+    assert_same_ground(model, level_map, np.ones(level_map.heights.shape, dtype=bool))
+
+
+@pytest.mark.parametrize(
+    ("border", "centered"), [(0.0, False), (0.1, True), (0.2, False), (0.3, True), (2.0, True)]
+)
 @every_collision
-def test_mjcf_friction_is_from_the_config(terrain_map, tmp_path, collision):
-    model = loaded(terrain_map, tmp_path, collision=collision)
-    np.testing.assert_allclose(model.geom_friction[:, 0], 0.8)
-    contact = [
-        model.numeric(f"terrain_{name}").data.item()
-        for name in ("static_friction", "dynamic_friction", "restitution")
-    ]
-    assert contact == [0.8, 0.6, 0.1]
+def test_mjcf_ground_extends_to_the_border(tmp_path, border, centered, collision):
+    terrain_map = course(*"/P", rows=1, patch_size=(3.0, 2.0), border=border, centered=centered)
+    assert_same_ground(loaded(terrain_map, tmp_path, collision=collision), terrain_map)
 
 
-@every_collision
-def test_mjcf_is_deterministic(terrain_map, tmp_path, collision):
-    again = generate(terrain_map.config)
-    first, second = (
-        each.save(tmp_path / f"{k}.xml", collision=collision).read_bytes()
-        for k, each in enumerate((terrain_map, again))
-    )
-    assert first == second
-
-
-def test_mjcf_unknown_collision_lists_options(terrain_map, tmp_path):
-    with pytest.raises(ConfigError, match=r"collision: got 'mesh'; .* one of: auto, hfield, boxes"):
-        terrain_map.save(tmp_path / "terrain.xml", collision="mesh")
-    assert list(tmp_path.iterdir()) == []
+def test_mjcf_rays_hit_the_solids(solid_map, tmp_path):
+    xy = np.array([[1, 6], [5, 6], [2, 6], [4.1, 6.1], [3, 6]])
+    heights, _ = ray_cast(loaded(solid_map, tmp_path), xy)
+    assert heights == pytest.approx([0.6, 0.6, 0.7, 0.4, 0.0], abs=1e-6)
 
 
 ROBOT = """
 <mujoco model="robot">
-  <compiler angle="degree" meshdir="meshes" texturedir="textures" autolimits="true"/>
   <default>
     <geom contype="4" conaffinity="2" condim="6" friction="0.1 0.2 0.3" priority="1" group="4"
           margin="0.2" gap="0.1" solref="0.5 2" solimp="0.5 0.6 0.1" solmix="7" rgba="1 0 0 1"/>
   </default>
   {before}
   <worldbody>
-    <light pos="0 0 9"/>
-    <body name="ball" pos="0 0 9">
+    <body pos="0 0 9">
       <freejoint/>
-      <geom name="ball" type="sphere" size="0.1" mass="1" contype="1" conaffinity="1" condim="3"
-            priority="0" margin="0" gap="0" solref="0.02 1" solimp="0.9 0.95 0.001"/>
+      <geom type="sphere" size="0.1" mass="1" contype="1" conaffinity="1" condim="3" priority="0"
+            margin="0" gap="0" solref="0.02 1" solimp="0.9 0.95 0.001"/>
     </body>
   </worldbody>
   {after}
 </mujoco>
 """
-INCLUDE = '<include file="terrain.xml"/>'
 
 
-@pytest.fixture(params=["before", "after"])
-def scene_with_ball(request):
-    places = {"before": "", "after": ""} | {request.param: INCLUDE}
-    return ROBOT.format(**places)
-
-
-def include(scene, terrain_map, folder, collision):
-    terrain_map.save(folder / "terrain.xml", collision=collision)
-    (folder / "scene.xml").write_text(scene)
-    return mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
-
-
+@pytest.mark.parametrize("place", ["before", "after"])
 @every_collision
-def test_mjcf_ignores_defaults_of_a_robot(scene_with_ball, terrain_map, tmp_path, collision):
-    model = include(scene_with_ball, terrain_map, tmp_path, collision)
-    alone = mujoco.MjModel.from_xml_path(str(tmp_path / "terrain.xml"))
+def test_mjcf_ignores_defaults_of_a_robot(terrain_map, tmp_path, place, collision):
+    alone = loaded(terrain_map, tmp_path, collision=collision)
+    scene = ROBOT.format(**{"before": "", "after": ""} | {place: '<include file="terrain.xml"/>'})
+    (tmp_path / "scene.xml").write_text(scene)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
     ground = np.flatnonzero(model.geom_bodyid == 0)
     assert len(ground) == alone.ngeom == model.ngeom - 1
     names = "pos size contype conaffinity condim priority friction solmix solref solimp margin gap"
     for name in (*names.split(), "group", "rgba"):
         found, wanted = (getattr(each, f"geom_{name}") for each in (model, alone))
         assert found[ground].tolist() == wanted.tolist()
-
-
-@every_collision
-def test_mjcf_ball_rests_at_spawn_origin(scene_with_ball, terrain_map, tmp_path, collision):
-    model = include(scene_with_ball, terrain_map, tmp_path, collision)
     data = mujoco.MjData(model)
     for origin in terrain_map.env_origins.reshape(-1, 3).astype(float):
         mujoco.mj_resetData(model, data)
         data.qpos[:3] = origin + 0.3 * UP
         mujoco.mj_step(model, data, nstep=700)
-        assert data.ncon > 0
         assert np.abs(data.qvel).max() < 0.01
         np.testing.assert_allclose(data.qpos[:3], origin + 0.1 * UP, atol=2e-3)
-
-
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-
-
-@pytest.mark.skipif(not GO2.is_file(), reason=f"no {GO2}; TERRAINKIT_ROBOTS says where robots are")
-@every_collision
-def test_mjcf_robot_rests_at_spawn_origin(terrain_map, tmp_path, collision):
-    # Its meshes are only to look at, and one is missing: any will do.
-    (tmp_path / "assets").mkdir()
-    for name in re.findall(r'file="(\w+\.obj)"', GO2.read_text()):
-        (tmp_path / "assets" / name).write_text(TETRAHEDRON)
-    scene = f'<mujoco><include file="{GO2.resolve()}"/>{INCLUDE}</mujoco>'
-    model = include(scene, terrain_map, tmp_path, collision)
-    data = mujoco.MjData(model)
-    for origin in terrain_map.env_origins.reshape(-1, 3).astype(float):
-        mujoco.mj_resetDataKeyframe(model, data, 0)
-        data.qpos[:3] = origin + 0.3 * UP
-        mujoco.mj_step(model, data, nstep=1000)
-        # Its motors are off, so it lies on its belly.
-        base = data.qpos[:3] - origin
-        assert np.abs(data.qvel[:6]).max() < 0.05
-        assert np.abs(base[:2]).max() < 0.05
-        assert 0.05 < base[2] < 0.15
-        on_ground = (model.geom_bodyid[data.contact.geom] == 0).any(axis=1)
-        assert on_ground.sum() >= 3
-        assert data.contact.dist[on_ground].min() > -5e-3
-
-
-@pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
-def test_mjcf_has_one_geom_per_solid(solid_map, tmp_path, collision):
-    model = loaded(solid_map, tmp_path, collision=collision)
-    kinds = [int(kind) for kind in model.geom_type[-4:]]
-    geom = mujoco.mjtGeom
-    assert kinds == [geom.mjGEOM_BOX, geom.mjGEOM_BOX, geom.mjGEOM_CYLINDER, geom.mjGEOM_MESH]
-    assert model.geom_friction[-4:, 0].tolist() == [0.3, 1.0, 1.0, 1.0]
-    assert model.geom_contype[-4:].tolist() == [1, 0, 1, 1]
-    assert model.geom_conaffinity[-4:].tolist() == [1, 0, 1, 1]
-    assert model.geom_group[-4:].tolist() == [0, 0, 3, 0]
-
-
-def test_mjcf_rays_hit_the_solids(solid_map, tmp_path):
-    model = loaded(solid_map, tmp_path)
-    xy = np.array([[1, 6], [5, 6], [2, 6], [4.1, 6.1], [3, 6]])
-    assert ray_cast(model, xy) == pytest.approx([0.6, 0.6, 0.7, 0.4, 0.0], abs=1e-6)
-
-
-def test_mjcf_ball_lands_on_the_first_solid_that_collides(solid_map, tmp_path):
-    path = solid_map.save(tmp_path / "ground.xml")
-    spec = mujoco.MjSpec.from_file(str(path))
-    for x in (1.0, 5.0):  # over the box, and over the box that does not collide
-        ball = spec.worldbody.add_body(pos=[x, 6.0, 1.5])
-        ball.add_freejoint()
-        ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0, 0], mass=1)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, 1500)
-    assert data.xpos[-2:, 2] == pytest.approx([0.65, 0.05], abs=2e-3)
 
 
 # ---- friction ----------------------------------------------------------------------------------
 
 
-def friction_map(terrain, overlays=(), **rest):
-    """Return a map whose second column has its own friction, and a third one overlays."""
+def friction_map(terrain, side=None, **rest):
+    """Return a map whose second column has its own friction, and a third one friction patches."""
+    overlays = (FrictionPatches(**{} if side is None else {"side": side}),)
     terrains = (
         SubTerrain(terrain=terrain, name="plain"),
         SubTerrain(terrain=terrain, name="icy", friction=(0.5, 0.25)),
@@ -359,106 +349,40 @@ def friction_map(terrain, overlays=(), **rest):
     return generate(MapConfig(terrains=terrains, static_friction=0.8, **size | rest))
 
 
-def friction_below(model, xy):
-    """Return the friction of the highest geom at each point."""
-    data, geom = mujoco.MjData(model), np.zeros(1, dtype=np.int32)
-    mujoco.mj_forward(model, data)
-    found = []
-    for x, y in xy:
-        mujoco.mj_ray(model, data, [x, y, 20.0], [0, 0, -1], None, 1, -1, geom, None)
-        found.append(model.geom_friction[geom[0], 0])
-    return np.array(found)
-
-
-@pytest.mark.parametrize(
-    ("terrain", "overlays"),
-    [("flat", FrictionPatches()), ("stairs", FrictionPatches()), ("rough", FrictionPatches())],
-)
-@pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
-def test_mjcf_has_friction_of_each_cell(tmp_path, terrain, overlays, collision):
-    terrain_map = friction_map(terrain, (overlays,))
+@pytest.mark.parametrize("terrain", ["flat", "stairs", "rough"])
+@every_collision
+def test_mjcf_has_friction_of_each_cell(tmp_path, terrain, collision):
+    terrain_map = friction_map(terrain)
     model = loaded(terrain_map, tmp_path, collision=collision)
     cells = np.random.default_rng(0).integers(0, terrain_map.heights.shape, (1000, 2))
-    # A heightfield ends at a sample, half a cell beyond the edge.
-    friction = np.pad(terrain_map.friction, 1, mode="edge")
-    block = np.array([friction[i : i + 3, j : j + 3] for i, j in cells])
-    cells = cells[(block == block[:, 1:2, 1:2]).all(axis=(1, 2))]
-    xy = terrain_map.first_sample + (cells + 0.1) * terrain_map.grid.cell
+    offset = 0.45  # boxes have exact edges
+    if model.nhfield:
+        # A heightfield ends at a sample, half a cell beyond the edge.
+        friction, offset = np.pad(terrain_map.friction, 1, mode="edge"), 0.1
+        block = np.array([friction[i : i + 3, j : j + 3] for i, j in cells])
+        cells = cells[(block == block[:, 1:2, 1:2]).all(axis=(1, 2))]
+    xy = terrain_map.first_sample + (cells + offset) * terrain_map.grid.cell
     expected = terrain_map.friction[tuple(cells.T)]
-    assert friction_below(model, xy) == pytest.approx(expected, abs=1e-6)
+    assert ray_cast(model, xy)[1] == pytest.approx(expected, abs=1e-6)
     assert len(np.unique(expected)) > 10
 
 
-@every_collision
-def test_mjcf_with_several_frictions_has_the_same_ground(tmp_path, collision):
-    terrain_map = friction_map("rough_slope", (FrictionPatches(),))
-    cells = points_in(terrain_map, np.ones(terrain_map.heights.shape, dtype=bool))
-    uniform = np.broadcast_to(np.float32(0.8), terrain_map.friction.shape)
-    plain = dataclasses.replace(terrain_map, friction=uniform)
-    expected = ray_cast(loaded(plain, tmp_path, collision=collision), cells)
-    found = ray_cast(loaded(terrain_map, tmp_path, collision=collision, overwrite=True), cells)
-    assert found == pytest.approx(expected, abs=2e-4)
-
-
-def test_mjcf_boxes_have_exact_friction_edges(tmp_path):
-    terrain_map = friction_map("flat", (FrictionPatches(),))
-    model = loaded(terrain_map, tmp_path, collision="boxes")
-    assert model.nhfield == 0
-    cells = np.random.default_rng(0).integers(0, terrain_map.heights.shape, (1000, 2))
-    xy = terrain_map.first_sample + (cells + 0.45) * terrain_map.grid.cell
-    expected = terrain_map.friction[tuple(cells.T)]
-    assert friction_below(model, xy) == pytest.approx(expected, abs=1e-6)
-
-
-def test_mjcf_auto_uses_boxes_for_level_friction_patches(tmp_path):
-    terrain_map = friction_map("flat", (FrictionPatches(side=0.3),), cols=9)
-    model = loaded(terrain_map, tmp_path)
-    assert model.nhfield == 0
-    assert model.ngeom > 200
-
-
-def test_mjcf_one_friction_per_patch_splits_the_heightfield(tmp_path):
-    model = loaded(friction_map("rough", rows=1, seed=0), tmp_path, collision="hfield")
-    # Border and two plain columns: four rectangles around the icy patch and the patch itself.
-    own = model.geom_friction[:, 0] == 0.5
-    assert own.sum() == 1
-    assert model.geom_priority[own].tolist() == [2]
-    assert (model.geom_priority[~own] == 0).all()
-    assert model.nhfield <= 5
-
-
-def test_mjcf_slippery_patch_lets_a_box_slide(tmp_path):
-    """A box on a slope of 0.3 slides where the friction is 0.1, and stays where it is 0.8."""
-    slope = {"terrain": "pyramid_slope", "parameters": {"grade": 0.3, "platform": 2.0}}
-    terrains = (SubTerrain(**slope), SubTerrain(**slope, name="icy", friction=0.1))
-    config = MapConfig(rows=1, cols=2, border=1.0, static_friction=0.8, terrains=terrains)
-    terrain_map = generate(config)
-    spec = mujoco.MjSpec.from_file(str(terrain_map.save(tmp_path / "map.xml")))
-    for col in (0, 1):
-        x, y = config.patch_grid(0, col).center
-        start = [x - 2.0, y, float(terrain_map.height((x - 2.0, y))) + 0.12]
-        body = spec.worldbody.add_body(pos=start)
-        body.add_freejoint()
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.05], priority=1)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    start = data.xpos[1:, 0].copy()
-    while data.time < 1.0:
-        mujoco.mj_step(model, data)
-    slid = start - data.xpos[1:, 0]
-    assert abs(slid[0]) < 0.1
-    assert slid[1] > 0.4
-
-
-def test_mjcf_has_a_site_per_goal(solid_map, tmp_path):
-    model = loaded(solid_map, tmp_path)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    names = [model.site(k).name for k in range(model.nsite)]
-    assert names == ["goal_0_1_0", "goal_0_1_1"]
-    goals = solid_map.goals[0, 1]
-    assert data.site_xpos == pytest.approx(goals[:, :3], abs=1e-5)
-    forward = data.site_xmat.reshape(-1, 3, 3)[:, :, 0]
-    heading = np.arctan2(forward[:, 1], forward[:, 0])
-    assert heading == pytest.approx(goals[:, 3], abs=1e-5)
+def test_mjcf_splits_a_heightfield_where_the_friction_changes():
+    """Cells 2 to 3 of 8 along x are slippery: samples 4 to 6 with the margin of 2."""
+    terrain_map = plot(np.zeros((8, 3)), static_friction=0.8)
+    friction = np.full((8, 3), 0.8, np.float32)
+    friction[2:4, :2] = 0.25
+    split = dataclasses.replace(terrain_map, friction=friction)
+    model = mjcf.make_model(split, "hfield")
+    parts = [
+        (x.start, x.stop, y.start, y.stop, round(value, 3))
+        for (x, y), value in model.hfields.values()
+    ]
+    assert sorted(parts) == [
+        (0, 5, 0, 5, 0.8),
+        (0, 12, 4, 7, 0.8),
+        (4, 7, 0, 5, 0.25),
+        (6, 12, 0, 5, 0.8),
+    ]
+    (icy,) = (each for each in model.geoms() if "friction" in each)
+    assert (icy["friction"], icy["priority"]) == ((0.25, 0.005, 0.0001), 2)

@@ -1,3 +1,4 @@
+import dataclasses
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -7,59 +8,77 @@ import trimesh
 import terrainkit as tk
 from terrainkit.errors import ExportError
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
+from tests.terrainkit.maps import plot
+
+TETRAHEDRON = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [0, 0, 2]], dtype=float)
+HULLS = [TETRAHEDRON, np.add(TETRAHEDRON, [2, 0, 0]), 2 * TETRAHEDRON]
 
 
 @pytest.fixture(scope="module")
-def solid_map():
-    rough = tk.SubTerrain(terrain="rough")
-    flat = tk.generate(tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(rough,), centered=True))
-    tetrahedron = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [0, 0, 2]], dtype=float)
+def saved(tmp_path_factory):
+    """Return the file of a map with solids of each kind, some of which collide or are visible."""
     parts = [
-        make_boxes([[1, 2, 3]], [[0.2, 0.4, 0.6]], rpy=[0, 0, np.pi / 4], friction=0.3),
-        make_cylinders([[-1, -2, 1]], 0.1, 0.8),
-        make_hulls([tetrahedron, np.add(tetrahedron, [2, 0, 0])], friction=[0.5, np.nan]),
+        make_boxes([[1, 2, 3]], [[0.2, 0.4, 0.6]], rpy=[0.3, -0.4, 1.2], friction=0.3),
+        make_boxes([[2, 2, 3]], [[0.2, 0.4, 0.6]], collides=False),
+        make_cylinders([[-1, -2, 1]], 0.1, 0.8, visible=False),
+        make_hulls(HULLS, friction=[0.5, np.nan, 0.5]),
     ]
-    return flat.edited(solids=Solids.concatenate(parts))
+    heights = np.zeros((4, 3))
+    heights[0, 0] = 0.5
+    flat = plot(heights, static_friction=0.8, restitution=0.25)
+    path = tmp_path_factory.mktemp("sdf") / "map.sdf"
+    return dataclasses.replace(flat, solids=Solids.concatenate(parts)).save(path)
 
 
-@pytest.fixture(scope="module")
-def link(solid_map, tmp_path_factory):
-    path = solid_map.save(tmp_path_factory.mktemp("sdf") / "map.sdf")
-    found = ET.parse(path).getroot().find("model/link")
-    found.set("folder", str(path.parent))
-    return found
+def described(element):
+    """Return name, geometry, pose, friction and restitution of a collision or a visual."""
+    (shape,) = element.find("geometry")
+    pose = [float(number) for number in element.findtext("pose", "").split()]
+    surface = [
+        element.findtext(f"surface/{path}") for path in ("friction/ode/mu", "friction/ode/mu2")
+    ]
+    bounce = element.findtext("surface/bounce/restitution_coefficient")
+    texts = [shape.tag, *(f"{each.tag} {each.text}" for each in shape)]
+    return element.get("name"), texts, pose, [*surface, bounce]
 
 
-def test_sdf_shapes_have_pose_size_and_friction(link):
-    box, cylinder = (link.find(f"collision[@name='solid_{k}_collision']") for k in (0, 1))
-    pose = [float(each) for each in box.find("pose").text.split()]
-    assert pose == pytest.approx([1, 2, 3, 0, 0, np.pi / 4], abs=1e-5)
-    assert box.find("geometry/box/size").text == "0.2 0.4 0.6"
-    assert box.find("surface/friction/ode/mu").text == "0.3"
-    assert cylinder.find("geometry/cylinder/radius").text == "0.1"
-    assert cylinder.find("geometry/cylinder/length").text == "0.8"
-    assert cylinder.find("surface/friction/ode/mu").text == "1"
+def test_sdf_is_a_static_link_of_ground_shapes_and_hulls(saved):
+    root = ET.parse(saved).getroot()
+    (model,) = root
+    assert (root.attrib, model.attrib) == ({"version": "1.9"}, {"name": "terrain"})
+    assert model.findtext("static") == "true"
+    link = model.find("link")
+    turned = pytest.approx([1, 2, 3, 0.3, -0.4, 1.2], abs=1e-5)  # about fixed axes
+    size, map_friction = "size 0.2 0.4 0.6", ["0.8", "0.8", "0.25"]
+    post = ["cylinder", "radius 0.1", "length 0.8"]
+    assert [described(each) for each in link.findall("collision")] == [
+        ("ground_collision", ["mesh", "uri map.stl"], [], map_friction),
+        ("solid_0_collision", ["box", size], turned, ["0.3", "0.3", "0.25"]),
+        ("solid_2_collision", post, [-1, -2, 1, 0, 0, 0], map_friction),
+        ("hulls_0_collision", ["mesh", "uri map_hulls_0.stl"], [], ["0.5", "0.5", "0.25"]),
+        ("hulls_1_collision", ["mesh", "uri map_hulls_1.stl"], [], map_friction),
+    ]
+    none = [None] * 3
+    assert [described(each) for each in link.findall("visual")] == [
+        ("ground_visual", ["mesh", "uri map.stl"], [], none),
+        ("solid_0_visual", ["box", size], turned, none),
+        ("solid_1_visual", ["box", size], [2, 2, 3, 0, 0, 0], none),
+        ("hulls_0_visual", ["mesh", "uri map_hulls_0.stl"], [], none),
+        ("hulls_1_visual", ["mesh", "uri map_hulls_1.stl"], [], none),
+    ]
 
 
-def test_sdf_meshes_are_ground_and_hulls_by_friction(link, solid_map):
-    uris = [each.find("geometry/mesh/uri") for each in link.findall("collision")]
-    files = [each.text for each in uris if each is not None]
-    assert files == ["map.stl", "map_hulls_0.stl", "map_hulls_1.stl"]
-    ground, *hulls = (trimesh.load_mesh(f"{link.get('folder')}/{name}") for name in files)
-    np.testing.assert_allclose(ground.area, trimesh.Trimesh(*_arrays(solid_map)).area, rtol=1e-5)
-    assert [hull.volume for hull in hulls] == pytest.approx([1 / 6, 1 / 6])
+def test_sdf_meshes_are_ground_and_hulls_by_friction(saved):
+    names = ("map.stl", "map_hulls_0.stl", "map_hulls_1.stl")
+    ground, *hulls = (trimesh.load_mesh(saved.with_name(name)) for name in names)
+    # The raised cell of 0.1 m has two walls.
+    assert ground.area == pytest.approx(0.4 * 0.3 + 2 * 0.1 * 0.5)
+    assert [hull.volume for hull in hulls] == pytest.approx([9 / 6, 1 / 6])
 
 
-def _arrays(terrain_map):
-    mesh = terrain_map.ground_mesh()
-    return mesh.vertices, mesh.triangles
-
-
-def test_sdf_pose_angles_are_about_fixed_axes(solid_map, tmp_path):
-    box = make_boxes([[0, 0, 2]], [[0.2, 0.4, 0.6]], rpy=[0.3, -0.4, 1.2])
-    path = solid_map.edited(solids=box).save(tmp_path / "a.sdf")
-    pose = ET.parse(path).getroot().find(".//pose").text.split()
-    assert [float(each) for each in pose[3:]] == pytest.approx([0.3, -0.4, 1.2], abs=1e-5)
+def test_sdf_without_solids_has_the_ground_only(tmp_path):
+    path = plot(np.zeros((4, 3))).save(tmp_path / "a.sdf")
+    assert len(ET.parse(path).getroot().find("model/link")) == 2
 
 
 @pytest.mark.parametrize("suffix", [".sdf", ".usda"])

@@ -1,18 +1,19 @@
 """The demand of a patch, against values worked out by hand."""
 
 import dataclasses
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility import RobotLimits, assess_map, assess_patch
 from terrainkit.feasibility import assess as assess_module
+from terrainkit.feasibility import assess_map, assess_patch
 from terrainkit.geometry.solids import make_boxes
 from terrainkit.terrain.registry import terrain_names
 from tests.limits import LIMITS
+from tests.terrainkit.maps import contents
 
 CASES = {
     # A step of h: h / step_up, or h / step_down where the robot starts at the top.
@@ -31,11 +32,7 @@ CASES = {
     "rings": ({"gap": 0.2, "width": 0.4, "variation": 0.0}, 0.5, "gap"),
     "stepping_stones": ({"stone": 0.8}, 0.25, "gap"),  # one cell between two stones
     "stone_rows": ({"stone": 0.4, "gap": 0.2, "variation": 0.0}, 0.5, "gap"),
-    "stones_everywhere": (
-        {"stone": 0.6, "gap": 0.2, "shift": 0.0, "variation": 0.0},
-        0.5,
-        "gap",
-    ),
+    "stones_everywhere": ({"stone": 0.6, "gap": 0.2, "shift": 0, "variation": 0}, 0.5, "gap"),
     "stakes": ({"diameter": 0.3, "gap": 0.2, "variation": 0.0}, 0.5, "gap"),
     "stepping_beams": ({"width": 0.3, "gap": 0.2, "yaw": 0.0}, 0.5, "gap"),
     "side_ramps": ({"roll": 0.2, "gap": 0.2}, 0.5, "gap"),
@@ -72,38 +69,26 @@ BOUNDS = {
     "crossing_ramps": ({"grade": 0.2}, 0.0, 0.4),
     "stepfield": ({"unit": 0.05}, 0.25, 1.0),  # at least one unit up
     "ladder": ({}, np.inf, np.inf),  # rungs are no footholds
-    "random_grid": ({"height": 0.1}, 0.0, 1.0),
-    "rocks": ({}, 0.0, 1.0),
     "rough": ({"amplitude": 0.05}, 0.0, 0.5),
-    "wave": ({"amplitude": 0.1}, 0.0, 1.0),
-    "perlin": ({}, 0.0, 1.0),
-    "fractal": ({}, 0.0, 1.0),
-    "eroded": ({}, 0.0, 1.0),
-    "imported": ({}, 0.0, 1.0),
 }
-"""Parameters of a terrain, and the lowest and the highest demand."""
+"""Parameters of a terrain, and the lowest and the highest demand; 0 to 1 of all others."""
 
 
-def config_of(terrain, **parameters):
+def config_of(terrain, size=(8.0, 4.0), **parameters):
     return MapConfig(
         terrains=(SubTerrain(terrain=terrain, parameters=parameters),),
         rows=1,
         cols=1,
-        patch_size=(8.0, 4.0),
+        patch_size=size,
         mode="selected",
         selected_difficulty=0.5,
         border=0.0,
     )
 
 
-def assess(terrain, limits=LIMITS, **parameters):
-    config = config_of(terrain, **parameters)
+def assess(terrain, limits=LIMITS, size=(8.0, 4.0), **parameters):
+    config = config_of(terrain, size, **parameters)
     return assess_patch(make_patch(config, 0, 0), limits, config.wall_threshold)
-
-
-def test_every_terrain_has_a_case():
-    assert not set(CASES) & set(BOUNDS)
-    assert set(terrain_names()) == {*CASES, *BOUNDS}
 
 
 @pytest.mark.parametrize("terrain", CASES)
@@ -113,9 +98,9 @@ def test_demand_by_hand(terrain):
     assert (result.demand, result.limit) == (pytest.approx(demand, abs=1e-3), limit)
 
 
-@pytest.mark.parametrize("terrain", sorted(set(BOUNDS) & set(terrain_names())))
+@pytest.mark.parametrize("terrain", sorted({*terrain_names()} - {*CASES}))
 def test_demand_between_bounds(terrain):
-    parameters, low, high = BOUNDS[terrain]
+    parameters, low, high = BOUNDS.get(terrain, ({}, 0.0, 1.0))
     assert low - 1e-6 <= assess(terrain, **parameters).demand <= high + 1e-6
 
 
@@ -139,37 +124,6 @@ def test_limit_is_exactly_demand_one():
     assert assess("pit", depth=1.0).value == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(
-    ("terrain", "size", "parameters"),
-    [
-        ("stairs", (8.0, 2.4), {"step_height": 0.15}),
-        ("gap", (8.0, 4.0), {"width": 0.3}),
-        ("rough_slope", (8.0, 4.0), {"grade": 0.3}),
-        ("stepping_stones", (8.0, 4.0), {"stone": 0.1}),
-        ("slit", (6.0, 2.4), {"opening": 1.5, "body_width": 0.35}),
-        ("tunnel", (5.0, 1.2), {"clearance": 0.45}),
-    ],
-)
-@pytest.mark.parametrize("name", [field.name for field in dataclasses.fields(RobotLimits)])
-def test_demand_is_monotone_in_every_limit(terrain, size, parameters, name):
-    demands = []
-    for factor in (0.75, 1.3):
-        limits = dataclasses.replace(LIMITS, **{name: factor * getattr(LIMITS, name)})
-        config = dataclasses.replace(config_of(terrain, **parameters), patch_size=size)
-        patch = make_patch(config, 0, 0)
-        demands.append(assess_patch(patch, limits, config.wall_threshold).demand)
-    needs_room = name in ("foothold", "body_width", "standing_height", "crouched_height")
-    assert demands == sorted(demands, reverse=not needs_room)
-
-
-@pytest.mark.parametrize("terrain", ["stairs", "pyramid_slope", "gap", "pit", "hurdles"])
-def test_demand_rises_with_difficulty(terrain):
-    config = MapConfig(terrains=(SubTerrain(terrain=terrain),), rows=5, cols=1, border=0.0)
-    demands = [each.demand for each in assess_map(generate(config), LIMITS)]
-    assert demands == sorted(demands)
-    assert demands[0] < demands[-1]
-
-
 def test_path_leads_from_spawn_over_the_blocking_place():
     result = assess("stairs", step_height=0.15)
     assert result.path[0] == pytest.approx([1.05, 2.05, 0.0], abs=0.11)
@@ -186,11 +140,6 @@ def test_path_passes_all_goals():
         assert np.linalg.norm(path[:, :2] - goal[:2], axis=1).min() < 0.03
 
 
-def test_result_is_deterministic():
-    first, second = assess("rough"), assess("rough")
-    assert (first.demand, first.path.tolist()) == (second.demand, second.path.tolist())
-
-
 def test_robot_goes_under_or_over_a_bar():
     """A bar at 0.45 m demands a crouch; one on the ground is a hurdle."""
     flat = generate(config_of("flat"))
@@ -201,11 +150,12 @@ def test_robot_goes_under_or_over_a_bar():
         assert (result.demand, result.limit) == (pytest.approx(demand, abs=1e-3), limit)
 
 
-def test_solids_that_do_not_collide_are_ignored():
+@pytest.mark.parametrize(("collides", "demand"), [(False, 0.0), (True, np.inf)])
+def test_solids_that_do_not_collide_are_ignored(collides, demand):
     flat = generate(config_of("flat"))
-    wall = make_boxes([6.0, 2.0, 0.5], [0.2, 4.0, 1.0], collides=False)
-    (result,) = assess_map(flat.edited(solids=wall), LIMITS)
-    assert result.demand == 0.0
+    walls = make_boxes([[0.6, 2.0, 0.5], [7.4, 2.0, 0.5]], [0.2, 4.0, 1.0], collides=collides)
+    (result,) = assess_map(flat.edited(solids=walls), LIMITS)
+    assert result.demand == demand
 
 
 def test_gap_edges_do_not_pass_walls():
@@ -236,31 +186,14 @@ def test_executor_gives_the_same_results():
     expected, seen = assess_map(terrain_map, LIMITS), []
 
     def watch(places, total):
-        assert total == 6
         for place in places:
-            seen.append(place)
+            seen.append((place, total))
             yield place
 
-    with ProcessPoolExecutor(2) as executor:
+    with ThreadPoolExecutor(2) as executor:
         results = assess_map(terrain_map, LIMITS, progress=watch, executor=executor)
-    assert seen == [(each.row, each.col) for each in results]
-    for result, other in zip(results, expected, strict=True):
-        assert (result.row, result.col) == (other.row, other.col)
-        assert (result.demand, result.path.tolist()) == (other.demand, other.path.tolist())
-
-
-def test_executor_reports_the_first_error_and_cancels_the_rest():
-    terrain_map = generate(MapConfig(terrains=(SubTerrain(terrain="slit"),), rows=1, cols=6))
-    goals = terrain_map.goals.copy()
-    goals[0, 1, 0, 0] = -5.0
-    wrong = dataclasses.replace(terrain_map, goals=goals)
-    submitted = []
-    with ThreadPoolExecutor(1) as executor:
-        submit = executor.submit
-        executor.submit = lambda *args: submitted.append(submit(*args)) or submitted[-1]
-        with pytest.raises(ConfigError, match="outside of its patch"):
-            assess_map(wrong, LIMITS, executor=executor)
-    assert submitted[-1].cancelled()
+    assert seen == [((each.row, each.col), 6) for each in results]
+    assert [contents(each) for each in results] == [contents(each) for each in expected]
 
 
 def test_memory_counts_the_columns_of_a_patch(monkeypatch):

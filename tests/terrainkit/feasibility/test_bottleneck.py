@@ -41,6 +41,8 @@ def test_shortest_path_uses_the_shortest_of_parallel_edges():
     length = np.array([2.0, 1.0, 1.0, 5.0])
     assert shortest_path(graph, length, 0, np.array([2]), 3).tolist() == [1, 2]
     assert shortest_path(graph, length, 2, np.array([0]), 3) is None
+    assert shortest_path(graph, length, 0, np.array([], int), 3) is None
+    assert shortest_path(edges([]), length[:0], 0, np.array([1]), 2) is None
 
 
 def test_components_are_joined_both_ways():

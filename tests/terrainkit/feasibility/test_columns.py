@@ -1,11 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, make_patch
-from terrainkit.feasibility.columns import MAX_SPACING, Columns, sample_columns
+from terrainkit.feasibility.columns import MAX_SPACING, sample_columns
+from tests.limits import columns_of
 
 
-def columns_of(terrain, **parameters):
+def columns_of_patch(terrain, **parameters):
     config = MapConfig(
         terrains=(SubTerrain(terrain=terrain, parameters=parameters),), rows=1, cols=1
     )
@@ -14,7 +17,7 @@ def columns_of(terrain, **parameters):
 
 
 def test_patch_without_solids_has_its_samples():
-    patch, columns = columns_of("rough")
+    patch, columns = columns_of_patch("rough")
     assert columns.floor[..., 0].tolist() == patch.heights.astype(float).tolist()
     assert np.isinf(columns.ceiling).all()
     node = np.array([0, 81])
@@ -22,7 +25,7 @@ def test_patch_without_solids_has_its_samples():
 
 
 def test_patch_with_solids_has_ground_and_roof():
-    _, columns = columns_of("ceiling", clearance=0.45)
+    _, columns = columns_of_patch("ceiling", clearance=0.45)
     assert columns.spacing <= MAX_SPACING
     assert columns.shape == (240, 240)
     i, j = np.argwhere(np.isfinite(columns.ceiling[..., 0]))[5000]
@@ -40,9 +43,7 @@ def test_patch_with_solids_has_ground_and_roof():
     ("x", "y", "node"), [(0, 0, 0), (-0.3, -0.3, 0), (0.5, 0.6, 11), (0.5, -0.3, 8), (0.1, 0.2, 6)]
 )
 def test_node_at_a_place_is_the_nearest_one_of_the_patch(x, y, node):
-    floor = np.zeros((3, 4, 1))
-    ceiling = np.full_like(floor, np.inf)
-    columns = Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)
+    columns = columns_of(np.zeros((3, 4)))
     assert columns.node_at(np.array([x, y, 0.0])) == node
     assert columns.column(np.array([node])) == ([node // 4], [node % 4])
 
@@ -51,8 +52,7 @@ def test_node_at_a_height_is_the_floor_of_this_height():
     floor = np.zeros((3, 3, 2))
     floor[..., 1] = np.nan
     floor[1, 1, 1] = 0.5
-    ceiling = np.full_like(floor, np.inf)
-    columns = Columns(spacing=0.1, lower=(1.0, 2.0), floor=floor, ceiling=ceiling)
+    columns = replace(columns_of(floor), lower=(1.0, 2.0))
     assert columns.node_at(np.array([1.1, 2.1, 0.2])) == 8
     assert columns.node_at(np.array([1.1, 2.1, 0.3])) == 9
     assert columns.positions(np.array([9])).tolist() == [[1.1, 2.1, 0.5]]

@@ -4,26 +4,19 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility.limits import RobotLimits, limit_overrides
+from tests.limits import LIMITS
 
-VALUES = {
-    "step_up": 0.2,
-    "step_down": 0.25,
-    "gap": 0.4,
-    "slope": 0.5,
-    "foothold": 0.1,
-    "body_width": 0.4,
-    "standing_height": 0.6,
-    "crouched_height": 0.3,
-}
+VALUES = vars(LIMITS)
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), "x", True])
+@pytest.mark.parametrize("value", [0.0, float("nan"), 1.001e6, "0.2", True])
 @pytest.mark.parametrize("name", VALUES)
 def test_limits_reject_values_that_are_not_above_0(name, value):
     with pytest.raises(ConfigError, match=rf"^{name}: got "):
         RobotLimits(**VALUES | {name: value})
     with pytest.raises(ConfigError, match=rf"^{name}: got "):
         limit_overrides({name: value})
+    assert limit_overrides({name: 1}) == {name: 1.0}
 
 
 def test_crouched_height_is_below_standing_height():

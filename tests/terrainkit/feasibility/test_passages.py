@@ -1,27 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from terrainkit.feasibility.columns import Columns
-from terrainkit.feasibility.limits import RobotLimits
 from terrainkit.feasibility.passages import Passages
+from tests.limits import LIMITS, columns_of
 
-LIMITS = RobotLimits(
-    step_up=0.2,
-    step_down=0.2,
-    gap=0.4,
-    slope=0.5,
-    foothold=0.1,
-    body_width=0.5,
-    standing_height=0.6,
-    crouched_height=0.3,
-)
+WIDE = replace(LIMITS, body_width=0.5)
 
 
-def widths(heights, limits=LIMITS):
-    floor = np.array(heights, float)[..., None]
-    ceiling = np.full_like(floor, np.inf)
-    columns = Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)
-    return Passages.build(columns, limits).node_widths()[..., 0]
+def widths(heights):
+    return Passages.build(columns_of(heights), WIDE).node_widths()[..., 0]
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -42,14 +31,26 @@ def test_width_of_an_opening_in_a_thin_wall():
 
 
 def test_one_wall_low_walls_and_slopes_leave_room():
-    most = 2 * LIMITS.body_width
+    most = 2 * WIDE.body_width
     wall, low = np.zeros((30, 30)), np.full((30, 30), 0.2)
     wall[:5] = 1.0
     assert widths(wall)[5:] == pytest.approx(most)
     low[10:12] = 0.0  # as high as a step
     assert widths(low) == pytest.approx(most)
+    assert widths(1.01 * low)[10:12] == pytest.approx(0.2)
     gutter = np.abs(np.arange(30) - 14.5)[:, None] * 0.05 + np.zeros(30)
     assert widths(gutter) == pytest.approx(most)
+
+
+@pytest.mark.parametrize(("height", "width"), [(0.29, 0.3), (0.31, 1.0)])
+def test_width_between_roofs_lower_than_the_crouched_height(height, width):
+    """Under the roofs, there need be no more height beside a place than above it."""
+    floor, ceiling = np.zeros((30, 30, 2)), np.full((30, 30, 2), np.inf)
+    floor[..., 1], ceiling[..., 0] = 1.0, height
+    floor[10:13, :, 1], ceiling[10:13, :, 0] = np.nan, np.inf
+    found = Passages.build(columns_of(floor, ceiling), WIDE).node_widths()[..., 0]
+    assert found[10:13] == pytest.approx(width)
+    assert found[20] == pytest.approx(1.0)
 
 
 def test_diagonal_corridor():
@@ -66,8 +67,7 @@ def test_ceilings_are_the_lowest_and_highest_within_the_body_width():
     floor[15, 15:17, 1] = 1.2, 2.1
     ceiling = np.full_like(floor, np.inf)
     ceiling[15, 15:17, 0] = 1.0, 2.0
-    columns = Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)
-    ((lowest, highest),) = Passages.build(columns, LIMITS).ceilings
+    ((lowest, highest),) = Passages.build(columns_of(floor, ceiling), WIDE).ceilings
     assert lowest[15, [8, 9, 15, 21, 22, 23]].tolist() == [np.inf, 1, 1, 1, 2, np.inf]
     assert highest[15, [8, 9, 10, 15, 22, 23]].tolist() == [-np.inf, 1, 2, 2, 2, -np.inf]
     assert lowest[[8, 9, 21, 22], 15].tolist() == [np.inf, 1, 1, np.inf]

@@ -7,23 +7,18 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, make_patch
 from terrainkit.feasibility import assess_patch
 from terrainkit.feasibility.bottleneck import bottleneck
-from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.gaps import gap_edges
 from terrainkit.feasibility.path_edges import MAX_DEMAND, path_edges
 from terrainkit.terrain.registry import make_overlay
-from tests.limits import LIMITS
+from tests.limits import LIMITS, columns_of
 
 LEVELS = np.array([-1.0, 0.0, 0.05, 0.1, 0.15])
 
 
-def graph_of(floor, spacing=0.1):
-    floor = floor[..., None]
-    columns = Columns(
-        spacing=spacing, lower=(0.0, 0.0), floor=floor, ceiling=np.full_like(floor, np.inf)
-    )
-    return FootholdGraph.build(columns, replace(LIMITS, foothold=0.02, body_width=0.02))
+def graph_of(floor):
+    return FootholdGraph.build(columns_of(floor), replace(LIMITS, foothold=0.02, body_width=0.02))
 
 
 @pytest.mark.parametrize("seed", range(40))

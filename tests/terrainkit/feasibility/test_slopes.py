@@ -6,19 +6,40 @@ from terrainkit.feasibility.slopes import slopes_of, step
 
 def grades(profile, spacing=0.1):
     floor = np.repeat(np.array(profile, float)[:, None], 3, axis=1)[..., None]
-    return slopes_of(floor, spacing).grade(spacing)[:, 1, 0]
+    along_y = slopes_of(floor.swapaxes(0, 1), spacing).grade(spacing)[1, :, 0]
+    found = slopes_of(floor, spacing).grade(spacing)[:, 1, 0]
+    assert found.tolist() == along_y.tolist()
+    return found
 
 
-def test_ramp_is_a_slope_and_stairs_are_steps():
-    assert grades([0, 0.03, 0.06, 0.09, 0.12])[2] == pytest.approx(0.3)
-    # Treads of two columns: each node is level to one side.
-    assert grades([0, 0, 0.15, 0.15, 0.3, 0.3]).tolist() == [0.0] * 6
+@pytest.mark.parametrize(
+    ("profile", "grade"),
+    [
+        ([0, 0.03, 0.06, 0.09, 0.12], 0.3),
+        ([0, 0.03, 0.06, 0.08, 0.10], 0.2),  # the smaller one
+        ([0.12, 0.09, 0.06, 0.03, 0], 0.3),
+        ([0, 0.03, 0.06, 0.03, 0], 0.3),  # a ridge
+        ([0.06, 0.03, 0, 0.03, 0.06], 0.3),  # a valley
+        ([0.05, 0.03, 0, 0.03, 0.06], 0.2),
+        ([0.06, 0.06, 0, 0.06, 0.06], 0.0),  # a groove
+        ([0, 0, 0.15, 0.15, 0.3], 0.0),  # a tread of two columns
+    ],
+)
+def test_slope_continues_on_both_sides(profile, grade):
+    assert grades(profile)[2] == pytest.approx(grade)
 
 
-def test_ridge_and_valley_are_slopes_where_they_continue():
-    assert grades([0, 0.03, 0.06, 0.03, 0])[2] == pytest.approx(0.3)
-    assert grades([0.06, 0.03, 0, 0.03, 0.06])[2] == pytest.approx(0.3)
-    assert grades([0.06, 0.06, 0, 0.06, 0.06])[2] == 0.0  # a groove
+def test_slope_of_fine_columns_is_compared_over_10_cm():
+    assert grades(np.arange(9) * 0.01, spacing=0.034)[4] == pytest.approx(0.01 / 0.034)
+
+
+def test_ridge_of_a_pyramid_continues_along_the_diagonal():
+    i, j = np.mgrid[-4:5, -4:5]
+    height = -0.03 * np.maximum(np.abs(i), np.abs(j))[..., None]
+    slopes = slopes_of(height, 0.1)
+    assert slopes.grade(0.1)[2, 2, 0] == pytest.approx(0.3 / 2**0.5)
+    assert slopes.grade(0.1)[2, 4, 0] == pytest.approx(0.3)
+    assert slopes.diagonal[2, 2, 0] == pytest.approx(0.03)
 
 
 def test_step_is_what_no_slope_explains():

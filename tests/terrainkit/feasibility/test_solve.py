@@ -1,14 +1,14 @@
 """Ranges that demand what is requested, against values worked out by hand."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility import assess_map, assess_patch, solve_ranges
-from terrainkit.map.generation import generate
+from terrainkit.feasibility import assess_patch, solve_ranges
+from terrainkit.feasibility.solve import _is_same
 from terrainkit.map.patch import build_patch
 from terrainkit.terrain.registry import make_overlay
 from terrainkit.terrains.course import Element
@@ -36,15 +36,16 @@ def test_ranges_end_at_the_requested_demands(terrain, name, easy, hard):
     base, inverted = terrain.removesuffix("_inverted"), terrain.endswith("_inverted")
     solved = solve(base, **({"inverted": True} if inverted else {}))
     assert solved.sub_terrain.parameters[name] == pytest.approx((easy, hard), abs=0.008)
-    assert solved.demand == pytest.approx((0.2, 0.9), abs=0.04)
-    assert solved.demand[0] <= 0.2
-    assert solved.demand[1] <= 0.9
+    assert 0.16 < solved.demand[0] <= 0.2
+    assert 0.86 < solved.demand[1] <= 0.9
 
 
-def test_ranges_may_fall():
+def test_ranges_may_fall_and_are_extrapolated():
     """The lower the bars, the harder: (0.6 - c) / (0.6 - 0.3)."""
     solved = solve("crawl", size=(4.0, 1.2))
     assert solved.sub_terrain.parameters["clearance"] == pytest.approx((0.54, 0.33), abs=0.008)
+    solved = solve("stairs", step_height=(0.05, 0.1))
+    assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.04, 0.18), abs=0.001)
 
 
 def test_lengths_are_whole_cells():
@@ -52,11 +53,6 @@ def test_lengths_are_whole_cells():
     solved = solve("gap")
     assert solved.sub_terrain.parameters["width"] == (0.0, 0.3)
     assert solved.demand == pytest.approx((0.0, 0.75))
-
-
-def test_ranges_are_extrapolated():
-    solved = solve("stairs", step_height=(0.05, 0.1))
-    assert solved.sub_terrain.parameters["step_height"] == pytest.approx((0.04, 0.18), abs=0.001)
 
 
 def test_closest_value_is_used_where_extrapolation_does_not_reach_the_demand():
@@ -87,34 +83,28 @@ def test_equal_elements_are_solved_once():
     spacing = {"min_spacing": 0.7, "max_spacing": 0.9}
     hurdles = Element(terrain="hurdles", parameters={"height": (0.05, 0.4), **spacing})
     gaps = Element(terrain="gap_track", parameters={"length": (0.1, 0.5), **spacing})
-    short, long = (
-        SubTerrain(
-            terrain="course",
-            name=name,
-            proportion=proportion,
-            parameters={"elements": elements, "order": "random"},
-        )
-        for name, proportion, elements in (
-            ("short", 1.0, (hurdles,)),
-            ("long", 3.0, (gaps, replace(hurdles, proportion=0.5))),
-        )
+
+    def course(name, *elements):
+        parameters = {"elements": elements, "order": "random"}
+        return SubTerrain(terrain="course", name=name, proportion=3.0, parameters=parameters)
+
+    config = MapConfig(
+        terrains=(course("short", hurdles), course("long", gaps, replace(hurdles, proportion=0.5))),
+        border=0,
+        patch_size=(8.0, 4.0),
     )
-    config = MapConfig(terrains=(short, long), border=0, patch_size=(8.0, 4.0))
     totals = []
 
     def progress(steps, total):
         totals.append(total)
         return steps
 
-    solved = solve_ranges(config, LIMITS, (0.2, 0.9), progress=progress)
+    short, long = solve_ranges(config, LIMITS, (0.2, 0.9), progress=progress)
     assert totals == [2]
-    alone = [
-        solve_ranges(replace(config, terrains=(each,)), LIMITS, (0.2, 0.9))[0]
-        for each in (short, long)
-    ]
-    assert solved == alone
-    assert solved[0].elements[0].ranges == solved[1].elements[1].ranges != {}
-    assert [each.sub_terrain.proportion for each in solved[1].elements] == [1.0, 0.5]
+    assert short.elements[0].ranges == long.elements[1].ranges != {}
+    assert (short.sub_terrain.name, long.sub_terrain.proportion) == ("short", 3.0)
+    assert [each.sub_terrain.proportion for each in long.elements] == [1.0, 0.5]
+    assert long.demand == tuple(max(each.demand[end] for each in long.elements) for end in (0, 1))
 
 
 def test_overlays_count_at_the_ends_of_the_map():
@@ -130,34 +120,30 @@ def test_overlays_count_at_the_ends_of_the_map():
     assert demands[0] != demands[1]
 
 
-def test_terrain_that_robots_walk_around_is_unchanged():
-    solved = solve("obstacles")
-    assert solved.sub_terrain == SubTerrain(terrain="obstacles")
-    assert solved.demand == (0.0, 0.0)
-
-
-def test_terrain_without_ranges_is_unchanged():
-    assert solve("stairs", step_height=0.1).sub_terrain.parameters == {"step_height": 0.1}
-    assert solve("stairs", step_height=0.1).demand == pytest.approx((0.5, 0.5))
-
-
-def test_random_terrains_reach_the_demand_on_the_median_patch():
-    solved = solve("rough_slope", demand=(0.3, 0.8))
-    size = (6.0, 6.0)
-    config = MapConfig(terrains=(solved.sub_terrain,), rows=2, cols=4, border=0, patch_size=size)
-    results = assess_map(generate(config), LIMITS)
-    hard = sorted(each.demand for each in results if each.row == 1)
-    assert 0.5 < hard[1] < 1.0
-
-
-def test_an_executor_gives_the_same_result():
-    config = MapConfig(terrains=(SubTerrain(terrain="slope"), SubTerrain(terrain="gap")))
-    with ThreadPoolExecutor(2) as executor:
-        parallel = solve_ranges(config, LIMITS, (0.1, 0.5), executor=executor)
-    assert parallel == solve_ranges(config, LIMITS, (0.1, 0.5))
+def test_terrain_whose_demand_has_no_range_is_unchanged():
+    solved = solve("obstacles", size=(6.0, 4.0))
+    assert (solved.sub_terrain, solved.demand) == (SubTerrain(terrain="obstacles"), (0.0, 0.0))
+    stairs = solve("stairs", step_height=0.1)
+    assert (stairs.ranges, stairs.demand) == ({}, (0.5, 0.5))
+    assert stairs.sub_terrain.parameters == {"step_height": 0.1}
 
 
 @pytest.mark.parametrize("demand", [(0.5, 0.5), (0.9, 0.2), (-0.1, 1), (0, 2.5), (0, float("nan"))])
 def test_invalid_demands_are_rejected(demand):
     with pytest.raises(ConfigError, match="expected LOW:HIGH with 0 <= LOW < HIGH <= 2"):
         solve("slope", demand=demand)
+
+
+def test_patches_are_the_same_up_to_their_places():
+    """Only one of several equal patches is assessed."""
+    crawl = SubTerrain(terrain="crawl")
+    config = MapConfig(terrains=(crawl,), rows=1, cols=2)
+    first = build_patch(config, crawl, 0.5, 0, 0)
+    solids = first.solids.transformed(np.eye(3), [0, 8, 0])
+    goals = first.goals + np.float32([0, 8, 0, 0])
+    other = replace(first, grid=config.patch_grid(0, 1), solids=solids, goals=goals)
+    assert _is_same(first, other)
+    assert not _is_same(first, replace(other, solids=first.solids))
+    assert not _is_same(first, replace(other, goals=other.goals + np.float32(1e-3)))
+    assert not _is_same(first, replace(other, goals=other.goals[1:]))
+    assert not _is_same(first, replace(other, heights=other.heights + np.float32(1e-3)))

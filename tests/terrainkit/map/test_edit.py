@@ -6,6 +6,7 @@ import pytest
 import terrainkit as tk
 from terrainkit.geometry.solids import make_boxes
 from terrainkit.map.validate import validate
+from tests.terrainkit.maps import contents
 
 FLAT = tk.MapConfig(
     rows=2,
@@ -34,21 +35,18 @@ def with_bump(terrain_map, row, col, height):
     return heights
 
 
-def test_edited_map_has_no_issues(flat):
+def test_edited_map_is_valid_and_survives_a_file(flat, tmp_path):
     edited = flat.edited(heights=with_bump(flat, 1, 2, 0.4))
-    assert edited.config.mode == "custom"
-    assert edited.config.terrains == flat.config.terrains
+    assert edited.config == dataclasses.replace(flat.config, mode="custom")
     assert messages(edited) == []
     assert flat.config.mode == "curriculum"
-
-
-def test_edited_map_survives_a_file(flat, tmp_path):
-    edited = flat.edited(heights=with_bump(flat, 0, 0, 0.4))
     loaded = tk.TerrainMap.load(edited.save(tmp_path / "edited.npz"))
-    assert loaded.config == edited.config
-    np.testing.assert_array_equal(loaded.heights, edited.heights)
-    np.testing.assert_array_equal(loaded.spawns, edited.spawns)
-    assert messages(loaded) == []
+    assert contents(loaded) == contents(edited)
+    for again in (edited.config, flat.edited().config):
+        with pytest.raises(tk.TerrainkitError, match=r"^mode custom: the map was imported or"):
+            tk.generate(again)
+        with pytest.raises(tk.TerrainkitError, match=r"^mode custom"):
+            tk.make_patch(again, 0, 0)
 
 
 def test_edited_moves_only_invalid_spawns(flat):
@@ -63,28 +61,22 @@ def test_edited_moves_only_invalid_spawns(flat):
 def test_edited_lifts_spawns_and_goals():
     crawl = tk.SubTerrain(terrain="crawl")
     old = tk.generate(tk.MapConfig(rows=1, cols=1, border=1.0, terrains=(crawl,)))
-    above_ground = old.goals[..., 2] - old.height(old.goals[..., :2])
-    edited = old.edited(heights=old.heights + 2.0, solids=None)
-    np.testing.assert_allclose(edited.env_origins[..., :2], old.env_origins[..., :2], atol=1e-6)
-    np.testing.assert_allclose(edited.env_origins[..., 2], old.env_origins[..., 2] + 2.0, atol=1e-6)
-    np.testing.assert_allclose(
-        edited.goals[..., 2] - edited.height(edited.goals[..., :2]), above_ground, atol=1e-6
-    )
+    edited = old.edited(heights=old.heights + 2.0)
+    np.testing.assert_allclose(edited.spawns - old.spawns, [[[[0, 0, 2, 0]]]], atol=1e-6)
+    lifted = np.broadcast_to([0, 0, 2, 0], old.goals.shape)
+    np.testing.assert_allclose(edited.goals - old.goals, lifted, atol=1e-6)
 
 
-def test_edited_assigns_solids_to_patches(flat):
-    # Patches of 4 m x 3 m: (5, 7.5) is in patch (1, 2), (3.9, 3.1) in patch (0, 1).
-    boxes = make_boxes([[5.0, 7.5, 2.0], [3.9, 3.1, 2.0]], [0.5, 0.5, 0.1])
-    edited = flat.edited(solids=boxes)
-    assert edited.solids.patch.tolist() == [[1, 2], [0, 1]]
+def test_edited_assigns_solids_to_the_patch_of_their_center(flat):
+    # Patches of 4 m x 3 m; solids beyond them belong to the nearest.
+    centers = [[5.0, 7.5, 2.0], [3.9, 3.1, 2.0], [-0.5, -0.5, 2.0], [8.4, 9.4, 2.0]]
+    edited = flat.edited(solids=make_boxes(centers, [0.5, 0.5, 0.1]))
+    assert edited.solids.patch.tolist() == [[1, 2], [0, 1], [0, 0], [1, 2]]
     assert messages(edited) == []
-
-
-def test_edited_keeps_spawns_clear_of_solids(flat):
-    # A board 0.3 m above the origin (2, 1.5) of patch (0, 0).
-    edited = flat.edited(solids=make_boxes([2.0, 1.5, 0.35], [0.4, 0.4, 0.1]))
-    assert abs(edited.env_origins[0, 0] - [2.0, 1.5, 0.0]).max() > 0.5
-    assert messages(edited) == []
+    # A board 0.3 m above the origin (2, 1.5) of patch (0, 0), which belongs to (0, 1).
+    board = flat.edited(solids=make_boxes([2.0, 3.05, 0.35], [0.4, 3.0, 0.1]))
+    assert abs(board.env_origins[0, 0] - [2.0, 1.5, 0.0]).max() > 0.5
+    assert messages(board) == []
 
 
 def test_edited_without_flat_disc_is_an_error(flat):
@@ -103,18 +95,11 @@ def test_edited_rejects_invalid_heights(flat, heights):
         flat.edited(heights=heights)
 
 
-def test_custom_map_cannot_be_generated(flat):
-    edited = flat.edited()
-    with pytest.raises(tk.TerrainkitError, match=r"^mode custom: the map was imported or edited"):
-        tk.generate(edited.config)
-    with pytest.raises(tk.TerrainkitError, match=r"^mode custom"):
-        tk.make_patch(edited.config, 0, 0)
-
-
 def test_validate_finds_solid_beyond_custom_map(flat):
     # The map ends at y = 10.
-    edited = flat.edited(solids=make_boxes([1.0, 9.9, 2.0], [0.5, 0.5, 0.1]))
-    assert messages(edited) == [("solids", "solid 0 extends 0.150 m beyond the map")]
+    boxes = make_boxes([[1.0, 9.9, 2.0], [1.0, 9.7509, 2.0]], [0.5, 0.5, 0.1])
+    issues = [("solids", "solid 0 extends 0.150 m beyond the map")]
+    assert messages(flat.edited(solids=boxes)) == issues
 
 
 @pytest.mark.parametrize(
@@ -125,9 +110,13 @@ def test_validate_finds_solid_beyond_custom_map(flat):
         ((1.0, np.nan, 0.0, 0.0), "is not finite"),
         ((np.nan, np.nan, np.nan, np.nan), "is not finite"),  # before the last goal
         ((1.0, 1.0, 0.0, np.inf), "is not finite"),
-        ((5.0, 1.0, 0.0, 0.0), "is outside the patch"),
-        ((1.0, 1.0, -0.2, 0.0), "is 0.200 m below the ground"),
-        ((3.5, 0.5, 0.5, 0.0), "is inside a solid"),
+        ((4.01, 1.0, 0.0, 0.0), "is outside the patch"),
+        ((1.0, -0.01, 0.0, 0.0), "is outside the patch"),
+        ((4.0, 0.0, 1.0, 0.0), None),
+        ((1.0, 1.0, -0.002, 0.0), "is 0.002 m below the ground"),
+        ((1.0, 1.0, -0.0009, 0.0), None),
+        ((3.5, 0.5, 0.998, 0.0), "is inside a solid"),
+        ((3.5, 0.5, 0.9991, 0.0), None),
     ],
 )
 def test_validate_finds_invalid_goal_of_custom_map(flat, goal, message):

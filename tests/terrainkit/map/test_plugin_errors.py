@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
-from terrainkit.errors import PluginError
+from terrainkit.errors import ConfigError, PluginError
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.map.validate import validate
 from terrainkit.terrain import Terrain, parameter, registry
@@ -47,10 +47,14 @@ def dunes(**methods):
     return SubTerrain(terrain=make_class("Dunes", Terrain, **flat | methods))
 
 
+def lifted(apply):
+    """Return flat ground with an overlay."""
+    return SubTerrain(terrain="flat", overlays=(make_class("Lift", Overlay, apply=apply)(),))
+
+
 def lift(**changes):
     """Return flat ground with an overlay that changes fields of the patch."""
-    made = make_class("Lift", Overlay, apply=lambda _, p, __: dataclasses.replace(p, **changes))
-    return SubTerrain(terrain="flat", overlays=(made(),))
+    return lifted(lambda _, patch, __: dataclasses.replace(patch, **changes))
 
 
 def map_of(*terrains):
@@ -58,16 +62,15 @@ def map_of(*terrains):
 
 
 @pytest.mark.parametrize(
-    ("error", "told"),
+    ("method", "error", "told"),
     [
-        (ValueError("two\nlines"), "ValueError: two lines"),
-        (SystemExit(0), "SystemExit: 0"),
-        (Stop("no"), "test_plugin_errors.Stop: no"),
-        (StopIteration(), "StopIteration"),
-        (MemoryError(), "MemoryError"),
+        ("heights", ValueError("two\nlines"), "ValueError: two lines"),
+        ("solids", SystemExit(0), "SystemExit: 0"),
+        ("goals", Stop("no"), "test_plugin_errors.Stop: no"),
+        ("spawn", StopIteration(), "StopIteration"),
+        ("realized", MemoryError(), "MemoryError"),
     ],
 )
-@pytest.mark.parametrize("method", ["heights", "solids", "goals", "spawn", "realized"])
 def test_exception_names_patch_and_terrain(method, error, told):
     config = map_of(SubTerrain(terrain="flat"), dunes(**{method: lambda *_: throw(error)}))
     with pytest.raises(PluginError) as caught:
@@ -78,11 +81,14 @@ def test_exception_names_patch_and_terrain(method, error, told):
     assert caught.value.__cause__ is error
 
 
-@pytest.mark.parametrize("name", ["__post_init__", "at"])
-def test_exception_of_constructor_names_the_terrain(name):
-    bad = {"__post_init__": lambda _: sys.exit(3), "at": classmethod(lambda *_: sys.exit(3))}
-    with pytest.raises(PluginError, match=r"^terrain dunes \(dune_pack:Dunes\): SystemExit: 3$"):
-        dunes(**{name: bad[name]})
+def test_exception_of_constructor_names_the_terrain():
+    for fails in (
+        {"__post_init__": lambda _: sys.exit(3)},
+        {"at": classmethod(lambda *_: sys.exit(3))},
+    ):
+        message = r"^terrain dunes \(dune_pack:Dunes\): SystemExit: 3$"
+        with pytest.raises(PluginError, match=message):
+            dunes(**fails)
 
 
 def test_invalid_parameter_is_no_error_of_the_terrain():
@@ -97,122 +103,119 @@ def test_ctrl_c_is_no_error_of_the_terrain():
         generate(map_of(dunes(heights=lambda *_: throw(KeyboardInterrupt()))))
 
 
-def test_exception_of_built_in_terrain_stays(monkeypatch):
-    monkeypatch.setattr(Stairs, "heights", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        generate(map_of(SubTerrain(terrain="stairs")))
-
-
-def test_exception_of_built_in_overlay_on_plugin_terrain_stays(monkeypatch):
+def test_exception_of_what_is_built_in_stays(monkeypatch):
     mirror = registry.get_overlay("mirror")
     monkeypatch.setattr(mirror, "apply", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        generate(map_of(dataclasses.replace(dunes(), overlays=(mirror(),))))
+    monkeypatch.setattr(Stairs, "heights", lambda *_: 1 / 0)
+    mirrored = dataclasses.replace(dunes(), overlays=(mirror(),))
+    for terrain in (SubTerrain(terrain="stairs"), mirrored):
+        with pytest.raises(ZeroDivisionError):
+            generate(map_of(terrain))
 
 
-def test_exception_of_overlay_names_the_overlay():
-    fails = make_class("Lift", Overlay, apply=lambda *_: 1 / 0)
-    terrain = dataclasses.replace(dunes(), overlays=(fails(),))
-    told = r"patch \(0, 0\): overlay lift \(dune_pack:Lift\): ZeroDivisionError: division by zero$"
-    with pytest.raises(PluginError, match=told):
-        make_patch(map_of(terrain), 0, 0)
+def course(**methods):
+    elements = [{"terrain": dunes(**methods).terrain}]
+    return map_of(SubTerrain(terrain="course", parameters={"elements": elements}))
 
 
 @pytest.mark.parametrize("method", ["heights", "solids", "requested", "realized"])
 def test_exception_of_element_names_the_element(method):
-    element = dunes(**{method: lambda *_: throw(OSError("no file"))}).terrain
     told = r"course\.elements\[0\]: terrain dunes \(dune_pack:Dunes\): OSError: no file"
     with pytest.raises(PluginError, match=told):
-        generate(map_of(SubTerrain(terrain="course", parameters={"elements": [
-            {"terrain": element}]})))  # fmt: skip
+        generate(course(**{method: lambda *_: throw(OSError("no file"))}))
 
 
 def test_solids_of_element_are_checked():
-    element = dunes(solids=lambda *_: None).terrain
-    course = SubTerrain(terrain="course", parameters={"elements": [{"terrain": element}]})
     with pytest.raises(PluginError, match=r"elements\[0\]: terrain dunes .*got NoneType; expected"):
-        generate(map_of(course))
+        generate(course(solids=lambda *_: None))
+
+
+SOLIDS = [
+    None,
+    [BOX],
+    dataclasses.replace(BOX, boxes=BOX.boxes.astype(float)),
+    dataclasses.replace(BOX, boxes=BOX.boxes[:, :9]),
+    dataclasses.replace(BOX, boxes=BOX.boxes * np.float32(NAN)),
+    dataclasses.replace(BOX, boxes=BOX.boxes * np.float32(2)),  # no unit quaternion
+    dataclasses.replace(BOX, friction=np.ones(5, np.float32)),
+    dataclasses.replace(BOX, friction=-np.ones(1, np.float32)),
+    dataclasses.replace(Solids.empty(), hull_counts=np.array([4], np.int32)),
+]
+GRID = (80, 80)
+FAR = make_boxes([7.902, 1.0, 0.1], [0.2, 0.2, 0.2])  # 2 mm beyond its patch
+RESULTS = {
+    "heights": [None, *(np.full(GRID, value) for value in ("high", 1e7, NAN, 1j))],
+    "goals": [
+        None,
+        [[1.0, 2.0, 3.0]],
+        [[1.0, 1.0, np.inf, 0.0]],
+        [[1.0, 1.0, 0.0, NAN]],
+        [[1.0, 1.0, 0.0, 0.0]] * 1001,
+    ],
+    "spawn": [None, (NAN, 1.0), (1.0, 1.0, 1.0)],
+    "realized": [None, {}, {"height": NAN}, {"height": np.float32(0.1)}],
+    "declarations": [{}],
+    "solids": SOLIDS,
+}
+PATCHES = {
+    "heights": [None, np.zeros((3, 3))],
+    "friction": [None, np.ones(3), np.full(GRID, -0.1), np.full(GRID, 1e300)],
+    "goals": [None],
+    "spawn": [(0.0, NAN)],
+    "heading": [None, NAN],
+    "spawn_radius": [None],
+    "solids": SOLIDS,
+}
+
+
+@pytest.mark.parametrize("method", RESULTS)
+def test_invalid_results_of_a_terrain_are_rejected(method):
+    for result in RESULTS[method]:
+        with pytest.raises(PluginError, match=r"^patch \(0, 0\): terrain dunes \(dune_pack:Dunes"):
+            generate(map_of(dunes(**{method: lambda *_, result=result: result})))
+
+
+@pytest.mark.parametrize("field", PATCHES)
+def test_invalid_patches_of_an_overlay_are_rejected(field):
+    for value in PATCHES[field]:
+        with pytest.raises(
+            PluginError, match=r"^patch \(0, 0\): overlay lift \(dune_pack:Lift\): "
+        ):
+            generate(map_of(lift(**{field: value})))
 
 
 @pytest.mark.parametrize(
-    "heights",
-    [None, "high", 1e300, 1e7, NAN, 1j, np.datetime64("2020-01-01")],
-)
-def test_invalid_heights_are_rejected(heights):
-    bad = dunes(heights=lambda _, grid, __: np.full(grid.shape, heights))
-    with pytest.raises(PluginError, match=r"^patch \(0, 0\): terrain dunes \(dune_pack:Dunes\): "):
-        generate(map_of(bad))
-
-
-@pytest.mark.parametrize(
-    ("method", "result"),
+    ("apply", "told"),
     [
-        ("goals", None),
-        ("goals", [[1.0, 2.0, 3.0]]),
-        ("goals", [[1.0, 1.0, np.inf, 0.0]]),
-        ("goals", [[1.0, 1.0, 0.0, NAN]]),
-        ("goals", [[1.0, 1.0, 0.0, 0.0]] * 1001),
-        ("spawn", None),
-        ("spawn", (NAN, 1.0)),
-        ("spawn", (1.0, 1.0, 1.0)),
-        ("realized", None),
-        ("realized", {}),
-        ("realized", {"height": NAN}),
-        ("realized", {"height": np.float32(0.1)}),
-        ("declarations", {}),
+        (lambda *_: 1 / 0, "ZeroDivisionError: division by zero$"),
+        (lambda *_: None, "got NoneType; expected a PatchGeometry"),
     ],
 )
-def test_invalid_result_is_rejected(method, result):
-    with pytest.raises(PluginError, match=r"^patch \(0, 0\): terrain dunes \(dune_pack:Dunes\): "):
+def test_exception_of_overlay_names_the_overlay(apply, told):
+    message = rf"patch \(0, 0\): overlay lift \(dune_pack:Lift\): .*{told}"
+    with pytest.raises(PluginError, match=message):
+        make_patch(map_of(lifted(apply)), 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("method", "result", "message"),
+    [
+        ("solids", FAR, r"dunes: solids\(\): got a solid 0\.002 m beyond its patch"),
+        ("goals", [[8.01, 1.0, 0, 0]], r"dunes: goals\(\): got a goal outside of the patch"),
+        ("goals", [[1.0, -0.01, 0, 0]], r"dunes: goals\(\): got a goal outside of the patch"),
+    ],
+)
+def test_solids_and_goals_are_within_the_patch(method, result, message):
+    with pytest.raises(ConfigError, match=message):
         generate(map_of(dunes(**{method: lambda *_: result})))
 
 
-@pytest.mark.parametrize(
-    "solids",
-    [
-        None,
-        [BOX],
-        dataclasses.replace(BOX, boxes=BOX.boxes.astype(float)),
-        dataclasses.replace(BOX, boxes=BOX.boxes[:, :9]),
-        dataclasses.replace(BOX, boxes=BOX.boxes * np.float32(NAN)),
-        dataclasses.replace(BOX, boxes=BOX.boxes * np.float32(2)),  # no unit quaternion
-        dataclasses.replace(BOX, friction=np.ones(5, np.float32)),
-        dataclasses.replace(BOX, friction=-np.ones(1, np.float32)),
-        dataclasses.replace(Solids.empty(), hull_counts=np.array([4], np.int32)),
-    ],
-)
-def test_invalid_solids_are_rejected(solids):
-    with pytest.raises(PluginError, match=r"^patch \(0, 0\): terrain dunes \(dune_pack:Dunes\): "):
-        generate(map_of(dunes(solids=lambda *_: solids)))
-    with pytest.raises(PluginError, match=r"^patch \(0, 0\): overlay lift \(dune_pack:Lift\): "):
-        generate(map_of(lift(solids=solids)))
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"heights": None},
-        {"heights": np.zeros((3, 3))},
-        {"friction": None},
-        {"friction": np.ones(3)},
-        {"friction": np.full((80, 80), -0.1)},
-        {"friction": np.full((80, 80), 1e300)},
-        {"goals": None},
-        {"spawn": (0.0, NAN)},
-        {"heading": None},
-        {"heading": NAN},
-        {"spawn_radius": None},
-    ],
-)
-def test_invalid_patch_of_overlay_is_rejected(changes):
-    with pytest.raises(PluginError, match=r"^patch \(0, 0\): overlay lift \(dune_pack:Lift\): "):
-        generate(map_of(lift(**changes)))
-
-
-def test_overlay_without_result_is_rejected():
-    silent = make_class("Lift", Overlay, apply=lambda *_: None)
-    with pytest.raises(PluginError, match="got NoneType; expected a PatchGeometry"):
-        generate(map_of(SubTerrain(terrain="flat", overlays=(silent(),))))
+def test_goals_without_a_height_are_on_the_ground():
+    goals = [[8.0, 8.0, NAN, 0.0], [0.0, 0.0, 0.5, 1.0]]
+    bar = make_boxes([7.9009, 1.0, 0.1], [0.2, 0.2, 0.2])  # 0.9 mm beyond
+    made = generate(map_of(dunes(goals=lambda *_: goals, solids=lambda *_: bar)))
+    assert made.goals[0, 0].tolist() == [[8.0, 8.0, 0.0, 0.0], [0.0, 0.0, 0.5, 1.0]]
+    assert made.solids.patch.tolist() == [[0, 0]]
 
 
 def test_results_of_other_types_are_converted(tmp_path):

@@ -7,7 +7,6 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate
 from terrainkit.map.seams import Seam, Seams, cliffs_text, seam_text
 from terrainkit.overlays.side_walls import SideWalls
-from terrainkit.terrain import presets
 
 SMALL = MapConfig(
     rows=2,
@@ -23,15 +22,18 @@ def seams_of(terrain_map):
     return Seams(terrain_map=terrain_map)
 
 
-def raised(config, *blocks):
-    """Return the seams of a flat map with raised blocks of samples (x, y, height)."""
-    heights = np.zeros(config.grid.shape, dtype=np.float32)
+def raised(*blocks, **config):
+    """Return the seams of a flat map with raised blocks of samples (x, y, height).
+
+    The border has 2 samples; patches have 40 x 20.
+    """
+    terrain_map = generate(replace(SMALL, **config))
+    heights = np.zeros(terrain_map.grid.shape, dtype=np.float32)
     for x, y, height in blocks:
         heights[x, y] = height
-    return seams_of(replace(generate(config), heights=heights))
+    return seams_of(replace(terrain_map, heights=heights))
 
 
-# The border has 2 samples; patches have 40 x 20.
 @pytest.mark.parametrize(
     ("block", "patches"),
     [
@@ -46,39 +48,38 @@ def raised(config, *blocks):
     ],
 )
 def test_largest_seam_is_between_these_patches(block, patches):
-    found = raised(SMALL, (*block, 0.25)).largest()
+    found = raised((*block, 0.25)).largest()
     assert found == Seam(height=0.25, patches=patches)
 
 
 def test_largest_seam_ignores_steps_within_patches():
-    assert raised(SMALL, (20, 12, 3.0)).largest().height == 0.0
-
-
-def test_map_of_one_patch_without_border_has_no_seam():
-    config = MapConfig(rows=1, cols=1, border=0.0, terrains=(SubTerrain(terrain="flat"),))
-    found = raised(config)
-    assert found.largest() is None
-    assert found.cliffs() == []
+    assert raised((20, 12, 3.0)).largest().height == 0.0
 
 
 def test_map_without_border_has_inner_seams_only():
-    config = MapConfig(rows=2, cols=2, border=0.0, terrains=(SubTerrain(terrain="flat"),))
-    assert raised(config, (0, slice(None), 1.0)).largest().height == 0.0
-    found = raised(config, (80, 20, 1.0)).largest()
-    assert found == Seam(height=1.0, patches=((0, 0), (1, 0)))
+    one = raised(rows=1, cols=1, border=0.0)
+    assert (one.largest(), one.cliffs()) == (None, [])
+    assert raised((0, slice(None), 1.0), border=0.0).largest().height == 0.0
+    found = raised((40, 20, 1.0), border=0.0).largest()
+    assert found == Seam(height=1.0, patches=((0, 1), (1, 1)))
 
 
-def test_cliff_is_higher_than_steps_within_patches():
-    # Patch (0, 0) is a block of 1 m: no step within it.
-    block = (slice(2, 42), slice(2, 22), 1.0)
-    assert {seam.patches for seam in raised(SMALL, block).cliffs()} == {
-        ((0, 0), (1, 0)),
-        ((0, 0), (0, 1)),
-        (None, (0, 0)),
-    }
-    # A post of 1 m at the edge is a step of 1 m within its patch.
-    assert raised(SMALL, (2, 10, 1.0)).cliffs() == []
-    assert raised(SMALL, (slice(2, 42), slice(2, 22), 0.5)).cliffs() == []
+def cliffs(seams):
+    return [(seam.height, seam.patches) for seam in seams.cliffs()]
+
+
+def test_cliff_is_higher_than_half_a_meter_and_than_steps_within_patches():
+    # Patch (0, 0) is a block: no step within it.
+    block = slice(2, 42), slice(2, 22)
+    around = [(None, (0, 0)), ((0, 0), (1, 0)), (None, (0, 0)), ((0, 0), (0, 1))]
+    assert cliffs(raised((*block, 0.501))) == [(pytest.approx(0.501), seam) for seam in around]
+    assert cliffs(raised((*block, 0.5))) == []
+    # A post of 1 m at the edge is a step of 1 m within its patch, and so is a ditch.
+    assert cliffs(raised((2, 10, 1.0))) == cliffs(raised((2, 10, -1.0))) == []
+    # The steps of both patches add up: 0.5 m in the block and 0.5 m in patch (1, 0).
+    for hole, seams in ((0.5, [each for each in around if (1, 0) not in each]), (0.51, around)):
+        found = cliffs(raised((*block, 1.0), (30, 10, hole), (60, 10, 0.5)))
+        assert found == [(1.0, seam) for seam in seams]
 
 
 @pytest.mark.parametrize(("sides", "walled"), [("both", True), ("one", False)])
@@ -89,39 +90,12 @@ def test_seam_between_walls_is_no_cliff(sides, walled):
     config = MapConfig(rows=2, cols=2, border=0.0, terrains=(high, low))
     with warnings.catch_warnings():
         warnings.simplefilter("error" if walled else "ignore")
-        cliffs = seams_of(generate(config)).cliffs()
-    assert (cliffs == []) == walled
+        assert (cliffs(seams_of(generate(config))) == []) == walled
 
 
 def test_cliffs_are_sorted_by_height():
     blocks = [(slice(2, 42), slice(2, 22), 1.0), (slice(42, 82), slice(42, 62), 2.0)]
-    assert [s.height for s in raised(SMALL, *blocks).cliffs()] == [2.0] * 4 + [1.0] * 4
-
-
-@pytest.mark.parametrize("size", [(8.0, 8.0), (8.0, 4.0), (12.0, 6.0), (8.0, 16.0)])
-@pytest.mark.parametrize("preset", ["legged_gym", "rough"])
-@pytest.mark.filterwarnings("ignore:cells of:terrainkit.TerrainkitWarning")
-def test_presets_have_no_cliffs(preset, size):
-    config = MapConfig(rows=3, cols=10, preset=preset, patch_size=size, border=1.0)
-    assert seams_of(generate(config)).cliffs() == []
-
-
-@pytest.mark.parametrize("preset", presets.preset_names())
-def test_presets_meet_at_the_same_height_along_x(preset):
-    # Proportions below or above 1 need more columns.
-    cols = {"legged_gym_rough": 20, "parkour_course": 10}.get(preset)
-    cols = cols or len(presets.get_preset(preset))
-    config = MapConfig(rows=3, cols=cols, preset=preset, border=1.0)
-    cliffs = seams_of(generate(config)).cliffs()
-    # Only the sides of straight slopes and stairs are cliffs.
-    inner = [seam.patches for seam in cliffs if None not in seam.patches]
-    assert [(first, second) for first, second in inner if first[1] == second[1]] == []
-
-
-def test_equal_stairs_meet_at_the_same_height():
-    stairs = SubTerrain(terrain="stairs")
-    terrain_map = generate(MapConfig(rows=3, cols=2, border=0.0, terrains=(stairs,)))
-    assert seams_of(terrain_map).largest().height == 0.0
+    assert [height for height, _ in cliffs(raised(*blocks))] == [2.0] * 4 + [1.0] * 4
 
 
 def test_generate_warns_of_cliffs():
@@ -134,22 +108,17 @@ def test_generate_warns_of_cliffs():
         generate(MapConfig(rows=2, cols=2, border=0.0, terrains=terrains))
 
 
-def test_seam_text_names_patches_and_height():
-    names = np.array([["stairs", "wave"]])
-    seam = Seam(height=1.614, patches=((0, 0), (0, 1)))
-    assert seam_text(seam, names) == "1.61 m between stairs (0, 0) and wave (0, 1)"
-    edge = Seam(height=0.5, patches=(None, (0, 0)))
-    assert seam_text(edge, names) == "0.50 m between stairs (0, 0) and the border"
-
-
 def test_cliffs_text_has_one_entry_per_pair():
     names = np.array([["stairs", "wave"], ["stairs", "wave"]])
-    cliffs = [
-        Seam(height=2.0, patches=((1, 0), (1, 1))),
+    seams = [
+        Seam(height=2.004, patches=((1, 0), (1, 1))),
         Seam(height=1.5, patches=(None, (1, 0))),
         Seam(height=1.0, patches=((0, 0), (0, 1))),
     ]
-    assert cliffs_text(cliffs, names) == (
-        "3 seams, up to 2.00 m between stairs (1, 0) and wave (1, 1), "
-        "1.50 m between stairs (1, 0) and the border"
+    highest, edge = (
+        "2.00 m between stairs (1, 0) and wave (1, 1)",
+        "1.50 m between stairs (1, 0) and the border",
     )
+    assert [seam_text(seam, names) for seam in seams[:2]] == [highest, edge]
+    assert cliffs_text(seams, names) == f"3 seams, up to {highest}, {edge}"
+    assert cliffs_text(seams[1:2], names) == f"1 seam, up to {edge}"

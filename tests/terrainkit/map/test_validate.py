@@ -1,13 +1,18 @@
-import dataclasses
-import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import terrainkit as tk
 from terrainkit.geometry.mesh import TriMesh
+from terrainkit.geometry.solids import make_boxes
 from terrainkit.map.validate import validate
+from terrainkit.overlays.noise import Noise
 from terrainkit.terrain import presets
+from tests.terrainkit.maps import changed, plot
+
+NAN = float("nan")
+ORIGIN, CONFIG = "patch (1, 2): the spawn origin", "by its config"
 
 
 @pytest.fixture(scope="module")
@@ -19,24 +24,12 @@ def found(terrain_map, mesh=None):
     return [(finding.check, finding.message) for finding in validate(terrain_map, mesh)]
 
 
-def changed(terrain_map, name, index, value):
-    array = getattr(terrain_map, name).copy()
-    array[index] = value
-    return dataclasses.replace(terrain_map, **{name: array})
-
-
-def moved_origin(terrain_map, row, col, origin):
-    return changed(terrain_map, "spawns", (row, col, 0, slice(3)), origin)
-
-
 @pytest.mark.parametrize(
     "config",
     [
-        tk.MapConfig(rows=2, border=1.0, preset="legged_gym"),
         tk.MapConfig(rows=2, cols=16, border=0.0, preset="all", seed=4, centered=True),
         tk.MapConfig(rows=2, cols=5, border=1.0, mode="randomized", preset="rough"),
         tk.MapConfig(rows=4, cols=1, border=1.0, difficulty_jitter=1.0, slope_threshold=None),
-        tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(tk.SubTerrain(terrain="wave"),)),
         tk.MapConfig(
             rows=1,
             border=1.0,
@@ -46,7 +39,7 @@ def moved_origin(terrain_map, row, col, origin):
             spawns_per_patch=9,
         ),
     ],
-    ids=["legged_gym", "all", "randomized", "jitter", "one patch", "spawns"],
+    ids=["all", "randomized", "jitter", "spawns"],
 )
 @pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
 def test_validate_generated_map_has_no_issues(config):
@@ -56,188 +49,201 @@ def test_validate_generated_map_has_no_issues(config):
 
 
 @pytest.mark.parametrize("preset", presets.preset_names())
-def test_validate_presets_realize_their_parameters(preset):
+def test_validate_presets_realize_their_parameters_without_cliffs(preset):
     # Proportions below or above 1 need more columns.
     cols = {"legged_gym_rough": 20, "parkour_course": 10}.get(preset)
     cols = cols or len(presets.get_preset(preset))
-    terrain_map = tk.generate(tk.MapConfig(rows=3, cols=cols, border=0.0, preset=preset))
-    assert found(terrain_map) == []
+    # A cliff would be a warning, which is an error here.
+    assert found(tk.generate(tk.MapConfig(rows=3, cols=cols, border=1.0, preset=preset))) == []
 
 
-def test_validate_large_disc_is_one_issue(sound):
-    config = dataclasses.replace(sound.config, spawn_radius=1e6)
-    messages = found(dataclasses.replace(sound, config=config))
-    assert ("spawn", "no disk of radius 1e+06 m fits in a patch of 8 m x 8 m") in messages
-    assert not any("border" in message for _, message in messages)
+@pytest.mark.parametrize(
+    ("name", "index", "change", "messages"),
+    [
+        ("heights", (2, 4), NAN, ["heights: 1 values are not finite, the first at (2, 4)"]),
+        ("difficulty", (2, 4), NAN, ["difficulty: 1 values are not finite, the first at (2, 4)"]),
+        ("difficulty", (2, 3), -0.1, ["row 2: got difficulty 0.9; expected exactly 1", CONFIG]),
+        ("difficulty", (0, 3), 0.25, ["row 0: got difficulty 0.25; expected exactly 0", CONFIG]),
+        ("difficulty", (1, 3), 0.75, ["decreases from row 1 to row 2 in column 3", CONFIG]),
+        ("difficulty", (1, 3), 5e-7, []),
+        # Patch (1, 6) begins at cell 10 + 80 along x, 10 + 480 along y.
+        ("heights", (91, 491), 3.0, ["patch (1, 6): heights differ by up to 3.000 m from"]),
+        ("heights", (91, 491), 9e-4, []),
+        ("heights", (0, 0), 1.1e-3, ["the border is not flat at height 0"]),
+        ("heights", (0, 0), 9e-4, []),
+        ("spawns", (1, 2, 0, 2), 0.5, [f"{ORIGIN} is 0.500 m above the ground"]),
+        ("spawns", (1, 2, 0, 2), -0.5, [f"{ORIGIN} is 0.500 m below the ground"]),
+        ("spawns", (1, 2, 0, 0), 0.3, [f"{ORIGIN} is 0.300 m from its place in the config"]),
+        (
+            "spawns",
+            (1, 2, 0, 0),
+            2.5,
+            ["2.500 m from its", "above the ground", "not on flat"],
+        ),
+        ("spawns", (1, 2, 0, slice(3)), 9e-4, []),
+    ],
+)
+def test_validate_finds_changed_values(sound, name, index, change, messages):
+    edited = changed(sound, name, index, getattr(sound, name)[index] + np.float32(change))
+    issues = found(edited)
+    assert len(issues) == len(messages)
+    assert all(part in text for part, (_, text) in zip(messages, issues, strict=True))
 
 
-def test_validate_finds_non_finite_height(sound):
-    assert found(changed(sound, "heights", (3, 4), np.nan)) == [
-        ("finite", "heights: 1 values are not finite, the first at (3, 4)")
-    ]
-
-
-def test_validate_finds_non_finite_vertex(sound):
+def test_validate_finds_vertices_that_are_not_finite(sound):
     mesh = sound.mesh()
     vertices = mesh.vertices.copy()
-    vertices[7, 2] = np.nan
-    messages = found(sound, TriMesh(vertices=vertices, triangles=mesh.triangles))
-    assert ("finite", "vertices: 1 values are not finite, the first at (7, 2)") in messages
+    vertices[7, 2] = vertices[8, 1] = np.inf
+    message = "vertices: 2 values are not finite, the first at (7, 2)"
+    assert found(sound, replace(mesh, vertices=vertices)) == [("finite", message)]
 
 
-def test_validate_finds_origin_above_ground(sound):
-    origin = sound.env_origins[1, 2] + np.float32([0, 0, 0.5])
-    assert found(moved_origin(sound, 1, 2, origin)) == [
-        ("spawn", "patch (1, 2): the spawn origin is 0.500 m above the ground")
-    ]
+def test_validate_compares_type_parameters_solids_and_goals():
+    crawl, noise = tk.SubTerrain(terrain="crawl"), Noise(amplitude=0.02)
+    config = tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(crawl,))
+    made = tk.generate(config)
+    other = tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(tk.SubTerrain(terrain="flat"),))
+    moved = made.solids.transformed(np.eye(3), [0, 0, 2e-3])
+    moved = replace(moved, patch=made.solids.patch)
+    goals = made.goals + np.float32([0, 0, 2e-3, 0])
+    friction = made.friction.copy()
+    friction[20, 20] = 0.5
+    for edited, message in (
+        (replace(made, friction=friction), "the friction coefficients differ from its config"),
+        (replace(made, solids=moved), "the solids differ from its config"),
+        (replace(made, goals=goals), "the goals differ from its config"),
+        (
+            replace(made, config=other, terrain_names=("crawl",)),
+            "got terrain crawl; expected flat by its config",
+        ),
+    ):
+        texts = [message for check, message in found(edited) if check == "patches"]
+        assert f"patch (0, 0): {message}" in texts
+    noisy = replace(crawl, overlays=(noise,))
+    (first, *_) = found(replace(made, config=replace(config, terrains=(noisy,))))
+    assert first[1].startswith("patch (0, 0): the recorded parameters differ from its config: over")
 
 
-def test_validate_finds_origin_on_uneven_ground(sound):
-    x, y = sound.config.patch_grid(2, 5).center
-    origin = [x + 2.0, y, sound.height([x + 2.0, y])]
-    moved, (check, message) = found(moved_origin(sound, 2, 5, origin))
-    assert moved == (
-        "patches",
-        "patch (2, 5): the spawn origin is 2.000 m from its place in the config",
-    )
-    assert check == "spawn"
-    assert message.startswith(
-        "patch (2, 5): the spawn origin is not on flat ground: heights within 0.5 m differ by 0."
-    )
+def test_validate_finds_patch_that_cannot_be_generated(sound):
+    config = replace(sound.config, spawn_radius=1e6)
+    findings = found(replace(sound, config=config))
+    assert ("spawn", "no disk of radius 1e+06 m fits in a patch of 8 m x 8 m") in findings
+    assert findings[0][1].startswith("cannot be generated from the config: patch (0, 0): ")
+    assert len(findings) == 31
 
 
-def test_validate_finds_moved_origin(sound):
-    origin = sound.env_origins[0, 3] + np.float32([0.3, 0, 0])
-    assert found(moved_origin(sound, 0, 3, origin)) == [
-        ("patches", "patch (0, 3): the spawn origin is 0.300 m from its place in the config")
-    ]
+@pytest.mark.parametrize(
+    ("terrain", "parameters", "issue"),
+    [
+        # A moat of 1 m around a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
+        ("gap", {}, ("realized", "patch (1, 0), gap: width is (1.0, 0.5); requested 1")),
+        # A disk of 1 m and the cells around it do not fit in a pit of 1 m.
+        ("pit", {"side": 1.0}, ("patches", "patch (1, 0): no flat disk at the spawn position of")),
+    ],
+)
+def test_validate_finds_what_generate_warns_of(terrain, parameters, issue):
+    sub_terrain = tk.SubTerrain(terrain=terrain, parameters=parameters)
+    config = tk.MapConfig(rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(sub_terrain,))
+    with pytest.warns(tk.TerrainkitWarning, match=f"{terrain}.* on 1 patches; the"):
+        ((check, message),) = found(tk.generate(config))
+    assert (check, message[: len(issue[1])]) == issue
 
 
-def test_validate_finds_origin_outside_pit():
-    # A disk of 1 m and the cells around it do not fit in a pit of 1 m.
-    pit = tk.SubTerrain(terrain="pit", parameters={"side": 1.0})
-    config = tk.MapConfig(rows=2, cols=1, border=1.0, terrains=(pit,))
-    with pytest.warns(tk.TerrainkitWarning, match="at the preferred spawn position: pit on 1 "):
-        terrain_map = tk.generate(config)
-    ((check, message),) = found(terrain_map)
-    assert check == "patches"
-    assert message.startswith("patch (1, 0): no flat disk at the spawn position of pit: the origin")
+# ---- spawns ------------------------------------------------------------------------------------
 
 
-def test_validate_finds_origin_outside_patch(sound):
-    findings = found(moved_origin(sound, 0, 0, sound.env_origins[0, 1]))
-    assert ("spawn", "patch (0, 0): the spawn origin is outside the patch") in findings
+@pytest.mark.parametrize("offset", [(8.0, 0, 0), (0, 8.0, 0), (-4.1, 0, 0), (0, -4.1, 0)])
+def test_validate_finds_origin_outside_patch(sound, offset):
+    origin = sound.env_origins[1, 1] + np.float32(offset)
+    findings = found(changed(sound, "spawns", (1, 1, 0, slice(3)), origin))
+    assert ("spawn", "patch (1, 1): the spawn origin is outside the patch") in findings
 
 
-@pytest.fixture(scope="module")
-def with_spawns():
+@pytest.mark.parametrize(
+    ("x", "messages"),
+    [
+        (
+            [2.0, 2.75],
+            ["spawn 2 is 0.750 m from spawn 1; expected at least 1 m, two spawn radii"],
+        ),
+        ([2.0, 3.0], []),
+        ([7.55, 2.0], []),
+    ],
+)
+def test_validate_finds_spawns_on_one_another(x, messages):
     flat = tk.SubTerrain(terrain="flat")
     config = tk.MapConfig(rows=1, cols=1, border=0.0, spawns_per_patch=3, terrains=(flat,))
-    return tk.generate(config)
-
-
-def test_validate_finds_spawns_on_one_another(with_spawns):
+    made = tk.generate(config)
     # The origin is at (4, 4).
-    edited = changed(with_spawns, "spawns", (0, 0, slice(1, 3), 0), [2.0, 2.75])
+    edited = changed(made, "spawns", (0, 0, slice(1, 3), 0), x)
     edited = changed(edited, "spawns", (0, 0, slice(1, 3), 1), 4.0)
-    assert found(edited) == [
-        ("patches", "patch (0, 0): the spawn positions differ from its config"),
-        (
-            "spawn",
-            "patch (0, 0): spawn 2 is 0.750 m from spawn 1; expected at least 1 m, two spawn radii",
-        ),
-    ]
+    differ = ("patches", "patch (0, 0): the spawn positions differ from its config")
+    assert found(edited) == [differ, *(("spawn", f"patch (0, 0): {each}") for each in messages)]
+    assert found(changed(made, "spawns", (0, 0, 2), np.nan)) == [differ]
+    lifted = found(changed(made, "spawns", (0, 0, 1, 2), 0.25))
+    assert ("spawn", "patch (0, 0): spawn 1 is 0.250 m above the ground") in lifted
 
 
-def test_validate_finds_missing_spawn(with_spawns):
-    edited = changed(with_spawns, "spawns", (0, 0, 2), np.nan)
-    assert found(edited) == [
-        ("patches", "patch (0, 0): the spawn positions differ from its config")
-    ]
+def test_validate_finds_solid_above_the_origin():
+    flat = plot(np.zeros((40, 30)))
+    for bottom, messages in ((0.998, 1), (0.9995, 0)):
+        board = make_boxes([2.0, 1.5, bottom + 0.1], [0.2, 0.2, 0.2])
+        config = replace(flat.config, mode="custom")
+        issues = found(replace(flat, config=config, solids=board))
+        text = "patch (0, 0): the spawn origin has 0.998 m of headroom; expected 1 m"
+        assert issues == [("spawn", text)] * messages
 
 
-def test_validate_finds_spawn_above_ground(with_spawns):
-    edited = changed(with_spawns, "spawns", (0, 0, 1, 2), 0.25)
-    assert ("spawn", "patch (0, 0): spawn 1 is 0.250 m above the ground") in found(edited)
+# ---- mesh --------------------------------------------------------------------------------------
 
 
-def test_validate_finds_edited_patch(sound):
-    i, j = sound.config.patch_start(1, 6)
-    findings = found(changed(sound, "heights", (i + 1, j + 1), 3.0))
-    assert [check for check, _ in findings] == ["patches"]
-    assert findings[0][1].startswith("patch (1, 6): heights differ by up to 3.")
+def hole(mesh):
+    return replace(mesh, triangles=mesh.triangles[100:])
 
 
-def test_validate_finds_swapped_axes():
-    square = tk.generate(tk.MapConfig(rows=10, border=1.0, preset="legged_gym"))
-    findings = found(dataclasses.replace(square, heights=square.heights.T.copy()))
-    assert any("with axes swapped" in message for _, message in findings)
+def flip(mesh):
+    return replace(mesh, triangles=np.vstack([mesh.triangles[:1, ::-1], mesh.triangles[1:]]))
 
 
-def test_validate_finds_uneven_border(sound):
-    assert ("patches", "the border is not flat at height 0") in found(
-        changed(sound, "heights", (0, 0), 0.01)
-    )
+def lift(height):
+    return lambda mesh: replace(mesh, vertices=mesh.vertices + np.float32([0, 0, height]))
 
 
-def test_validate_finds_incomplete_difficulty(sound):
-    stale = sound.difficulty * np.float32(0.9)
-    findings = found(dataclasses.replace(sound, difficulty=stale))
-    assert ("difficulty", "row 2: got difficulty 0.9; expected exactly 1") in findings
+def point(mesh):
+    return replace(mesh, triangles=np.vstack([mesh.triangles, np.zeros((1, 3), np.int32)]))
 
 
-def test_validate_finds_decreasing_difficulty(sound):
-    messages = found(changed(sound, "difficulty", (1, 3), 1.5))
-    assert ("difficulty", "difficulty decreases from row 1 to row 2 in column 3") in messages
+def empty(mesh):
+    return replace(mesh, triangles=mesh.triangles[:0])
 
 
-def test_validate_finds_deviating_width():
-    # A moat of 1 m around a platform of 3 m: a patch of 8 m x 4 m has 0.5 m for it along y.
-    config = tk.MapConfig(
-        rows=2, cols=1, patch_size=(8.0, 4.0), terrains=(tk.SubTerrain(terrain="gap"),)
-    )
-    with pytest.warns(tk.TerrainkitWarning, match="gap.width on 1 patches; the map records"):
-        terrain_map = tk.generate(config)
-    assert found(terrain_map) == [
-        ("realized", "patch (1, 0), gap: width is (1.0, 0.5); requested 1")
-    ]
+@pytest.mark.parametrize(
+    ("change", "messages"),
+    [
+        (hole, ["the mesh covers", "edges have only one face, for example at"]),
+        (flip, ["1 faces point downward", "by faces of opposite winding"]),
+        (lift(0.25), ["the mesh differs from the heights by up to 0.250 m, most at"]),
+        (lift(9e-4), []),
+        (point, ["1 faces have no area", "edges are shared by more than two faces or"]),
+        (empty, ["the mesh has no faces"]),
+    ],
+)
+def test_validate_finds_invalid_faces(sound, change, messages):
+    issues = found(sound, change(sound.mesh()))
+    assert [check for check, _ in issues] == ["mesh"] * len(messages)
+    assert all(part in text for part, (_, text) in zip(messages, issues, strict=True))
 
 
-def test_validate_finds_hole_in_mesh(sound):
-    mesh = sound.mesh()
-    holed = TriMesh(vertices=mesh.vertices, triangles=mesh.triangles[100:])
-    messages = " ".join(message for _, message in found(sound, holed))
-    assert "edges have only one face" in messages
-    assert "the mesh covers" in messages
-
-
-def test_validate_finds_flipped_face(sound):
-    mesh = sound.mesh()
+def test_validate_compares_the_solids_of_the_mesh(solid_map):
+    custom = replace(solid_map, config=replace(solid_map.config, mode="custom"))
+    mesh = custom.mesh()
+    differ = ("mesh", "the last faces of the mesh differ from the solids of the map")
+    assert differ not in found(custom, mesh)
+    moved = mesh.vertices.copy()
+    moved[-1, 0] += 2e-3
     turned = mesh.triangles.copy()
-    turned[0] = turned[0, ::-1]
-    messages = [m for _, m in found(sound, TriMesh(vertices=mesh.vertices, triangles=turned))]
-    assert "1 faces point downward" in messages
-    assert any("or by faces of opposite winding" in message for message in messages)
-
-
-def test_validate_finds_mesh_of_another_map(sound):
-    lifted = sound.mesh().vertices + np.float32([0, 0, 0.25])
-    findings = found(sound, TriMesh(vertices=lifted, triangles=sound.mesh().triangles))
-    assert [check for check, _ in findings] == ["mesh"]
-    assert findings[0][1].startswith("the mesh differs from the heights by up to 0.250 m")
-
-
-def test_validate_finds_mesh_without_faces(sound):
-    empty = TriMesh(vertices=sound.mesh().vertices, triangles=np.empty((0, 3), dtype=np.int32))
-    assert found(sound, empty) == [("mesh", "the mesh has no faces")]
-
-
-def test_validate_takes_at_most_twice_the_memory_of_the_mesh():
-    terrain_map = tk.generate(tk.MapConfig(rows=16, cols=16))
-    peaks = []
-    for work in (terrain_map.mesh, lambda: validate(terrain_map)):
-        tracemalloc.start()
-        work()
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    assert peaks[1] < 2 * peaks[0]
+    turned[-1] = turned[-1, ::-1]
+    for vertices, triangles in ((moved, mesh.triangles), (mesh.vertices, turned)):
+        assert found(custom, replace(mesh, vertices=vertices, triangles=triangles))[-1] == differ
+    few = TriMesh(vertices=mesh.vertices[:3], triangles=np.array([[0, 1, 2]], np.int32))
+    assert found(custom, few)[-1] == differ
