@@ -1,3 +1,4 @@
+import shlex
 import shutil
 import subprocess
 import sys
@@ -54,6 +55,26 @@ def run_main(capsys) -> Callable[..., Run]:
         code = main([str(word) for word in words])
         captured = capsys.readouterr()
         return Run(words, code, captured.out, captured.err)
+
+    return run
+
+
+@pytest.fixture
+def rejected(terrainkit) -> Callable[..., str]:
+    """Return a function that runs a command that fails, and returns its error, which is one line.
+
+    The words may be one text, as in a shell.
+    """
+
+    def run(*words: object) -> str:
+        if len(words) == 1:
+            words = tuple(shlex.split(str(words[0])))
+        done = terrainkit(*words)
+        prefix = "terrainkit: error: "
+        assert (done.returncode, done.stdout) == (2, ""), done
+        assert done.stderr.startswith(prefix)
+        assert done.stderr.count("\n") == 1
+        return done.stderr.removeprefix(prefix)
 
     return run
 

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 import terrainkit
-from terrainkit import MapConfig, SubTerrain, TerrainMap
-from terrainkit.map.validate import validate
+from terrainkit import TerrainMap
 from terrainkit.overlays.mirror import Mirror
 from terrainkit.overlays.noise import Noise
 from terrainkit.overlays.side_walls import SideWalls
@@ -64,8 +63,12 @@ def test_custom_terrain_through_the_command_line(run_main, tmp_path):
 
 
 @pytest.mark.usefixtures("banked")
-def test_list_prints_choices_and_registered_terrains(run_main):
-    assert "registered: banked_track" in run_main("list").stdout
+def test_list_prints_choices_overlays_and_registered_terrains(run_main):
+    listed = run_main("list").stdout
+    assert "registered: banked_track" in listed
+    assert "  side_walls  " in listed
+    noise = run_main("list", "noise").stdout
+    assert noise.startswith("noise: Random heights that are added to the ground.")
     output = run_main("list", "banked_track").stdout
     assert "Side of the shoulder. One of: left, right." in output
     assert "[0.5, 0.5, 0.5]" in output
@@ -78,14 +81,15 @@ def test_list_prints_choices_and_registered_terrains(run_main):
         ("side=up", "banked_track.side: got 'up'; expected one of: left, right"),
         ("color=[1,2]", "banked_track.color: got [1, 2]; expected 3 values"),
         ("color=[1,2", "--set: got '2'; expected name=value or name=easy:hard"),
+        ("color=[1", "banked_track.color: got '[1'; expected 3 values"),
+        ("color=1]", "banked_track.color: got '1]'; expected 3 values"),
         ("height=1:2:3", "banked_track.height: got [1, 2, 3]; expected one value or a pair"),
         ("height", "--set: got 'height'; expected name=value"),
     ],
 )
-def test_set_rejects_invalid_value(run_main, values, message):
-    run = run_main("generate", "-o", "a.npz", "--terrain", "banked_track", "--set", values)
-    assert (run.returncode, run.stderr.count("\n")) == (2, 1)
-    assert message in run.stderr
+def test_set_rejects_invalid_value(rejected, values, message):
+    words = ("generate", "-o", "a.npz", "--terrain", "banked_track", "--set", values)
+    assert message in rejected(*words)
 
 
 def test_generate_adds_overlays_to_all_terrains(run_main, tmp_path):
@@ -103,31 +107,11 @@ def test_generate_adds_overlays_to_all_terrains(run_main, tmp_path):
 @pytest.mark.parametrize(
     ("overlay", "message"),
     [
-        (
-            "nois",
-            "registered with terrainkit.register_overlay; did you mean 'noise'? terrainkit list",
-        ),
+        ("nois", "with terrainkit.register_overlay; did you mean 'noise'? terrainkit list"),
         ("noise:amplitude", "--overlay: got 'amplitude'; expected name=value"),
         ("noise:pattern=pink", "noise.pattern: got 'pink'; expected one of: uniform, perlin"),
         ("noise:amplitudes=1", "noise has no parameter 'amplitudes'; did you mean 'amplitude'"),
     ],
 )
-def test_overlay_rejects_invalid_value(run_main, overlay, message):
-    run = run_main("generate", "-o", "a.npz", "--overlay", overlay)
-    assert (run.returncode, run.stderr.count("\n")) == (2, 1)
-    assert message in run.stderr
-
-
-def test_list_prints_overlays(run_main):
-    assert "  side_walls  " in run_main("list").stdout
-    output = run_main("list", "noise").stdout
-    assert output.startswith("noise: Random heights that are added to the ground.")
-    assert "One of: uniform, perlin." in output
-
-
-def test_custom_terrain_config_round_trips_through_toml(banked):
-    given = {"label": 'a "b"\n', "side": "right", "color": (1, 2, 3), "height": (0.1, 0.2)}
-    track = SubTerrain(terrain=banked, parameters=given)
-    config = MapConfig(rows=2, cols=1, border=0.0, terrains=(track,))
-    assert MapConfig.from_toml(config.to_toml()) == config
-    assert validate(terrainkit.generate(config)) == []
+def test_overlay_rejects_invalid_value(rejected, overlay, message):
+    assert message in rejected("generate", "-o", "a.npz", "--overlay", overlay)

@@ -7,7 +7,6 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, suites
-from terrainkit_cli import training_extra
 from terrainkit_cli.evaluate_command import result_rows, summary_line
 from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
 from terrainkit_robots.policy.export import export_policy
@@ -23,12 +22,6 @@ QUICK = ("--seconds", "0.04", "--num-envs", "1")
 def here(run_beside_walk):
     """Run `terrainkit evaluate` in a folder with a run `walk`."""
     return partial(run_beside_walk, "evaluate")
-
-
-def one_line(err):
-    assert err.startswith("terrainkit: error: ")
-    assert err.count("\n") == 1
-    return err
 
 
 def test_evaluate_prints_a_table(here):
@@ -47,30 +40,7 @@ def test_evaluate_prints_a_table(here):
     assert all(row.split()[3] == "0" for row in rows)
 
 
-def test_evaluate_prints_json(here):
-    code, out, err = here("walk", "--seconds", "0.1", "--num-envs", "2", "--format", "json")
-    assert (code, err) == (0, "")
-    document = json.loads(out)
-    names = document["robot"], document["checkpoint"], document["terrain"]
-    assert names == ("quadruped", "model_7.pt", "plane")
-    assert document["all"]["robots"] == 2
-    assert len(document["by_command"]) == 2
-
-
-def test_evaluate_is_reproducible(here):
-    words = ("walk", "--seconds", "0.2", "--num-envs", "2", "--seed", "3", "--format", "json")
-    assert here(*words) == here(*words)
-
-
-def test_evaluate_with_one_command(here):
-    options = ("--seconds", "2.1", "--num-envs", "1", "--format", "json")
-    document = json.loads(here("walk", *options, "--command", "-0.5", "0", "0")[1])
-    assert document["all"]["robots"] == 1
-    assert document["all"]["lin_vel_error"] < 0.25  # it walks backward
-    assert "by_command" not in document
-
-
-def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
+def test_evaluate_writes_json_to_a_file(here, rejected, tmp_path, monkeypatch):
     words = ("walk", *QUICK, "-o", "result.json", "--diagram", "gait.png")
     code, out, err = here(*words)
     assert (code, err) == (0, "")
@@ -81,70 +51,53 @@ def test_evaluate_writes_json_to_a_file(here, tmp_path, monkeypatch):
     assert json.loads(before)["seconds"] == 0.04
     with monkeypatch.context() as patch:
         patch.setattr(run_module, "open_run", None)  # the file is checked before any work
-        code, _, err = here(*words)
-    assert code == 2
-    assert "result.json exists" in one_line(err)
+        assert "result.json exists" in rejected("evaluate", *words)
     assert here(*words, "--overwrite")[0] == 0
     assert (tmp_path / "result.json").read_text() == before
 
 
-def test_evaluate_prints_and_writes_the_same_json(here, tmp_path):
-    _, out, _ = here("walk", *QUICK, "--format", "json", "-o", "result.json")
-    assert out == (tmp_path / "result.json").read_text()
-
-
-def test_evaluate_loads_the_given_checkpoint(here):
-    names = [
-        json.loads(here(*run, *QUICK, "--format", "json")[1])["checkpoint"]
-        for run in (("walk",), ("walk", "--checkpoint", "3"), ("walk/model_3.pt",))
-    ]
-    assert names == ["model_7.pt", "model_3.pt", "model_3.pt"]
-
-
-def test_evaluate_bundled_policy_by_name(here):
-    options = ("--seconds", "3", "--num-envs", "1", "--command", "0.5", "0", "0.5")
-    document = json.loads(here("quadruped", *options, "--format", "json")[1])
-    assert document["robot"] == "quadruped"
-    assert document["all"]["falls"] == 0
-    assert document["all"]["lin_vel_error"] < 0.25
-    assert document["all"]["ang_vel_error"] < 0.25
+def test_evaluate_loads_the_given_checkpoint(here, monkeypatch):
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)  # the progress is not in the JSON
+    for words, checkpoint in (
+        ("walk", "model_7.pt"),
+        ("walk --checkpoint 3", "model_3.pt"),
+        ("walk/model_3.pt", "model_3.pt"),
+    ):
+        document = json.loads(here(*words.split(), *QUICK, "--format", "json")[1])
+        names = document["robot"], document["checkpoint"], document["terrain"]
+        assert names == ("quadruped", checkpoint, "plane")
+        assert (document["all"]["robots"], len(document["by_command"])) == (1, 1)
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((), "RUN: missing; expected"),
-        (("walk", "--checkpoint", "5"), "expected one of: 3, 7"),
-        (("walk", "--seconds", "-1"), "seconds: got -1.0; expected a number > 0"),
-        (("walk", "--checkpoint", "-5"), "expected one of: 3, 7"),
-        (("walk", "--num-envs", "-3"), "num_envs: got -3"),
-        (("walk", "--num-envs", "0"), "num_envs: got 0"),
-        (("walk", "--terrain", "moon"), "moon"),
-        (("walk", "--terrain", "gone.npz"), "gone.npz"),
-        (("walk", "--device", "abacus"), "abacus"),
-        (("walk", "--command", "1", "0"), "--command"),
-        (("walk", "--command", "nan", "0", "0"), "command: got [nan, 0, 0]; expected 3 values"),
-        (("walk", "--command", "1", "0", "0", "--random-commands"), "expected one of them"),
-        (("walk", "--suite", "basics-2"), "no suite 'basics-2'; did you mean 'basics-1'?"),
-        (("walk", "--suite", "basics-1", "--limits"), "--suite, --limits: got both"),
-        (("walk", "--limits", "--terrain", "plane"), "--terrain: got a value; expected none with"),
-        (("walk", "--limits", "--num-envs", "3"), "--num-envs: got a value; expected none with"),
-        (
-            ("walk", "--limits", "--repetitions", "0"),
-            "--repetitions: got 0; expected an integer from 1",
-        ),
-        (("gone", "--limits"), "gone"),
-        (("walk", "--repetitions", "3"), "--repetitions: got a value; expected none without"),
-        (("walk", "--limits", "-o", "."), "."),
+        ("", "RUN: missing; expected"),
+        ("walk --checkpoint 5", "expected one of: 3, 7"),
+        ("walk --checkpoint -5", "expected one of: 3, 7"),
+        ("walk --seconds -1", "seconds: got -1.0; expected a number > 0"),
+        ("walk --num-envs 0", "num_envs: got 0"),
+        ("walk --terrain moon", "moon"),
+        ("walk --device abacus", "abacus"),
+        ("walk --command 1 0", "--command"),
+        ("walk --command nan 0 0", "command: got [nan, 0, 0]; expected 3 values"),
+        ("walk --command 1 0 0 --random-commands", "expected one of them"),
+        ("walk --suite basics-2", "no suite 'basics-2'; did you mean 'basics-1'?"),
+        ("walk --suite basics-1 --limits", "--suite, --limits: got both"),
+        ("walk --limits --terrain plane", "--terrain: got a value; expected none with"),
+        ("walk --limits --random-commands", "--random-commands: got a value; expected none with"),
+        ("walk --limits --repetitions 0", "--repetitions: got 0; expected an integer from 1"),
+        ("gone --limits", "gone"),
+        ("walk --repetitions 3", "--repetitions: got a value; expected none without"),
+        ("walk --limits -o .", "."),
     ],
 )
-def test_evaluate_rejects_invalid_input(here, words, message):
-    code, out, err = here(*words)
-    assert (code, out) == (2, "")
-    assert message in one_line(err)
+@pytest.mark.usefixtures("walking")
+def test_evaluate_rejects_invalid_input(rejected, words, message):
+    assert message in rejected(f"evaluate {words}")
 
 
-def test_exported_policy_is_evaluated(here, tmp_path, monkeypatch):
+def test_exported_policy_is_evaluated(here, rejected, tmp_path, monkeypatch):
     export_policy(open_run(tmp_path / "walk"), tmp_path / "out")
     outside = ("--policy", "out/policy.onnx", "--robot", "quadruped")
     code, out, err = here(*outside, *QUICK)
@@ -158,34 +111,18 @@ def test_exported_policy_is_evaluated(here, tmp_path, monkeypatch):
     assert spec.policy_name == "policy.onnx"
     assert robot_limits.step_up == pytest.approx(0.1792)
     (tmp_path / "text.onnx").write_text("text")
+    given = "--policy out/policy.onnx --robot"
     for words, message in (
-        (("--policy", "out/policy.onnx"), "--robot: missing; expected the robot of --policy"),
-        (("walk", "--robot", "quadruped"), "--robot: got a value; expected none without --policy"),
-        (("walk", *outside), "RUN, --policy: got both; expected one of them"),
-        ((*outside, "--checkpoint", "3"), "--checkpoint: got a value; expected none with --policy"),
-        ((*outside[:3], "biped"), "policy.json: joints.name, the policy belongs to another robot"),
-        ((*outside[:3], "hare"), "no task or robot folder 'hare'"),
-        (("--policy", "gone.onnx", "--robot", "biped"), "cannot read gone.onnx: No such file"),
-        (
-            ("--policy", "text.onnx", "--robot", "biped"),
-            "text.onnx is not a policy: not an ONNX file",
-        ),
+        ("--policy out/policy.onnx", "--robot: missing; expected the robot of --policy"),
+        ("walk --robot quadruped", "--robot: got a value; expected none without --policy"),
+        (f"walk {given} quadruped", "RUN, --policy: got both; expected one of them"),
+        (f"{given} quadruped --checkpoint 3", "--checkpoint: got a value; expected none with"),
+        (f"{given} biped", "policy.json: joints.name, the policy belongs to another robot"),
+        (f"{given} hare", "no task or robot folder 'hare'"),
+        ("--policy gone.onnx --robot biped", "cannot read gone.onnx: No such file"),
+        ("--policy text.onnx --robot biped", "text.onnx is not a policy: not an ONNX file"),
     ):
-        code, out, err = here(*words)
-        assert (code, out) == (2, "")
-        assert message in one_line(err)
-
-
-def test_evaluate_names_the_missing_extra(here, monkeypatch):
-    monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
-    code, _, err = here("walk")
-    assert code == 2
-    assert "pip install '.[train]'" in one_line(err)
-
-
-def test_evaluate_json_is_clean_in_a_terminal(here, monkeypatch):
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    assert json.loads(here("walk", *QUICK, "--format", "json")[1])
+        assert message in rejected(f"evaluate {words}")
 
 
 def make_metrics(**values):
@@ -225,7 +162,7 @@ def test_result_rows_show_success_by_level():
     assert row == ("flat", "4", "4", "-", "-", "25%", "-", "100%")
 
 
-def test_suite_prints_and_writes_a_report_card(here, tmp_path, monkeypatch):
+def test_suite_prints_and_writes_a_report_card(here, rejected, tmp_path, monkeypatch):
     slope = SubTerrain(terrain="slope", parameters={"grade": (0.0, 0.1), "landing": 1.4})
     config = MapConfig(rows=2, cols=1, patch_size=(5.0, 4.0), border=2.0, terrains=(slope,))
     monkeypatch.setattr(suites, "generate_suite", lambda _: generate(config))
@@ -245,10 +182,10 @@ def test_suite_prints_and_writes_a_report_card(here, tmp_path, monkeypatch):
     assert document["repetitions"] == 2
     assert (tmp_path / "card.md").read_text().startswith("# quadruped on basics-1\n")
     assert (tmp_path / "card.png").read_bytes().startswith(b"\x89PNG")
-    assert "card.json exists" in one_line(here(*words)[2])
+    assert "card.json exists" in rejected("evaluate", *words)
 
 
-def test_suite_may_be_a_map(here, tmp_path):
+def test_suite_may_be_a_map(here, rejected, tmp_path):
     flat = SubTerrain(terrain="flat")
     terrain_map = generate(MapConfig(rows=1, cols=1, patch_size=(4.0, 3.0), terrains=(flat,)))
     terrain_map.save(tmp_path / "yard.npz")
@@ -257,7 +194,7 @@ def test_suite_may_be_a_map(here, tmp_path):
     assert out.splitlines()[0].startswith("quadruped, model_7.pt, on yard.npz: success ")
     document = json.loads((tmp_path / "card.json").read_text())
     assert document["sha256"] == suites.suite_hash(terrain_map)
-    assert "no file missing.npz" in here("walk", "--suite", "missing.npz")[2]
+    assert "no file missing.npz" in rejected("evaluate walk --suite missing.npz")
 
 
 def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):

@@ -1,5 +1,3 @@
-"""Installed packages whose terrains, overlays or tasks fail."""
-
 import pytest
 
 MODULE = """

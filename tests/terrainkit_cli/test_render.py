@@ -1,5 +1,7 @@
 import warnings
 
+import pytest
+
 from terrainkit import TerrainkitWarning
 from terrainkit_cli import render
 
@@ -10,5 +12,15 @@ def test_warnings_are_one_line(capsys, monkeypatch):
         warnings.simplefilter("always")
         warnings.warn("cliffs", TerrainkitWarning, stacklevel=1)
         warnings.warn_explicit("two\nlines", RuntimeWarning, "dunes.py", 12)
-    told = "terrainkit: warning: dunes.py:12: RuntimeWarning: two lines"
-    assert capsys.readouterr().err.splitlines() == ["terrainkit: warning: cliffs", told]
+        warnings.warn_explicit("one", UserWarning, "dunes.py", 13)
+    assert capsys.readouterr().err.splitlines() == [
+        "terrainkit: warning: cliffs",
+        "terrainkit: warning: dunes.py:12: RuntimeWarning: two lines",
+        "terrainkit: warning: dunes.py:13: UserWarning: one",
+    ]
+
+
+@pytest.mark.parametrize(("columns", "width"), [(59, 60), (61, 61), (119, 119), (121, 120)])
+def test_reports_are_60_to_120_columns_wide(monkeypatch, columns, width):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    assert render.width() == width

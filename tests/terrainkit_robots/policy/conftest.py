@@ -1,5 +1,3 @@
-"""Runs without a checkpoint, one trained run, and environments for rollouts."""
-
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import count

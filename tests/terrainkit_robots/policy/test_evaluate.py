@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit import generate
 from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
     ErrorMean,
@@ -70,11 +70,6 @@ def test_command_grid_respects_one_sided_ranges_and_min_norm():
     assert len(np.unique(grid, axis=0)) == len(grid) == 9
 
 
-def test_plane_has_one_robot_per_command(make_run):
-    env, commands = make_eval_env(make_run(), EvaluationConfig())
-    assert env.num_envs == len(commands) == len(np.unique(commands, axis=0)) == 75
-
-
 @pytest.mark.parametrize(
     ("num_envs", "max_patch_envs", "per_patch"), [(12, 512, 2), (None, 3, 3), (4, 512, 1)]
 )
@@ -124,11 +119,6 @@ def test_evaluation_config_rejects_invalid_values(options, message):
         EvaluationConfig(**options)
 
 
-def test_evaluation_env_rejects_an_unknown_device(make_run):
-    with pytest.raises(ConfigError, match="abacus"):
-        make_eval_env(make_run(), EvaluationConfig(device="abacus"))
-
-
 def test_evaluation_env_rejects_a_changed_map(make_run, small_map, map_file):
     run = make_run(map_file)
     generate(replace(small_map.config, seed=9)).save(map_file, overwrite=True)
@@ -144,11 +134,6 @@ def test_evaluation_env_ignores_the_map_of_a_flat_run(make_run, map_file):
     map_file.write_text("gone")
     env, _ = make_eval_env(run, EvaluationConfig(num_envs=1))
     assert env.terrain.is_plane
-
-
-def test_evaluate_requires_a_checkpoint(make_run):
-    with pytest.raises(ConfigError, match="got no checkpoint"):
-        evaluate(make_run(), EvaluationConfig(num_envs=1, seconds=0.1))
 
 
 @pytest.mark.parametrize("on_map", [False, True])
@@ -215,22 +200,6 @@ def test_summary_groups_by_terrain_and_level(make_run, map_file):
     directions = [(group["direction"], group["robots"]) for group in document["by_direction"]]
     assert directions == [("forward", 6), ("backward", 6)]
     assert "by_command" not in document
-
-
-def test_summary_counts_terrains_of_a_randomized_map(make_run, tmp_path):
-    terrains = tuple(SubTerrain(terrain=name) for name in ("flat", "pyramid_slope"))
-    size = {"rows": 3, "cols": 3, "patch_size": (4, 4), "border": 0.5}
-    path = generate(MapConfig(mode="randomized", terrains=terrains, **size)).save(
-        tmp_path / "map.npz"
-    )
-    run, config = make_run(path), EvaluationConfig(num_envs=9)
-    rollout, _ = run_still(run, config)
-    groups, names = summarize(run, config, rollout).groups, rollout.env.terrain.terrain_names
-    assert len({tuple(row) for row in names}) > 1
-    for group in groups["by_terrain"]:
-        assert group.robots == (names == group.terrain).sum()
-    for group in groups["by_terrain_and_level"]:
-        assert group.robots == (names[group.level] == group.terrain).sum()
 
 
 def test_bundled_quadruped_follows_commands():

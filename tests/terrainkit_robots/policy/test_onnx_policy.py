@@ -2,7 +2,6 @@ import json
 import shutil
 import signal
 import threading
-import time
 from dataclasses import replace
 from functools import partial
 
@@ -63,8 +62,7 @@ def test_exported_policy_is_evaluated_as_its_run(trained, mine):
     spec, result = open_onnx(mine, "quadruped"), json.loads(evaluate(trained, SHORT).as_json())
     outside = json.loads(evaluate(spec, SHORT).as_json())
     assert (result.pop("checkpoint"), outside.pop("checkpoint")) == ("model_2.pt", "mine.onnx")
-    assert outside.pop("all") == pytest.approx(result.pop("all"), abs=1e-4)
-    assert outside == result
+    assert (outside.pop("all"), outside) == (pytest.approx(result.pop("all"), abs=1e-4), result)
 
 
 @pytest.mark.parametrize("control_type", ["P", "V", "T"])
@@ -134,10 +132,7 @@ def test_json_replaces_gains_and_joint_order(mine):
         ({"timing__decimation": 5}, "timing.decimation: got 5; expected 4"),
         ({"task__commands": {"speed": 1}}, "task.commands has no key 'speed'"),
         ({"task__observations": {"foot_contact": True}}, "observation.size: got 47; expected 51"),
-        (
-            {"observation__parts": [{"name": "camera"}]},
-            "parts.0.name: got camera; expected commands",
-        ),
+        ({"observation__parts": [{"name": "camera"}]}, "parts.0.name: got camera; expected comm"),
         ({"observation__parts": 3}, "observation.parts: got 3; the environment"),
         ({"format_version": 2}, "format_version: got 2; expected 1"),
         ({"joints__name": [{}] * 12}, "Expected .*, got `object`"),
@@ -162,22 +157,20 @@ def test_json_that_is_not_an_object_is_rejected(mine, text):
         open_onnx(mine, "quadruped")
 
 
-def test_unknown_part_of_the_observation_is_named(mine):
-    observation = json.loads(mine.with_name("policy.json").read_text())["observation"]
-    observation["parts"].append({"name": "camera", "start": 47, "stop": 50})
-    change_json(mine, observation={**observation, "size": 50})
-    with pytest.raises(ConfigError, match=r"observation\.parts\.7\.name: got camera; .* has no"):
-        open_onnx(mine, "quadruped")
-
-
 def test_policy_of_another_robot_is_rejected(mine):
     with pytest.raises(ConfigError, match=r"got FL_hip_joint, .* which biped lacks, .* left_hip"):
         open_onnx(mine, "biped")
 
 
-def make_onnx(
-    path, shape=("n", 47), size=12, op="MatMul", kind=TensorProto.FLOAT, nodes=(), save=onnx.save
-):
+FLOAT, INT64, BOOL = TensorProto.FLOAT, TensorProto.INT64, TensorProto.BOOL
+
+
+def node(op, inputs, output, **attributes):
+    """Return a node whose inputs are the words of a text."""
+    return helper.make_node(op, inputs.split(), [output], **attributes)
+
+
+def make_onnx(path, shape=("n", 47), size=12, op="MatMul", kind=FLOAT, nodes=(), save=onnx.save):
     """Write a linear policy with some nodes before it, or a network of one other operation."""
     names = ["obs", "weight"] if op == "MatMul" else ["obs"]
     weight = numpy_helper.from_array(np.ones((47, size), np.float32), "weight")
@@ -196,51 +189,36 @@ def make_onnx(
 
 def endless_loop():
     """Nodes whose output `before` is `obs`, after a loop that ends only if all `obs` are 0."""
+    nodes = [node("Identity", "go_on", "again"), node("Identity", "old", "new")]
     value = partial(helper.make_tensor_value_info, shape=[])
-    body = helper.make_graph(
-        [
-            helper.make_node("Identity", ["go_on"], ["again"]),
-            helper.make_node("Identity", ["old"], ["new"]),
-        ],
-        "body",
-        [
-            value("index", TensorProto.INT64),
-            value("go_on", TensorProto.BOOL),
-            value("old", TensorProto.FLOAT),
-        ],
-        [value("again", TensorProto.BOOL), value("new", TensorProto.FLOAT)],
-    )
+    inputs = [value("index", INT64), value("go_on", BOOL), value("old", FLOAT)]
+    body = helper.make_graph(nodes, "body", inputs, [value("again", BOOL), value("new", FLOAT)])
     return [
-        helper.make_node("ReduceSumSquare", ["obs"], ["sum"], keepdims=0),
-        helper.make_node("Cast", ["sum"], ["is_moving"], to=TensorProto.BOOL),
+        node("ReduceSumSquare", "obs", "sum", keepdims=0),
+        node("Cast", "sum", "is_moving", to=BOOL),
         helper.make_node("Loop", ["", "is_moving", "sum"], ["same"], body=body),
-        helper.make_node("Sub", ["same", "sum"], ["zero"]),
-        helper.make_node("Add", ["obs", "zero"], ["before"]),
+        node("Sub", "same sum", "zero"),
+        node("Add", "obs zero", "before"),
     ]
 
 
 def memory_bomb():
     """Nodes whose output `before` is `obs`, after 100 GB of numbers unless all `obs` are 0."""
-    count = helper.make_tensor("count", TensorProto.FLOAT, (1,), [25e9])
     return [
-        helper.make_node("Constant", [], ["count"], value=count),
-        helper.make_node("ReduceMax", ["obs"], ["largest"], keepdims=0),
-        helper.make_node("Mul", ["count", "largest"], ["product"]),
-        helper.make_node("Cast", ["product"], ["size"], to=TensorProto.INT64),
-        helper.make_node("ConstantOfShape", ["size"], ["zeros"]),
-        helper.make_node("ReduceSum", ["zeros"], ["sum"], keepdims=0),
-        helper.make_node("Add", ["obs", "sum"], ["before"]),
+        node("Constant", "", "count", value=helper.make_tensor("count", FLOAT, (1,), [25e9])),
+        node("ReduceMax", "obs", "largest", keepdims=0),
+        node("Mul", "count largest", "product"),
+        node("Cast", "product", "size", to=INT64),
+        node("ConstantOfShape", "size", "zeros"),
+        node("ReduceSum", "zeros", "sum", keepdims=0),
+        node("Add", "obs sum", "before"),
     ]
 
 
 def test_first_call_that_does_not_end_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(onnx_policy, "LIMITS", ProcessLimits(seconds=5.0))
-    one = helper.make_tensor("one", TensorProto.FLOAT, (), [1.0])
-    always = [
-        helper.make_node("Constant", [], ["one"], value=one),
-        helper.make_node("Add", ["obs", "one"], ["shifted"]),
-        *endless_loop(),
-    ]
+    one = node("Constant", "", "one", value=helper.make_tensor("one", FLOAT, (), [1.0]))
+    always = [one, node("Add", "obs one", "shifted"), *endless_loop()]
     always[2].input[0] = "shifted"
     path = make_onnx(tmp_path / "always.onnx", nodes=always)
     with pytest.raises(ConfigError, match=r"always\.onnx is not a policy: takes more than 5 s"):
@@ -333,16 +311,6 @@ def test_text_that_is_not_utf8_is_rejected(tmp_path, part):
         OnnxPolicy(path)
 
 
-def test_thread_ends_with_its_call(tmp_path):
-    policy, before = OnnxPolicy(make_onnx(tmp_path / "mine.onnx")), threading.active_count()
-    policy(torch.ones(1, 47))
-    for _ in range(100):
-        if threading.active_count() == before:
-            break
-        time.sleep(0.05)
-    assert threading.active_count() == before
-
-
 def test_policy_with_a_batch_of_one_runs_row_by_row(tmp_path):
     policy = OnnxPolicy(make_onnx(tmp_path / "one.onnx", shape=(1, 47)))
     obs = torch.arange(3.0)[:, None] * torch.ones(47)
@@ -354,10 +322,7 @@ def test_policy_with_a_batch_of_one_runs_row_by_row(tmp_path):
     [
         ({"shape": ("n", 3, 8, 8), "op": "Relu"}, "not a policy: got the inputs .*3, 8, 8"),
         ({"shape": (), "op": "Relu"}, r"got the inputs obs tensor\(float\) \[\]; expected one"),
-        (
-            {"kind": TensorProto.INT64, "op": "Abs"},
-            r"got the outputs tensor\(int64\); expected",
-        ),
+        ({"kind": TensorProto.INT64, "op": "Abs"}, r"got the outputs tensor\(int64\); expected"),
         ({"kind": TensorProto.STRING, "op": "Identity"}, r"got the outputs tensor\(string\)"),
         ({"shape": (5, 47)}, r"got the inputs obs tensor\(float\) \[5, 47\]; expected one"),
         ({"shape": ("n", "k")}, r"got the inputs obs tensor\(float\) \['n', 'k'\]; expected one"),

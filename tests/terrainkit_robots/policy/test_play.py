@@ -38,18 +38,15 @@ def test_play_on_a_plane_shows_demo_commands(make_run, map_file, flat_map):
     fractions = []
     run = make_run(map_file, terrain=Terrain(collision="plane")) if flat_map else make_run()
     result = play(run, EvaluationConfig(seconds=0.8), progress=fractions.append)
-    assert len(fractions) == 40
-    assert fractions[-1] == 1
+    assert (len(fractions), fractions[-1]) == (40, 1)
     assert result.evaluation.metrics.robots == 9
     video = result.video
-    assert video.poses.shape == (20, 9, 19)
-    assert video.fps == 25
+    assert (video.poses.shape, video.fps) == ((20, 9, 19), 25)
     (shot,) = video.shots
     assert (shot.robot, len(shot.captions)) == (4, 20)
     captions = list(dict.fromkeys(shot.captions))
     assert captions[0] == "forward 0.75 m/s"
-    assert captions[1] == "forward 0.75 m/s, turning left 0.75 rad/s"
-    assert len(captions) == 4
+    assert (captions[1], len(captions)) == ("forward 0.75 m/s, turning left 0.75 rad/s", 4)
 
 
 def test_play_arranges_robots_in_a_formation(make_run):
@@ -76,8 +73,7 @@ def test_play_on_a_map_follows_robots_on_each_terrain(make_run, map_file):
     result = play(run, config, robots=2, size=(128, 72))
     assert result.evaluation.metrics.robots == 6  # one per patch
     video = result.video
-    assert video.poses.shape[:2] == (20, 6)
-    assert video.size == (128, 72)
+    assert (video.poses.shape[:2], video.size) == ((20, 6), (128, 72))
     captions = [shot.captions[0] for shot in video.shots]
     assert captions == ["stairs, level 1 of 2", "rough_slope, level 1 of 2"]
     assert [len(shot.captions) for shot in video.shots] == [10, 10]

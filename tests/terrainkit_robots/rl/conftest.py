@@ -33,7 +33,6 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 
 # Test files are not in packages, so shared modules are found by path.
 sys.path.append(str(Path(__file__).parent))
-pytest.register_assert_rewrite("vec_env_contract")
 
 torch.set_num_threads(1)
 

@@ -1,5 +1,3 @@
-"""Handmade states for tests."""
-
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any

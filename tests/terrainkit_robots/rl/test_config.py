@@ -21,20 +21,11 @@ from terrainkit_robots.rl.config import (
     Task,
 )
 
-NESTING = {
-    *("env", "terrain", "init_state", "control", "asset", "commands", "rewards", "domain_rand"),
-    *("normalization", "noise", "sim", "policy", "algorithm", "runner"),
-}
-
 
 def sections(section):
     """Return a config and all its sections."""
     inner = [getattr(section, each.name) for each in dataclasses.fields(section)]
     return [section] + [s for one in inner if isinstance(one, Config) for s in sections(one)]
-
-
-def test_task_has_sections_of_legged_gym():
-    assert {each.name for each in dataclasses.fields(Task)} >= NESTING
 
 
 @pytest.mark.parametrize("section", sections(Task()), ids=lambda s: type(s).__name__)
@@ -60,44 +51,27 @@ def with_value(section, name, value):
         ("env.episode_length_s", 0, "expected a number > 0 and <= 1000000"),
         ("env.num_threads", -1, "num_threads: got -1; expected an integer from 0 to 4096"),
         ("terrain.collision", "mesh", "expected one of: auto, hfield, boxes, plane"),
-        ("terrain.curriculum", True, "curriculum: got True; expected one of: levels, uniform, "),
         ("terrain.curriculum", "level", "expected one of: .*, or none; did you mean 'levels'?"),
         ("terrain.measured_points_x", [], r"measured_points_x: got \[\]; expected a non-empty"),
         ("init_state.reset_range", (0.5, -1), "reset_range: got .*each a number >= 0"),
-        ("init_state.reset_range", (1.5, 0.5), "the lower one first, or none"),
-        ("init_state.position", -0.1, "position: got -0.1; expected a number >= 0"),
         ("control.decimation", 0, "decimation: got 0; expected an integer from 1 to 1000"),
         ("control.action_scale", 0.0, "action_scale: got 0.0; expected a number > 0, or none"),
         ("control.control_type", "X", "expected one of: P, V, T"),
         ("commands.lin_vel_x", (1, -1), "lin_vel_x: got .*, the lower one first"),
         ("commands.lin_vel_x", (math.nan, 1), "lin_vel_x: got .nan, 1.; expected 2 values"),
         ("commands.standing", 1.5, "standing: got 1.5; expected a number from 0 to 1"),
-        (
-            "noise.noise_level",
-            1e300,
-            "noise_level: got 1e.300, which is beyond 1e.30",
-        ),
-        (
-            "normalization.obs_scales.lin_vel",
-            1e38,
-            "lin_vel: got 1e.38, which is beyond 1e.30",
-        ),
-        ("commands.resampling_time", 0, "expected a number > 0"),
+        ("noise.noise_level", 1e300, "noise_level: got 1e.300, which is beyond 1e.30"),
+        ("normalization.obs_scales.lin_vel", 1e38, "lin_vel: got 1e.38, which is beyond 1e.30"),
         ("domain_rand.friction", (-0.1, 1), "friction: got .*each a number >= 0"),
         ("domain_rand.com_shift", -1, "com_shift: got -1; expected a number >= 0"),
-        ("domain_rand.com_shift", None, "com_shift: got None; expected a number"),
         ("domain_rand.action_delay", (0.02, 0), "action_delay: got .*, the lower one first"),
-        ("domain_rand.action_delay", (-0.01, 0), "action_delay: got .*each a number >= 0"),
         ("observations.history_length", 0, "got 0; expected an integer from 1 to 100"),
-        ("rewards.tracking_sigma", 0, "tracking_sigma: got 0; expected a number > 0"),
         ("rewards.tracking_lin_vel", math.inf, "tracking_lin_vel: got inf; expected a number"),
         ("termination.tilt", 4, "tilt: got 4; expected a number > 0 and <= 3.14159"),
         ("sim.dt", 1, "dt: got 1; expected a number from 1e-06 to 0.1"),
-        ("policy.actor_hidden_dims", (), r"actor_hidden_dims: got \[\]"),
         ("policy.critic_hidden_dims", (128, 10**12), "critic_hidden_dims: .* from 1 to 65536"),
         ("policy.activation", "relu6", "got 'relu6'; expected one of: elu, .*mean 'relu'"),
         ("algorithm.gamma", 1.01, "gamma: got 1.01; expected a number from 0 to 1"),
-        ("runner.seed", -1, "seed: got -1; expected an integer from 0"),
         ("rewards", Sim(), r"rewards: got Sim; expected a table \(Rewards\)"),
     ],
 )
@@ -182,19 +156,9 @@ def test_toml_round_trip_of_each_value():
         assert tried or isinstance(value, str), name
 
 
-@pytest.mark.parametrize("kind", [Task, RoverTask])
-def test_toml_round_trip_of_a_task(kind):
-    assert kind.from_toml(kind().to_toml()) == kind.from_toml("") == kind()
-
-
 def test_toml_has_every_value_with_its_doc():
     text = Task().to_toml()
-    table = tomllib.loads(text)
-    assert list(table) == [each.name for each in dataclasses.fields(Task)]
-    for name, _ in flatten(Task()):
-        inner = table
-        for part in name.split("."):
-            inner = inner[part]
+    assert list(tomllib.loads(text)) == [each.name for each in dataclasses.fields(Task)]
     assert "tracking_lin_vel = 1.5  # Tracking of the linear velocity command.\n" in text
     assert "\n# Scales of the observations.\n[normalization.obs_scales]\n" in text
 
@@ -223,12 +187,8 @@ def test_subclass_adds_keys():
         ("[[rewards]]\nx = 1", r"rewards: got \[.*; expected a table"),
         ("tracking_lin_vel = 1", r"no key 'tracking_lin_vel'; did you mean 'rewards\.track"),
         ("[reward]\nx = 1", r"no key 'reward'; did you mean 'rewards'\? It has: env, terrain"),
-        ("[rewards]\ntracking_lin_vel.x = 1", r"rewards\.tracking_lin_vel: got a table; exp"),
         ("[rewards]\ntracking_sigma = 0", r"rewards\.tracking_sigma: got 0; expected a number > 0"),
-        ("[normalization.obs_scales]\nlin_vel = -1", r"normalization\.obs_scales\.lin_vel: got -1"),
         ("[algorithm]\nnum_mini_batches = 1000000", r"^algorithm\.num_mini_batches: got 1000000"),
-        ("[domain_rand]\ncom_shift = 'none'", r"domain_rand\.com_shift: got 'none'; expected a nu"),
-        ("[rewards]\n'a b' = 1", "rewards has no key 'a b'; it has"),
         ("a.b" * 9999, "not a TOML file"),
         (f"[rewards]\n{'a' * 9999} = 1", "rewards has no key 'aaaa"),
     ],
@@ -238,8 +198,3 @@ def test_error_is_one_short_line(text, told):
         Task.from_toml(text, Task())
     assert "\n" not in str(error.value)
     assert len(str(error.value)) <= 500
-
-
-def test_path_with_a_null_byte_is_rejected():
-    with pytest.raises(ConfigError, match="cannot read "):
-        Task.load("a\0b")

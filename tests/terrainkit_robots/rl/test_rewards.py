@@ -1,7 +1,4 @@
-"""Reward terms: values computed by hand, and properties of all terms."""
-
-import re
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +9,7 @@ from made_states import FLAGS, made_state, shapes
 from terrainkit.errors import PluginError
 from terrainkit_robots.rl import rewards
 from terrainkit_robots.rl.config import Env, Rewards
-from terrainkit_robots.rl.rewards import REWARDS, STANDING_TRACKING, active_rewards, reward
+from terrainkit_robots.rl.rewards import REWARDS, active_rewards
 from terrainkit_robots.rl.state import State
 
 _SHAPES = shapes(joints=2, feet=2, penalized=3, points=0)
@@ -81,12 +78,12 @@ _BY_HAND = [
         commands=[[9, 9, -1], [0, 0, 1], [1, 0, 0]],
         mean_vel=[[8, 8, -1], [0, 0, 0], [0, 0, 0]],
     ),
-    # Half of the command; against it; (1 + 0.5) / 2; half of the yaw rate; nothing to do.
+    # Half of the command; against it; (1 + 0.5) / 2; half of the yaw rate; standing.
     case(
         "progress",
-        [0.5, -1, 0.75, 0.5, 0],
-        commands=[[0.5, 0, 0], [0, -0.5, 0], [1, 0, 1], [0, 0, 0.5], [0, 0, 0]],
-        mean_vel=[[0.25, 9, 9], [0, 3, 9], [2, 0, 0.5], [9, 9, 0.25], [9, 9, 9]],
+        [0.5, -1, 0.75, 0.5, 0, 0],
+        commands=[[0.5, 0, 0], [0, -0.5, 0], [1, 0, 1], [0, 0, 0.5], [0, 0, 0], [1, 0, 1]],
+        mean_vel=[[0.25, 9, 9], [0, 3, 9], [2, 0, 0.5], [9, 9, 0.25], [9, 9, 9], [0, 0, 0]],
     ),
     # A squared sine of 0.01 is worth exp(-1).
     case("upright", [1, 0.36788], projected_gravity=[[0, 0, -1], [0.06, 0.08, -0.995]]),
@@ -97,7 +94,7 @@ _BY_HAND = [
     case("torques", [25], torques=[[3, -4]]),
     case("dof_acc", [250], dof_acc=[[10, -20]]),
     case("action_rate", [5], actions=[[1, 2]], last_actions=[[0, -1]]),
-    case("collision", [0, 2], penalized_force=[[0, 0.05, 0], [0.2, 0, 300]]),
+    case("collision", [0, 2], penalized_force=[[0, 0.099, 0], [0.101, 0, 300]]),
     case("termination", [0, 1], fallen=[False, True]),
     # Soft limits of -1 and 1; the second joint has none.
     case("dof_pos_limits", [0, 0.25, 0.5], dof_pos=[[0.9, 100], [1.25, -100], [-1.5, 0]]),
@@ -116,18 +113,12 @@ _BY_HAND = [
         foot_height=[[0.09, 9], [0.045, 0.09], [0, 9], [9, 9]],
     ),
     case("foot_slip", [12.5], foot_vel=[[[3, 4, 9]] * 2], foot_force=[[[0, 0, 50], [0, 0, 0.5]]]),
-    case(
-        "stand_still",
-        [0.375, 0, 0],
-        commands=[[0, 0, 0], [0, 0, 0.3], [0, 0, 0]],
-        dof_pos=[*_MOVED[:2], [0.5, -0.5]],
-    ),
     # A small yaw rate counts as standing.
     case(
         "stand_still",
-        [0.375, 0, 0, 0],
-        commands=[[0, 0, 0.09], [0, 0, -0.11], [0.05, 0, 0], [0, -0.05, 0.01]],
-        dof_pos=_MOVED,
+        [0, 0.375, 0, 0, 0],
+        commands=[[0, 0, 0], [0, 0, 0.099], [0, 0, -0.101], [0.05, 0, 0], [0, -0.05, 0.01]],
+        dof_pos=[[0.5, -0.5], *_MOVED],
     ),
 ]
 
@@ -137,12 +128,6 @@ def test_reward_by_hand(robot, name, arrays, expected):
     given = state(len(expected), **arrays)
     found = paid(name, robot, given, tracking_sigma=0.25)
     assert found == pytest.approx(expected, abs=1e-5)
-
-
-def test_foot_swing_height_is_the_tasks(robot):
-    arrays = next(arrays for name, arrays, _ in _BY_HAND if name == "foot_swing_height")
-    found = paid("foot_swing_height", robot, state(4, **arrays), swing_height=0.09)
-    assert found == pytest.approx([1 / 2, 1 / 2, 1, 0], abs=1e-6)
 
 
 def test_stand_still_ignores_wheels(robot):
@@ -206,22 +191,6 @@ class TestEveryReward:
             assert values.min() >= 0
             assert 0.5 < values.max() <= 1
 
-    def test_docstring_has_the_unit(self, name):
-        """The unit is in brackets at the end of the docstring, unless there is none."""
-        docstring = str(REWARDS[name].__doc__)
-        assert docstring.startswith(("Reward ", "Penalize ", "Count "))
-        assert docstring.endswith(".")
-        pure = {*_BOUNDED, "action_rate", "collision", "termination", "foot_swing_height"}
-        assert bool(re.search(r" \[[^\]]+\]\.$", docstring)) == (name not in pure)
-
-
-@pytest.mark.parametrize("command", [(1, 0, 0), (0.2, 0.1, 0), (0, 0, -0.2), (0.4, 0.3, 0.5)])
-def test_standing_earns_a_quarter_of_the_tracking(robot, command):
-    given = state(commands=[command])
-    for name in ("tracking_lin_vel", "tracking_ang_vel"):
-        assert paid(name, robot, given) == pytest.approx([STANDING_TRACKING])
-    assert paid("progress", robot, given) == [0]
-
 
 def test_every_scale_has_a_reward():
     settings = {"tracking_sigma", "swing_height"}
@@ -230,6 +199,7 @@ def test_every_scale_has_a_reward():
 
 def test_active_rewards_have_nonzero_scales():
     nothing = dict.fromkeys(REWARDS, 0.0)
+    assert active_rewards(SimpleNamespace(), 1.0, 1.0) == {}
     assert active_rewards(Rewards(**nothing), 1.0, 1.0) == {}
     only = active_rewards(Rewards(**(nothing | {"collision": -0.5})), 3.0, 2.0)
     assert only == {"collision": (REWARDS["collision"], -0.5)}
@@ -239,13 +209,9 @@ def test_scales_are_in_units_of_the_robot():
     # 2 kg on legs of 9.81 / 4 m: the unit of time is 0.5 s.
     length = 9.81 / 4
     scales = {k: v for k, (_, v) in active_rewards(Rewards(), 2.0, length).items()}
-    assert scales["collision"] == -1
-    assert scales["ang_vel_xy"] == pytest.approx(-1 / 2**2)
+    assert (scales["collision"], scales["ang_vel_xy"]) == (-1, pytest.approx(-1 / 2**2))
     assert scales["torques"] == pytest.approx(-1 / (2 * 9.81 * length) ** 2)
     assert scales["lin_vel_z"] == pytest.approx(-9 / (length / 0.5) ** 2)
-
-
-# In the environment.
 
 
 _NONE = dict.fromkeys(REWARDS, 0.0)
@@ -260,16 +226,6 @@ def test_reward_is_sum_of_scaled_terms(random_env):
     touching = (env.state.penalized_force > 0.1).sum(axis=1)
     np.testing.assert_allclose(rewards, 0.02 * (-3 * touching - 0.5 * 0.01), rtol=1e-5)
     assert (rewards < 0).all()
-
-
-def test_zero_scale_is_not_computed(random_env, monkeypatch):
-    def never(*_):
-        raise AssertionError
-
-    monkeypatch.setitem(REWARDS, "torques", never)
-    env = random_env(rewards=Rewards(torques=0.0))
-    env.step(_REST)
-    assert "torques" not in env.episode_sums
 
 
 @pytest.fixture
@@ -310,48 +266,13 @@ def test_episode_sums_of_short_episode(standing):
     assert sums.tolist() == pytest.approx([0, 0.12, 0.12, 0.12])
 
 
-@dataclass(frozen=True, kw_only=True)
-class MyRewards(Rewards):
-    """Rewards with a user's own term."""
-
-    headway: float = 0.0
-    """Moving along x."""
-
-
-@pytest.fixture
-def own():
-    @reward
-    def headway(state, robot, settings):  # noqa: ARG001
-        """Reward the position along x [m]."""
-        return state.base_pos[:, 0]
-
-    yield
-    del REWARDS["headway"]
-
-
-@pytest.mark.usefixtures("own")
-class TestUserReward:
-    def test_user_reward_is_added(self, random_env):
-        env = random_env(rewards=MyRewards(**(_NONE | {"headway": 10.0})))
-        _, rewards, *_ = env.step(_REST)
-        np.testing.assert_allclose(rewards, 10 * 0.02 * env.state.base_pos[:, 0], rtol=1e-5)
-        assert np.ptp(rewards.numpy()) > 0
-        assert list(env.episode_sums) == ["headway"]
-
-    @pytest.mark.parametrize("rewards", [Rewards(), MyRewards()])
-    def test_user_reward_without_scale_is_ignored(self, random_env, rewards):
-        assert "headway" not in random_env(rewards=rewards).reward_terms
-
-
 @pytest.mark.parametrize(
     ("result", "told"),
     [
         (ValueError("two\nlines"), "ValueError: two lines"),
         (SystemExit(0), "SystemExit: 0"),
         (None, "TypeError: Cannot cast .*"),
-        (1.0, r"got shape \(\); expected \(3,\)"),
         (np.zeros((3, 1)), r"got shape \(3, 1\); expected \(3,\)"),
-        (np.zeros(3, complex), "TypeError: Cannot cast .*"),
     ],
 )
 def test_failing_reward_of_another_package_is_named(monkeypatch, robot, result, told):

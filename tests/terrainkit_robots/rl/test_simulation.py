@@ -6,13 +6,12 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-import torch
 
 from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit_robots.rl.config import Algorithm, DomainRand, Env, Runner, Task
 from terrainkit_robots.rl.scene import build_scene
 from terrainkit_robots.rl.simulation import Simulation, check_env_memory
-from terrainkit_robots.rl.terrain import MapGround, Plane
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
@@ -39,28 +38,6 @@ class TestSimulation:
         np.testing.assert_array_equal(sim.qpos[1], data.qpos)
         np.testing.assert_array_equal(sim.qvel[1], data.qvel)
 
-    def test_sensors_match_the_current_state(self, sim):
-        sim.step(4)
-        data = mujoco.MjData(sim.scene.model)
-        data.qpos[:], data.qvel[:] = sim.qpos[2], sim.qvel[2]
-        mujoco.mj_forward(sim.scene.model, data)
-        for name in ("foot_position", "foot_velocity"):
-            where = sim.scene.sensors[name]
-            found = sim.sensor(name)[2].ravel()
-            np.testing.assert_allclose(found, data.sensordata[where], atol=1e-5)
-
-    def test_simulations_are_independent(self, sim):
-        sim.step(10)
-        heights = sim.qpos[:, 2].copy()
-        assert heights[0] < heights[1] < heights[2]
-
-    def test_sensor_returns_copies(self, sim):
-        before = sim.sensor("foot_position")
-        kept = before.copy()
-        sim.step(10)
-        np.testing.assert_array_equal(before, kept)
-        assert not np.allclose(sim.sensor("foot_position"), kept)
-
     def test_reset_of_some_simulations(self, sim):
         sim.step(10)
         untouched = sim.qpos[[0, 2]].copy()
@@ -76,57 +53,14 @@ class TestSimulation:
 
 class TestUnstable:
     @pytest.mark.parametrize(
-        ("array", "value"),
-        [("ctrl", np.nan)]
-        + [(array, value) for array in ("qvel", "qpos") for value in (np.nan, np.inf, 1e12, -1e12)],
+        ("array", "value"), [("ctrl", np.nan), ("qpos", np.inf), ("qvel", 1e12), ("qvel", -1e12)]
     )
-    def test_bad_values_are_reported(self, sim, array, value):
+    def test_bad_values_are_reported(self, sim, tmp_path, monkeypatch, array, value):
+        monkeypatch.chdir(tmp_path)
         getattr(sim, array)[1, -1] = value
         assert sim.step(4).tolist() == [False, True, False]
         assert np.isfinite(sim.qpos).all()
-
-    @pytest.mark.parametrize("reset", [False, True])
-    def test_reported_every_time(self, sim, reset):
-        for _ in range(3):
-            sim.qvel[1, 7] = np.nan
-            assert sim.step(4).tolist() == [False, True, False]
-            if reset:  # the warning counters as well
-                start = sim.scene.default_qpos[None]
-                sim.reset(np.array([1]), start, np.zeros((1, sim.scene.model.nv)))
-            else:
-                assert not sim.step(4).any()
-
-    def test_other_simulations_are_unaffected(self, cart, nominal_task):
-        def run(bad):
-            scene = build_scene(cart, Plane(), nominal_task())
-            sim = Simulation(scene, 3, 1)
-            sim.qpos[:] = scene.default_qpos + 0.3
-            if bad:
-                sim.qvel[1, 7] = np.nan
-            sim.step(8)
-            return sim.qpos[[0, 2]].copy()
-
-        np.testing.assert_array_equal(run(bad=True), run(bad=False))
-
-    def test_no_mujoco_log_file(self, sim, tmp_path, monkeypatch):
-        monkeypatch.chdir(tmp_path)
-        sim.qvel[1, 7] = np.nan
-        sim.step(4)
-        assert list(tmp_path.iterdir()) == []
-
-
-def test_num_threads_does_not_change_results(random_env, mixed_map):
-    def run(threads):
-        env = random_env(9, MapGround(mixed_map), num_threads=threads)
-        made = torch.Generator().manual_seed(0)
-        return [
-            (observed["privileged"].numpy().tobytes(), rewards.numpy().tobytes())
-            for observed, rewards, _, _ in (
-                env.step(torch.randn(9, 12, generator=made)) for _ in range(15)
-            )
-        ]
-
-    assert run(1) == run(2)
+        assert list(tmp_path.iterdir()) == []  # no log of MuJoCo
 
 
 class TestApplyParamsToEnv:
@@ -143,6 +77,8 @@ class TestApplyParamsToEnv:
             model = varied.sim.batch.get_model(k)
             mass = nominal.body_mass[base] + found.added_mass[k, 0]
             assert model.body_mass[base] == pytest.approx(mass)
+            subtree = nominal.body_subtreemass[base] + found.added_mass[k, 0]
+            assert model.body_subtreemass[base] == pytest.approx(subtree)  # a derived constant
             inertia = nominal.body_inertia[base] * mass / nominal.body_mass[base]
             np.testing.assert_allclose(model.body_inertia[base], inertia)
             center = nominal.body_ipos[base] + found.com_shift[k]
@@ -160,13 +96,6 @@ class TestApplyParamsToEnv:
             np.testing.assert_allclose(model.actuator_gainprm[wheel, 0], kd, rtol=1e-6)
             np.testing.assert_allclose(model.actuator_biasprm[wheel, :3], [0, 0, -kd], rtol=1e-6)
 
-    def test_derived_constants_are_updated(self, varied):
-        base = varied.scene.base
-        nominal = varied.scene.model.body_subtreemass[base]
-        for k, (added,) in enumerate(varied.params.added_mass):
-            model = varied.sim.batch.get_model(k)
-            assert model.body_subtreemass[base] == pytest.approx(nominal + added)
-
     def test_negative_base_mass_is_rejected(self, nominal_env, cart, tmp_path, monkeypatch):
         # The base weighs 4 kg.
         monkeypatch.chdir(tmp_path)
@@ -174,16 +103,6 @@ class TestApplyParamsToEnv:
             nominal_env(2, robot=cart, domain_rand=DomainRand(added_mass=(-6.0, -5.0)))
         assert "\n" not in str(caught.value)
         assert list(tmp_path.iterdir()) == []
-
-    def test_added_mass_changes_contact_forces(self, nominal_env, no_randomization):
-        masses = replace(no_randomization, added_mass=(-0.13, 0.2))
-        env = nominal_env(3, domain_rand=masses)
-        for _ in range(60):
-            env.step(torch.zeros(3, 12))
-        robot = env.scene.model.body_subtreemass[env.scene.base]
-        weight = (robot + env.params.added_mass[:, 0]) * 9.81
-        np.testing.assert_allclose(env.state.foot_force.sum(axis=1)[:, 2], weight, rtol=0.02)
-        assert np.ptp(weight) > 1
 
 
 MEASURED = """

@@ -1,7 +1,6 @@
 import dataclasses
 import importlib.metadata
 import re
-import subprocess
 import sys
 import tomllib
 from dataclasses import replace
@@ -65,13 +64,10 @@ def test_register_task_keeps_the_folder(tmp_path):
     assert get_task("quadruped").task == MINE
 
 
-@pytest.mark.parametrize("name", ["", "a/b", "/a", ".", "..", 3])
-def test_register_task_rejects_paths(tmp_path, name):
-    with pytest.raises(ConfigError, match="expected a name without slashes"):
-        register_task(name, tmp_path)
-
-
-def test_register_task_rejects_classes(tmp_path):
+def test_register_task_rejects_paths_and_classes(tmp_path):
+    for name in ("", "a/b", "..", 3):
+        with pytest.raises(ConfigError, match="expected a name without slashes"):
+            register_task(name, tmp_path)
     with pytest.raises(ConfigError, match=r"task rover: got <class .*; expected an instance of"):
         register_task("rover", tmp_path, Task)
 
@@ -97,15 +93,11 @@ def test_unknown_task_lists_known_ones(tmp_path):
     (tmp_path / "robot.toml").write_text("x = 1")
     with pytest.raises(ConfigError, match=r"robot\.toml: format_version: got nothing"):
         get_task(tmp_path)
-
-
-@pytest.mark.parametrize("name", ["", "a\0b", "a" * 5000])
-def test_odd_name_is_one_short_line(tmp_path, monkeypatch, name):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError) as error:
-        get_task(name)
-    assert "\n" not in str(error.value)
-    assert len(str(error.value)) < 400
+    for odd in ("", "a\0b", "a" * 5000):
+        with pytest.raises(ConfigError) as error:
+            get_task(odd)
+        assert "\n" not in str(error.value)
+        assert len(str(error.value)) < 400
 
 
 def test_entry_point_is_imported_on_use(tmp_path, monkeypatch, plugin):
@@ -200,12 +192,3 @@ def test_guide_is_short_and_current():
         assert option in options or option == "--rewards.trot"
     for command in set(re.findall(r"terrainkit ([a-z]+(?:-[a-z]+)*) ", text)):
         assert command in COMMANDS
-
-
-def test_torch_and_mujoco_are_not_imported():
-    code = (
-        "import sys; from terrainkit_robots.rl import tasks; tasks.get_task('quadruped'); "
-        "assert tasks.get_task('biped').task.to_toml(); "
-        "assert not {'torch', 'mujoco', 'rsl_rl'} & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)

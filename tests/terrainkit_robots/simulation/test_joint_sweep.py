@@ -2,9 +2,6 @@ import math
 
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.joint_sweep import joint_sweep
 from terrainkit_robots.simulation.sim_model import make_sim_model
 
@@ -45,10 +42,14 @@ CRANE = """
 
 
 @pytest.fixture
-def crane(tmp_path):
-    path = tmp_path / "robot.urdf"
-    path.write_text(CRANE)
-    return {result.joint: result for result in joint_sweep(make_sim_model(Facts(load_robot(path))))}
+def sweep(robot):
+    """Return a function that sweeps the joints of a robot in a text, by name."""
+    return lambda text: {each.joint: each for each in joint_sweep(make_sim_model(robot(text)))}
+
+
+@pytest.fixture
+def crane(sweep):
+    return sweep(CRANE)
 
 
 def test_joint_sweep_stops_at_collision(crane):
@@ -63,16 +64,13 @@ def test_joint_sweep_stops_at_collision(crane):
 
 def test_joint_sweep_measures_gravity_load(crane):
     hook = crane["hook_joint"]
-    assert hook.load == pytest.approx(0.5 * 9.81 * 0.2)
-    assert hook.max_load == pytest.approx(0.5 * 9.81 * 0.2)
-    assert hook.effort == 10
-    assert hook.share == pytest.approx(1)
+    load = pytest.approx(0.5 * 9.81 * 0.2)
+    assert (hook.load, hook.max_load, hook.effort, hook.share) == (load, load, 10, 1)
     assert crane["swing"].max_load == pytest.approx(0, abs=1e-9)
 
 
-def test_joint_sweep_follows_actuator_order():
-    facts = Facts(load_robot(bundled.urdf_path("biped")))
-    sim = make_sim_model(facts)
+def test_joint_sweep_follows_actuator_order(bundled):
+    sim = make_sim_model(bundled("biped.urdf"))
     results = joint_sweep(sim)
     assert tuple(result.joint for result in results) == sim.actuated
     assert results == joint_sweep(sim)
@@ -81,26 +79,19 @@ def test_joint_sweep_follows_actuator_order():
         assert result.load < result.effort
 
 
-def test_joint_sweep_is_symmetric():
-    results = {
-        r.joint: r
-        for r in joint_sweep(make_sim_model(Facts(load_robot(bundled.urdf_path("quadruped")))))
-    }
+def test_joint_sweep_is_symmetric(bundled):
+    results = {r.joint: r for r in joint_sweep(make_sim_model(bundled("quadruped.urdf")))}
     left, right = results["FL_hip_joint"], results["FR_hip_joint"]
     assert left.reached[0] == pytest.approx(-right.reached[1], abs=1e-9)
     assert left.share < 0.9  # the feet meet under the trunk
     assert set(left.blocked[0]) == {"FL_foot", "FR_foot"}
 
 
-def test_joint_sweep_moves_mimic_joints(tmp_path):
+def test_joint_sweep_moves_mimic_joints(sweep):
     text = CRANE.replace(
         '<parent link="boom"/><child link="hook"/>',
         '<mimic joint="swing" multiplier="0.5"/><parent link="boom"/><child link="hook"/>',
     )
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    results = {
-        result.joint: result for result in joint_sweep(make_sim_model(Facts(load_robot(path))))
-    }
+    results = sweep(text)
     assert set(results) == {"lift", "swing"}
     assert results["swing"].share < 1

@@ -2,11 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit import MapConfig
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility import assess_patch
-from terrainkit.map.patch import build_patch
-from terrainkit.terrain.presets import get_preset
 from terrainkit_robots.description import bundled
 from terrainkit_robots.simulation.robot_limits import derive_limits
 
@@ -36,15 +32,3 @@ def test_overrides_replace_derived_limits():
     assert (derived.limits.gap, derived.reasons["gap"]) == (0.25, "given")
     with pytest.raises(ConfigError, match=r"step_up: got -1\.0"):
         derive_limits(FOLDER / "biped", {"step_up": -1.0})
-
-
-def test_quadruped_can_cross_the_easiest_parkour_courses():
-    """The patches hold one obstacle, so that the test is fast."""
-    limits, sub_terrains = derive_limits(FOLDER / "quadruped").limits, get_preset("parkour_course")
-    config = MapConfig(
-        rows=1, cols=1, patch_size=(5.0, 2.4), border=0.0, terrains=(sub_terrains[0],)
-    )
-    for sub_terrain in sub_terrains[:-1]:
-        patch = build_patch(config, sub_terrain, 0.0, 0, 0)
-        assert len(patch.goals) == 1
-        assert assess_patch(patch, limits, config.wall_threshold).demand < 1, sub_terrain.name

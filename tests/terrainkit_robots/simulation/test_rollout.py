@@ -2,9 +2,6 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.rollout import Rollout
@@ -14,25 +11,28 @@ INERTIAL = """<inertial><mass value="1"/>
   <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>"""
 
 
-def quadruped():
-    return Facts(load_robot(bundled.urdf_path("quadruped")))
+@pytest.fixture
+def facts(bundled):
+    return bundled("quadruped.urdf")
 
 
-def chain(folder, count, shape=""):
-    """Return the simulation model of a chain of hinges, all at the same point."""
+@pytest.fixture
+def sim(facts):
+    return make_sim_model(facts)
+
+
+def chain(count, shape=""):
+    """Return the URDF of a chain of hinges, all at the same point."""
     links = [f'<link name="l{k}">{INERTIAL}{shape}</link>' for k in range(count + 1)]
     joints = [
         f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>'
         '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
         for k in range(count)
     ]
-    path = folder / "robot.urdf"
-    path.write_text(f'<robot name="r">{"".join(links + joints)}</robot>')
-    return make_sim_model(Facts(load_robot(path)))
+    return f'<robot name="r">{"".join(links + joints)}</robot>'
 
 
-def test_reset_places_robot_above_floor():
-    sim = make_sim_model(quadruped())
+def test_reset_places_robot_above_floor(sim):
     with quiet_mujoco():
         rollout = Rollout(sim)
         rollout.reset(sim.standing_qpos, clearance=0.1)
@@ -41,9 +41,8 @@ def test_reset_places_robot_above_floor():
         np.testing.assert_array_equal(rollout.data.qpos[3:], sim.standing_qpos[3:])
 
 
-def test_rollout_applies_gains():
-    facts = quadruped()
-    sim, gains = make_sim_model(facts), suggest_gains(facts)
+def test_rollout_applies_gains(facts, sim):
+    gains = suggest_gains(facts)
     with quiet_mujoco():
         rollout = Rollout(sim, gains)
         rollout.reset(sim.standing_qpos, clearance=1.0)
@@ -59,8 +58,7 @@ def test_rollout_applies_gains():
     assert rollout.model.dof_armature[dof] == gains["FL_calf_joint"].armature
 
 
-def test_rollout_without_self_collision():
-    sim = make_sim_model(quadruped())
+def test_rollout_without_self_collision(sim):
     crossed = sim.standing_qpos.copy()
     crossed[[7, 10]] = -1.0, 1.0  # both front legs inward
     with quiet_mujoco():
@@ -72,19 +70,7 @@ def test_rollout_without_self_collision():
             assert rollout.data.ncon == 4  # the feet on the floor
 
 
-def test_rollout_with_locked_joints():
-    sim = make_sim_model(quadruped())
-    with quiet_mujoco():
-        rollout = Rollout(sim)
-        rollout.lock_joints()
-        rollout.reset(sim.standing_qpos, clearance=0.0)
-        for _ in rollout.steps(1.0):
-            pass
-    np.testing.assert_allclose(rollout.data.qpos[7:], sim.standing_qpos[7:], atol=1e-6)
-
-
-def test_rollout_detects_divergence():
-    sim = make_sim_model(quadruped())
+def test_rollout_detects_divergence(sim):
     with quiet_mujoco():
         rollout = Rollout(sim)
         rollout.reset(sim.standing_qpos, clearance=0.0)
@@ -95,21 +81,21 @@ def test_rollout_detects_divergence():
         assert rollout.diverged
 
 
-def test_rollout_rejects_many_joints(tmp_path):
+def test_rollout_rejects_many_joints(robot):
+    Rollout(make_sim_model(robot(chain(100))))
     with pytest.raises(CannotCheckError, match="degrees of freedom: got 101"):
-        Rollout(chain(tmp_path, 101))
+        Rollout(make_sim_model(robot(chain(101))))
 
 
-def test_rollout_rejects_many_contacts(tmp_path):
+def test_rollout_rejects_many_contacts(robot):
     ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
-    sim = chain(tmp_path, 40, ball)
+    sim = make_sim_model(robot(chain(40, ball)))
     with quiet_mujoco(), pytest.raises(CannotCheckError, match="contacts: got"):
         Rollout(sim).reset(sim.standing_qpos)
 
 
-def test_inertia_of_the_contact_solver_includes_the_armature_of_the_gains():
-    facts = quadruped()
-    sim, gains = make_sim_model(facts), suggest_gains(facts)
+def test_inertia_of_the_contact_solver_includes_the_armature_of_the_gains(facts, sim):
+    gains = suggest_gains(facts)
     with quiet_mujoco():
         added = Rollout(sim, gains).model.dof_M0 - Rollout(sim).model.dof_M0
     for name in sim.actuated:
@@ -119,8 +105,7 @@ def test_inertia_of_the_contact_solver_includes_the_armature_of_the_gains():
 
 
 @pytest.mark.parametrize("self_collision", [False, True])
-def test_disabled_floor_has_no_contacts(self_collision):
-    sim = make_sim_model(quadruped())
+def test_disabled_floor_has_no_contacts(sim, self_collision):
     with quiet_mujoco():
         rollout = Rollout(sim, self_collision=self_collision)
         rollout.reset(sim.standing_qpos, clearance=-0.01)

@@ -3,49 +3,23 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
+from tests.robots import BUNDLED, PENDULUM
 
-ROBOTS = [(name, suffix) for name in bundled.robot_names() for suffix in (".urdf", ".xml")]
 BASES = {"quadruped": "base", "biped": "pelvis"}
 
-ARM = """
-<robot name="arm">
-  <link name="pole"/>
-  <link name="{name}">
-    <inertial><origin xyz="0.1 0 0"/><mass value="1"/>
-      <inertia ixx="{ixx}" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <joint name="shoulder" type="revolute">
-    <parent link="pole"/><child link="{name}"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" effort="{effort}" velocity="10"/>
-  </joint>
-</robot>
-"""
 
-
-@pytest.fixture(params=ROBOTS, ids=lambda robot: "".join(robot))
-def facts(request):
-    name, suffix = request.param
-    return Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix)))
-
-
-@pytest.fixture
-def arm(tmp_path):
-    def write(name="arm", ixx="0.01", effort="5"):
-        path = tmp_path / "robot.urdf"
-        path.write_text(ARM.format(name=name, ixx=ixx, effort=effort))
-        return Facts(load_robot(path))
-
-    return write
+@pytest.fixture(params=BUNDLED)
+def facts(request, bundled):
+    return bundled(request.param)
 
 
 def test_sim_model_has_names_of_robot(facts):
     sim = make_sim_model(facts)
-    assert sim.floating
+    assert make_sim_model(facts) is sim
+    again = SimModel.from_mujoco(sim.model, base=sim.base)
+    assert (again.joints, again.actuated, again.floating) == (sim.joints, sim.actuated, True)
     assert sim.base == BASES[facts.model.name]
     assert sim.actuated == tuple(joint.name for joint in facts.actuated)
     assert set(sim.joints) == {joint.name for joint in facts.joints if joint.moves}
@@ -58,6 +32,7 @@ def test_sim_model_has_mass_of_robot(facts):
     model = make_sim_model(facts).model
     assert model.body_subtreemass[0] == pytest.approx(facts.total_mass)
     assert model.opt.timestep == TIME_STEP
+    assert ((model.geom_contype != 0) | (model.geom_conaffinity != 0)).all()  # of collisions only
 
 
 def test_sim_model_stands_on_the_floor(facts):
@@ -86,20 +61,6 @@ def test_sim_model_has_effort_limits(facts):
         assert actuator.forcerange[1] == pytest.approx(joint.limit.effort)
 
 
-def test_sim_model_has_only_collision_shapes(facts):
-    model = make_sim_model(facts).model
-    assert ((model.geom_contype != 0) | (model.geom_conaffinity != 0)).all()
-
-
-def test_sim_model_is_cached(facts):
-    assert make_sim_model(facts) is make_sim_model(facts)
-    again = SimModel.from_mujoco(make_sim_model(facts).model, base=make_sim_model(facts).base)
-    assert (again.joints, again.actuated) == (
-        make_sim_model(facts).joints,
-        make_sim_model(facts).actuated,
-    )
-
-
 def test_qpos_at_keeps_other_positions(facts):
     sim = make_sim_model(facts)
     first, *others = sim.joints
@@ -110,17 +71,17 @@ def test_qpos_at_keeps_other_positions(facts):
     assert len(others) == len(moved) - 8
 
 
-def test_sim_model_with_fixed_base_has_no_floor(arm):
-    sim = make_sim_model(arm())
+def test_sim_model_with_fixed_base_has_no_floor(robot):
+    sim = make_sim_model(robot(PENDULUM))
     assert not sim.floating
-    assert sim.model.ngeom == 0
-    assert len(sim.standing_qpos) == 1
+    assert (sim.model.ngeom, len(sim.standing_qpos)) == (0, 1)
 
 
-@pytest.mark.parametrize("name", ["arm", "it's, id 7, line 3", "n" * 5000])
-def test_sim_model_error_is_one_line(arm, name):
+@pytest.mark.parametrize("name", ["bob", "it's, id 7, line 3", "n" * 5000])
+def test_sim_model_error_is_one_line(robot, name):
+    text = PENDULUM.replace('ixx="0.01"', 'ixx="1.0"').replace('"bob"', f'"{name}"')
     with pytest.raises(CannotCheckError) as caught:
-        make_sim_model(arm(name=name, ixx="1.0"))
+        make_sim_model(robot(text))
     error = str(caught.value)
     assert error.startswith(f"MuJoCo cannot simulate it: {name[:50]}")
     assert error.endswith(": inertia must satisfy A + B >= C; use 'balanceinertia' to fix")
@@ -129,13 +90,13 @@ def test_sim_model_error_is_one_line(arm, name):
     assert len(error) < 300
 
 
-def test_sim_model_rejects_many_bodies(tmp_path):
+def test_sim_model_rejects_many_bodies(robot):
     parts = [
         f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="l{k - 1}"/>'
         f'<child link="l{k}"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-        for k in range(1, 400)
+        for k in range(1, 301)
     ]
-    path = tmp_path / "robot.urdf"
-    path.write_text(f'<robot name="r"><link name="l0"/>{"".join(parts)}</robot>')
-    with pytest.raises(CannotCheckError, match="bodies: got 400; expected at most 300"):
-        make_sim_model(Facts(load_robot(path)))
+    with pytest.raises(CannotCheckError, match="mass and inertia of moving bodies"):
+        make_sim_model(robot(f'<robot name="r"><link name="l0"/>{"".join(parts[:-1])}</robot>'))
+    with pytest.raises(CannotCheckError, match="bodies: got 301; expected at most 300"):
+        make_sim_model(robot(f'<robot name="r"><link name="l0"/>{"".join(parts)}</robot>'))

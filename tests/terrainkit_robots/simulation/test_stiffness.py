@@ -53,7 +53,7 @@ JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child li
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
-def test_gravity_load_is_that_of_all_bodies_below_a_joint(tmp_path, kind):
+def test_gravity_load_is_that_of_all_bodies_below_a_joint(robot, kind):
     """An arm of 2 kg and 1 kg beside one of 4 kg, which does not count."""
     links = {"base": (0, 9), "other": (0.1, 4), "upper": (0.3, 2), "fore": (0.2, 1)}
     text = "".join(
@@ -66,9 +66,7 @@ def test_gravity_load_is_that_of_all_bodies_below_a_joint(tmp_path, kind):
         ("side", "base", "other", -0.1),
     ):
         text += JOINT.format(name=name, kind=kind, parent=parent, child=child, x=x)
-    path = tmp_path / "robot.urdf"
-    path.write_text(f'<robot name="r">{text}</robot>')
-    sim = make_sim_model(Facts(load_robot(path)))
+    sim = make_sim_model(robot(f'<robot name="r">{text}</robot>'))
     loads = {name: _max_gravity_load(sim, name) / 9.81 for name in ("shoulder", "elbow", "side")}
     turning = {"shoulder": 2 * 0.3 + 1 * (0.5 + 0.2), "elbow": 0.2, "side": 0.4}
     expected = turning if kind == "revolute" else {"shoulder": 3, "elbow": 1, "side": 4}
@@ -92,6 +90,5 @@ def test_knees_of_a_biped_are_stiff_for_its_weight(effort, gain_set, factor, lim
     target = leg_gain_target(biped, make_sim_model(biped), heavy, names, gain_set)
     length = sum(leg.length for leg in biped.legs) / 2
     expected = factor * biped.total_mass * 9.81 * length
-    assert target.stiffness == pytest.approx(min(expected, limit))
-    assert target.joints == names
+    assert (target.stiffness, target.joints) == (pytest.approx(min(expected, limit)), names)
     assert not target.extra_armature

@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from terrainkit.errors import ConfigError
+from terrainkit_robots.policy.play import demo_commands
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.viewer.show_policy import PolicyView
 from tests.viewer_client import CAMERA, connect_to, send, update, wait_for
@@ -44,6 +44,35 @@ def test_robot_of_scene_has_the_pose_of_the_simulation(view):
         np.testing.assert_allclose(rotation @ frame.position, expected, atol=1e-5)
 
 
+def test_controls_and_camera(server, shown, view):
+    commands, names = view.env.cfg.commands, ("forward [m/s]", "left [m/s]", "yaw [rad/s]")
+    ranges = commands.lin_vel_x, commands.lin_vel_y, commands.ang_vel_yaw
+    for name, (low, high), initial in zip(names, ranges, demo_commands(commands)[0], strict=True):
+        slider = shown[name]
+        assert (slider.min, slider.max, slider.step) == (min(low, 0), max(high, 0), 0.01)
+        assert slider.value == pytest.approx(initial)
+    assert (shown["level"].max, shown["level"].visible, shown["terrain"].visible) == (
+        1,
+        False,
+        False,
+    )
+    camera = server.initial_camera
+    np.testing.assert_allclose(camera.look_at, view.robot.base.position)
+    offset = np.subtract(camera.position, camera.look_at)
+    np.testing.assert_allclose(offset, [-1.5, -2.5, 1.5])
+
+
+def test_falls_are_counted_until_a_reset(view):
+    view.step()
+    for count in ("1", "2"):
+        view.env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
+        view.step()
+        assert view.falls.value == count
+    view.request_reset()
+    view.step()
+    assert view.falls.value == "0"
+
+
 def test_pause_and_reset(shown, view):
     for _ in range(5):
         view.step()
@@ -62,6 +91,8 @@ def test_map_policy_is_reset_to_the_selected_patch(server, shown):
     assert "/map/ground" in shown
     terrain = view.env.terrain
     levels, columns = terrain.terrain_names.shape
+    assert (shown["level"].max, shown["level"].visible) == (levels - 1, True)
+    assert shown["terrain"].value.startswith(f"{columns // 2}: ")
     shown["level"].value = levels - 1
     shown["terrain"].value = shown["terrain"].options[-1]
     shown["pause"].value = True
@@ -69,11 +100,6 @@ def test_map_policy_is_reset_to_the_selected_patch(server, shown):
     origin = terrain.env_origins[levels - 1, columns - 1]
     size = view.env.terrain.terrain_map.config.patch_size
     assert (np.abs(view.env.sim.qpos[0, :2] - origin[:2]) < np.array(size) / 2).all()
-
-
-def test_policy_view_rejects_unknown_terrain(server):
-    with pytest.raises(ConfigError, match="expected plane"):
-        PolicyView(server, open_run("quadruped"), "hills")
 
 
 def test_invalid_messages_of_a_browser_do_not_end_the_view(server, view):
@@ -111,20 +137,6 @@ def test_robot_stays_in_view_of_a_page_that_reports_its_camera_late(server, view
         assert view.env.sim.qpos[0, 0] > 1.0
         distance = np.linalg.norm(page.camera.position - view.robot.base.position)
         assert distance == pytest.approx(math.hypot(3.0, 1.5), abs=0.3)
-
-
-def test_page_keeps_the_camera_that_its_user_chose(server, view):
-    with connect_to(server) as client:
-        send(client, CAMERA)
-        wait_for(server.get_clients)
-        (page,) = server.get_clients().values()
-        for x in (4.0, 5.0, 6.0):
-            send(client, CAMERA | {"position": (x, 1.0, 1.0)})
-            wait_for(lambda x=x: page.camera.position[0] == x)
-            for _ in range(10):
-                view.step()
-                view.update_robot()
-            assert page.camera.position.tolist() == [x, 1.0, 1.0]
 
 
 def test_ground_moves_under_the_robot_only_while_it_is_followed(server, shown, view):

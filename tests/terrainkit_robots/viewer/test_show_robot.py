@@ -1,14 +1,21 @@
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
 from terrainkit_robots.description.model import Joint, Limit, Source
-from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
-from terrainkit_robots.viewer.show_robot import findings_html, show_robot, slider_range
+from terrainkit_robots.viewer.robot_scene import shape_surface
+from terrainkit_robots.viewer.show_robot import (
+    FindingPlaces,
+    findings_html,
+    show_robot,
+    slider_range,
+)
 
 
 @pytest.fixture
@@ -31,10 +38,30 @@ def test_show_robot_adds_meshes_and_sliders(show, bundled):
     assert all(handle.visible for handle in scene.visuals)
     assert not any(handle.visible for handle in scene.collisions)
     assert len(scene.visuals) > 13
-    assert shown["FL_calf_joint [rad]"].min == pytest.approx(-2.7227)
-    assert shown["FL_calf_joint [rad]"].value == scene.facts.default_pose["FL_calf_joint"]
+    slider = shown["FL_calf_joint [rad]"]  # of 1.885 rad, 500 times 0.0038
+    assert (slider.min, slider.step) == pytest.approx((-2.7227, 0.001))
+    assert slider.value == scene.facts.default_pose["FL_calf_joint"]
+    slider.value = slider.max
+    shown["default pose"].value = True
+    assert slider.value == scene.facts.default_pose["FL_calf_joint"]
+    shown["collision shapes"].value, shown["visual shapes"].value = True, False
+    assert all(handle.visible for handle in scene.collisions)
+    assert not any(handle.visible for handle in scene.visuals)
     # The feet touch the ground in the default pose.
     assert scene.base.position[2] == pytest.approx(scene.facts.stance.height)
+
+
+def test_camera_sees_the_whole_robot(server, show, bundled, robot):
+    scene, _ = show(bundled("quadruped.urdf"))
+    points = np.array([frame.position for frame in scene.bodies]) + scene.base.position
+    size, camera = np.linalg.norm(np.ptp(points, axis=0)), server.initial_camera
+    assert size > 0.5
+    np.testing.assert_allclose(camera.look_at, points.mean(axis=0))
+    offset = np.subtract(camera.position, camera.look_at)
+    np.testing.assert_allclose(offset, size * np.array([1.2, -1.2, 0.6]))
+    show_robot(server, lint(robot('<robot name="r"><link name="a"/></robot>'), selected=()))
+    np.testing.assert_allclose(camera.look_at, [0, 0, 0])
+    np.testing.assert_allclose(camera.position, [0.6, -0.6, 0.3])
 
 
 def test_slider_moves_joint(show, bundled):
@@ -64,29 +91,12 @@ def test_mirrored_joints_move_together_if_checked(show, bundled):
     np.testing.assert_allclose(position(scene, "FL_calf"), mirrored, atol=1e-6)
 
 
-def test_default_pose_button_resets_sliders(show, bundled):
-    scene, shown = show(bundled("biped.urdf"))
-    name = "left_knee_joint"
-    slider, default = shown[f"{name} [rad]"], scene.facts.default_pose[name]
-    slider.value = slider.max
-    shown["default pose"].value = True
-    assert slider.value == default
-
-
 def test_mimic_joint_follows_without_slider(show, robot):
     scene, shown = show(robot(GRIPPER))
     assert "right [m]" not in shown
     shown["left [m]"].value = 0.03
     assert position(scene, "left_finger") == pytest.approx([0.03, 0, 0])
     assert position(scene, "right_finger") == pytest.approx([0.06, 0, 0])
-
-
-def test_checkbox_shows_collision_shapes(show, bundled):
-    scene, shown = show(bundled("quadruped.xml"))
-    shown["collision shapes"].value = True
-    assert all(handle.visible for handle in scene.collisions)
-    shown["visual shapes"].value = False
-    assert not any(handle.visible for handle in scene.visuals)
 
 
 def test_finding_is_listed_and_marked_at_its_link(show, bundled, tmp_path):
@@ -97,14 +107,26 @@ def test_finding_is_listed_and_marked_at_its_link(show, bundled, tmp_path):
     (finding, *_) = (each for each in report.findings if each.code == "INR002")
     body = facts.body_of[finding.subject]
     _, shown = show(facts)
-    codes = [
-        h.text
-        for name, h in shown.items()
-        if name.endswith("/codes") and f"body_{body.index}/" in name
-    ]
-    assert any("INR002" in text for text in codes)
+    marked = f"/robot/body_{body.index}/finding_"
+    labels = [name for name in shown if name.startswith(marked) and name.endswith("/codes")]
+    (label,) = (name for name in labels if "INR002" in shown[name].text.split(", "))
+    marker = shown[label.removesuffix("/codes")]
+    farthest = max(np.linalg.norm(body.zero_pose[:3, 3]) for body in facts.bodies)
+    assert (marker.color, marker.radius) == ((200, 40, 40), pytest.approx(0.05 * farthest))
     (listed,) = (name for name in shown if "INR002</b>" in name)
     assert finding.subject in listed
+
+
+def test_findings_of_links_and_joints_have_a_place(bundled):
+    facts = bundled("quadruped.urdf")
+    index, locate = facts.body_of["FL_foot"].index, FindingPlaces(facts)
+
+    def place(subject):
+        return locate(SimpleNamespace(subject=subject, file=None, line=0))
+
+    assert place("FL_foot") == (index, pytest.approx((0, 0, -0.213)))  # fixed to the calf
+    assert place("FL_calf_joint") == (index, (0, 0, 0))
+    assert place("robot") is None
 
 
 def test_findings_escape_texts_of_the_file(robot):
@@ -114,23 +136,13 @@ def test_findings_escape_texts_of_the_file(robot):
     assert "<img" not in findings_html(report.findings)
 
 
-def test_show_robot_without_findings_or_shapes(server, robot):
-    show_robot(server, lint(robot('<robot name="r"><link name="a"/></robot>'), selected=()))
-
-
-@pytest.mark.parametrize("name", ["go2/urdf/go2.urdf", "h1/h1.xml"])
-def test_show_robot_with_meshes(server, robot_file, name):
-    report = check_robot(robot_file(name))
-    scene = show_robot(server, report)
-    assert len(scene.visuals) >= len(report.facts.bodies)
-
-
 @pytest.mark.parametrize(
     ("limits", "expected"),
     [
         ((-1.0, 2.0), (-1.0, 2.0)),
         ((0.5, 2.0), (0.1, 2.0)),  # includes the position
-        ((-1e10, 1e10), (-math.pi, math.pi)),
+        ((-49.9, 50.0), (-49.9, 50.0)),
+        ((-50.0, 50.0), (-math.pi, math.pi)),
         ((None, None), (-math.pi, math.pi)),
     ],
 )
@@ -149,3 +161,40 @@ FINGER = """<link name="{0}_finger"><inertial><mass value="0.1"/>
 MIMIC = '<mimic joint="left" multiplier="2"/>'
 GRIPPER = f"""<robot name="gripper"><link name="palm"/>
   {FINGER.format("left", "")} {FINGER.format("right", MIMIC)}</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("shape", "size", "upper"),
+    [
+        ("box", (1, 2, 3), (1, 2, 3)),
+        ("cylinder", (1, 2), (1, 1, 2)),
+        ("capsule", (1, 2), (1, 1, 3)),
+        ("sphere", (2,), (2, 2, 2)),
+        ("ellipsoid", (1, 2, 3), (1, 2, 3)),
+    ],
+)
+def test_surfaces_of_shapes(shape, size, upper):
+    points = shape_surface(SimpleNamespace(shape=shape, size=size), None).points
+    np.testing.assert_allclose(points.max(axis=0), upper, rtol=0.01)
+    np.testing.assert_allclose(points.min(axis=0), np.negative(upper), rtol=0.01)
+
+
+def test_colors_of_shapes(show, robot):
+    ball = '<geometry><sphere radius="0.1"/></geometry>'
+    paint = '<material name="m"><color rgba="1 0.5 0.1 1"/></material>'
+    shapes = f"<visual>{ball}{paint}</visual><visual>{ball}</visual><collision>{ball}</collision>"
+    scene, _ = show(robot(f'<robot name="r"><link name="a">{shapes}</link></robot>'))
+    (collision,) = scene.collisions
+    assert [each.color for each in scene.visuals] == [(255, 127, 25), (184, 189, 199)]
+    assert (collision.color, collision.opacity, collision.visible) == ((230, 120, 40), 0.5, False)
+    assert [each.opacity for each in scene.visuals] == [None, None]
+    assert scene.base.position == pytest.approx([0, 0, 0.1])
+
+
+def test_meshes_are_shown_if_they_can_be_read(show, robot, tmp_path):
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
+    mesh = '<visual><geometry><mesh filename="{}.stl" scale="2 2 2"/></geometry></visual>'
+    link = f'<link name="a">{mesh.format("box")}{mesh.format("gone")}</link>'
+    scene, _ = show(robot(f'<robot name="r">{link}</robot>'))
+    (shown,) = scene.visuals
+    assert shown.vertices.max(axis=0) == pytest.approx([1, 2, 3])
