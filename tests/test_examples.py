@@ -50,11 +50,10 @@ def run(folder, *arguments):
     return done.stdout
 
 
-def run_with_stand_ins(folder, script, packages, check, before=""):
+def run_with_stand_ins(folder, script, packages, before, check):
     """Run an example with mocks in place of a framework, and then a check."""
     names = {"frameworks": str(ROOT / "tests/frameworks"), "script": str(EXAMPLES / script)}
-    code = STAND_IN.format(packages=packages, before=before, **names)
-    return run(folder, "-c", code + check)
+    return run(folder, "-c", STAND_IN.format(packages=packages, before=before, **names) + check)
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -70,23 +69,15 @@ def test_example_runs_in_an_empty_folder(name, tmp_path):
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
-def test_example_is_run(path):
+def test_example_is_run_and_short_and_says_what_to_install(path):
     is_run = path.stem in WRITTEN or f"docs/examples/{path.name}" in CHECKS
     assert is_run, f"{path.name} is neither in WRITTEN nor in a check of tests/frameworks"
-
-
-@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
-def test_example_is_short_and_says_what_to_install(path):
     text = path.read_text()
     assert len(text.splitlines()) <= 60
     summary, _, rest = ast.get_docstring(ast.parse(text)).partition("\n")
     assert summary.endswith(".")
     assert "pip install" in rest
-
-
-@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
-def test_example_imports_names_that_exist(path):
-    for node in ast.walk(ast.parse(path.read_text())):
+    for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom) and node.module.startswith("terrainkit.integrations."):
             module = (ROOT / f"{node.module.replace('.', '/')}.py").read_text()
             defined = {getattr(each, "name", "") for each in ast.parse(module).body}
@@ -94,37 +85,37 @@ def test_example_imports_names_that_exist(path):
 
 
 def test_mjlab_example_registers_task_of_a_stand_in(tmp_path):
-    check = """
-from mjlab.tasks.registry import register_mjlab_task
-from mjlab.scripts.train import main
-print(register_mjlab_task.call_args.args[0], main.call_count, *sys.argv[1:4])
-"""
     before = """
 from dataclasses import make_dataclass
 import mjlab.terrains
 fields = [("flat_patch_sampling", dict, None)]
 mjlab.terrains.SubTerrainCfg = make_dataclass("SubTerrainCfg", fields)
 """
-    printed = run_with_stand_ins(tmp_path, "mjlab_terrain.py", ("mjlab",), check, before)
+    check = """
+from mjlab.tasks.registry import register_mjlab_task
+from mjlab.scripts.train import main
+print(register_mjlab_task.call_args.args[0], main.call_count, *sys.argv[1:4])
+"""
+    printed = run_with_stand_ins(tmp_path, "mjlab_terrain.py", ("mjlab",), before, check)
     assert printed.split() == ["Map-Go1", "1", "Map-Go1", "--env.scene.num-envs", "16"]
     assert (tmp_path / "map.npz").exists()
 
 
 def test_legged_gym_example_replaces_terrain_of_a_stand_in(tmp_path):
     assert "terrain.npz" in run(tmp_path, EXAMPLES / "legged_gym_terrain.py")
-    check = """
-import terrain
-from legged_gym.envs.base import legged_robot
-print(legged_robot.Terrain is terrain.Terrain)
-"""
     before = """
 sys.version_info = (3, 8)
 from legged_gym.utils import task_registry
 pair = (task_registry.env, task_registry.cfg)
 task_registry.make_env.return_value = task_registry.make_alg_runner.return_value = pair
 """
+    check = """
+import terrain
+from legged_gym.envs.base import legged_robot
+print(legged_robot.Terrain is terrain.Terrain)
+"""
     packages, script = ("isaacgym", "legged_gym"), "legged_gym_terrain.py"
-    printed = run_with_stand_ins(tmp_path, script, packages, check, before)
+    printed = run_with_stand_ins(tmp_path, script, packages, before, check)
     assert printed.splitlines()[-1] == "True"
 
 

@@ -29,38 +29,36 @@ def m(tmp_path, monkeypatch):
     return terrain_map
 
 
-def test_integrations_all_blocks_are_tested():
+def test_blocks_are_counted_and_import_what_the_adapters_define():
     assert len(BLOCKS) == 20, "add a test of the new block, and count it here"
-
-
-def test_numpy_block_reads_map(m):
-    names = {}
-    exec(block("import numpy"), names)
-    assert names["name"] == "stepping_stones"
-    assert m.height(names["spawn"][:2]) == pytest.approx(names["spawn"][2], abs=1e-3)
-    assert names["x"][0] == pytest.approx(m.first_sample[0])
-
-
-def test_mujoco_block_drops_ball(m):
-    names = {}
-    exec(block("add_freejoint"), names)
-    x, y, z = names["data"].qpos[:3]
-    assert z - 0.1 == pytest.approx(m.height([x, y]), abs=0.01)  # the ball, 0.1 m, lies on it
-
-
-def test_scripts_of_checks_are_short():
-    """tests/frameworks runs these two."""
-    for text in ("gs.init", "MapJoystick"):
+    for text in ("gs.init", "MapJoystick"):  # tests/frameworks runs these two
         assert len(re.findall(r".+", block(text))) <= 25
-
-
-def test_blocks_import_what_the_adapters_define():
     imports = re.findall(r"^from (terrainkit\.integrations\.\w+) import (.+)$", PAGE, re.MULTILINE)
     assert len(imports) == 8, "count the import of the new adapter here"
     for module, names in imports:
         path = ROOT / f"{module.replace('.', '/')}.py"
         defined = {getattr(node, "name", "") for node in ast.parse(path.read_text()).body}
         assert set(names.split(", ")) <= defined, module
+
+
+def run_block(text):
+    """Run the block that contains a text, and return its names."""
+    names = {}
+    exec(block(text), names)
+    return names
+
+
+def test_numpy_block_reads_map(m):
+    names = run_block("import numpy")
+    assert names["name"] == "stepping_stones"
+    assert m.height(names["spawn"][:2]) == pytest.approx(names["spawn"][2], abs=1e-3)
+    assert names["x"][0] == pytest.approx(m.first_sample[0])
+
+
+def test_mujoco_block_drops_ball(m):
+    names = run_block("add_freejoint")
+    x, y, z = names["data"].qpos[:3]
+    assert z - 0.1 == pytest.approx(m.height([x, y]), abs=0.01)  # the ball, 0.1 m, lies on it
 
 
 def test_isaaclab_page_imports_mesh(m, monkeypatch):
@@ -81,8 +79,7 @@ def test_isaaclab_page_imports_mesh(m, monkeypatch):
 def test_mujoco_adapter_block_adds_map_to_robot():
     Path("my_robot").mkdir()
     Path("my_robot/robot.xml").write_text("<mujoco><worldbody><body/></worldbody></mujoco>")
-    names = {}
-    exec(block("add_map(spec"), names)
+    names = run_block("add_map(spec")
     assert names["model"].ngeom > 0
 
 
@@ -98,8 +95,7 @@ def test_import_block_restores_map(m):
 
 
 def test_gymnasium_block_runs_map(m):
-    names = {}
-    exec(block("import gymnasium\n"), names)
+    names = run_block("import gymnasium\n")
     assert names["env"].env.terrain.terrain_map.grid == m.grid
     assert names["observations"].shape[0] == 16
     assert np.isfinite(names["observations"]).all()
@@ -107,7 +103,6 @@ def test_gymnasium_block_runs_map(m):
 
 def test_stable_baselines3_block_trains_on_map(m):
     pytest.importorskip("stable_baselines3")  # `make integrations` installs it
-    names = {}
-    exec(block("import PPO"), names)
+    names = run_block("import PPO")
     assert names["env"].env.env.terrain.terrain_map.grid == m.grid
     assert names["model"].num_timesteps == 64 * 24

@@ -8,18 +8,9 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.fixture
-def changed_lines(monkeypatch):
-    """Return a function that returns the changed versions of one line."""
+@pytest.fixture(autouse=True)
+def benchmarks_on_path(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "benchmarks")
-    from mutation.changes import find_changes
-
-    def run(line):
-        source = line.encode()
-        changes = [each for each in find_changes(source) if each.is_valid(source)]
-        return {each.apply(source).decode() for each in changes}
-
-    return run
 
 
 @pytest.mark.parametrize(
@@ -50,12 +41,15 @@ def changed_lines(monkeypatch):
         ("from a import b", set()),
     ],
 )
-def test_changes_of_a_line(changed_lines, line, expected):
-    assert changed_lines(line) == expected
+def test_changes_of_a_line(line, expected):
+    from mutation.changes import find_changes
+
+    source = line.encode()
+    changes = [each for each in find_changes(source) if each.is_valid(source)]
+    assert {each.apply(source).decode() for each in changes} == expected
 
 
-def test_lines_of_changes_are_those_of_the_statement(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+def test_lines_of_changes_are_those_of_the_statement():
     from mutation.changes import find_changes
 
     source = "x = 1\ndef f(a=1):\n  if (a <\n      b):\n    g(\n      True,\n    )\n  return c\n"
@@ -73,7 +67,6 @@ def test_lines_of_changes_are_those_of_the_statement(monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux only")
 def test_endless_runs_are_ended_with_their_children(monkeypatch, tmp_path):
-    monkeypatch.syspath_prepend(ROOT / "benchmarks")
     from mutation import runner
 
     # The pages of this process, which the children share, count for each of them.

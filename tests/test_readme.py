@@ -8,6 +8,7 @@ import pytest
 
 import terrainkit as tk
 from terrainkit_cli.main import main
+from tests.robots import QUADRUPED
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
@@ -29,18 +30,15 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-def test_readme_has_two_setup_commands():
+def test_readme_is_short_and_has_two_setup_commands_and_links_that_exist():
     (part,) = re.findall(r"<!-- set-up -->(.*?)<!-- /set-up -->", README, re.DOTALL)
-    assert re.findall(r"```sh\n(.*?)\n```", part, re.DOTALL) == [
-        "pip install . && terrainkit generate --rows 10 --cols 10 -o map.npz",
-        'pip install -e ".[dev]" && python -m pytest',
+    assert blocks(part, "sh") == [
+        "pip install . && terrainkit generate --rows 10 --cols 10 -o map.npz\n",
+        'pip install -e ".[dev]" && python -m pytest\n',
     ]
-
-
-def test_readme_is_short_and_its_links_exist():
     assert len(README.splitlines()) <= 150
-    for target in re.findall(r"\]\((?!http)([^)#]+)", README):
-        assert (ROOT / target).exists(), target
+    links = re.findall(r"\]\((?!http)([^)#]+)", README)
+    assert [each for each in links if not (ROOT / each).exists()] == []
 
 
 @pytest.mark.usefixtures("healthy_robots")
@@ -68,17 +66,13 @@ def test_readme_commands_run():
 @pytest.fixture
 def my_robot():
     """Write the robot of the example: two numbers exchanged, and a 2 instead of a 1."""
-    from terrainkit_robots.description import bundled
-
-    path = bundled.urdf_path("quadruped")
-    assert path is not None
-    text = path.read_text()
+    text = QUADRUPED.read_text()
     limits = 'lower="-2.7227" upper="-0.83776"', 'lower="-0.83776" upper="-2.7227"'
     for old, new in (limits, ('axis xyz="0 1 0"', 'axis xyz="0 2 0"')):
         assert old in text
         text = text.replace(old, new, 1)
     Path("my_robot.urdf").write_text(text)
-    Path("my_robot.xacro").write_text(path.read_text())
+    Path("my_robot.xacro").write_text(QUADRUPED.read_text())
     return text
 
 
@@ -116,13 +110,9 @@ def test_check_robot_page_suppressions_work(my_robot, capsys):
 @pytest.fixture
 def healthy_robots():
     """Write the robot files of the examples; each is the bundled quadruped."""
-    from terrainkit_robots.description import bundled
-
-    path = bundled.urdf_path("quadruped")
-    assert path is not None
     for name in ("my_robot.urdf", "go2.urdf"):
-        Path(name).write_text(path.read_text())
-    Path("go2.xml").write_text(path.with_suffix(".xml").read_text())
+        Path(name).write_text(QUADRUPED.read_text())
+    Path("go2.xml").write_text(QUADRUPED.with_suffix(".xml").read_text())
 
 
 @pytest.mark.usefixtures("healthy_robots")

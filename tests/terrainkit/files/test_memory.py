@@ -3,34 +3,33 @@ import pytest
 
 from terrainkit import MapConfig, TerrainkitError, generate
 from terrainkit.errors import MemoryLimitError
+from terrainkit.files import memory
 from terrainkit.files.memory import check_memory
-
-
-@pytest.mark.parametrize("needed", [0, 1 << 20, 1 << 28, (1 << 28) + 1])
-def test_check_memory_accepts_small_work(needed):
-    check_memory(needed, "this test")
 
 
 @pytest.mark.parametrize("needed", [2 * psutil.virtual_memory().total, 1 << 62, 10**40])
 def test_check_memory_rejects_large_work(needed):
-    with pytest.raises(
-        MemoryLimitError, match=r"^a lot needs [\d.]+ GB of memory; [\d.]+ GB free$"
-    ):
+    message = r"^a lot needs [\d.]+ GB of memory; [\d.]+ GB free$"
+    with pytest.raises(MemoryLimitError, match=message) as error:
         check_memory(needed, "a lot")
-
-
-def test_check_memory_names_parts_that_fit(monkeypatch):
-    monkeypatch.setattr("terrainkit.files.memory._free_memory", lambda: 10**9)
-    with pytest.raises(MemoryLimitError, match=r"; num_envs 25 would fit$"):
-        check_memory(4 * 10**9, "training", ("num_envs", 100))
-    with pytest.raises(MemoryLimitError, match=r"1\.0 GB free$"):
-        check_memory(4 * 10**9, "training", ("num_envs", 1))
-
-
-def test_check_memory_error_is_a_memory_error():
-    with pytest.raises(MemoryError) as error:
-        check_memory(1 << 62, "a lot")
+    assert isinstance(error.value, MemoryError)
     assert isinstance(error.value, TerrainkitError)
+
+
+def test_check_memory_accepts_what_is_free_and_names_parts_that_fit(monkeypatch):
+    monkeypatch.setattr(memory, "_free_memory", lambda: 10**9)
+    check_memory(10**9, "training")
+    for parts, hint in ((100, "; num_envs 25 would fit"), (4, "; num_envs 1 would fit"), (3, "")):
+        with pytest.raises(MemoryLimitError) as error:
+            check_memory(4 * 10**9, "training", ("num_envs", parts))
+        assert str(error.value) == f"training needs 4.0 GB of memory; 1.0 GB free{hint}"
+
+
+def test_check_memory_accepts_small_work(monkeypatch):
+    monkeypatch.setattr(memory, "_free_memory", lambda: 0)
+    check_memory(1 << 28, "this test")
+    with pytest.raises(MemoryLimitError):
+        check_memory((1 << 28) + 1, "this test")
 
 
 def test_check_memory_rejects_large_map():
@@ -38,54 +37,35 @@ def test_check_memory_rejects_large_map():
         generate(MapConfig(rows=10_000, cols=10_000))
 
 
-@pytest.fixture
-def group(tmp_path, monkeypatch):
-    """Return a function that makes a control group which this process is in, or is below."""
-    own = tmp_path / "cgroup"
-    own.write_text("1:net:/x\n0::/job/step\n")
-    monkeypatch.setattr("terrainkit.files.memory._OWN_GROUP", own)
-    monkeypatch.setattr("terrainkit.files.memory._CONTROL_GROUPS", tmp_path / "groups")
+GB = 10**9
 
-    def make(name, limit, used=2 * 10**9, cached=0):
+
+@pytest.mark.parametrize(
+    ("groups", "cached", "free"),
+    [
+        ({".": 3 * GB}, 0, GB),
+        ({"job": 3 * GB}, 0, GB),
+        ({"job/step": 3 * GB}, 0, GB),
+        ({".": 9 * GB, "job": 3 * GB, "job/step": 8 * GB}, 0, GB),
+        ({"job": 2 * GB}, 2 * GB, 2 * GB),  # the kernel reclaims the page cache
+        ({"job": "max"}, 0, None),
+        ({"job": ""}, 0, None),
+        ({"other": 1}, 0, None),
+    ],
+)
+def test_check_memory_respects_control_groups(tmp_path, monkeypatch, groups, cached, free):
+    monkeypatch.setattr(memory, "_OWN_GROUP", tmp_path / "cgroup")
+    monkeypatch.setattr(memory, "_CONTROL_GROUPS", tmp_path / "groups")
+    (tmp_path / "cgroup").write_text("1:net:/x\n0::/job/step\n")
+    for name, limit in groups.items():
         folder = tmp_path / "groups" / name
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "memory.max").write_text(f"{limit}\n")
-        (folder / "memory.current").write_text(f"{used}\n")
+        (folder / "memory.current").write_text(f"{2 * GB}\n")
         (folder / "memory.stat").write_text(f"anon 5\ninactive_file {cached}\n")
-
-    return make
-
-
-@pytest.mark.parametrize("name", [".", "job", "job/step"])
-def test_check_memory_respects_control_group(group, name):
-    group("job/step", "max")
-    group(name, 3 * 10**9)
-    check_memory(9 * 10**8, "a map")
-    with pytest.raises(MemoryLimitError, match=r"a map needs 1\.1 GB of memory; 1\.0 GB free"):
-        check_memory(11 * 10**8, "a map")
-
-
-def test_check_memory_uses_smallest_limit(group):
-    group(".", 9 * 10**9)
-    group("job", 3 * 10**9)
-    group("job/step", 8 * 10**9)
-    with pytest.raises(MemoryLimitError, match=r"1\.0 GB free"):
-        check_memory(11 * 10**8, "a map")
-
-
-def test_check_memory_ignores_page_cache(group):
-    group("job", 3 * 10**9, used=28 * 10**8, cached=2 * 10**9)
-    check_memory(21 * 10**8, "a map")
-    with pytest.raises(MemoryLimitError, match=r"2\.2 GB free"):
-        check_memory(23 * 10**8, "a map")
-
-
-@pytest.mark.parametrize("limit", ["max", ""])
-def test_check_memory_ignores_group_without_limit(group, limit):
-    group("job", limit, used=1)
-    check_memory(3 * 10**8, "a map")
-
-
-def test_check_memory_ignores_other_groups(group):
-    group("other", 1)
-    check_memory(3 * 10**8, "a map")
+    if free is None:
+        check_memory(3 * 10**8, "a map")
+    else:
+        check_memory(free, "a map")
+        with pytest.raises(MemoryLimitError, match=rf" {free / GB:.1f} GB free$"):
+            check_memory(free + 1, "a map")

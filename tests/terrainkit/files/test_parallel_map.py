@@ -24,14 +24,8 @@ def test_parallel_map_reports_an_ended_process_in_one_line():
 @pytest.mark.parametrize(
     ("error", "expected"),
     [
-        (
-            CancelledError(),
-            "an executor failed: CancelledError; use fewer",
-        ),
-        (
-            OSError("no\nroom."),
-            "an executor failed: OSError: no room; use fewer",
-        ),
+        (CancelledError(), "an executor failed: CancelledError; use fewer"),
+        (OSError("no\nroom."), "an executor failed: OSError: no room; use fewer"),
         (ConfigError("seed: wrong"), "seed: wrong"),
     ],
 )

@@ -1,107 +1,92 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import array_shapes, arrays
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.geometry.box_decomposition import decompose_boxes, flat_cells
-from terrainkit.geometry.grid import Grid
-from terrainkit.geometry.mesh.node_grid import NodeGrid
-from terrainkit.geometry.surface import surface_at
-
-SMALL = arrays(
-    np.float32,
-    array_shapes(min_dims=2, max_dims=2, min_side=1, max_side=7),
-    elements=st.integers(0, 3),
+from terrainkit.geometry.box_decomposition import (
+    changes,
+    decompose_boxes,
+    flat_cells,
+    merge_boxes,
+    neighborhood,
 )
-HEIGHTFIELDS = SMALL | SMALL.map(lambda z: np.kron(z, np.ones((2, 3), dtype=np.float32)))
+from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.surface import surface_at
+from tests.terrainkit.geometry.heightfields import HEIGHTFIELDS, for_any, node_grid_of, samples
+
+any_walls = for_any(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
 
 
 def top_at(cover, xy):
     beside = np.abs(xy[:, None] - cover.centers[:, :2]) > cover.half_sizes[:, :2]
-    tops = cover.centers[:, 2] + cover.half_sizes[:, 2]
-    return np.where(beside.any(axis=2), -np.inf, tops).max(axis=1, initial=-np.inf)
+    return np.where(beside.any(axis=2), -np.inf, tops(cover)).max(axis=1, initial=-np.inf)
 
 
-def points_in_cells(cells, cell, lower):
+def tops(cover):
+    return cover.centers[:, 2] + cover.half_sizes[:, 2]
+
+
+def points_in_cells(cells, cell=1.0, lower=0.0):
     inside = np.array([(0.02, 0.03), (0.96, 0.48), (0.52, 0.51), (0.04, 0.97), (0.98, 0.95)])
     return ((np.argwhere(cells)[:, None] + inside) * cell + lower).reshape(-1, 2)
 
 
-def cover_of(heights, threshold):
-    patch_edges = tuple(np.array([0, n // 2, n]) for n in heights.shape)
-    return decompose_boxes(heights, Grid(shape=heights.shape, cell=1.0), threshold, patch_edges)
-
-
-def level_of(heights, threshold):
-    grid = Grid(shape=heights.shape, cell=1.0)
-    return flat_cells(NodeGrid.from_heights(heights, grid, threshold))
-
-
-def patch(terrain, *, size=(6.0, 4.0), **parameters):
-    choice = SubTerrain(terrain=terrain, parameters=parameters)
-    config = MapConfig(
-        rows=1, cols=1, patch_size=size, border=0.0, terrains=(choice,), spawn_radius=0.3
+def cover_of(heights, threshold, patch_edges=None, cell=1.0, **options):
+    heights = samples(heights)
+    patch_edges = patch_edges or tuple(np.array([0, n]) for n in heights.shape)
+    return decompose_boxes(
+        heights, Grid(shape=heights.shape, cell=cell), threshold, patch_edges, **options
     )
-    return generate(config)
 
 
-@given(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
-@settings(deadline=None, derandomize=True, max_examples=100)
+def patch(terrain, *, size=(6.0, 4.0), border=0.0, **parameters):
+    choice = SubTerrain(terrain=terrain, parameters=parameters)
+    return generate(
+        MapConfig(
+            rows=1, cols=1, patch_size=size, border=border, terrains=(choice,), spawn_radius=0.3
+        )
+    )
+
+
+@any_walls
 def test_boxes_match_covered_cells(heights, threshold):
-    cover = cover_of(heights, threshold)
-    on, off = (points_in_cells(cells, 1.0, 0.0) for cells in (cover.covered, ~cover.covered))
+    cover = cover_of(heights, threshold, tuple(np.array([0, n // 2, n]) for n in heights.shape))
+    on, off = (points_in_cells(cells) for cells in (cover.covered, ~cover.covered))
     ground = surface_at(heights, on - 0.5, threshold=threshold).height
     np.testing.assert_allclose(top_at(cover, on), ground, atol=1e-6)
     ground = surface_at(heights, off - 0.5, threshold=threshold).height
     assert (top_at(cover, off) <= ground + 1e-6).all()
+    assert cover.covered.all() or threshold > 1  # else all steps are walls
 
 
-@given(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
-@settings(deadline=None, derandomize=True, max_examples=100)
+@any_walls
 def test_flat_cells_are_flat_everywhere(heights, threshold):
     offsets = np.linspace(0.02, 0.98, 7) - 0.5
     steps = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2)
     place = (np.argwhere(np.ones(heights.shape))[:, None] + steps).reshape(-1, 2)
     ground = surface_at(heights, place, threshold=threshold).height.reshape(*heights.shape, -1)
-    assert (np.ptp(ground, axis=2)[level_of(heights, threshold)] < 1e-6).all()
+    flat = flat_cells(node_grid_of(heights, threshold))
+    assert (np.ptp(ground, axis=2)[flat] < 1e-6).all()
 
 
-@given(heights=HEIGHTFIELDS)
-@settings(deadline=None, derandomize=True, max_examples=50)
-def test_boxes_cover_everything_with_walls_at_steps(heights):
-    assert cover_of(heights, 0.5).covered.all()
-
-
-def test_boxes_exclude_cells_at_ramps():
-    heights = np.array([[0], [0], [0], [1], [1]], dtype=np.float32)
-    assert level_of(heights, 2.0)[:, 0].tolist() == [True, True, False, False, True]
-    assert not cover_of(heights, 2.0).covered.all()
-
-
-def test_boxes_match_a_level_map(level_map):
+def test_boxes_of_a_level_map(level_map):
     cover = level_map.boxes()
     assert cover.covered.all()
     place = points_in_cells(cover.covered, level_map.config.cell, level_map.grid.lower)
     np.testing.assert_allclose(top_at(cover, place), level_map.height(place), atol=1e-3)
+    bottoms = cover.centers[:, 2] - cover.half_sizes[:, 2]
+    np.testing.assert_allclose(bottoms, level_map.heights.min() - 1.0)
+    order = np.column_stack([cover.centers[:, :2].round(6), tops(cover)]).tolist()
+    assert order == sorted(order)
 
 
 def test_boxes_never_exceed_a_map_with_slopes(terrain_map):
     cover = terrain_map.boxes()
-    assert not cover.covered.all()
     assert 0.5 < cover.covered.mean() < 1.0
     cell, lower = terrain_map.config.cell, terrain_map.grid.lower
     on, off = (points_in_cells(cells, cell, lower) for cells in (cover.covered, ~cover.covered))
     np.testing.assert_allclose(top_at(cover, on), terrain_map.height(on), atol=1e-3)
     assert (top_at(cover, off) < terrain_map.height(off) + 1e-3).all()
-
-
-def test_boxes_extend_one_meter_below_the_ground(level_map):
-    cover = level_map.boxes()
-    bottoms = cover.centers[:, 2] - cover.half_sizes[:, 2]
-    np.testing.assert_allclose(bottoms, level_map.heights.min() - 1.0)
-    assert (cover.half_sizes > 0).all()
 
 
 def test_boxes_of_a_flat_map_are_one():
@@ -113,49 +98,37 @@ def test_boxes_of_a_flat_map_are_one():
     assert cover.half_sizes.tolist() == [pytest.approx([9.0, 7.0, 0.5])]
 
 
-@pytest.mark.parametrize("steps", [1, 2, 4])
-def test_boxes_of_pyramid_stairs_are_a_stack(steps):
-    # Steps of half a metre on either side of the platform, in a patch of 5 m.
-    sizes = {"step_width": 0.5, "step_height": 0.2, "platform": 5.0 - steps}
-    pyramid = patch("pyramid_stairs", size=(5.0, 5.0), **sizes)
-    assert len(pyramid.boxes().centers) == steps + 1
+STEPS = {"step_width": 0.5, "step_height": 0.2, "size": (5.0, 5.0)}
+STAIRS = {"step_height": 0.2, "step_width": 0.4, "landing": 1.0}
 
 
-def test_boxes_of_a_pit_are_five():
-    pit = patch("pit", depth=1.0, side=2.0)
-    assert len(pit.boxes().centers) == 4 + 1
-
-
-def test_boxes_of_inverted_pyramid_are_four_per_step():
-    sizes = {"step_width": 0.5, "step_height": 0.2, "platform": 2.0}
-    bowl = patch("pyramid_stairs", size=(5.0, 5.0), inverted=True, **sizes)
-    assert len(bowl.boxes().centers) == 3 * 4 + 1
-
-
-@pytest.mark.parametrize("inverted", [False, True])
-def test_boxes_of_stairs_are_one_per_height(inverted):
-    stairs = patch("stairs", step_height=0.2, step_width=0.4, landing=1.0, inverted=inverted)
-    treads = 2 * len(np.unique(stairs.heights)) - 1
-    # Each height is one box under all higher ones, or one tread of a valley.
-    assert len(stairs.boxes().centers) == (treads if inverted else len(np.unique(stairs.heights)))
+@pytest.mark.parametrize(
+    ("terrain", "parameters", "number"),
+    [
+        # Steps of half a meter on either side of the platform, in a patch of 5 m: a stack.
+        ("pyramid_stairs", STEPS | {"platform": 4.0}, 1 + 1),
+        ("pyramid_stairs", STEPS | {"platform": 1.0}, 4 + 1),
+        ("pyramid_stairs", STEPS | {"platform": 2.0, "inverted": True}, 3 * 4 + 1),
+        ("pit", {"depth": 1.0, "side": 2.0}, 4 + 1),
+        # Five treads of 0.4 m up and down: boxes under all higher ones, or treads of a valley.
+        ("stairs", STAIRS, 6),
+        ("stairs", STAIRS | {"inverted": True}, 2 * 5 + 1),
+        ("slope", {"grade": 0.3, "landing": 1.5}, 0),  # without walls, it is a heightfield
+    ],
+)
+def test_boxes_of_a_terrain_are_few(terrain, parameters, number):
+    assert len(patch(terrain, **parameters).boxes().centers) == number
 
 
 def test_boxes_of_a_slope_with_walls_cover_its_flat_ends():
     heights = patch("slope", grade=0.3, landing=1.5).heights.copy()
+    assert not cover_of(heights, 0.075, cell=0.1).covered.any()
     heights[0] = -1.0
-    edges = tuple(np.array([0, n]) for n in heights.shape)
-    cover = decompose_boxes(heights, Grid(shape=heights.shape, cell=0.1), 0.075, edges)
+    cover = cover_of(heights, 0.075, cell=0.1)
     # Both ends are at height 0, so one box reaches under the slope from one to the other.
-    tops = cover.centers[:, 2] + cover.half_sizes[:, 2]
-    assert sorted(tops.tolist()) == pytest.approx([-1.0, 0.0])
+    assert sorted(tops(cover).tolist()) == pytest.approx([-1.0, 0.0])
     # From the last of 15 flat cells, where the slope starts, to the first at the other end.
     assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 46))
-
-
-def test_boxes_of_a_patch_without_walls_are_none():
-    cover = patch("slope", grade=0.3, landing=1.5).boxes()
-    assert len(cover.centers) == 0
-    assert not cover.covered.any()
 
 
 def stripes(counts, axis):
@@ -165,8 +138,7 @@ def stripes(counts, axis):
     edges = (np.array([0, 20]), 10 * np.arange(sum(counts) + 1))
     if axis == 0:
         heights, edges = np.ascontiguousarray(heights.T), edges[::-1]
-    cover = decompose_boxes(heights, Grid(shape=heights.shape, cell=1.0), 0.5, edges)
-    sizes = 2 * cover.half_sizes[:, :2]
+    sizes = 2 * cover_of(heights, 0.5, edges).half_sizes[:, :2]
     return sorted(map(tuple, (sizes[:, ::-1] if axis == 0 else sizes).tolist()))
 
 
@@ -178,23 +150,40 @@ def test_boxes_are_merged_to_a_limited_length():
 
 
 def test_boxes_are_longer_where_that_halves_their_number():
-    # Without a limit 2 boxes, with it 6.
-    assert stripes([9], axis=1) == [(10.0, 90.0), (20.0, 90.0)]
+    # Without a limit 2 boxes, with it 4.
+    assert stripes([5], axis=1) == [(10.0, 50.0), (20.0, 50.0)]
 
 
-def test_boxes_are_in_the_order_of_their_centers(level_map):
-    cover = level_map.boxes()
-    tops = cover.centers[:, 2] + cover.half_sizes[:, 2]
-    keys = np.column_stack([cover.centers[:, :2].round(6), tops]).tolist()
-    assert keys == sorted(keys)
-
-
-def test_boxes_of_many_heights_match():
-    # 60 columns of cells, each a level of its own: more than are searched over the whole block.
-    heights = np.repeat(np.arange(60, dtype=np.float32)[:, None], 20, axis=1)
-    cover = decompose_boxes(
-        heights, Grid(shape=(60, 20), cell=0.1), 0.075, (np.array([0, 60]), np.array([0, 20]))
-    )
+@pytest.mark.parametrize("number", [50, 51])
+def test_boxes_of_many_heights_do_not_reach_under_each_other(number):
+    heights = np.repeat(np.arange(number, dtype=np.float32)[:, None], 20, axis=1)
+    cover = cover_of(heights, 0.075, cell=0.1)
     assert cover.covered.all()
-    assert len(cover.centers) == 60
-    assert sorted(cover.centers[:, 2] + cover.half_sizes[:, 2]) == pytest.approx(range(60))
+    expected = np.ones(number) if number > 50 else np.arange(number, 0, -1)
+    order = np.argsort(tops(cover))
+    np.testing.assert_allclose(2 * cover.half_sizes[order, 0], 0.1 * expected)
+    np.testing.assert_allclose(tops(cover)[order], np.arange(number), atol=1e-9)
+
+
+def test_boxes_have_one_friction():
+    friction = samples([[1, 1, 0.5, 0.5]] * 2 + [[0.5] * 4])
+    cover = cover_of(np.zeros((3, 4)), 0.5, friction=friction)
+    found = [*zip(cover.centers[:, :2].tolist(), cover.friction.tolist(), strict=True)]
+    # Where a row or a column differs, all is divided; boxes of the same friction merge again.
+    assert found == [([1.0, 1.0], 1.0), ([1.5, 3.0], 0.5), ([2.5, 1.0], 0.5)]
+
+
+def test_merged_boxes_share_a_top_and_a_whole_side():
+    boxes = [[0, 0, 1, 0, 2], [0, 1, 3, 0, 2], [1, 3, 4, 0, 2], [0, 3, 4, 0, 1], [0, 0, 3, 2, 5]]
+    boxes += [[0, 5, 6, 0, 2]]
+    merged = merge_boxes(np.array(boxes, float))
+    expected = [[0, 0, 3, 0, 5], [0, 3, 4, 0, 1], [0, 5, 6, 0, 2], [1, 3, 4, 0, 2]]
+    assert sorted(merged.tolist()) == expected
+
+
+def test_changes_and_neighborhood_of_rows():
+    rows = np.array([[1, 2], [1, 2], [1, 3], [0, 3]])
+    assert changes(rows).tolist() == [0, 2, 3, 4]
+    assert changes(np.broadcast_to(rows[0], (4, 2))).tolist() == [0, 4]
+    around = [each[1, 0] for each in neighborhood(rows)]
+    assert around == [1, 1, 2, 1, 1, 2, 1, 1, 3]

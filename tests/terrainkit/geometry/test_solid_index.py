@@ -2,63 +2,74 @@ import mujoco
 import numpy as np
 import pytest
 
+from terrainkit.geometry import solid_index
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
+
+HALF = np.sqrt(0.5)
+CUBE = make_boxes((0, 0, 1), (1, 1, 1))
+POST = make_cylinders((0, 0, 1), 0.5, 2)
+LYING = make_cylinders((0, 0, 1), 0.5, 2, rpy=(0, np.pi / 2, 0))  # along x
+LEANING = make_cylinders((0, 0, 1), 0.5, 4, rpy=(0, np.pi / 4, 0))  # along x = z
+PLATE = make_boxes((0, 0, 1), (2, 2, 0.1), rpy=(0, np.pi / 4, 0))  # falls with x
+TETRAHEDRON = make_hulls([[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]])
 
 
 def spans(solids, *xy, radius=0.0):
     return SolidIndex(solids, radius=radius).spans(np.array(xy, dtype=float))
 
 
-def test_spans_of_a_box_and_of_open_space():
-    found = spans(make_boxes((0, 0, 1), (2, 2, 0.5)), (0.9, 0), (1.1, 0), (100, 100))
-    assert found.shape == (3, 1, 2)
-    assert found[0, 0].tolist() == [0.75, 1.25]
-    assert np.isnan(found[1:]).all()
+@pytest.mark.parametrize(
+    ("solid", "xy", "radius", "expected"),
+    [
+        (CUBE, (0.49, -0.49), 0, [0.5, 1.5]),
+        (CUBE, (0.51, 0), 0, None),
+        (CUBE, (0, -0.51), 0, None),
+        (CUBE, (100, 100), 0, None),
+        (CUBE, (0.79, 0.79), 0.3, [0.5, 1.5]),  # corners stay sharp
+        (CUBE, (0.81, 0), 0.3, None),
+        (POST, (0.3, 0.39), 0, [0, 2]),
+        (POST, (0.3, 0.41), 0, None),
+        (POST, (0.79, 0), 0.3, [0, 2]),
+        (POST, (0.81, 0), 0.3, None),
+        (POST, (0.57, 0.57), 0.3, None),  # a post stays round
+        (LYING, (0.9, 0.3), 0, [0.6, 1.4]),
+        (LYING, (-0.99, 0), 0, [0.5, 1.5]),
+        (LYING, (1.01, 0), 0, None),
+        (LYING, (0, 0.51), 0, None),
+        (LYING, (0.9, 0.2), 0.3, [0.5, 1.5]),  # no higher than without a radius
+        (LYING, (1.31, 0), 0.3, None),
+        # Around z = 1 + x; a chord at a right angle to the axis is sqrt(2) as long along z.
+        (LEANING, (0.2, 0.3), 0, [1.2 - 0.4 / HALF, 1.2 + 0.4 / HALF]),
+        (LEANING, (-0.2, 0), 0, [0.8 - 0.5 / HALF, 0.8 + 0.5 / HALF]),
+        (LEANING, (0, 0.51), 0, None),
+        # At x = 1.6, the end plane x + z - 1 = 2 sqrt(2) cuts the top.
+        (LEANING, (1.6, 0), 0, [2.6 - 0.5 / HALF, 1 + 4 * HALF - 1.6]),
+        (PLATE, (0.2, 0), 0, [0.8 - 0.05 / HALF, 0.8 + 0.05 / HALF]),
+        (PLATE, (0, 1.01), 0, None),
+        (TETRAHEDRON, (0.25, 0.25), 0, [0, 0.5]),
+        (TETRAHEDRON, (0.51, 0.5), 0, None),
+        (TETRAHEDRON, (-0.1, 0.25), 0.2, [0, 0.85 + 0.2 * np.sqrt(2)]),
+    ],
+)
+def test_spans_of_a_solid(solid, xy, radius, expected):
+    found = spans(solid, xy, radius=radius)
+    if expected is None:
+        assert found.shape[1] == 0
+    else:
+        assert found[0] == pytest.approx(np.array([expected]), abs=1e-6)
 
 
 def test_spans_are_in_the_order_of_their_bottoms():
     stack = make_boxes([[0, 0, 3], [0, 0, 1], [9, 0, 2]], (1, 1, 1))
-    assert spans(stack, (0, 0))[0].tolist() == [[0.5, 1.5], [2.5, 3.5]]
-
-
-def test_spans_of_a_tilted_box():
-    # A plate of thickness 0.1 at 45 degrees is 0.1 sqrt(2) thick vertically, and rises with -x.
-    plate = make_boxes((0, 0, 1), (2, 2, 0.1), rpy=(0, np.pi / 4, 0))
-    half = 0.05 * np.sqrt(2)
-    assert spans(plate, (0.2, 0))[0, 0] == pytest.approx([0.8 - half, 0.8 + half], abs=1e-6)
-
-
-def test_spans_of_cylinders():
-    upright = make_cylinders((0, 0, 1), 0.5, 2)
-    lying = make_cylinders((0, 0, 1), 0.5, 2, rpy=(0, np.pi / 2, 0))
-    for solid, xy, expected in (
-        (upright, (0.3, 0.39), [0, 2]),
-        (lying, (0.9, 0.3), [0.6, 1.4]),
-    ):
-        assert spans(solid, xy)[0, 0] == pytest.approx(expected, abs=1e-6)
-    assert np.isnan(spans(upright, (0.4, 0.4))).all()
-    assert np.isnan(spans(lying, (1.1, 0.0))).all()
-
-
-def test_spans_of_a_hull():
-    tetrahedron = make_hulls([[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]])
-    assert spans(tetrahedron, (0.25, 0.25))[0, 0] == pytest.approx([0, 0.5], abs=1e-6)
-    assert np.isnan(spans(tetrahedron, (0.6, 0.6))).all()
-
-
-def test_spans_within_a_radius():
-    box = make_boxes((0, 0, 1), (1, 1, 1))
-    pole = make_cylinders((5, 0, 1), 0.1, 2)
-    assert np.isnan(spans(box, (0.7, 0), radius=0.1)).all()
-    assert spans(box, (0.7, 0), radius=0.3)[0, 0].tolist() == [0.5, 1.5]
-    assert spans(pole, (5.35, 0), radius=0.3)[0, 0] == pytest.approx([0, 2])
-    assert np.isnan(spans(pole, (5.45, 0), radius=0.3)).all()
+    found = spans(stack, (0, 0), (9, 0), (5, 5))
+    expected = [[[0.5, 1.5], [2.5, 3.5]], [[1.5, 2.5], [np.nan] * 2], [[np.nan] * 2] * 2]
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_spans_without_solids_or_points():
     assert spans(Solids.empty(), (0, 0)).shape == (1, 0, 2)
-    assert SolidIndex(make_boxes((0, 0, 0), (1, 1, 1))).spans(np.empty((0, 2))).shape == (0, 0, 2)
+    assert SolidIndex(CUBE).spans(np.empty((0, 2))).shape == (0, 0, 2)
 
 
 def random_solids(rng, number):
@@ -78,7 +89,6 @@ def random_solids(rng, number):
 
 @pytest.mark.parametrize("number", [1, 20])
 def test_spans_agree_with_mujoco(number):
-    """MuJoCo casts a ray down from above and up from below each line, for each solid alone."""
     rng = np.random.default_rng(number)
     solids = random_solids(rng, number)
     spec = mujoco.MjSpec()
@@ -114,10 +124,12 @@ def test_spans_agree_with_mujoco(number):
     assert hits >= 20 * min(number, 10)
 
 
-@pytest.mark.parametrize("rpy", [(np.pi / 2, 0, 0), (0, np.pi / 2, 0), (np.pi / 2, 0, 0.3)])
-def test_spans_radius_does_not_raise_a_cylinder(rpy):
-    index = SolidIndex(make_cylinders((0, 0, 1.2), 0.1, 2.0, rpy=rpy), radius=0.5)
-    xy = np.random.default_rng(0).uniform(-0.2, 0.2, (100, 2))
-    bottom, top = np.moveaxis(index.spans(xy), -1, 0)
-    assert bottom == pytest.approx(np.full((100, 1), 1.1), abs=1e-5)
-    assert top == pytest.approx(np.full((100, 1), 1.3), abs=1e-5)
+@pytest.mark.parametrize(
+    ("name", "value"), [("_MAX_PAIRS", 5), ("_MIN_BIN", 50.0), ("_MAX_BINS", 4)]
+)
+def test_spans_do_not_depend_on_blocks_and_bins(monkeypatch, name, value):
+    rng = np.random.default_rng(0)
+    solids, xy = random_solids(rng, 10), rng.uniform(-6, 6, (200, 2))
+    expected = spans(solids, *xy)
+    monkeypatch.setattr(solid_index, name, value)
+    np.testing.assert_array_equal(spans(solids, *xy), expected)

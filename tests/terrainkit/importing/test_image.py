@@ -21,46 +21,43 @@ def write(path, pixels, **sidecar):
     return path
 
 
-def test_image_columns_are_x_and_rows_go_down(tmp_path):
-    path = write(tmp_path / "a.png", PIXELS)
-    raster = read(path, ReadOptions(file_cell=0.5, height_range=(-1.0, 4.0)))
-    # 65535 levels are 5 m: 13107 levels are 1 m. values[x, y], y upward.
-    np.testing.assert_allclose(raster.values, [[2.0, -1.0], [3.0, 0.0], [4.0, 1.0]], atol=1e-6)
-    assert raster.cell == 0.5
-    assert raster.lower == (0.0, 0.0)
-    assert raster.upper == (1.5, 1.0)
+SIDECAR = {"scale": 0.001, "offset": -2.0, "cell": 0.2}
+SAMPLE = {"first_sample": [3.1, 3.1]}
+RANGE = {"file_cell": 0.5, "height_range": (-1.0, 4.0)}
 
 
-def test_image_sidecar_has_scale_and_position(tmp_path):
-    path = write(
-        tmp_path / "a.png", PIXELS, scale=0.001, offset=-2.0, cell=0.2, first_sample=[3.1, -0.9]
-    )
-    raster = read(path, ReadOptions())
-    assert raster.values[0, 0] == pytest.approx(39.321 - 2.0)
-    assert raster.cell == 0.2
-    assert raster.lower == pytest.approx((3.0, -1.0))
+@pytest.mark.parametrize(
+    ("sidecar", "options", "level", "offset", "cell", "lower"),
+    [
+        ({}, RANGE, 1.0, -1.0, 0.5, 0.0),  # 65535 levels are 5 m: 13107 levels are 1 m
+        (SIDECAR, RANGE, 1.0, -1.0, 0.5, 0.0),
+        (SIDECAR, {}, 13.107, -2.0, 0.2, 0.0),
+        (SIDECAR | SAMPLE, {"scale": 0.002}, 26.214, -2.0, 0.2, 3.0),
+        (SAMPLE, {"scale": 0.002, "file_cell": 0.4}, 26.214, 0.0, 0.4, 2.9),
+    ],
+)
+def test_image_columns_are_x_and_rows_go_down(
+    tmp_path, sidecar, options, level, offset, cell, lower
+):
+    raster = read(write(tmp_path / "a.png", PIXELS, **sidecar), ReadOptions(**options))
+    levels = np.array([[3, 0], [4, 1], [5, 2]])
+    np.testing.assert_allclose(raster.values, levels * level + offset, atol=1e-5)
+    assert raster.cell == cell
+    assert raster.lower == pytest.approx((lower, lower))
+    assert raster.upper == pytest.approx((lower + 3 * cell, lower + 2 * cell))
 
 
-def test_image_options_override_the_sidecar(tmp_path):
-    path = write(tmp_path / "a.png", PIXELS, scale=0.001, offset=-2.0, cell=0.2)
-    raster = read(path, ReadOptions(file_cell=0.5, height_range=(0.0, 5.0)))
-    assert raster.values[2, 0] == pytest.approx(5.0)
-    assert raster.cell == 0.5
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize("suffix", [".tif", ".tiff"])
-def test_image_float_tiff_is_in_meters(tmp_path, dtype, suffix):
-    heights = np.array([[1.5, -2.25, np.nan]], dtype=dtype)
-    raster = read(write(tmp_path / f"a{suffix}", heights), ReadOptions(file_cell=1.0))
-    np.testing.assert_array_equal(raster.values, [[1.5], [-2.25], [np.nan]])
-
-
-def test_image_scale_and_nodata(tmp_path):
-    heights = np.array([[100, -9999, 250]], dtype=np.int16)
-    options = ReadOptions(file_cell=1.0, scale=0.01, nodata=-9999)
-    raster = read(write(tmp_path / "a.tif", heights), options)
-    np.testing.assert_allclose(raster.values, [[1.0], [np.nan], [2.5]])
+@pytest.mark.parametrize(
+    ("name", "heights", "options"),
+    [
+        ("a.tif", np.array([[1.5, np.nan, -2.25]], np.float32), {}),
+        ("a.tiff", np.array([[1.5, np.nan, -2.25]]), {}),
+        ("a.tif", np.array([[150, -9999, -225]], np.int16), {"scale": 0.01, "nodata": -9999}),
+    ],
+)
+def test_image_float_tiff_is_in_meters(tmp_path, name, heights, options):
+    raster = read(write(tmp_path / name, heights), ReadOptions(file_cell=1.0, **options))
+    np.testing.assert_allclose(raster.values, [[1.5], [np.nan], [-2.25]])
 
 
 def test_image_with_8_bits_warns_about_terraces(tmp_path):
@@ -71,28 +68,22 @@ def test_image_with_8_bits_warns_about_terraces(tmp_path):
         read(path, ReadOptions(file_cell=1.0, height_range=(0.0, 5.1)))
 
 
-def test_image_needs_a_height_range(tmp_path):
-    path = write(tmp_path / "a.png", PIXELS)
-    with pytest.raises(ConfigError, match=r"^height_range: missing; .* uint16 values"):
-        read(path, ReadOptions(file_cell=1.0))
+METER = {"file_cell": 1.0}
+COLORS, FLOATS = np.zeros((4, 5, 3), np.uint16), PIXELS.astype(np.float32)
 
 
-def test_image_needs_a_cell(tmp_path):
-    path = write(tmp_path / "a.png", PIXELS)
-    with pytest.raises(ConfigError, match=r"^file_cell: missing"):
-        read(path, ReadOptions(scale=1.0))
-
-
-def test_image_height_range_needs_unsigned_integers(tmp_path):
-    path = write(tmp_path / "a.tif", np.zeros((2, 2), np.float32))
-    with pytest.raises(ConfigError, match=r"^height_range: got float32 values"):
-        read(path, ReadOptions(file_cell=1.0, height_range=(0.0, 1.0)))
-
-
-def test_image_with_colors_is_rejected(tmp_path):
-    path = write(tmp_path / "a.png", np.zeros((4, 5, 3), np.uint16))
-    with pytest.raises(HeightFileError, match=r"got shape .*3.* expected a gray image"):
-        read(path, ReadOptions(file_cell=1.0, scale=1.0))
+@pytest.mark.parametrize(
+    ("name", "pixels", "options", "error", "message"),
+    [
+        ("a.png", PIXELS, METER, ConfigError, "^height_range: missing; .* uint16 values"),
+        ("a.png", PIXELS, {"scale": 1.0}, ConfigError, "^file_cell: missing"),
+        ("a.tif", FLOATS, RANGE, ConfigError, "^height_range: got float32 values"),
+        ("a.png", COLORS, METER, HeightFileError, r"got shape .*3.* expected a gray image"),
+    ],
+)
+def test_image_needs_options_and_gray_pixels(tmp_path, name, pixels, options, error, message):
+    with pytest.raises(error, match=message):
+        read(write(tmp_path / name, pixels), ReadOptions(**options))
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif"])

@@ -9,19 +9,22 @@ from terrainkit.importing import source
 from terrainkit.importing.source import check_file
 
 
-def test_check_file_limits_the_size(tmp_path, monkeypatch):
-    path = tmp_path / "a.stl"
-    path.write_bytes(bytes(684))
-    check_file(path)
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        (0, r"a\.stl: got an empty file$"),
+        (100, None),
+        (101, r"a\.stl: got 101 bytes; expected at most 100$"),
+    ],
+)
+def test_check_file_limits_the_size(tmp_path, monkeypatch, size, message):
     monkeypatch.setattr(source, "MAX_FILE_BYTES", 100)
-    with pytest.raises(HeightFileError, match=r"a\.stl: got 684 bytes; expected at most 100$"):
-        check_file(path)
-
-
-def test_check_file_rejects_empty_file(tmp_path):
-    path = tmp_path / "a.glb"
-    path.touch()
-    with pytest.raises(HeightFileError, match=r"a\.glb: got an empty file$"):
+    path = tmp_path / "a.stl"
+    path.write_bytes(bytes(size))
+    if message:
+        with pytest.raises(HeightFileError, match=message):
+            check_file(path)
+    else:
         check_file(path)
 
 

@@ -6,12 +6,6 @@ import terrainkit as tk
 from terrainkit.integrations.mujoco import add_map, make_spec, static_mesh
 
 
-@pytest.fixture(scope="module")
-def parkour():
-    config = tk.MapConfig(rows=2, cols=7, patch_size=(8.0, 6.0), border=1.0, preset="parkour")
-    return tk.generate(config)
-
-
 @pytest.mark.parametrize("collision", ["boxes", "hfield"])
 def test_specs_are_the_saved_model(tmp_path, collision):
     slippery = tk.SubTerrain(terrain="crawl", friction=(0.5, 0.25), proportion=2.0)
@@ -36,13 +30,12 @@ def test_specs_are_the_saved_model(tmp_path, collision):
                     np.testing.assert_allclose(found, expected, atol=2e-5, err_msg=name)
 
 
-def test_add_map_supports_ball_on_ground_and_solids(parkour, tmp_path):
-    path = parkour.save(tmp_path / "map.npz")
+def test_add_map_supports_ball_on_ground_and_solids(parkour, parkour_path):
     spec = mujoco.MjSpec()
     ball = spec.worldbody.add_body(pos=parkour.env_origins[1, 2] + [0, 0, 0.3])
     ball.add_freejoint()
     ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.1, 0, 0])
-    add_map(spec, path, collision="boxes")
+    add_map(spec, parkour_path, collision="boxes")
     model = spec.compile()
     assert model.nbody == 2  # all geoms belong to the world body
     assert model.ngeom > len(parkour.solids)
@@ -81,8 +74,37 @@ def test_static_mesh_is_hit_by_the_rays_of_mujoco(parkour):
     assert np.quantile(error, 0.95) < 0.05
 
 
-def test_static_mesh_rejects_plane():
+SHAPES = mujoco.mjtGeom
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "extents"),
+    [
+        (SHAPES.mjGEOM_BOX, [1, 2, 3], [2, 4, 6]),
+        (SHAPES.mjGEOM_SPHERE, [1, 0, 0], [2, 2, 2]),
+        (SHAPES.mjGEOM_ELLIPSOID, [1, 2, 3], [2, 4, 6]),
+        (SHAPES.mjGEOM_CYLINDER, [1, 2, 0], [2, 2, 4]),
+        (SHAPES.mjGEOM_CAPSULE, [1, 2, 0], [2, 2, 6]),
+    ],
+)
+def test_static_mesh_has_the_size_of_a_static_geom(kind, size, extents):
     spec = mujoco.MjSpec()
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])
-    with pytest.raises(tk.TerrainkitError, match="static geom 0: got a plane"):
+    spec.worldbody.add_geom(type=kind, size=size, pos=[4, 5, 6])
+    moving = spec.worldbody.add_body()
+    moving.add_freejoint()
+    moving.add_geom(type=SHAPES.mjGEOM_BOX, size=[9, 9, 9])
+    mesh = static_mesh(spec.compile())
+    np.testing.assert_allclose(mesh.extents, extents, rtol=0.01)
+    np.testing.assert_allclose(mesh.bounds.mean(axis=0), [4, 5, 6], atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [(SHAPES.mjGEOM_PLANE, "static geom 0: got a plane; expected a"), (None, "geoms: got none")],
+)
+def test_static_mesh_rejects_models_without_a_surface(kind, message):
+    spec = mujoco.MjSpec()
+    if kind is not None:
+        spec.worldbody.add_geom(type=kind, size=[1, 1, 1])
+    with pytest.raises(tk.TerrainkitError, match=message):
         static_mesh(spec.compile())

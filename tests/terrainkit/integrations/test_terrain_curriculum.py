@@ -50,7 +50,7 @@ class Env:
         self.progress, self.params = term, {"sampler": sampler}
         self.curriculum = TerrainLevels(SimpleNamespace(params=self.params), self)
 
-    def reset(self, ids=slice(None)):
+    def reset(self, ids=None):
         log = self.curriculum(self, ids, **self.params)
         self.data.root_link_pos_w[ids] = self.terrain.env_origins[ids]
         self.progress.reset(ids)
@@ -80,27 +80,62 @@ def test_robots_that_follow_their_commands_move_up():
     expected = env.terrain.terrain_origins[[1, 0, 0], [0, 0, 1]]
     assert torch.equal(env.terrain.env_origins[:3], expected)
     # One of two episodes on level 0 crossed its patch: 0 and 1 of the same column.
-    assert log["success/level_0"] == pytest.approx(0.5)
-    assert log["success/level_1"] == 0
-    assert log["success/stairs"] == pytest.approx(0.25)
-    assert "success/level_2" not in log
+    success = {"success/stairs": 0.25, "success/level_0": 0.5, "success/level_1": 0.0}
+    assert log == {"mean": 0.75, "stairs": 0.75} | {k: pytest.approx(v) for k, v in success.items()}
 
 
-def test_heading_commands_turn_the_reference():
+@pytest.mark.parametrize(("y", "levels"), [(-7.9, [0, 1]), (-8.1, [0, 2])])
+def test_robots_that_follow_and_leave_the_map_move_up(y, levels):
+    env = Env(levels=(1, 1, 1, 1))
+    env.reset()
+    env.step([0.0] * 4)
+    # The map of 3 x 2 patches ends 8 m from its center. Robot 0 stays; robot 1 follows for 0.5 m.
+    env.data.root_link_pos_w[1] = torch.tensor([0.5, y, 0.0])
+    env.step([0.0] * 4)
+    env.reset(torch.tensor([0, 1]))
+    assert env.terrain.terrain_levels[:2].tolist() == levels
+
+
+@pytest.mark.parametrize(("distance", "level"), [(3.9, 1), (4.1, 2)])
+def test_robots_cross_half_a_patch(distance, level):
+    env = Env(levels=(1, 1, 1, 1))
+    env.reset()
+    for _ in range(10):  # 5 m were commanded
+        env.step([0.0] * 4)
+    env.data.root_link_pos_w[1, 0] = distance
+    env.step([0.0] * 4)
+    env.reset(torch.tensor([1]))
+    assert env.terrain.terrain_levels.tolist() == [1, level, 1, 1]
+
+
+def test_curriculum_begins_with_the_patches_of_the_terrain():
+    env = Env()
+    env.terrain.cfg.terrain_generator.sub_terrains = {"stairs": None}  # less than the columns
+    env.terrain.terrain_types = torch.tensor([1, 0, 1, 0])
+    term = TerrainLevels(SimpleNamespace(params={"sampler": None}), env)
+    assert term.sampler.columns.tolist() == [1, 0, 1, 0]
+    assert term.sampler.levels.tolist() == [0, 0, 1, 2]
+    assert term._log() == {"mean": 0.75, "terrain": 0.75}
+
+
+@pytest.mark.parametrize(
+    ("target", "yaw"), [(3.0, 0.25), (0.6, 0.15), (0.6 - 2 * np.pi, 0.15), (-3.5, 0.25)]
+)
+def test_heading_commands_turn_the_reference(target, yaw):
     env = Env()
     cfg = SimpleNamespace(
         heading_command=True,
-        heading_control_stiffness=1.0,
+        heading_control_stiffness=0.5,
         ranges=SimpleNamespace(ang_vel_z=(-0.5, 0.5)),
     )
     term = SimpleNamespace(
         cfg=cfg,
-        heading_target=torch.full((4,), 3.0),
+        heading_target=torch.full((4,), target),
         is_heading_env=torch.tensor([True, False, True, False]),
     )
     env.command_manager.get_term = lambda _: term
     env.step([0.0] * 4)
-    assert env.progress.progress.yaw.tolist() == [0.25, 0, 0.25, 0]
+    assert env.progress.progress.yaw == pytest.approx([yaw, 0, yaw, 0])
 
 
 def test_unknown_sampler_is_an_error():

@@ -83,13 +83,10 @@ def test_from_toml_error_names_the_key(text, message):
         Robot.from_toml(text)
 
 
-def test_from_toml_suggests_key_of_nested_config():
+def test_nested_keys_are_flattened_and_suggested():
+    assert dict(flatten(Robot(legs=4)))["motor.effort"] == 1.0
     with pytest.raises(ConfigError, match=r"no key 'effort'; did you mean 'motor\.effort'"):
         Robot.from_toml("effort = 1", Robot(legs=4))
-
-
-def test_flatten_yields_dotted_names():
-    assert dict(flatten(Robot(legs=4)))["motor.effort"] == 1.0
 
 
 def test_to_toml_describes_subclass_without_docstring():

@@ -9,52 +9,39 @@ from terrainkit.settings.text import (
 )
 
 
-def test_shorten_cuts_long_text():
-    assert truncate("abc", 3) == "abc"
-    assert truncate("abcdefghij", 8) == "abcde..."
-    assert len(truncate("x" * 101)) == 100
+def test_truncate_cuts_long_text():
+    assert [truncate(text, 8) for text in ("abcdefgh", "abcdefghi")] == ["abcdefgh", "abcde..."]
+    assert [len(truncate("x" * n)) for n in (99, 100, 101)] == [99, 100, 100]
 
 
 @pytest.mark.parametrize(
-    ("word", "meant"),
+    ("word", "names", "ratio", "expected"),
     [
-        ("colision", "collision"),
-        ("Collision", "collision"),
-        ("visaul", "visual"),
-        ("vendor", ""),
-        ("", ""),
-        ("x" * 200, ""),
+        ("colision", ["collision", "visual"], 0.7, "collision"),
+        ("Collision", ["collision"], 0.7, "collision"),
+        ("visaul", ["collision", "visual"], 0.7, "visual"),
+        ("vendor", ["collision", "visual"], 0.7, ""),
+        ("", ["a"], 0.7, ""),
+        ("fl_foot", ["FL_foot", "lf_foot"], 0.6, "FL_foot"),  # case first, then the same letters
+        ("fl_foot", ["lf_foot", "fl_foo"], 0.6, "lf_foot"),
+        ("link_12", ["link_21", "link_1"], 0.6, "link_1"),  # digits are not swapped
+        ("abcx", ["abcy"], 0.75, "abcy"),
+        ("abcx", ["abcy"], 0.76, ""),
+        ("x" * 100, ["x" * 101, "x" * 99], 0.7, "x" * 99),
+        ("x" * 101, ["x" * 100], 0.7, ""),
+        ("y" * 100, [f"link_{number:095d}" for number in range(5000)], 0.6, ""),  # which is fast
     ],
 )
-def test_nearest_finds_misspelled_names(word, meant):
-    assert closest(word, {"collision", "visual", "inertial", "x" * 201}, 0.7) == meant
+def test_closest_finds_misspelled_names(word, names, ratio, expected):
+    assert closest(word, names, ratio) == closest(word, names[::-1], ratio) == expected
 
 
-def test_nearest_prefers_case_then_same_letters():
-    assert closest("fl_foot", ["FL_foot", "lf_foot"], 0.6) == "FL_foot"
-    assert closest("fl_foot", ["lf_foot", "fl_foo"], 0.6) == "lf_foot"
+def test_closest_does_not_depend_on_the_order_of_names():
+    names = ["leg_a", "leg_b", "leg_c"]
+    assert closest("leg_d", names, 0.6) == closest("leg_d", names[::-1], 0.6)
 
 
-def test_nearest_does_not_swap_digits():
-    assert closest("link_12", ["link_21", "link_1"], 0.6) == "link_1"
-
-
-def test_nearest_respects_the_similarity():
-    assert closest("abcx", ["abcy"], 0.75) == "abcy"
-    assert closest("abcx", ["abcy"], 0.76) == ""
-
-
-def test_nearest_ignores_the_order_of_names():
-    known = ["leg_a", "leg_b", "leg_c"]
-    assert closest("leg_d", known, 0.6) == closest("leg_d", known[::-1], 0.6)
-
-
-def test_nearest_is_fast_for_long_names():
-    known = [f"link_{number:095d}" for number in range(5000)]
-    assert closest("y" * 100, known, 0.6) == ""
-
-
-def test_known_names_suggests_the_nearest():
+def test_expected_names_suggests_the_closest():
     assert expected_names("gapp", ["flat", "gap"]) == "did you mean 'gap'? There are: flat, gap"
     assert expected_names("x", ["flat", "gap"], "it has") == "it has: flat, gap"
     assert expected_names("x", ["a"], closest_name="b.x") == "did you mean 'b.x'? There are: a"
@@ -69,4 +56,4 @@ def test_closest_names_are_at_most_three_and_the_closest_first():
     assert closest_names("LEG_C", names)[0] == "leg_c"
     assert len(closest_names("leg_e", names)) == 3
     assert closest_names("wheel", names) == []
-    assert closest_names("x" * 201, ["x" * 200]) == []
+    assert closest_names("x" * 101, ["x" * 100]) == []

@@ -3,7 +3,7 @@ import time
 import tomllib
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from terrainkit.errors import ConfigError
@@ -65,6 +65,7 @@ values = st.recursive(
 )
 
 
+@settings(max_examples=50)
 @given(texts, values, texts)
 def test_line_text_round_trip(key, value, comment):
     line = line_text(key, value, comment) + "\n"
@@ -79,20 +80,33 @@ def test_key_text_quotes_where_needed(key, text):
     assert key_text(key) == text
 
 
-def test_value_text_escapes_control_characters():
-    assert value_text("a\n\x7f\\") == '"a\\n\\u007f\\\\"'
+LONG = ["a" * 40, "b" * 40, "c" * 8]
 
 
-def test_value_text_wraps_long_lists():
-    names = ["a" * 40, "b" * 40, "c" * 40]
-    assert value_text(names[:2]).count("\n") == 0
-    assert value_text(names).splitlines() == ["[", *(f'    "{name}",' for name in names), "]"]
-    assert value_text(names[:2], 50).count("\n") == 3
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ("a\n\x7f\\", '"a\\n\\u007f\\\\"'),
+        (math.pi, "3.141592653589793"),
+        (1.0, "1.0"),
+        (True, "true"),
+        ({}, "{}"),
+        ({"a": 1, "b c": [2]}, '{ a = 1, "b c" = [2] }'),
+        (LONG, f'["{LONG[0]}", "{LONG[1]}", "cccccccc"]'),  # 100 characters
+        ([*LONG[:2], "c" * 9], f'[\n    "{LONG[0]}",\n    "{LONG[1]}",\n    "ccccccccc",\n]'),
+    ],
+)
+def test_value_text_is_exact_and_wraps_long_lists(value, text):
+    assert value_text(value) == text
 
 
-def test_value_text_writes_exact_numbers():
-    assert float(value_text(math.pi)) == math.pi
-    assert value_text(1.0) == "1.0"
+def test_line_text_wraps_at_the_length_of_the_line():
+    assert line_text("k", LONG[:2]).count("\n") == 0
+    assert line_text("key_" * 4, LONG[:2], "a", "b").splitlines()[1:] == [
+        f'    "{LONG[0]}",',
+        f'    "{LONG[1]}",',
+        "]  # a; b",
+    ]
 
 
 def test_comment_text_is_one_line():
@@ -100,8 +114,19 @@ def test_comment_text_is_one_line():
     assert comment_text("", " \n") == ""
 
 
-def test_read_text_rejects_other_than_regular_files(tmp_path):
+def test_read_text_reads_regular_files_up_to_a_megabyte(tmp_path):
+    path = tmp_path / "a.toml"
+    for data, message in (
+        (b"a" * 2**20 + b"a", "more than 1048576 bytes"),
+        (b"\xff", "invalid start byte"),
+    ):
+        path.write_bytes(data)
+        with pytest.raises(ConfigError, match=message):
+            read_text(path)
+    path.write_bytes(b"a" * 2**20)
+    assert len(read_text(path)) == 2**20
     with pytest.raises(ConfigError, match="not a regular file"):
         read_text(tmp_path)
-    with pytest.raises(ConfigError, match=r"cannot read .*: No such file"):
-        read_text(tmp_path / "none.toml")
+    for name in ("none.toml", "nul\0"):
+        with pytest.raises(ConfigError, match=r"cannot read .*; expected a TOML file"):
+            read_text(tmp_path / name)

@@ -38,24 +38,23 @@ MOTOR = Motor(effort=2.0)
 @pytest.mark.parametrize(
     ("value", "annotation", "result"),
     [
-        (3, int, 3),
         (0.5, float, 0.5),
         (8, float, 8.0),
         (True, bool, True),
         ("8", str, "8"),
         ("b", Mode, "b"),
         (None, float | None, None),
-        (1, float | None, 1.0),
-        ([8, 4], tuple[float, float], (8.0, 4.0)),
         ((8, 4.5), tuple[float, float], (8.0, 4.5)),
         ([1, 2, 3], tuple[float, ...], (1.0, 2.0, 3.0)),
         ([], tuple[float, ...], ()),
         ([MOTOR], tuple[Motor, ...], (MOTOR,)),
+        ({"a.b": [1, 1]}, Mapping[str, Interval], {"a.b": (1.0, 1.0)}),
         (2**63 - 1, int, 2**63 - 1),
-        (np.int64(3), int, 3),
+        (1 - 2**63, int, 1 - 2**63),
+        (-1e30, float, -1e30),
+        (1e-12, PositiveFloat, 1e-12),
         (np.int8(8), float, 8.0),
-        (np.float32(0.5), float, 0.5),
-        (np.float64(0.5), float | None, 0.5),
+        (np.float32(0.5), float | None, 0.5),
         (-1e-300, float, -1e-300),
         (np.True_, bool, True),
         (np.str_("b"), Mode, "b"),
@@ -75,53 +74,41 @@ def test_convert_makes_floats_of_integers_in_lists():
 @pytest.mark.parametrize(
     ("value", "annotation", "message"),
     [
-        ("3", int, "key: got '3'; expected an integer"),
-        (3.0, int, r"key: got 3\.0; expected an integer"),
-        (True, int, "key: got True; expected an integer"),
-        ("0.5", float, r"key: got '0\.5'; expected a number"),
-        (False, float, "key: got False; expected a number"),
-        (None, float, "key: got None; expected a number"),
-        (math.nan, float, "key: got nan; expected a number"),
-        (-math.inf, float | None, "key: got -inf; expected a number, or none"),
-        (
-            -1e39,
-            float,
-            "key: got -1e\\+39, which is beyond 1e\\+30; expected a number",
-        ),
-        (
-            1e-39,
-            PositiveFloat,
-            "key: got 1e-39, which is below 1e-12; expected a number > 0",
-        ),
-        (datetime.date(2000, 1, 1), float, r"key: got datetime\.date.*; expected a number"),
-        (np.float64(3), int, r"key: got 3\.0; expected an integer"),
-        (np.True_, float, "key: got True; expected a number"),
-        (2**63, int, "key: got an integer beyond 64 bits"),
-        pytest.param(10**400, float, "key: got an integer beyond 64 bits", id="10**400"),
-        pytest.param(-(10**400), float | None, "key: got an integer beyond", id="-10**400"),
-        (1, bool, "key: got 1; expected true or false"),
-        ("true", bool, "key: got 'true'; expected true or false"),
-        (3, str, "key: got 3; expected a string"),
-        ("c", Mode, "key: got 'c'; expected one of: a, b"),
-        (["a"], Mode, r"key: got \['a'\]; expected one of: a, b"),
-        ("x", float | None, "key: got 'x'; expected a number"),
-        (8.0, tuple[float, float], r"key: got 8\.0; expected 2 values, each a number"),
-        ("84", tuple[float, float], "key: got '84'; expected 2 values"),
-        ([8.0], tuple[float, float], r"key: got \[8\.0\]; expected 2 values"),
-        ([8.0, "4"], tuple[float, float], r"key: got \[8\.0, '4'\]; expected 2 values"),
-        ([1.0, None], tuple[float, ...], "key: got .*; expected a list, each value a number"),
-        ([2, 1], Interval, r"key: got \[2, 1\]; expected .*, the lower one first"),
-        (["pit"], tuple[Motor, ...], r"key\[0\]: got 'pit'; expected a table \(Motor\)"),
-        ({"effort": 1.0}, Motor, r"key: got a table; expected a table \(Motor\)"),
-        ({"a": 1}, Mapping[str, Interval], r"key\.a: got 1; expected 2 values"),
-        ({"a.b": 1}, Mapping[str, str], r'key\."a\.b": got 1; expected a string'),
-        ({"a": 1}, float, "key: got a table; expected a number"),
-        ("ab", Mapping[str, str], "key: got 'ab'; expected a table, each value a string"),
+        ("3", int, "got '3'; expected an integer"),
+        (np.float64(3), int, "got 3.0; expected an integer"),
+        (True, int, "got True; expected an integer"),
+        (np.True_, float, "got True; expected a number"),
+        (None, float, "got None; expected a number"),
+        (math.nan, float, "got nan; expected a number"),
+        (-math.inf, float | None, "got -inf; expected a number, or none"),
+        (-1.1e30, float, "got -1.1e+30, which is beyond 1e+30; expected a number"),
+        (0.9e-12, PositiveFloat, "got 9e-13, which is below 1e-12; expected a number > 0"),
+        (datetime.date(2000, 1, 1), float, "got datetime.date(2000, 1, 1); expected a number"),
+        (2**63, int, "got an integer beyond 64 bits; expected an integer"),
+        (-(2**63), int, "got an integer beyond 64 bits; expected an integer"),
+        pytest.param(10**400, float, "got an integer beyond 64 bits; expected a n", id="10**400"),
+        (1, bool, "got 1; expected true or false"),
+        (3, str, "got 3; expected a string"),
+        ("c", Mode, "got 'c'; expected one of: a, b"),
+        (["a"], Mode, "got ['a']; expected one of: a, b"),
+        ("staris", Literal["stairs"], "'staris'; expected one of: stairs; did you mean 'stairs'?"),
+        (8.0, tuple[float, float], "got 8.0; expected 2 values, each a number"),
+        ("84", tuple[float, float], "got '84'; expected 2 values"),
+        ([8.0], tuple[float, float], "got [8.0]; expected 2 values"),
+        ([1.0, None], tuple[float, ...], "got [1.0, None]; expected a list, each value a number"),
+        ([2, 1], Interval, "got [2, 1]; expected 2 values, each a number, the lower one first"),
+        (["pit"], tuple[Motor, ...], "[0]: got 'pit'; expected a table (Motor)"),
+        ({"effort": 1.0}, Motor, "got a table; expected a table (Motor)"),
+        ({"a": 1}, Mapping[str, Interval], ".a: got 1; expected 2 values"),
+        ({"a.b": 1}, Mapping[str, str], '."a.b": got 1; expected a string'),
+        ("ab", Mapping[str, str], "got 'ab'; expected a table, each value a string"),
     ],
 )
 def test_convert_rejects_other_types(value, annotation, message):
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(ConfigError) as error:
         convert("key", value, annotation)
+    assert str(error.value).startswith("key")
+    assert message in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -147,7 +134,7 @@ def test_describe_states_type_and_range(annotation, text):
 )
 def test_named_types_include_their_ends(hint, low, high):
     assert [convert("x", value, hint) for value in (low, high)] == [low, high]
-    step = 1 if hint is Count else 1e-6
-    for value in (low - step, high * (1 + 1e-9) if step < 1 else high + 1):
+    step = 1 if hint is Count else 1e-9
+    for value in (low - step, high + step):
         with pytest.raises(ConfigError, match="x: got "):
             convert("x", value, hint)

@@ -7,9 +7,9 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
 from terrainkit.views.budget import (
-    BOX_COSTS,
     HFIELD_COST,
     MAX_CONTACTS,
+    CollisionBudget,
     box_step_time,
     compute_budget,
     foot_contacts,
@@ -27,18 +27,19 @@ def flat_budget(flat_map):
     return compute_budget(flat_map)
 
 
-def test_budget_counts_triangles(flat_budget):
+def test_budget_counts_triangles_geoms_and_cells(flat_budget):
     # 100 x 50 samples with half a cell around them: 101 x 51 quads.
     assert flat_budget.full_triangles == 2 * 101 * 51
     assert flat_budget.merged_triangles == 2
-
-
-def test_budget_counts_geoms_and_cells(flat_budget):
-    boxes, hfield = flat_budget.collisions["boxes"], flat_budget.collisions["hfield"]
-    assert (boxes.num_geoms, boxes.num_boxes, boxes.hfield_cells) == (1, 1, 0)
-    # The heightfield has 80 x 30 samples and 2 on each side; 4 boxes are the rest of the border.
-    assert (hfield.num_geoms, hfield.num_boxes, hfield.hfield_cells) == (5, 4, 83 * 33)
     assert flat_budget.auto == "boxes"
+    assert flat_budget.foot_contacts == 8
+    assert flat_budget.collisions == {
+        "boxes": CollisionBudget(num_geoms=1, num_boxes=1, hfield_cells=0, step_time=1.03),
+        # 80 x 30 samples and 2 on each side; 4 boxes are the rest of the border.
+        "hfield": CollisionBudget(
+            num_geoms=5, num_boxes=4, hfield_cells=83 * 33, step_time=HFIELD_COST
+        ),
+    }
 
 
 def test_budget_counts_what_mujoco_loads(terrain_map, tmp_path):
@@ -52,6 +53,8 @@ def test_budget_counts_what_mujoco_loads(terrain_map, tmp_path):
         assert cost.hfield_cells == cells.sum()
         assert budget.file_sizes[f".xml ({collision})"] == path.stat().st_size
     assert budget.auto == "hfield"
+    mixed = budget.collisions["boxes"]
+    assert mixed.step_time == max(box_step_time(mixed.num_boxes), HFIELD_COST)
 
 
 def test_budget_sizes_are_those_of_the_files(flat_map, flat_budget, tmp_path):
@@ -64,19 +67,12 @@ def test_budget_sizes_are_those_of_the_files(flat_map, flat_budget, tmp_path):
 
 
 def test_budget_says_which_format_has_no_solids():
-    config = MapConfig(rows=1, cols=1, border=0.0, terrains=(SubTerrain(terrain="crawl"),))
-    terrain_map = generate(config)
+    crawl = SubTerrain(terrain="crawl")
+    terrain_map = generate(MapConfig(rows=1, cols=1, border=0.0, terrains=(crawl,)))
     budget = compute_budget(terrain_map)
     assert "solids" in budget.file_sizes[".png"]
     # The ground is one box, and crawl's bars are boxes.
     assert budget.collisions["boxes"].num_boxes == 1 + len(terrain_map.solids)
-
-
-def test_budget_step_time_is_that_of_the_slower_geoms(flat_budget, terrain_map):
-    assert flat_budget.collisions["boxes"].step_time == BOX_COSTS[1]
-    assert flat_budget.collisions["hfield"].step_time == HFIELD_COST
-    mixed = compute_budget(terrain_map).collisions["boxes"]
-    assert mixed.step_time == max(box_step_time(mixed.num_boxes), HFIELD_COST)
 
 
 @pytest.mark.parametrize(
@@ -114,6 +110,7 @@ def test_foot_contacts_bound_is_tight_in_mujoco(radius, cell, contacts):
         data.qpos[:3] = [*rng.uniform(-cell, cell, 2), 0.7 * radius]
         mujoco.mj_forward(model, data)
         most = max(most, data.ncon)
+    assert mujoco.mjMAXCONPAIR == MAX_CONTACTS
     assert min(contacts, MAX_CONTACTS) - 2 <= most <= min(contacts, MAX_CONTACTS)
 
 
@@ -121,7 +118,3 @@ def test_foot_contacts_bound_is_tight_in_mujoco(radius, cell, contacts):
 def test_foot_contacts_rejects_invalid_radius(radius):
     with pytest.raises(ConfigError, match=r"foot radius: got .*; expected a number above 0 m"):
         foot_contacts(radius, 0.1)
-
-
-def test_max_contacts_is_that_of_mujoco():
-    assert mujoco.mjMAXCONPAIR == MAX_CONTACTS

@@ -8,6 +8,7 @@ import terrainkit as tk
 from terrainkit.errors import ExportError
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.views.preview import (
+    Route,
     color_levels,
     height_colors,
     render_preview,
@@ -15,47 +16,60 @@ from terrainkit.views.preview import (
     write_preview,
 )
 
+LEFT, BELOW, RIGHT, ABOVE = 250, 60, 130, 70
 PAPER = (250, 249, 246)
+FLAT = tk.SubTerrain(terrain="flat")
+
+
+def map_of(*terrains, rows=1, cols=1, border=0.0, **options):
+    config = tk.MapConfig(rows=rows, cols=cols, border=border, terrains=terrains, **options)
+    return tk.generate(config)
+
+
+def slope(*, inverted):
+    return tk.SubTerrain(terrain="pyramid_slope", parameters={"inverted": inverted})
+
+
+def color_bar(picture):
+    return picture[ABOVE:-BELOW, -RIGHT + 20 : -RIGHT + 42].astype(int)
 
 
 @pytest.fixture(scope="module")
 def pits():
     """Make three rows along x and one column along y; only the last row has a deep pit."""
-    pit = tk.SubTerrain(terrain="pit", parameters={"side": 6.0})
-    return tk.generate(tk.MapConfig(rows=3, cols=1, border=1.0, terrains=(pit,)))
+    return map_of(tk.SubTerrain(terrain="pit", parameters={"side": 6.0}), rows=3, border=1.0)
 
 
-def test_preview_x_is_to_the_right(pits):
-    picture = render_preview(pits, 520)  # 26 m along x: 20 px for a metre
-    left, _, _, above = 250, 60, 130, 70
-    first, last = (picture[above + 100, left + 20 + row * 160 + 30].astype(int) for row in (0, 2))
+def test_preview_has_x_to_the_right_and_y_up(pits):
+    picture = render_preview(pits, 520)  # 26 m along x: 20 px for a meter
+    first, last = (picture[ABOVE + 100, LEFT + 50 + row * 160].astype(int) for row in (0, 2))
     assert np.abs(last - first).max() > 40
-
-
-def test_preview_y_is_up():
-    bowl = tk.SubTerrain(terrain="pyramid_slope", name="bowl", parameters={"inverted": True})
-    config = tk.MapConfig(
-        rows=1,
-        cols=2,
-        border=0.0,
-        difficulty_range=(1.0, 1.0),
-        terrains=(tk.SubTerrain(terrain="flat"), bowl),
-    )
-    picture = render_preview(tk.generate(config), 160)
-    top, bottom = (picture[70 + i, 250 + 30].astype(int) for i in (80 + 30, 240 + 30))
-    assert tuple(bottom) == tuple(shaded_relief(np.zeros((3, 3), np.float32), 0.1)[1, 1])
+    assert (picture[:, :LEFT] != PAPER).any()  # labels
+    bowl = dataclasses.replace(slope(inverted=True), name="bowl")
+    picture = render_preview(map_of(FLAT, bowl, cols=2, difficulty_range=(1.0, 1.0)), 160)
+    top, bottom = (picture[ABOVE + 30 + i, LEFT + 30].astype(int) for i in (80, 240))
+    assert bottom.tolist() == shaded_relief(np.zeros((3, 3), np.float32), 0.1)[1, 1].tolist()
     assert np.abs(top - bottom).max() > 40
 
 
-def test_preview_has_the_minimum_width(pits):
-    for width in (100, 520, 1000):
-        ground = render_preview(pits, width).shape[1] - 250 - 130
-        assert width <= ground < 2 * max(width, 260)
+@pytest.mark.parametrize(("width", "expected"), [(100, 100), (260, 260), (261, 520), (520, 520)])
+def test_preview_has_the_minimum_width(pits, width, expected):
+    assert render_preview(pits, width).shape[1] == LEFT + expected + RIGHT
 
 
-def test_preview_labels_every_column(pits):
-    picture = render_preview(pits, 520)
-    assert (picture[:, :250] != PAPER).any()
+def test_preview_of_a_long_map_is_limited():
+    long = map_of(FLAT, cols=300, patch_size=(2.0, 2.0), cell=0.2)
+    height, width, _ = render_preview(long, 1600).shape
+    assert (height, width) == (ABOVE + 9000 + BELOW, LEFT + 30 + RIGHT)
+
+
+@pytest.mark.parametrize(("rows", "cols", "longer"), [(1, 40, 0), (40, 1, 1), (3, 3, 0)])
+def test_map_in_a_notebook_is_a_picture_of_limited_size(rows, cols, longer):
+    data = map_of(FLAT, rows=rows, cols=cols, border=20.0)._repr_png_()
+    picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
+    relief = np.subtract(picture.shape[:2], (ABOVE + BELOW, LEFT + RIGHT))
+    assert relief.argmax() == longer or rows == cols
+    assert 700 <= relief.max() <= 1100
 
 
 def test_color_levels_are_ends_and_color_stops():
@@ -63,65 +77,63 @@ def test_color_levels_are_ends_and_color_stops():
     assert color_levels(0.0, 0.0).tolist() == [0.0]
 
 
+def test_height_colors_are_linear_between_stops():
+    found = height_colors(np.array([-20.0, -0.2, 0.0, 0.95, 9.0]))
+    expected = [(38, 32, 44), (168, 179.5, 188), (224, 221, 208), (189, 141, 95), (116, 66, 46)]
+    np.testing.assert_allclose(found, expected)
+
+
+def test_shaded_relief_is_brighter_toward_the_light():
+    grid = np.indices((5, 5)) * np.float32(0.01)
+    color = height_colors(np.array(0.02))
+    # The light comes from (-0.55, 0.45, 0.7); the slopes are -0.1 along x and 0.2 along y.
+    heights = (2 * grid[1] - grid[0]).astype(np.float32)
+    shade = (0.7 - 0.55 * 0.1 - 0.45 * 0.2) / 0.7 / np.sqrt(1 + 0.1**2 + 0.2**2)
+    assert shaded_relief(heights, 0.1)[2, 2] == pytest.approx(color * shade - 0.5, abs=0.5)
+
+
 def test_preview_height_scale_includes_the_tops_of_solids(solid_map):
-    lifted = dataclasses.replace(
-        solid_map, solids=solid_map.solids.transformed(np.eye(3), np.array([0.0, 0.0, 3.0]))
-    )
-    bars = [
-        render_preview(each, 400)[70:-60, -130 + 25]
-        for each in (dataclasses.replace(solid_map, solids=Solids.empty()), solid_map, lifted)
-    ]
-    highest = [0.0, 0.7, 3.7]  # the top of the cylinder
-    for bar, top in zip(bars, highest, strict=True):
-        assert bar[2] == pytest.approx(height_colors(np.array(top)), abs=4)
+    lifted = solid_map.solids.transformed(np.eye(3), np.array([0.0, 0.0, 3.0]))
+    # The top of the cylinder is the highest.
+    for solids, top in ((Solids.empty(), 0.0), (solid_map.solids, 0.7), (lifted, 3.7)):
+        bar = color_bar(render_preview(dataclasses.replace(solid_map, solids=solids), 400))
+        assert bar[2, 5] == pytest.approx(height_colors(np.array(top)), abs=4)
 
 
-@pytest.mark.parametrize("inverted", [False, True])
-def test_preview_height_scale_has_the_colors_of_heights(inverted):
-    slope = tk.SubTerrain(terrain="pyramid_slope", parameters={"inverted": inverted})
-    config = tk.MapConfig(rows=1, cols=1, difficulty_range=(1.0, 1.0), terrains=(slope,))
-    picture = render_preview(tk.generate(config), 400)
-    bar = picture[70:-60, -130 + 20 : -130 + 42].astype(int)
-    # Heights from 0 to 1 m or from -1 m to 0; row 0 is the highest.
-    top, bottom = height_colors(np.array([0.0, -1.0] if inverted else [1.0, 0.0]))
-    assert np.abs(bar[2, 10] - top).max() < 8
-    assert np.abs(bar[-3, 10] - bottom).max() < 8
-    middle = height_colors(np.array([-0.4 if inverted else 0.4]))[0]
-    assert np.abs(bar[len(bar) // 2, 10] - middle).max() < 8
-    assert (picture[70:-60, -80:] != PAPER).any()  # tick labels
+@pytest.mark.parametrize(
+    ("inverted", "heights"), [(False, (1.0, 0.4, 0.0)), (True, (0.0, -0.4, -1.0))]
+)
+def test_preview_height_scale_has_the_colors_of_heights(inverted, heights):
+    terrain_map = map_of(slope(inverted=inverted), border=20.0, difficulty_range=(1.0, 1.0))
+    picture = render_preview(terrain_map, 400)
+    bar = color_bar(picture)
+    found = bar[[2, len(bar) // 2, -3], 10]  # row 0 is the highest
+    assert np.abs(found - height_colors(np.array(heights))).max() < 8
+    assert (picture[ABOVE:-BELOW, -80:] != PAPER).any()  # tick labels
 
 
 @pytest.mark.parametrize("width", [100, 130, 400])
 def test_preview_height_scale_of_a_flat_map(width):
-    flat = tk.SubTerrain(terrain="flat")
-    terrain_map = tk.generate(tk.MapConfig(rows=5, cols=1, border=0.0, terrains=(flat,)))
-    bar = render_preview(terrain_map, width)[70:-60, -130 + 20 : -130 + 42]
+    bar = color_bar(render_preview(map_of(FLAT, rows=5), width))
     assert (bar[3:-3, 3:-3] == height_colors(np.array(0.0)).astype(np.uint8)).all()
 
 
-def test_shaded_relief_is_brighter_toward_the_light():
-    x = np.arange(20, dtype=np.float32)[:, None] * np.ones((1, 20), np.float32) * 0.01
-    facing, away = shaded_relief(x, 0.1)[10, 10].sum(), shaded_relief(x[::-1], 0.1)[10, 10].sum()
-    assert facing > away
-
-
-def test_height_colors_are_blue_to_red():
-    low, high = height_colors(np.array([-1.0, 1.0]))
-    assert low[2] > low[0]
-    assert high[0] > high[2]
-
-
-def test_write_preview_writes_the_image(pits, tmp_path):
+def test_write_preview_keeps_existing_file(pits, tmp_path):
     path = write_preview(pits, tmp_path / "a.png", width=300)
     assert (cv2.imread(str(path))[..., ::-1] == render_preview(pits, 300)).all()
+    path.write_text("mine")
+    with pytest.raises(ExportError, match="exists"):
+        write_preview(pits, path)
+    assert path.read_text() == "mine"
+    assert write_preview(pits, path, overwrite=True).read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
     ("name", "width", "said"),
     [
         ("a.jpg", 300, "expected a .png file"),
-        ("a.png", 0, "width: got 0; expected 100 to 10000"),
-        ("a.png", 10**6, "width: got 1000000; expected 100 to 10000"),
+        ("a.png", 99, "width: got 99; expected 100 to 10000"),
+        ("a.png", 10_001, "width: got 10001; expected 100 to 10000"),
         ("file/a.png", 300, "is not a folder"),
     ],
 )
@@ -132,62 +144,47 @@ def test_write_preview_rejects_invalid_input(pits, tmp_path, name, width, said):
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_write_preview_keeps_existing_file(pits, tmp_path):
-    target = tmp_path / "a.png"
-    target.write_text("mine")
-    with pytest.raises(ExportError, match="exists"):
-        write_preview(pits, target)
-    assert target.read_text() == "mine"
-    write_preview(pits, target, overwrite=True)
-    assert target.read_bytes().startswith(b"\x89PNG")
+def render_with(terrain_map, solids, goals=np.nan, routes=()):
+    """Return a function that returns the color at a position of a map of 7 m on 700 pixels."""
+    goals = np.full_like(terrain_map.goals, goals) if np.isscalar(goals) else goals
+    changed = dataclasses.replace(terrain_map, solids=solids, goals=goals)
+    picture = render_preview(changed, 700, routes)
+    bottom = picture.shape[0] - BELOW
 
+    def pixel(x, y):
+        return picture[bottom - round((y + 0.5) * 100), LEFT + round((x + 0.5) * 100)].astype(int)
 
-def test_preview_of_a_long_map_is_limited():
-    flat = tk.SubTerrain(terrain="flat")
-    config = tk.MapConfig(
-        rows=1, cols=300, patch_size=(2.0, 2.0), cell=0.2, border=0.0, terrains=(flat,)
-    )
-    height, width, _ = render_preview(tk.generate(config), 1600).shape
-    assert height <= 10_000 + 70 + 60
-    assert width < 300 + 10_000 / 300 + 130
+    return pixel
 
 
 def test_preview_draws_solids_and_goals(solid_map):
-    """The color at the center of the box mixes the colors of its top and the ground."""
-    bare = dataclasses.replace(
-        solid_map, solids=Solids.empty(), goals=np.full_like(solid_map.goals, np.nan)
-    )
-    with_solids, without = (render_preview(each, 700).astype(int) for each in (solid_map, bare))
-    scale = 100  # 7 m on 700 pixels
-    bottom, left = without.shape[0] - 60, 250
-
-    def pixel(picture, x, y):
-        return picture[bottom - round((y + 0.5) * scale), left + round((x + 0.5) * scale)]
-
-    expected = 0.75 * height_colors(np.array(0.6)) + 0.25 * pixel(without, 1, 6)
-    assert pixel(with_solids, 1, 6) == pytest.approx(expected, abs=2)
-    assert (pixel(with_solids, 3, 1) == pixel(without, 3, 1)).all()
-    assert (pixel(with_solids, 3.1, 6) != pixel(without, 3.1, 6)).any()  # the arrow of a goal
-
-
-@pytest.mark.parametrize(("rows", "cols", "longer"), [(1, 40, 0), (40, 1, 1), (3, 3, 0)])
-def test_map_in_a_notebook_is_a_picture_of_limited_size(rows, cols, longer):
-    flat = tk.SubTerrain(terrain="flat")
-    terrain_map = tk.generate(tk.MapConfig(rows=rows, cols=cols, terrains=(flat,)))
-    picture = cv2.imdecode(np.frombuffer(terrain_map._repr_png_(), np.uint8), cv2.IMREAD_COLOR)
-    relief = np.subtract(picture.shape[:2], (130, 380))  # without the margins
-    assert relief.argmax() == longer or rows == cols
-    assert 700 <= relief.max() <= 1100
+    bare = render_with(solid_map, Solids.empty())
+    drawn = render_with(solid_map, solid_map.solids, solid_map.goals)
+    # The color at the center of the box mixes the colors of its top and the ground.
+    expected = 0.75 * height_colors(np.array(0.6)) + 0.25 * bare(1, 6)
+    assert drawn(1, 6) == pytest.approx(expected, abs=2)
+    assert (drawn(3, 1) == bare(3, 1)).all()
+    assert (drawn(3.1, 6) != bare(3.1, 6)).any()  # the arrow of a goal
 
 
 def test_preview_draws_the_solid_with_the_highest_top_last(solid_map):
-    """A pillar of 1 m leads through a slab from 0.4 m to 0.6 m."""
-    boxes = make_boxes([(1, 6, 0.5), (1, 6, 0.5)], [(0.5, 0.5, 1.0), (1.5, 1.5, 0.2)])
-    solids = dataclasses.replace(boxes, patch=np.tile(np.array([0, 1], np.int32), (2, 1)))
-    given = dataclasses.replace(solid_map, solids=solids, goals=np.full_like(solid_map.goals, 0.0))
-    ground = dataclasses.replace(given, solids=Solids.empty())
-    picture, bare = (render_preview(each, 700).astype(int) for each in (given, ground))
-    at = bare.shape[0] - 60 - 650, 250 + 150
-    slab = 0.75 * height_colors(np.array(0.6)) + 0.25 * bare[at]
+    # A pillar of 1 m leads through a slab from 0.4 m to 0.6 m.
+    solids = make_boxes([(1, 6, 0.5), (1, 6, 0.5)], [(0.5, 0.5, 1.0), (1.5, 1.5, 0.2)])
+    slab = 0.75 * height_colors(np.array(0.6)) + 0.25 * render_with(solid_map, Solids.empty())(1, 6)
     expected = 0.75 * height_colors(np.array(1.0)) + 0.25 * slab
-    assert picture[at] == pytest.approx(expected, abs=2)
+    assert render_with(solid_map, solids)(1, 6) == pytest.approx(expected, abs=2)
+
+
+def test_preview_draws_spawns_and_routes(solid_map):
+    def route(y, place, *, is_passable):
+        points = np.array([[1.0, y], [3.0, y]])
+        return Route(points=points, place=place, label="no", is_passable=is_passable)
+
+    routes = [route(1.0, None, is_passable=True), route(3.0, (5.0, 3.0), is_passable=False)]
+    color = render_with(solid_map, Solids.empty(), routes=routes)
+    x, y, _ = solid_map.env_origins[0, 0]
+    assert color(x, y).tolist() == [196, 40, 40]
+    assert color(1.5, 1).tolist() == [30, 120, 60]
+    assert color(1.5, 3).tolist() == color(5, 3).tolist() == [200, 30, 30]
+    label = [color(5 + dx / 100, 3 + dy / 100) for dx in range(10, 30) for dy in range(6, 17)]
+    assert [40, 40, 46] in np.array(label).tolist()
