@@ -2,8 +2,6 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from terrainkit_robots.description.package_resolver import (
     PackageResolver,
@@ -14,12 +12,8 @@ from terrainkit_robots.description.package_resolver import (
 )
 
 
-def resolve(name, file, packages):
-    return PackageResolver(file, packages).resolve(name)
-
-
-def find_package(name, file, packages):
-    return PackageResolver(file, packages).find_package(name)
+def resolve(name, file, packages=None):
+    return PackageResolver(file, packages or {}).resolve(name)
 
 
 @pytest.fixture(autouse=True)
@@ -29,236 +23,189 @@ def no_ros(monkeypatch):
 
 
 @pytest.fixture
-def place(tmp_path):
+def root(tmp_path):
+    """Return a folder from which no search reaches the folders of other tests."""
+    return tmp_path / "1/2/3"
+
+
+@pytest.fixture
+def place(root):
     """Return a function that makes files in an empty folder and gives their paths."""
 
     def make(*names):
         for name in names:
-            path = tmp_path / name
+            path = root / name
             path.parent.mkdir(parents=True, exist_ok=True)
             # a package is called like its folder, with _pkg, to tell the two apart
             path.write_text(f"<package><name>{path.parent.name}_pkg</name></package>")
-        return [tmp_path / name for name in names]
+        return [root / name for name in names]
 
     return make
 
 
-def same(found, path):
-    return os.path.realpath(found[0]) == os.path.realpath(path)
+DOG, DOGS_FOOT, WS = "dog/urdf/dog.urdf", "dog/meshes/foot.stl", "ws/a/urdf/dog.urdf"
 
 
-class TestPaths:
-    def test_relative_to_the_file(self, place):
-        robot, mesh = place("dog/urdf/dog.urdf", "dog/meshes/foot.stl")
-        assert resolve("../meshes/foot.stl", robot, {}) == (
-            robot.parent / "../meshes/foot.stl",
-            "path",
-        )
-        assert same(resolve("../meshes/foot.stl", robot, {}), mesh)
-
-    def test_absolute(self, place):
-        robot, mesh = place("dog.urdf", "foot.stl")
-        assert resolve(str(mesh), robot, {}) == (mesh, "path")
-        assert resolve(f"file://{mesh}", robot, {}) == (mesh, "path")
-
-    def test_file_uri_with_space(self, place):
-        robot, mesh = place("dog.urdf", "my foot.stl")
-        assert resolve(f"file://{mesh.parent}/my%20foot.stl", robot, {}) == (mesh, "path")
-
-    @pytest.mark.parametrize("name", ["../Meshes/FOOT.STL", "..\\meshes\\foot.stl"])
-    def test_ignores_case(self, place, name):
-        robot, mesh = place("dog/urdf/dog.urdf", "dog/meshes/foot.stl")
-        found = resolve(name, robot, {})
-        assert found[1] == "search"
-        assert same(found, mesh)
-
-    def test_ambiguous_case_is_not_resolved(self, place):
-        robot, *_ = place("dog.urdf", "a/foot.stl", "a/FOOT.stl")
-        assert resolve("a/Foot.stl", robot, {})[1] == "nothing"
-
-    @pytest.mark.parametrize(
-        "name", ["/home/x/dog/meshes/foot.stl", "C:\\x\\dog\\meshes\\foot.stl", "meshes/foot.stl"]
-    )
-    def test_found_by_path_suffix(self, place, name):
-        robot, mesh = place("dog/urdf/dog.urdf", "dog/meshes/foot.stl")
-        found = resolve(name, robot, {})
-        assert found[1] == "search"
-        assert same(found, mesh)
-
-    def test_missing_file_has_expected_path(self, place):
-        (robot,) = place("dog/dog.urdf")
-        assert resolve("a/foot.stl", robot, {}) == (robot.parent / "a/foot.stl", "nothing")
-
-    def test_url_is_not_downloaded(self, place):
-        robot, _ = place("dog.urdf", "foot.stl")
-        assert resolve("https://example.org/foot.stl", robot, {})[1] == "nothing"
-
-    def test_pipe_exists(self, place):
-        (robot,) = place("dog.urdf")
-        os.mkfifo(robot.parent / "foot.stl")
-        assert resolve("foot.stl", robot, {}) == (robot.parent / "foot.stl", "path")
+@pytest.mark.parametrize(
+    ("robot", "others", "name", "how"),
+    [
+        (DOG, (DOGS_FOOT,), "../meshes/foot.stl", "path"),
+        (DOG, (DOGS_FOOT,), "../Meshes/FOOT.STL", "search"),
+        (DOG, (DOGS_FOOT,), "..\\meshes\\foot.stl", "search"),
+        (DOG, (DOGS_FOOT,), "/home/x/dog/meshes/foot.stl", "search"),
+        (DOG, (DOGS_FOOT,), "C:\\x\\dog\\meshes\\foot.stl", "search"),
+        (DOG, (DOGS_FOOT,), "meshes/foot.stl", "search"),
+        (DOG, (DOGS_FOOT,), "foot.stl", "search"),
+        (DOG, ("dog/package.xml", "dog/m/foot.stl"), "package://dog_pkg/m/foot.stl", "package"),
+        (DOG, ("dog/m/foot.stl",), "package://dog/m/foot.stl", "search"),
+        (DOG, ("dog/m/foot.stl",), "package://dog/M/Foot.STL", "search"),
+        (WS, ("ws/legs/m/foot.stl",), "package://legs/m/foot.stl", "search"),
+        (WS, ("ws/b/package.xml", "ws/b/m/foot.stl"), "package://b_pkg/m/foot.stl", "package"),
+        (WS, ("ws/b/package.xml", "ws/b/m/foot.stl"), "package://b/m/foot.stl", "package"),
+        ("dog/dog/dog.urdf", ("dog/m/foot.stl",), "package://dog/m/foot.stl", "search"),
+        ("dog-main/urdf/dog.urdf", ("dog-main/m/foot.stl",), "package://dog/m/foot.stl", "search"),
+        ("dog.urdf", ("wheel.obj",), "package://wheel.obj", "search"),
+    ],
+)
+def test_file_is_found(robot, others, name, how, place):
+    file, *_, mesh = place(robot, *others)
+    path, found_by = resolve(name, file)
+    assert (os.path.realpath(path), found_by) == (os.path.realpath(mesh), how)
 
 
-class TestPackageNames:
-    @pytest.mark.parametrize(
-        "name", ["package://dog/m/foot.stl", "model://dog/m/foot.stl", "$(find dog)/m/foot.stl"]
-    )
-    def test_given(self, place, name):
-        robot, mesh = place("a/dog.urdf", "b/c/m/foot.stl")
-        found = resolve(name, robot, {"dog": mesh.parents[1]})
-        assert found == (mesh, "package")
-
-    def test_given_package_has_precedence(self, place):
-        robot, _, mesh = place("dog/dog.urdf", "dog/foot.stl", "b/foot.stl")
-        assert resolve("package://dog/foot.stl", robot, {"dog": mesh.parent}) == (mesh, "package")
-        assert resolve("package://dog/foot.stl", robot, {"dog": Path("nowhere")}) == (
-            robot.parent / "foot.stl",
-            "search",
-        )
-
-    def test_package_xml_in_parent_folder(self, place):
-        robot, _, mesh = place("dog/urdf/dog.urdf", "dog/package.xml", "dog/m/foot.stl")
-        found = resolve("package://dog_pkg/m/foot.stl", robot, {})
-        assert found[1] == "package"
-        assert same(found, mesh)
-
-    def test_name_of_parent_folder(self, place):
-        robot, mesh = place("dog/urdf/dog.urdf", "dog/m/foot.stl")
-        found = resolve("package://dog/m/foot.stl", robot, {})
-        assert found[1] == "search"
-        assert same(found, mesh)
-
-    def test_sibling_folder(self, place):
-        robot, mesh = place("ws/a/urdf/dog.urdf", "ws/dog_meshes/m/foot.stl")
-        found = resolve("package://dog_meshes/m/foot.stl", robot, {})
-        assert same(found, mesh)
-
-    def test_sibling_package(self, place):
-        robot, _, mesh = place("ws/a/urdf/dog.urdf", "ws/b/package.xml", "ws/b/m/foot.stl")
-        found = resolve("package://b_pkg/m/foot.stl", robot, {})
-        assert found[1] == "package"
-        assert same(found, mesh)
-
-    def test_package_with_file_is_preferred(self, place):
-        robot, mesh = place("dog/dog/dog.urdf", "dog/m/foot.stl")
-        assert same(resolve("package://dog/m/foot.stl", robot, {}), mesh)
-
-    def test_renamed_package_folder(self, place):
-        robot, mesh = place("dog-main/urdf/dog.urdf", "dog-main/m/foot.stl")
-        found = resolve("package://dog_description/m/foot.stl", robot, {})
-        assert found[1] == "search"
-        assert same(found, mesh)
-
-    @pytest.mark.parametrize(
-        ("variable", "folder"), [("ROS_PACKAGE_PATH", "src"), ("AMENT_PREFIX_PATH", "src/share")]
-    )
-    def test_ros_environment_variables(self, place, monkeypatch, tmp_path, variable, folder):
-        robot, mesh = place("far/from/all/of/it/dog.urdf", f"{folder}/dog/m/foot.stl")
-        monkeypatch.setenv(variable, f"/nowhere{os.pathsep}{tmp_path / 'src'}")
-        assert resolve("package://dog/m/foot.stl", robot, {}) == (mesh, "package")
-
-    def test_ignores_case(self, place):
-        robot, mesh = place("dog/urdf/dog.urdf", "dog/m/foot.stl")
-        assert same(resolve("package://dog/M/Foot.STL", robot, {}), mesh)
-
-    def test_package_without_file(self, place):
-        robot, _ = place("dog/urdf/dog.urdf", "dog/package.xml")
-        found = resolve("package://dog_pkg/m/foot.stl", robot, {})
-        assert found[1] == "package"
-        assert not found[0].exists()
-
-    def test_file_name_instead_of_package(self, place):
-        robot, mesh = place("dog.urdf", "wheel.obj")
-        assert resolve("package://wheel.obj", robot, {}) == (mesh, "search")
-
-    def test_find_package(self, place):
-        robot, package = place("dog/urdf/dog.urdf", "dog/package.xml")
-        found = find_package("dog_pkg", robot, {})
-        assert found is not None
-        assert found.samefile(package.parent)
-        assert find_package("cat", robot, {}) is None
-        assert find_package("cat", robot, {"cat": Path("x")}) == Path("x")
+def test_absolute_names(place):
+    robot, mesh = place("dog.urdf", "my foot.stl")
+    for name in (
+        f"{mesh}",
+        f"file://{mesh}",
+        f"file:{mesh}",
+        f"FILE://{mesh.parent}/my%20foot.stl",
+    ):
+        assert resolve(name, robot) == (mesh, "path")
 
 
-class TestUntrustedNames:
-    NAMES = (
-        "",
-        "\0",
-        "a\0b",
-        "package://",
-        "package://..",
-        "package://../../etc/passwd",
-        "package://\0/x",
-        "x" * 5000,
-        "../" * 1300 + "x",
-        "../" * 1_000_000 + "x",
-        "a/" * 2000 + "x",
-        "package://a/" + "b/" * 2000,
-        "\\" * 4000 + "x",
-        "\ud800",
-        "~/x",
-        "//x/y",
-        "file://",
-        "C:",
-        "$(find )",
-        "$(find a",
-        ".",
-        "..",
-        "loop/x",
-    )
-
-    @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
-    def test_hostile_names(self, place, name):
-        (robot,) = place("a/dog.urdf")
-        (robot.parent / "loop").symlink_to("loop")
-        path, _ = resolve(name, robot, {})
-        assert "\0" not in str(path)
-        assert filename_on_disk(name, path) is None
-
-    @settings(max_examples=40, deadline=None)
-    @given(st.text(max_size=40))
-    def test_any_text(self, text):
-        for name in (text, f"package://{text}", f"$(find {text})/x", f"C:\\{text}"):
-            path, found_by = resolve(name, Path("/nowhere/dog.urdf"), {})
-            assert found_by in ("path", "package", "search", "nothing")
-            filename_on_disk(name, path)
-
-    def test_symbolic_link_cycle(self, place):
-        (robot,) = place("a/dog.urdf")
-        (robot.parent / "loop").symlink_to("loop")
-        assert resolve("package://cat/x", robot.parent / "loop/dog.urdf", {})[1] == "nothing"
-
-    def test_package_xml_is_pipe_or_binary(self, place):
-        robot, package = place("a/dog.urdf", "b/package.xml")
-        os.mkfifo(robot.parent / "package.xml")
-        package.write_bytes(bytes(range(256)) * 1000)
-        assert find_package("nothing", robot, {}) is None
+@pytest.mark.parametrize(
+    ("name", "path"),
+    [
+        ("a/hand.stl", "a/hand.stl"),
+        ("/a/hand.stl", "/a/hand.stl"),
+        ("https://example.org/foot.stl", "foot.stl"),  # nothing is downloaded
+        ("a/Foot.stl", "a/Foot.stl"),  # two files could be meant
+        ("package://cat/hand.stl", "hand.stl"),
+        ("package://a", "a"),  # a folder is no mesh
+    ],
+)
+def test_missing_file_has_expected_path(name, path, place):
+    robot, *_ = place("dog.urdf", "foot.stl", "a/foot.stl", "a/FOOT.stl")
+    assert resolve(name, robot) == (robot.parent / path, "nothing")
 
 
-class TestPackages:
-    def test_package_search_is_cached(self, place, monkeypatch):
-        robot, _ = place("dog/urdf/dog.urdf", "dog/m/foot.stl")
-        packages = PackageResolver(robot, {})
-        first = packages.resolve("package://dog/m/foot.stl")
-        monkeypatch.setattr(os, "scandir", None)  # what is not asked cannot fail
-        assert packages.resolve("package://dog/m/foot.stl") == first
+def test_pipe_exists(place):
+    (robot,) = place("dog.urdf")
+    os.mkfifo(robot.parent / "foot.stl")
+    assert resolve("foot.stl", robot) == (robot.parent / "foot.stl", "path")
+
+
+@pytest.mark.parametrize(
+    "name", ["package://dog/m/foot.stl", "model://dog/m/foot.stl", "$(find dog)/m/foot.stl"]
+)
+def test_given_package_has_precedence(name, place):
+    robot, near, mesh = place("dog/dog.urdf", "dog/m/foot.stl", "b/c/m/foot.stl")
+    assert resolve(name, robot, {"dog": mesh.parents[1]}) == (mesh, "package")
+    assert resolve(name, robot, {"dog": Path("nowhere")}) == (near, "search")
+    assert resolve(name, robot, {"dog": Path("nowhere"), "cat": mesh.parents[1]})[0] == near
+
+
+@pytest.mark.parametrize(
+    ("variable", "folder"),
+    [
+        ("ROS_PACKAGE_PATH", "src/dog"),
+        ("ROS_PACKAGE_PATH", "src/stack/dog"),
+        ("AMENT_PREFIX_PATH", "src/share/dog"),
+    ],
+)
+def test_ros_environment_variables(variable, folder, place, monkeypatch, root):
+    robot, mesh = place("far/from/all/of/it/dog.urdf", f"{folder}/m/foot.stl")
+    monkeypatch.setenv(variable, f"/nowhere{os.pathsep}{root / 'src'}")
+    assert resolve("package://dog/m/foot.stl", robot) == (mesh, "package")
+    if folder == "src/dog":
+        monkeypatch.setenv(variable, str(root / folder))
+        assert resolve("package://dog/m/foot.stl", robot) == (mesh, "package")
+
+
+def test_package_without_the_file(place):
+    robot, package = place(DOG, "dog/package.xml")
+    expected = package.parent / "m/foot.stl"
+    assert resolve("package://dog_pkg/m/foot.stl", robot) == (expected, "package")
+
+
+def test_find_package(place):
+    robot, package = place(DOG, "dog/package.xml")
+    packages = PackageResolver(robot, {"cat": Path("x")})
+    found = [packages.find_package(name) for name in ("dog_pkg", "cat", "cow")]
+    assert found == [package.parent, Path("x"), None]
+
+
+@pytest.mark.parametrize(("depth", "how"), [(3, "search"), (4, "nothing")])
+def test_search_is_bounded(depth, how, place):
+    robot, _ = place(f"ws/{'a/' * depth}dog.urdf", "ws/dog_meshes/m/foot.stl")
+    assert resolve("package://dog_meshes/m/foot.stl", robot)[1] == how
+    assert resolve("dog_meshes/m/foot.stl", robot)[1] == how
+
+
+def test_package_search_is_cached(place, monkeypatch):
+    robot, _ = place(DOG, "dog/m/foot.stl")
+    packages = PackageResolver(robot, {})
+    first = packages.resolve("package://dog/m/foot.stl")
+    monkeypatch.setattr(os, "scandir", None)  # what is not asked cannot fail
+    assert packages.resolve("package://dog/m/foot.stl") == first
+
+
+# Names and files of strangers
+
+NAMES = ["", "\0", "a\0b", ".", "..", "~/x", "//x/y", "file://", "C:", "\ud800", "loop/x"]
+NAMES += ["package://", "package://..", "package://../../etc/passwd", "package://\0/x"]
+NAMES += ["$(find )", "$(find a", "x" * 5000, "../" * 1300 + "x", "../" * 1_000_000 + "x"]
+NAMES += ["a/" * 2000 + "x", "package://a/" + "b/" * 2000, "\\" * 4000 + "x"]
+
+
+@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
+def test_hostile_names(place, name):
+    (robot,) = place("a/dog.urdf")
+    (robot.parent / "loop").symlink_to("loop")
+    path, _ = resolve(name, robot)
+    assert "\0" not in str(path)
+    assert filename_on_disk(name, path) is None
+    assert resolve("package://cat/x", robot.parent / "loop/dog.urdf")[1] == "nothing"
+
+
+def test_package_xml_is_pipe_or_binary(place):
+    robot, package = place("a/dog.urdf", "b/package.xml")
+    os.mkfifo(robot.parent / "package.xml")
+    package.write_bytes(bytes(range(256)) * 1000)
+    assert PackageResolver(robot, {}).find_package("nothing") is None
+
+
+# Functions
 
 
 def test_resolve_in_folders(place):
     first, second = place("a/foot.stl", "b/hand.stl")
     folders = (first.parent, second.parent)
-    assert resolve_in(folders, "foot.stl") == (first, "path")
-    assert resolve_in(folders, "hand.stl") == (second, "path")
-    assert resolve_in(folders, "HAND.stl") == (second, "search")
-    assert resolve_in(folders, "head.stl") == (first.parent / "head.stl", "nothing")
-    assert resolve_in(folders, str(second)) == (second, "path")
-    assert resolve_in(folders, "a\0b")[1] == "nothing"
+    names = ["foot.stl", "hand.stl", "HAND.stl", "head.stl", str(second), "a\0b"]
+    assert [resolve_in(folders, name) for name in names] == [
+        (first, "path"),
+        (second, "path"),
+        (second, "search"),
+        (first.parent / "head.stl", "nothing"),
+        (second, "path"),
+        (first.parent / "ab", "nothing"),
+    ]
 
 
 @pytest.mark.parametrize(
     ("name", "right"),
     [
-        ("meshes/foot.stl", None),
         ("./meshes//foot.stl", None),
         ("meshes/Foot.STL", "meshes/foot.stl"),
         ("../x/Meshes/foot.stl", "../x/meshes/foot.stl"),

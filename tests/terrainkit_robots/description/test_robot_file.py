@@ -26,6 +26,9 @@ REPOSITORIES = {
 }
 
 
+pytest.importorskip("robot_descriptions")
+
+
 @pytest.fixture(autouse=True)
 def published(tmp_path_factory, monkeypatch) -> Path:
     """Return the cache of robot_descriptions, with small repositories; downloads fail."""
@@ -49,20 +52,18 @@ def published(tmp_path_factory, monkeypatch) -> Path:
 
 
 def test_find_robot_by_name(published):
-    pytest.importorskip("robot_descriptions")
     found = find_robot("go2_description").path
     assert found.relative_to(published).parts[:2] == ("unitree_ros-HEAD", "unitree_ros")
     report = check_robot("go2_description", against="go2_description")
     assert report.facts.model.name == "go2"
 
 
-def test_find_robot_prefers_mjcf_for_mj_name():
-    pytest.importorskip("robot_descriptions")
-    assert load_robot("a1_mj_description").kind == "mjcf"
+@pytest.mark.parametrize(("name", "kind"), [("go2", "urdf"), ("a1_mj", "mjcf")])
+def test_mj_name_prefers_mjcf(name, kind):
+    assert load_robot(f"{name}_description").kind == kind
 
 
 def test_load_robot_by_name_with_xacro_arguments():
-    pytest.importorskip("robot_descriptions")
     model = load_robot("enlight_description")
     assert [link.name for link in model.links] == ["base", "Enlight-L"]
     model = load_robot("enlight_description", xacro_arguments={"robot_type": "mine"})
@@ -70,7 +71,6 @@ def test_load_robot_by_name_with_xacro_arguments():
 
 
 def test_find_robot_download_fails(capfd):
-    pytest.importorskip("robot_descriptions")
     message = "^solo_description: robot_descriptions cannot download it: .*example-robot-data"
     with pytest.raises(RobotFileError, match=message) as caught:
         find_robot("solo_description")
@@ -79,11 +79,14 @@ def test_find_robot_download_fails(capfd):
 
 
 def test_find_robot_unknown_name():
-    pytest.importorskip("robot_descriptions")
     with pytest.raises(RobotFileError, match=r"^no robot go3_description .* go2_description"):
         find_robot("go3_description")
-    with pytest.raises(RobotFileError, match="did you mean go2_description"):
+    with pytest.raises(
+        RobotFileError, match=r"got go2, which .*; did you mean go2_description[?] B"
+    ):
         find_robot("go2")
+    with pytest.raises(RobotFileError, match=r"^cannot read a{5000}: File name too long"):
+        find_robot("a" * 5000)
 
 
 def test_find_robot_without_package(monkeypatch):

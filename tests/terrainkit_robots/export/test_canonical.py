@@ -1,51 +1,44 @@
-from itertools import pairwise
-
 import numpy as np
 import pytest
+import trimesh
 
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.export.canonical import to_canonical
-from tests.robots import REAL_ROBOTS
-
-MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
-
-
-def facts(tmp_path, text):
-    path = tmp_path / ("robot.xml" if "<mujoco" in text else "robot.urdf")
-    path.write_text(text)
-    return Facts(load_robot(path))
+from terrainkit_robots.export import canonical
+from terrainkit_robots.export.canonical import has_unknown_inertia, to_canonical
+from tests.robots import BUNDLED, REAL_ROBOTS
+from tests.terrainkit_robots.export.made_models import MJCF_MASS, inertial, urdf_link
 
 
-def mjcf(body, more=""):
-    return f"""<mujoco model="r"><compiler angle="radian"/><worldbody>
-      <body name="base">{MASS}<geom size="0.1" mass="0"/>{body}</body></worldbody>{more}</mujoco>"""
+def mjcf(body, more="", base=""):
+    return f"""<mujoco model="r"><compiler angle="radian"/><worldbody><body name="base">{base}
+      {MJCF_MASS}<geom size="0.1" mass="0"/>{body}</body></worldbody>{more}</mujoco>"""
 
 
-def link_poses(robot, positions):
-    poses = body_poses(robot.bodies, positions)
+def urdf(*joints, links="abc", name="r"):
+    return f'<robot name="{name}">{"".join(map(urdf_link, links))}{"".join(joints)}</robot>'
+
+
+def urdf_joint(name, parent, child, kind="continuous", inside=""):
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<axis xyz="0 1 0"/>{inside}</joint>'
+    )
+
+
+def link_poses(facts, positions):
     return {
         link.name: pose @ local
-        for body, pose in zip(robot.bodies, poses, strict=True)
+        for body, pose in zip(facts.bodies, body_poses(facts.bodies, positions), strict=True)
         for link, local in zip(body.links, body.poses, strict=True)
     }
 
 
-@pytest.mark.parametrize("name", REAL_ROBOTS)
+@pytest.mark.parametrize("name", BUNDLED + REAL_ROBOTS)
 def test_canonical_robot_is_equivalent(name, robot_file):
-    check_same(Facts(load_robot(robot_file(name))))
-
-
-@pytest.mark.parametrize("name", ["quadruped", "biped"])
-@pytest.mark.parametrize("suffix", [".urdf", ".xml"])
-def test_canonical_bundled_robot_is_equivalent(name, suffix):
-    check_same(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))))
-
-
-def check_same(source):
+    source = Facts(load_robot(robot_file(name)))
     form = to_canonical(source)
     made = Facts(form.model)
     assert made.total_mass == pytest.approx(source.total_mass)
@@ -63,214 +56,212 @@ def check_same(source):
     assert [j.name for j in again.model.joints] == [j.name for j in form.model.joints]
 
 
-def test_reference_moves_to_origin(tmp_path):
-    robot = facts(
-        tmp_path,
-        mjcf(
-            f'<body name="leg" pos="0 0 -0.2">{MASS}'
-            '<joint name="j" axis="0 2 0" pos="0 0 0.1" ref="0.5" range="-1 1"/></body>'
-        ),
-    )
-    (joint,) = to_canonical(robot).model.joints
-    assert joint.reference == 0
-    np.testing.assert_allclose(joint.axis, [0, 1, 0])
+# Joints
+
+
+def test_reference_moves_to_origin(robot):
+    leg = f"""<body name="leg" pos="0 0 -0.2">{MJCF_MASS}
+      <joint name="j" axis="0 2 0" pos="0 0 0.1" ref="0.5" range="-1 1"/></body>"""
+    model = to_canonical(robot(mjcf(leg))).model
+    (joint,) = model.joints
+    assert (joint.reference, joint.axis.tolist()) == (0, [0, 1, 0])
     # At q = 0.5 the leg is where the file has it; at 0 it is turned back about (0, 0, -0.1).
     c, s = np.cos(-0.5), np.sin(-0.5)
     np.testing.assert_allclose(joint.origin[:3, 3], [-0.1 * s, 0, -0.1 - 0.1 * c], atol=1e-12)
-    (body,) = [b for b in Facts(to_canonical(robot).model).bodies if b.joint is not None]
-    at = body_poses(Facts(to_canonical(robot).model).bodies, {"j": 0.5})[body.index]
-    np.testing.assert_allclose(at[:3, 3], [0, 0, -0.2], atol=1e-12)
+    there = link_poses(Facts(model), {"j": 0.5})["leg"]
+    np.testing.assert_allclose(there[:3, 3], [0, 0, -0.2], atol=1e-12)
 
 
-def test_unsupported_joint_is_fixed(tmp_path):
-    robot = facts(tmp_path, mjcf(f'<body name="ball">{MASS}<joint name="b" type="ball"/></body>'))
-    form = to_canonical(robot)
-    assert [joint.kind for joint in form.model.joints] == ["fixed"]
-    assert any("b" in change and "ball" in change for change in form.changes)
-
-
-def test_mjcf_effort_is_that_of_actuator(tmp_path):
-    robot = facts(
-        tmp_path,
-        mjcf(
-            f'<body name="leg">{MASS}<joint name="j" axis="0 1 0" range="-1 1"/></body>',
-            '<actuator><motor joint="j" gear="2" ctrlrange="-10 10"/></actuator>',
-        ),
+@pytest.mark.parametrize(
+    ("kind", "limit", "wanted", "changes"),
+    [
+        ("revolute", 'lower="-1" upper="2"', ("revolute", -1, 2), ()),
+        ("revolute", 'lower="2" upper="1"', ("continuous", None, None), ("j has no limits",)),
+        ("continuous", 'lower="-1" upper="2"', ("continuous", None, None), ()),
+        ("prismatic", 'lower="-1" upper="2"', ("prismatic", -1, 2), ()),
+        ("prismatic", "", ("prismatic", None, None), ()),
+    ],
+)
+def test_kind_follows_limits(kind, limit, wanted, changes, robot):
+    form = to_canonical(
+        robot(urdf(urdf_joint("j", "a", "b", kind, f"<limit {limit}/>"), links="ab"))
     )
-    form = to_canonical(robot)
     (joint,) = form.model.joints
-    assert joint.limit.effort == 20
-    assert [motor.joint for motor in form.model.actuators] == ["j"]
+    assert (joint.kind, joint.limit.lower, joint.limit.upper) == wanted
+    assert form.changes == changes
 
 
-def test_other_trees_are_removed(tmp_path):
-    text = mjcf(f'<body name="leg">{MASS}<joint name="j"/></body>').replace(
-        "</worldbody>", f'<body name="crate">{MASS}<freejoint/></body></worldbody>'
-    )
-    form = to_canonical(facts(tmp_path, text))
-    assert [link.name for link in form.model.links] == ["base", "leg"]
-    assert any("crate" in change for change in form.changes)
+def test_unsupported_joint_is_fixed(robot):
+    form = to_canonical(robot(mjcf(f'<body>{MJCF_MASS}<joint name="b" type="ball"/></body>')))
+    assert [joint.kind for joint in form.model.joints] == ["fixed"]
+    assert form.changes == ("fixed b: joint type 'ball' is not supported",)
 
 
-@pytest.mark.parametrize(
-    ("joint", "floating"),
-    [
-        ("<freejoint/>", True),
-        ("", False),
-    ],
-)
-def test_mjcf_defines_floating_base(tmp_path, joint, floating):
-    text = mjcf(f'<body name="arm">{MASS}<joint name="j" range="-1 1"/></body>')
-    robot = facts(tmp_path, text.replace('<body name="base">', f'<body name="base">{joint}'))
-    assert to_canonical(robot).model.floating is floating
-
-
-def test_arm_is_fixed_and_car_is_not(tmp_path):
-    link = (
-        '<link name="{}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
-        'ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    )
-    joint = (
-        '<joint name="j" type="{}"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>{}</joint>'
-    )
-    limit = '<limit lower="-1" upper="1" effort="5" velocity="5"/>'
-    links = link.format("a") + link.format("b")
-    arm = f'<robot name="r">{links}{joint.format("revolute", limit)}</robot>'
-    car = f'<robot name="r">{links}{joint.format("continuous", "")}</robot>'
-    assert to_canonical(facts(tmp_path, arm)).model.floating is False
-    assert to_canonical(facts(tmp_path, car)).model.floating is True
-    assert to_canonical(facts(tmp_path, arm), floating=True).model.floating is True
-
-
-CHAIN = """<robot name="r">{}<joint name="a" type="{}"><parent link="base"/><child link="one"/>
-  <axis xyz="0 0 1"/><limit lower="{}" upper="{}" effort="5" velocity="5"/></joint>{}</robot>"""
-
-
-@pytest.mark.parametrize(
-    ("kind", "ends", "joints", "floating"),
-    [
-        ("revolute", (-1e16, 1e16), 1, True),  # a propeller, as exporters write it
-        ("continuous", (0, 0), 1, True),
-        ("revolute", (-1, 1), 2, True),  # a wheel that is steered
-        ("revolute", (-1, 1), 3, False),  # the wrist of an arm
-        ("prismatic", (-1e16, 1e16), 1, False),
-    ],
-)
-def test_wheel_on_base_or_steering_body(tmp_path, kind, ends, joints, floating):
-    names = ["base", "one", "two", "three"][: joints + 1]
-    links = "".join(
-        f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
-        'ixy="0" ixz="0" iyz="0"/></inertial></link>'
-        for name in names
-    )
-    more = [
-        f'<joint name="{name}" type="continuous"><parent link="{above}"/><child link="{name}"/>'
-        '<origin xyz="0.1 0 0"/><axis xyz="0 1 0"/></joint>'
-        for above, name in pairwise(names[1:])
+def test_mjcf_effort_is_that_of_actuator(robot):
+    leg = f'<body>{MJCF_MASS}<joint name="j" range="-1 1"/><body><joint name="k"/></body></body>'
+    drive = '<actuator><motor joint="j" gear="2" ctrlrange="-10 10"/></actuator>'
+    model = to_canonical(robot(mjcf(leg, drive))).model
+    assert [joint.limit.effort for joint in model.joints] == [20, None]
+    assert [(motor.name, motor.joint, motor.effort) for motor in model.actuators] == [
+        ("j", "j", 20)
     ]
-    robot = facts(tmp_path, CHAIN.format(links, kind, *ends, "".join(more)))
-    assert to_canonical(robot).model.floating is floating
 
 
-def test_mass_from_mesh_matches_mujoco(tmp_path):
-    import trimesh
-
-    trimesh.creation.box((0.1, 0.2, 0.3)).export(tmp_path / "box.stl")
-    text = """<mujoco><asset><mesh name="box" file="box.stl"/></asset><worldbody>
-      <body name="base"><geom type="mesh" mesh="box" density="1000"/></body>
-    </worldbody></mujoco>"""
-    robot = facts(tmp_path, text)
-    assert np.isnan(robot.total_mass)
-    (link,) = to_canonical(robot).model.links
-    assert link.inertial.mass == pytest.approx(6.0, rel=1e-5)
-    moments = 6.0 / 12 * np.array([0.01 + 0.04, 0.01 + 0.09, 0.04 + 0.09])
-    assert sorted(np.linalg.eigvalsh(link.inertial.inertia)) == pytest.approx(moments, rel=1e-4)
+@pytest.mark.parametrize(("written", "wanted"), [("0.3", 0.3), ("-0.3", 0.0), ("0", 0.0)])
+def test_losses_and_limits_are_positive(written, wanted, robot):
+    inside = '<dynamics damping="{0}" friction="{0}"/><limit effort="{0}" velocity="{0}"/>'
+    text = urdf(urdf_joint("j", "a", "b", inside=inside.format(written)), links="ab")
+    (joint,) = to_canonical(robot(text)).model.joints
+    assert (joint.friction, joint.damping) == (wanted, wanted)
+    assert (joint.effort, joint.velocity) == (wanted or None, wanted or None)
 
 
-def test_robot_without_links_is_rejected(tmp_path):
-    with pytest.raises(RobotFileError, match="expected a robot"):
-        to_canonical(facts(tmp_path, '<robot name="r"/>'))
-
-
-def test_duplicate_joint_names(tmp_path):
-    text = """<robot name="r"><link name="a"/><link name="b"/><link name="c"/>
-      <joint name="j" type="fixed"><parent link="a"/><child link="b"/></joint>
-      <joint name="j" type="fixed"><parent link="a"/><child link="c"/></joint></robot>"""
-    form = to_canonical(facts(tmp_path, text))
+def test_duplicate_joint_names(robot):
+    joints = [urdf_joint("j", "a", "b", "fixed"), urdf_joint("j", "a", "c", "fixed")]
+    form = to_canonical(robot(urdf(*joints)))
     assert [joint.name for joint in form.model.joints] == ["j", "c_joint"]
     assert form.changes == ("renamed the joint of c to c_joint: duplicate name j",)
 
 
-@pytest.mark.parametrize(("name", "wanted"), [("my robot/../x", "my_robot_.._x"), ("..", "robot")])
-def test_plain_name(tmp_path, name, wanted):
-    form = to_canonical(facts(tmp_path, f'<robot name="{name}"><link name="a"/></robot>'))
-    assert form.model.name == wanted
+@pytest.mark.parametrize(
+    ("leads", "removed", "why"),
+    [
+        (("k", "j"), ("j", "k"), "it is part of a cycle"),
+        (("j", "j"), ("j",), "it is part of a cycle"),
+        (("nobody", "j"), ("j",), "there is no joint 'nobody'"),
+    ],
+)
+def test_invalid_mimic_is_removed(leads, removed, why, robot):
+    joints = [
+        urdf_joint(name, "a", child, inside=f'<mimic joint="{lead}"/>')
+        for name, child, lead in zip("jk", "bc", leads, strict=True)
+    ]
+    form = to_canonical(robot(urdf(*joints)))
+    assert tuple(joint.name for joint in form.model.joints if joint.mimic is None) == removed
+    assert form.changes == tuple(f"removed the mimic of {name}: {why}" for name in removed)
 
 
-def test_link_named_world_is_renamed(tmp_path):
-    text = """<robot name="r"><link name="world"/><link name="world_link"/>
-      <joint name="j" type="fixed"><parent link="world"/><child link="world_link"/></joint>
-      </robot>"""
-    form = to_canonical(facts(tmp_path, text))
-    assert [link.name for link in form.model.links] == ["world_link_2", "world_link"]
-    assert form.model.joints[0].parent == "world_link_2"
-    assert form.model.floating is False
-    assert form.changes == ("renamed link world to world_link_2: MuJoCo reserves the name world",)
+# Base
 
 
-DYNAMICS = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">
-  <parent link="a"/><child link="b"/><dynamics damping="{0}" friction="{0}"/></joint></robot>"""
+@pytest.mark.parametrize(("base", "floating"), [("<freejoint/>", True), ("", False)])
+def test_mjcf_defines_floating_base(base, floating, robot):
+    text = mjcf(f'<body>{MJCF_MASS}<joint name="j" range="-1 1"/></body>', base=base)
+    assert to_canonical(robot(text)).model.floating is floating
 
 
-@pytest.mark.parametrize(("written", "wanted"), [("0.3", 0.3), ("-0.3", 0.0), ("nan", 0.0)])
-def test_friction_and_damping(tmp_path, written, wanted):
-    (joint,) = to_canonical(facts(tmp_path, DYNAMICS.format(written))).model.joints
-    assert (joint.friction, joint.damping) == (wanted, wanted)
+TURN = 4 * np.pi
 
 
 @pytest.mark.parametrize(
-    ("leads", "changes"),
+    ("kind", "limit", "joints", "floating"),
     [
-        (("k", "j"), ("j", "k")),
-        (("j", "j"), ("j",)),
-        (("nobody", "j"), ("j",)),
+        ("revolute", 'lower="-1" upper="1"', 1, False),
+        ("revolute", f'lower="0" upper="{TURN - 0.01}"', 1, False),
+        ("revolute", f'lower="0" upper="{TURN + 0.01}"', 1, True),  # a propeller, as exported
+        ("continuous", "", 1, True),
+        ("revolute", 'lower="-1" upper="1"', 2, True),  # a wheel that is steered
+        ("revolute", 'lower="-1" upper="1"', 3, False),  # the wrist of an arm
+        ("prismatic", 'lower="-1e16" upper="1e16"', 1, False),
     ],
 )
-def test_invalid_mimic_is_removed(tmp_path, leads, changes):
-    joint = """<joint name="{}" type="continuous"><parent link="a"/><child link="{}"/>
-      <mimic joint="{}"/></joint>"""
-    joints = joint.format("j", "b", leads[0]) + joint.format("k", "c", leads[1])
-    text = f'<robot name="r"><link name="a"/><link name="b"/><link name="c"/>{joints}</robot>'
-    form = to_canonical(facts(tmp_path, text))
-    free = [joint.name for joint in form.model.joints if joint.mimic is None]
-    assert free == list(changes)
-    why = {"nobody": "there is no joint 'nobody'"}.get(leads[0], "it is part of a cycle")
-    assert form.changes == tuple(f"removed the mimic of {name}: {why}" for name in changes)
+def test_wheel_on_base_or_steering_body(kind, limit, joints, floating, robot):
+    first = urdf_joint("first", "a", "b", kind, f"<limit {limit}/>")
+    others = [
+        urdf_joint(child, parent, child, inside='<origin xyz="0.1 0 0"/>')
+        for parent, child in [("b", "c"), ("c", "d")][: joints - 1]
+    ]
+    facts = robot(urdf(first, *others, links="abcd"[: joints + 1]))
+    assert to_canonical(facts).model.floating is floating
+    assert to_canonical(facts, floating=not floating).model.floating is not floating
 
+
+def test_base_without_joints_is_free_if_it_has_a_mass(robot):
+    assert to_canonical(robot(urdf(links="a"))).model.floating is True
+    assert to_canonical(robot('<robot name="r"><link name="a"/></robot>')).model.floating is False
+
+
+def test_robot_without_links_is_rejected(robot):
+    with pytest.raises(RobotFileError, match="got no links; expected a robot"):
+        to_canonical(robot('<robot name="r"/>'))
+
+
+def test_other_trees_are_removed(robot):
+    excluded = '<contact><exclude body1="base" body2="{}"/></contact>'
+    crate = f'<body name="crate">{MJCF_MASS}<freejoint/></body></worldbody>'
+    text = mjcf(f'<body name="leg">{MJCF_MASS}<joint name="j"/></body>', excluded.format("leg"))
+    both = text.replace("</worldbody>", crate).replace(
+        "</mujoco>", excluded.format("crate") + "</mujoco>"
+    )
+    form = to_canonical(robot(both))
+    assert [link.name for link in form.model.links] == ["base", "leg"]
+    assert form.changes == ("removed crate: not part of the kinematic tree",)
+    assert form.model.excluded == {frozenset({"base", "leg"})}
+
+
+# Names
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"), [("my robot/../x", "my_robot_.._x"), ("..", "robot"), ("", "robot")]
+)
+def test_plain_name(name, wanted, robot):
+    assert to_canonical(robot(urdf(links="a", name=name))).model.name == wanted
+
+
+def test_link_named_world_is_renamed(robot):
+    joint = urdf_joint("j", "world", "world_link", "fixed")
+    form = to_canonical(robot(urdf(joint, links=["world", "world_link"])))
+    assert [link.name for link in form.model.links] == ["world_link_2", "world_link"]
+    (joint,) = form.model.joints
+    assert (joint.parent, joint.child, form.model.floating) == ("world_link_2", "world_link", False)
+    assert form.changes == ("renamed link world to world_link_2: MuJoCo reserves the name world",)
+    inside = urdf(urdf_joint("j", "a", "world", "fixed"), links=["a", "world"])
+    (joint,) = to_canonical(robot(inside)).model.joints
+    assert (joint.parent, joint.child) == ("a", "world_link")
+
+
+# Masses from meshes
 
 MESH = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/>'
 
 
-def test_endless_texture_is_not_read(tmp_path):
-    """It would take 2.4 GB, for a mass."""
-    text = f"""<mujoco><asset>{MESH}
-      <texture name="t" type="2d" builtin="flat" width="20000" height="20000"/>
-      <material name="p" texture="t"/></asset>
-      <worldbody><body name="base"><geom type="mesh" mesh="m" material="p"/></body></worldbody>
+def of_mesh(asset, geom="", name=' name="base"'):
+    geoms = f'<geom type="mesh" mesh="m" {geom}/>'
+    return f"""<mujoco><asset>{asset}</asset><worldbody><body{name}>{geoms}</body></worldbody>
     </mujoco>"""
-    (link,) = to_canonical(facts(tmp_path, text)).model.links
+
+
+def test_mass_from_mesh_matches_mujoco(robot, tmp_path):
+    trimesh.creation.box((0.1, 0.2, 0.3)).export(tmp_path / "box.stl")
+    facts = robot(of_mesh('<mesh name="m" file="box.stl"/>', 'pos="1 2 3" density="1000"'))
+    assert np.isnan(facts.total_mass)
+    (link,) = to_canonical(facts).model.links
+    assert link.inertial.mass == pytest.approx(6.0, rel=1e-5)
+    assert link.inertial.origin[:3, 3] == pytest.approx([1, 2, 3])
+    moments = 6.0 / 12 * np.array([0.01 + 0.04, 0.01 + 0.09, 0.04 + 0.09])
+    assert np.linalg.eigvalsh(link.inertial.inertia) == pytest.approx(moments, rel=1e-4)
+
+
+def test_endless_texture_is_not_read(robot):
+    """It would take 2.4 GB, for a mass."""
+    texture = '<texture name="t" type="2d" builtin="flat" width="20000" height="20000"/>'
+    asset = f'{MESH}{texture}<material name="p" texture="t"/>'
+    (link,) = to_canonical(robot(of_mesh(asset, 'material="p"'))).model.links
     assert link.inertial.mass == pytest.approx(1000 / 6)
 
 
-def test_unnamed_body_with_mesh_mass(tmp_path):
-    text = f"""<mujoco><asset>{MESH}</asset><worldbody><body>
-      <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+def test_masses_that_cannot_be_computed(robot, monkeypatch):
     with pytest.raises(RobotFileError, match="a body with its mass from a mesh has no name"):
-        to_canonical(facts(tmp_path, text))
-
-
-def test_missing_mesh_for_mass(tmp_path):
-    text = """<mujoco><asset><mesh name="m" file="no.stl"/></asset><worldbody><body name="base">
-      <geom type="mesh" mesh="m"/></body></worldbody></mujoco>"""
+        to_canonical(robot(of_mesh(MESH, name="")))
     with pytest.raises(RobotFileError, match="cannot compute masses from meshes: MuJoCo rejects"):
-        to_canonical(facts(tmp_path, text))
+        to_canonical(robot(of_mesh('<mesh name="m" file="no.stl"/>')))
+    monkeypatch.setattr(canonical, "_MAX_BODIES", 0)
+    with pytest.raises(RobotFileError, match=r"cannot compute masses .*: more than 0 bodies"):
+        to_canonical(robot(of_mesh(MESH)))
+
+
+def test_unknown_inertia_is_nan():
+    known, moments = inertial(1.0), (np.nan, 1, 1)
+    cases = [None, known, inertial(None), inertial(np.nan), inertial(1.0, moments)]
+    assert [has_unknown_inertia(each) for each in cases] == [False, False, False, True, True]

@@ -1,25 +1,45 @@
-import dataclasses
+from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.description.model import Dynamics
+from terrainkit_robots.description.model import Dynamics, Mimic
 from terrainkit_robots.export.actuator import ActuatorConfig
 from terrainkit_robots.export.canonical import to_canonical
-from terrainkit_robots.export.mjcf import Extras, mjcf_text, scene_text
+from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_site
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.transforms import quat_to_matrix
+from tests.terrainkit_robots.export.made_models import (
+    MJCF_MASS,
+    SOURCE,
+    at,
+    joint,
+    limits,
+    link,
+    mesh,
+    model,
+    shape,
+    stl_of,
+)
 
-MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
-
-def written(model, **extras):
+def written(robot, **extras):
     with quiet_mujoco():
-        return mujoco.MjModel.from_xml_string(mjcf_text(model, Extras(**extras)))
+        return mujoco.MjModel.from_xml_string(mjcf_text(robot, Extras(**extras)))
+
+
+def kinematics(compiled, qpos, name):
+    """Return the position and orientation of a body."""
+    data = mujoco.MjData(compiled)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(compiled, data)
+    return np.r_[data.body(name).xpos, data.body(name).xmat]
 
 
 @pytest.fixture
@@ -28,108 +48,176 @@ def quadruped():
     return Facts(to_canonical(facts).model)
 
 
-def test_masses_and_inertias(quadruped):
-    model = written(quadruped.model)
-    for link in quadruped.links:
-        body = model.body(link.name)
-        declared = link.inertial
-        assert body.mass[0] == pytest.approx(declared.mass, rel=1e-9)
-        turn = np.zeros(9)
-        mujoco.mju_quat2Mat(turn, body.iquat)
-        turn = turn.reshape(3, 3)
-        origin = declared.origin[:3, :3]
+TURNED = at(0.1, 0.2, 0.3, [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+LEG = model(
+    link(
+        "base",
+        visuals=(shape("box", 0.1, 0.2, 0.3, color=(1, 0, 0.5, 1)), shape("sphere", 0.1)),
+        collisions=(shape("cylinder", 0.1, 0.2, origin=TURNED, contype=2, conaffinity=4),),
+    ),
+    link("leg", collisions=(shape("sphere", 0.1), shape("sphere", 0.2))),
+    link("foot"),
+    link("toe", None, collisions=(shape("sphere", 0.1, origin=at(1, 0, 0)), shape("sphere", 0.1))),
+    joint(
+        "hip",
+        "revolute",
+        "base",
+        "leg",
+        origin=TURNED,
+        axis=np.array([0.0, 2, 0]),
+        limit=limits(-0.5, 1.5),
+        armature=0.5,
+        dynamics=Dynamics(source=SOURCE, damping=0.3, friction=0.4),
+    ),
+    joint(
+        "slide",
+        "prismatic",
+        "leg",
+        "foot",
+        limit=None,
+        mimic=Mimic(source=SOURCE, joint="hip", multiplier=-2.0, offset=0.1),
+    ),
+    joint("tip", "fixed", "foot", "toe"),
+    floating=True,
+)
+
+
+def test_joints_are_written():
+    made = written(LEG)
+    root, hip, slide = (made.joint(name) for name in ("root", "hip", "slide"))
+    assert [each.type[0] for each in (root, hip, slide)] == [0, 3, 2]
+    assert (hip.axis.tolist(), hip.range.tolist()) == ([0, 1, 0], [-0.5, 1.5])
+    assert [hip.damping[0], hip.frictionloss[0], hip.armature[0]] == [0.3, 0.4, 0.5]
+    assert [slide.limited[0], slide.damping[0], slide.armature[0]] == [0, 0, 0]
+    leg = made.body("leg")
+    assert leg.pos.tolist() == [0.1, 0.2, 0.3]
+    np.testing.assert_allclose(quat_to_matrix(leg.quat), TURNED[:3, :3], atol=1e-12)
+    assert made.eq_data[0, :5].tolist() == [0.1, -2, 0, 0, 0]
+    assert (made.eq_obj1id[0], made.eq_obj2id[0]) == (slide.id, hip.id)
+
+
+def test_geoms_are_written():
+    """Shapes have no mass, and only those that collide have a name."""
+    made = written(LEG)
+    names = ["", "", "base_collision", "leg_collision1", "leg_collision2"]
+    names += ["toe_collision1", "toe_collision2"]
+    assert [made.geom(k).name for k in range(made.ngeom)] == names
+    assert made.geom_group.tolist() == [2, 2, 3, 3, 3, 3, 3]
+    assert made.geom_contype.tolist() == [0, 0, 2, 1, 1, 1, 1]
+    assert made.geom_conaffinity.tolist() == [0, 0, 4, 1, 1, 1, 1]
+    assert made.geom_rgba[:2].tolist() == [[1, 0, 0.5, 1], pytest.approx([0.75, 0.77, 0.8, 1])]
+    assert made.geom("base_collision").pos.tolist() == [0.1, 0.2, 0.3]
+    assert made.body_mass.tolist() == [0, 1, 1, 1, 0]
+    assert made.body("toe").ipos.tolist() == [0.5, 0, 0]  # the middle of its shapes
+
+
+def test_inertias_are_written(quadruped):
+    made = written(quadruped.model)
+    for each in quadruped.links:
+        body, rotation = made.body(each.name), each.inertial.origin[:3, :3]
+        assert body.mass[0] == pytest.approx(each.inertial.mass, rel=1e-9)
+        axes = quat_to_matrix(body.iquat)
         np.testing.assert_allclose(
-            turn @ np.diag(body.inertia) @ turn.T,
-            origin @ declared.inertia @ origin.T,
+            axes @ np.diag(body.inertia) @ axes.T,
+            rotation @ each.inertial.inertia @ rotation.T,
             rtol=1e-6,
             atol=1e-7,  # MuJoCo before 3.14 diagonalizes with an error of 5e-8
         )
 
 
-def test_visual_geoms_have_their_colors(quadruped):
-    model = written(quadruped.model)
-    shown = model.geom_rgba[model.geom_contype == 0]
-    colors = {tuple(color.astype(float).round(3).tolist()) for color in shown}
-    assert colors == {(0.75, 0.77, 0.8, 1.0), (0.2, 0.21, 0.23, 1.0)}
+def test_meshes_have_a_name_for_each_file_and_scale(tmp_path):
+    box = stl_of(trimesh.creation.box([1, 1, 1]))
+    scales = [(1, 1, 1), (2, 1, 1)]
+    shapes = [mesh("a.stl", scale, origin=at(0, 0, 0)) for scale in scales]
+    shapes = [replace(each, mesh=replace(each.mesh, filename="a.stl")) for each in shapes]
+    base = link("base", visuals=(*shapes, shapes[0]), collisions=(shapes[1],))
+    (tmp_path / "a.stl").write_bytes(box)
+    (tmp_path / "robot.xml").write_text(mjcf_text(model(base), Extras()))
+    made = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    assert [made.mesh(k).name for k in range(made.nmesh)] == ["a", "a_2"]
+    assert made.geom_dataid.tolist() == [0, 1, 0, 1]
+    assert made.geom_size.max(axis=1).tolist() == pytest.approx([0.5, 1, 0.5, 1])
 
 
-def test_several_joints_of_one_body(tmp_path):
+def test_several_joints_of_one_body(robot, tmp_path):
     """Two hinges and a slide on one body, off its origin and with references."""
-    text = f"""<mujoco><compiler angle="radian"/><worldbody><body name="base">{MASS}
-      <body name="hip" pos="0.1 0.2 -0.3" quat="0.9 0.1 0.2 0.3">{MASS}
-        <joint name="a" axis="1 0 0" pos="0.01 0.02 0.03" ref="0.1"/>
-        <joint name="b" axis="0 1 1" pos="-0.02 0 0.1" ref="-0.2"/>
-        <joint name="c" type="slide" axis="0 0 1" ref="0.05"/>
-        <body name="knee" pos="0 0 -0.2">{MASS}
-          <joint name="d" axis="0 1 0" pos="0 0 0.02"/></body>
-      </body></body></worldbody></mujoco>"""
-    path = tmp_path / "robot.xml"
-    path.write_text(text)
-    source = mujoco.MjModel.from_xml_path(str(path))
-    model = written(to_canonical(Facts(load_robot(path)), floating=False).model)
-    assert [model.joint(k).name for k in range(model.njnt)] == ["a", "b", "c", "d"]
-    rng = np.random.default_rng(0)
-    for qpos in rng.uniform(-1, 1, (20, 4)):
+    facts = robot(
+        f"""<mujoco><compiler angle="radian"/><worldbody><body name="base">{MJCF_MASS}
+        <body name="hip" pos="0.1 0.2 -0.3" quat="0.9 0.1 0.2 0.3">{MJCF_MASS}
+          <joint name="a" axis="1 0 0" pos="0.01 0.02 0.03" ref="0.1"/>
+          <joint name="b" axis="0 1 1" pos="-0.02 0 0.1" ref="-0.2"/>
+          <joint name="c" type="slide" axis="0 0 1" ref="0.05"/>
+          <body name="knee" pos="0 0 -0.2">{MJCF_MASS}
+            <joint name="d" axis="0 1 0" pos="0 0 0.02"/></body>
+        </body></body></worldbody></mujoco>"""
+    )
+    source = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    made = written(to_canonical(facts, floating=False).model)
+    assert [made.joint(k).name for k in range(made.njnt)] == ["a", "b", "c", "d"]
+    for qpos in np.random.default_rng(0).uniform(-1, 1, (3, 4)):
         for name in ("hip", "knee"):
-            there, here = (pose_of(m, qpos, name) for m in (source, model))
+            there, here = (kinematics(each, qpos, name) for each in (source, made))
             np.testing.assert_allclose(here, there, atol=1e-9)
 
 
-def pose_of(model, qpos, name):
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    return np.r_[data.body(name).xpos, data.body(name).xmat]
-
-
-def test_actuator_order(quadruped):
-    names = [joint.name for joint in quadruped.actuated][::-1]
+def test_actuators_and_keyframe():
+    """The order is the one of the actuators; a wheel is commanded its speed."""
     drives = {
-        name: ActuatorConfig(stiffness=20 + k, damping=0.5, effort=5.0 + k, armature=0.01)
-        for k, name in enumerate(names)
+        "slide": ActuatorConfig(stiffness=0, damping=0.5, velocity=7.0),
+        "hip": ActuatorConfig(stiffness=20, damping=2, effort=5.0, armature=0.01),
     }
-    model = written(quadruped.model, actuators=drives, keyframe=quadruped.default_pose, height=0.3)
-    assert [model.actuator(k).name for k in range(model.nu)] == names
-    for k, name in enumerate(names):
-        motor, joint = model.actuator(k), model.joint(name)
-        assert motor.trnid[0] == joint.id
-        assert motor.gainprm[0] == 20 + k
-        assert list(motor.biasprm[:3]) == [0, -20 - k, -0.5]
-        assert list(motor.forcerange) == [-5 - k, 5 + k]
-        np.testing.assert_allclose(motor.ctrlrange, joint.range)
-        assert model.dof_armature[joint.dofadr[0]] == 0.01
-    key = model.key("home")
-    assert key.qpos[2] == 0.3
-    assert list(key.ctrl) == pytest.approx([quadruped.default_pose[name] for name in names])
+    pose = {"hip": 0.25, "slide": 0.5}
+    made = written(LEG, actuators=drives, keyframe=pose, height=0.3, height_at_zero=0.4)
+    speed, position = made.actuator(0), made.actuator(1)
+    assert [made.joint(each.trnid[0]).name for each in (speed, position)] == ["slide", "hip"]
+    assert (position.gainprm[0], position.biasprm[:3].tolist()) == (20, [0, -20, -2])
+    assert (position.forcerange.tolist(), position.ctrlrange.tolist()) == ([-5, 5], [-0.5, 1.5])
+    assert (speed.gainprm[0], speed.biasprm[:3].tolist()) == (0.5, [0, 0, -0.5])
+    assert (bool(speed.forcelimited[0]), speed.ctrlrange.tolist()) == (False, [-7, 7])
+    assert (made.joint("hip").armature[0], made.joint("slide").armature[0]) == (0.01, 0)
+    key = made.key("home")
+    assert key.qpos.tolist() == [0, 0, 0.3, 1, 0, 0, 0, 0.25, 0.5]
+    assert key.ctrl.tolist() == [0, 0.25]
+    assert made.body("base").pos.tolist() == [0, 0, 0.4]
+    fixed = written(replace(LEG, floating=False), keyframe=pose, height=0.3, time_step=0.002)
+    assert (fixed.key("home").qpos.tolist(), fixed.nu) == ([0.25, 0.5], 0)
+    assert (fixed.body("base").pos.tolist(), fixed.opt.timestep) == ([0, 0, 0.3], 0.002)
+    assert written(model(link("base"))).nkey == 0
 
 
-def test_actuator_without_effort_is_unlimited(quadruped):
-    model = written(
-        quadruped.model, actuators={"FL_hip_joint": ActuatorConfig(stiffness=1, damping=0)}
-    )
-    assert not model.actuator(0).forcelimited
+def test_sites_and_sensors():
+    """A frame with the name of another site is not written."""
+    foot = Site(name="foot", body="foot", pose=TURNED, half_size=(0.1, 0.2, 0.3))
+    frames = tuple(Site(name=name, body="base", pose=at(0, 0, 1)) for name in ("foot", "camera"))
+    imu = Site(name="imu", body="leg", pose=np.eye(4))
+    made = written(LEG, feet=(foot,), imu=imu, frames=frames)
+    found = {made.site(k).name: made.site(k).bodyid[0] for k in range(made.nsite)}
+    assert found == {"camera": 1, "imu": 2, "foot": 3}
+    assert made.site("foot").size.tolist() == [0.1, 0.2, 0.3]
+    assert made.site("foot").pos.tolist() == [0.1, 0.2, 0.3]
+    names = ["orientation", "angular_velocity", "acceleration", "linear_velocity", "foot_contact"]
+    assert [made.sensor(k).name for k in range(made.nsensor)] == names
+    assert set(made.sensor_objtype.tolist()) == {mujoco.mjtObj.mjOBJ_SITE}
+    assert written(LEG, imu=imu).nsensor == 4
 
 
-def test_touch_sensors_of_feet(quadruped):
+def test_touch_sensors_carry_the_weight(quadruped):
     weight = quadruped.total_mass * 9.81
-    drives = {
-        joint.name: ActuatorConfig(stiffness=100, damping=2, effort=50.0, armature=0.01)
-        for joint in quadruped.actuated
-    }
+    drive = ActuatorConfig(stiffness=100, damping=2, effort=50.0, armature=0.01)
     extras = Extras(
-        actuators=drives,
+        actuators={each.name: drive for each in quadruped.actuated},
         feet=foot_sites(quadruped),
         imu=imu_site(quadruped),
         keyframe=quadruped.default_pose,
         height=quadruped.stance.height,
     )
-    text = mjcf_text(quadruped.model, extras)
     floor = '<worldbody><geom type="plane" size="0 0 1"/>'
-    model = mujoco.MjModel.from_xml_string(text.replace("<worldbody>", floor, 1))
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
+    text = mjcf_text(quadruped.model, extras).replace("<worldbody>", floor, 1)
+    made = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(made)
+    mujoco.mj_resetDataKeyframe(made, data, 0)
     for _ in range(400):
-        mujoco.mj_step(model, data)
+        mujoco.mj_step(made, data)
     felt = [data.sensor(f"{leg.foot}_contact").data[0] for leg in quadruped.legs]
     assert min(felt) > 0.1 * weight
     assert sum(felt) == pytest.approx(weight, rel=0.01)
@@ -137,85 +225,25 @@ def test_touch_sensors_of_feet(quadruped):
     assert data.sensor("orientation").data[0] == pytest.approx(1, abs=1e-3)
 
 
-def test_mimic_joint(tmp_path):
-    link = (
-        '<link name="{}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" '
-        'ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    )
-    joint = (
-        '<joint name="{0}" type="revolute"><parent link="a"/><child link="{1}"/><axis xyz="0 1 0"/>'
-        '<limit lower="-1" upper="1" effort="5" velocity="5"/>{2}</joint>'
-    )
-    text = f"""<robot name="r">{link.format("a")}{link.format("b")}{link.format("c")}
-      {joint.format("j", "b", "")}
-      {joint.format("k", "c", '<mimic joint="j" multiplier="-2" offset="0.1"/>')}</robot>"""
-    path = tmp_path / "robot.urdf"
-    path.write_text(text)
-    facts = Facts(to_canonical(Facts(load_robot(path))).model)
-    assert [joint.name for joint in facts.actuated] == ["j"]
-    model = written(facts.model)
-    assert model.neq == 1
-    np.testing.assert_allclose(model.eq_data[0, :5], [0.1, -2, 0, 0, 0])
-
-
-def test_special_characters_in_names(quadruped):
+def test_names_cannot_end_the_text():
     hostile = '"/><body name="x">&amp; é'
-    links = [
-        dataclasses.replace(link, name=hostile) if link.name == "imu" else link
-        for link in quadruped.model.links
-    ]
-    base = dataclasses.replace(quadruped.model, name=hostile, links=tuple(links))
-    assert written(base).nbody == written(quadruped.model).nbody
+    robot = replace(LEG, name=hostile, links=(*LEG.links, link(hostile)))
+    robot = replace(robot, joints=(*LEG.joints, joint("floor", "fixed", "leg", hostile)))
+    made = written(robot)
+    assert [made.body(k).name for k in range(4, made.nbody)] == ["toe", hostile]
 
 
-def test_excluded_pairs(quadruped):
-    pair = frozenset(("base", "FL_calf"))
-    assert written(quadruped.model).nexclude == 0
-    assert written(quadruped.model, excluded=[pair]).nexclude == 1
+def test_excluded_pairs():
+    assert written(LEG).nexclude == 0
+    assert written(LEG, excluded=[frozenset(("base", "foot"))]).exclude_signature == [(1 << 16) + 3]
 
 
-def test_arm_keeps_its_pose(tmp_path):
-    text = f"""<mujoco><worldbody><body name="base">{MASS}<body name="arm">{MASS}
-      <joint name="j" range="-1 1"/></body></body></worldbody></mujoco>"""
-    path = tmp_path / "robot.xml"
-    path.write_text(text)
-    model = written(to_canonical(Facts(load_robot(path))).model)
-    assert (model.nq, model.nkey) == (1, 1)
-
-
-def test_scene(quadruped, tmp_path):
-    (tmp_path / "robot.xml").write_text(mjcf_text(quadruped.model, Extras(height=0.3)))
-    (tmp_path / "scene.xml").write_text(scene_text("quadruped", "robot.xml", height=0.3))
-    model = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
-    assert model.geom("floor").type[0] == mujoco.mjtGeom.mjGEOM_PLANE
-    assert model.body("base").pos[2] == 0.3
-
-
-def test_contacts_of_massless_foot(quadruped):
-    def weighs(mass):
-        def foot(link):
-            if link.name != "FL_foot":
-                return link
-            light = dataclasses.replace(link.inertial, mass=mass, inertia=1e-3 * mass * np.eye(3))
-            return dataclasses.replace(link, inertial=light if mass else None)
-
-        links = tuple(map(foot, quadruped.model.links))
-        model = written(dataclasses.replace(quadruped.model, links=links))
-        return model.body("FL_foot")
-
-    none, next_to_none = weighs(0.0), weighs(1e-9)
-    assert none.mass[0] == 0
-    np.testing.assert_allclose(none.invweight0, next_to_none.invweight0, rtol=1e-4)
-
-
-def test_joint_friction(quadruped):
-    joints = [
-        dataclasses.replace(joint, dynamics=Dynamics(source=joint.source, friction=0.25))
-        if joint.name == "FL_hip_joint"
-        else joint
-        for joint in quadruped.model.joints
-    ]
-    model = written(dataclasses.replace(quadruped.model, joints=tuple(joints)))
-    for joint in quadruped.joints:
-        wanted = 0.25 if joint.name == "FL_hip_joint" else joint.friction
-        assert model.joint(joint.name).frictionloss[0] == wanted
+def test_scene(tmp_path):
+    (tmp_path / "robot.xml").write_text(mjcf_text(LEG, Extras(height=0.3)))
+    (tmp_path / "scene.xml").write_text(scene_text("leg", "robot.xml", height=0.3))
+    made = mujoco.MjModel.from_xml_path(str(tmp_path / "scene.xml"))
+    floor = made.geom("floor")
+    assert (floor.type[0], floor.contype[0]) == (mujoco.mjtGeom.mjGEOM_PLANE, 2**31 - 1)
+    assert made.body("base").pos[2] == 0.3
+    assert (made.stat.center.tolist(), made.stat.extent) == ([0, 0, 0.15], 0.6)
+    assert made.light_pos.tolist() == [[0, 0, 1.2]]

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,79 +14,63 @@ def facts_of(name):
     return Facts(load_robot(bundled.urdf_path(name)))
 
 
-def test_site_encloses_ball_foot():
-    sites = foot_sites(facts_of("quadruped"))
-    assert [site.body for site in sites] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
-    for site in sites:
-        np.testing.assert_allclose(site.pose, np.eye(4), atol=1e-12)
+def test_sites_enclose_feet():
+    """A foot is a ball of 22 mm, or a flat sole; the margin is 2 mm."""
+    sites = foot_sites(facts_of("quadruped"), ["RR_calf"])
+    assert [site.name for site in sites] == ["FL_foot", "FR_foot", "RL_foot", "RR_calf"]
+    for site, height in zip(sites, [0, 0, 0, -0.213], strict=True):
+        assert site.name == site.body
+        np.testing.assert_allclose(site.pose[:3, 3], [0, 0, height], atol=1e-12)
         assert site.half_size == pytest.approx((0.024, 0.024, 0.024))
-
-
-def test_site_of_flat_foot():
     for site in foot_sites(facts_of("biped")):
         x, y, z = site.half_size
         assert x > y > z
         assert site.pose[2, 3] < 0
 
 
-def test_imu_at_link(tmp_path):
-    path = tmp_path / "robot.urdf"
-    path.write_text(
-        """<robot name="r"><link name="trunk"/><link name="imu_link"/>
-        <joint name="imu_joint" type="fixed"><parent link="trunk"/><child link="imu_link"/>
-        <origin xyz="0.1 0.2 0.3"/></joint></robot>"""
-    )
-    facts = Facts(load_robot(path))
-    site = imu_site(facts)
-    assert site.body == "trunk"
-    np.testing.assert_allclose(site.pose[:3, 3], [0.1, 0.2, 0.3])
-    assert imu_changes(facts) == ()
+def test_foot_without_shapes_has_a_site_without_size():
+    model = facts_of("quadruped").model
+    links = [
+        replace(each, collisions=()) if each.name in ("FL_calf", "FL_foot") else each
+        for each in model.links
+    ]
+    site = foot_sites(Facts(replace(model, links=tuple(links))))[0]
+    assert (site.name, site.pose.tolist(), site.half_size) == ("FL_foot", np.eye(4).tolist(), ())
 
 
-def test_imu_default_is_base(tmp_path):
-    path = tmp_path / "robot.urdf"
-    path.write_text('<robot name="r"><link name="trunk"/></robot>')
-    facts = Facts(load_robot(path))
+IMU_LINK = """<link name="{}"/><joint name="imu_joint" type="fixed"><parent link="trunk"/>
+  <child link="{}"/><origin xyz="0.1 0.2 0.3"/></joint>"""
+
+
+@pytest.mark.parametrize(
+    ("link", "place", "is_found"), [("My_IMU", (0.1, 0.2, 0.3), True), ("camera", (0, 0, 0), False)]
+)
+def test_imu_is_at_link_or_origin_of_base(link, place, is_found, robot):
+    facts = robot(f'<robot name="r"><link name="trunk"/>{IMU_LINK.format(link, link)}</robot>')
     site = imu_site(facts)
-    assert site.body == "trunk"
-    np.testing.assert_allclose(site.pose, np.eye(4))
-    assert imu_changes(facts) == (
-        "placed the IMU at the origin of trunk: no sensor, site or link defines it",
-    )
-    # An arm that is bolted down has none, and nobody misses it.
-    arm = Facts(to_canonical(facts, floating=False).model)
-    assert imu_changes(arm) == ()
+    assert (site.name, site.body, site.pose[:3, 3].tolist()) == ("imu", "trunk", list(place))
+    told = "placed the IMU at the origin of trunk: no sensor, site or link defines it"
+    assert imu_changes(facts) == (() if is_found else (told,))
+    # An arm that is bolted down needs none.
+    assert imu_changes(Facts(to_canonical(facts, floating=False).model)) == ()
 
 
 IMU = """<mujoco><worldbody><body name="trunk"><freejoint/><geom size="0.1"/>
-  <body name="head" pos="0 0 1"><body name="imu_link" pos="5 5 5"/>
-    <site name="sensed" pos="0.1 0.2 0.3"/></body></body></worldbody>
+  <body name="head" pos="0 0 1"><body name="{}" pos="5 5 5"/>{}</body></body>{}</worldbody>
   <sensor><gyro site="sensed"/></sensor></mujoco>"""
+SITE = '<site name="sensed" pos="0.1 0.2 0.3"/>'
 
 
-def test_imu_of_file_has_precedence(tmp_path):
-    path = tmp_path / "robot.xml"
-    path.write_text(IMU)
-    facts = Facts(to_canonical(Facts(load_robot(path))).model)
+def test_imu_of_file_has_precedence(robot):
+    facts = Facts(to_canonical(robot(IMU.format("imu_link", SITE, ""))).model)
     site = imu_site(facts)
     assert site.body == "trunk"  # of which the head is a part
     np.testing.assert_allclose(site.pose[:3, 3], [0.1, 0.2, 1.3])
     assert imu_changes(facts) == ()
 
 
-def test_imu_of_other_tree_is_ignored(tmp_path):
-    path = tmp_path / "robot.xml"
-    crate = '<body name="crate"><freejoint/><geom size="0.1"/><site name="sensed"/></body>'
-    text = IMU.replace("</worldbody>", f"{crate}</worldbody>")
-    text = text.replace('<site name="sensed" pos="0.1 0.2 0.3"/>', "", 1)
-    path.write_text(text.replace('name="imu_link"', 'name="cover"'))
-    model = to_canonical(Facts(load_robot(path))).model
+def test_imu_of_other_tree_is_ignored(robot):
+    crate = f'<body name="crate"><freejoint/><geom size="0.1"/>{SITE}</body>'
+    model = to_canonical(robot(IMU.format("cover", "", crate))).model
     assert model.imu is None
     assert imu_changes(Facts(model))[0].startswith("placed the IMU at the origin of trunk")
-
-
-def test_imu_of_go2(robot_file):
-    facts = Facts(to_canonical(Facts(load_robot(robot_file("go2_mjcf/go2.xml")))).model)
-    site = imu_site(facts)
-    assert site.body == "base_link"
-    np.testing.assert_allclose(site.pose[:3, 3], [-0.02557, 0, 0.04232], atol=1e-12)

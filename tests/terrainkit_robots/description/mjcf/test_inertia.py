@@ -50,6 +50,8 @@ def test_minimums_replace_smaller_values_only():
     assert found.mass == 2.0
     assert np.diag(found.inertia) == pytest.approx([-1.0, 1.0, 4.0])
     assert apply_minimums(link(0.0), 2.0, 0.0).mass == 2.0
+    unknown = np.diag([np.nan, 0.5, 0.5])
+    assert apply_minimums(link(1.0, unknown), 2.0, 1.0).inertia is unknown
     assert [apply_minimums(link(m), 2.0, 0.0).mass for m in (-1.0, 3.0, None)] == [-1.0, 3.0, None]
 
 

@@ -2,70 +2,66 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots.description.load import load_robot
+from tests.terrainkit_robots.description import made_robots
+from tests.terrainkit_robots.description.made_robots import codes
 
-FILE = Path("/robots/robot.urdf")
 BOX = '<geometry><box size="1 1 1"/></geometry>'
+NAMED = '<material name="m"/>'
+RED, GREEN, BLUE = (1, 0, 0, 1), (0, 1, 0, 1), (0, 0, 1, 1)
 
 
-def visuals(inner):
-    text = f'<robot name="r">{inner}</robot>'
-    model = load_robot(FILE, contents={FILE: text.encode()})
-    assert {problem.code for problem in model.problems} <= {"XML016"}  # undefined materials
-    return [visual.color for link in model.links for visual in link.visuals]
+def read(inner):
+    return made_robots.read(f'<robot name="r">{inner}</robot>', Path("robot.urdf"))
 
 
-def visual(material):
-    return f"<visual>{BOX}{material}</visual>"
+def link(material, name="l"):
+    return f'<link name="{name}"><visual>{BOX}{material}</visual></link>'
 
 
-def link(*materials):
-    return f'<link name="l{abs(hash(materials))}">{"".join(map(visual, materials))}</link>'
-
-
-def color(rgba):
-    return f'<material name="m"><color rgba="{rgba}"/></material>'
-
-
-def test_color_of_visual():
-    assert visuals(link(color("1 0.5 0 0.25"))) == [(1, 0.5, 0, 0.25)]
-
-
-def test_color_of_named_material():
-    named = '<material name="m"/>'
-    assert visuals(link(named) + color("0 0 1 1")) == [(0, 0, 1, 1)]
-    assert visuals(link(named) + link(color("0 1 0 1"))) == [(0, 1, 0, 1)] * 2
-
-
-def test_precedence_of_materials():
-    text = link('<material name="m"/>') + link(color("0 1 0 1")) + color("0 0 1 1")
-    assert visuals(text + color("1 0 0 1")) == [(0, 0, 1, 1), (0, 1, 0, 1)]
+def color(rgba, name="m"):
+    words = rgba if isinstance(rgba, str) else " ".join(map(str, rgba))
+    return f'<material name="{name}"><color rgba="{words}"/></material>'
 
 
 @pytest.mark.parametrize(
-    "rgba",
-    ["1 1 1", "1 1 1 1 1", "a b c d", "nan 0 0 1", "inf 0 0 1", "-0.1 0 0 1", "255 0 0 1", ""],
-)
-def test_invalid_color(rgba):
-    assert visuals(link(color(rgba))) == [None]
-
-
-@pytest.mark.parametrize(
-    "material",
+    ("inner", "wanted"),
     [
-        "",
-        '<material name="m"/>',
-        "<material/>",
-        '<material name="m"><color/></material>',
-        '<material name="m"><texture filename="wood.png"/></material>',
-        '<material><color/></material><!-- --><contact_coefficients mu="1"/>',
+        (link(color("1 0.5 0 0.25")), [(1, 0.5, 0, 0.25)]),
+        (link(NAMED) + color(BLUE), [BLUE]),
+        (link(NAMED) + color(BLUE, " m "), [BLUE]),
+        (link(NAMED) + link(color(GREEN)), [GREEN, GREEN]),
+        (link(NAMED) + link(color(GREEN)) + color(BLUE) + color(RED), [BLUE, GREEN]),
+        (link(NAMED) + color("x") + color(BLUE), [BLUE]),  # the first that is a color
+        (link(color("1 1 1")), [None]),
+        (link(color("1 1 1 1 1")), [None]),
+        (link(color("nan 0 0 1")), [None]),
+        (link(color("-0.1 0 0 1")), [None]),
+        (link(color("1.1 0 0 1")), [None]),
+        (link(color("")), [None]),
+        (link(color("x")) + color(BLUE), [None]),  # its own is invalid
+        (link("") + color(RED, ""), [None]),
+        (link("<material/>") + color(RED, ""), [None]),
+        (link('<material name="m"><color/></material>') + color(RED), [None]),
     ],
 )
-def test_no_color(material):
-    assert visuals(link(material) + '<material><color rgba="1 0 0 1"/></material>') == [None]
+def test_color_of_visual(inner, wanted):
+    assert [visual.color for each in read(inner).links for visual in each.visuals] == wanted
 
 
 def test_collisions_have_no_color():
-    text = f'<robot name="r"><link name="l"><collision>{BOX}{color("1 0 0 1")}</collision></link>'
-    model = load_robot(FILE, contents={FILE: f"{text}</robot>".encode()})
+    model = read(f'<link name="l"><collision>{BOX}{color(RED)}</collision></link>')
     assert model.links[0].collisions[0].color is None
+
+
+@pytest.mark.parametrize(
+    ("inner", "found"),
+    [
+        (link(NAMED) * 2, ["XML016"]),
+        (link(NAMED) + color("x"), []),
+        (link(NAMED) + link('<material name="m"><texture filename="a.png"/></material>'), []),
+        (link("<material/>"), []),
+        (link('<material name="${x}"/>'), ["XML004"]),
+    ],
+)
+def test_undefined_materials_are_reported_once(inner, found):
+    assert codes(read(inner)) == found

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.export.collision_simplification.fit_primitive import fit_primitive
+from terrainkit_robots.export.collision_simplification.fit_primitive import _capsule, fit_primitive
 from terrainkit_robots.transforms import rpy_to_matrix
 
 ROTATION = rpy_to_matrix(np.array([0.3, -0.4, 0.5]))
@@ -29,7 +29,7 @@ def test_fit_primitive_recovers_shape(shape, rotated):
 
 
 def outside(fitted, points):
-    """Rerotation the distance of the farthest point outside [m]."""
+    """Return the distance of the farthest point outside [m]."""
     local = (points - fitted.pose[:3, 3]) @ fitted.pose[:3, :3]
     size = fitted.size
     match fitted.shape:
@@ -50,3 +50,14 @@ def test_fit_primitive_encloses_points(seed):
     rng = np.random.default_rng(seed)
     points = rng.uniform(-1, 1, (300, 3)) * rng.uniform(0.1, 1, 3) @ ROTATION
     assert outside(fit_primitive(points), points) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("height", "shape", "size"), [(0, "sphere", (1,)), (0.1, "capsule", (1, 0.1))]
+)
+def test_capsule_without_a_length_is_a_sphere(height, shape, size):
+    """Two points are on top of each other in the middle, on and above a circle."""
+    circle = [[1, 0, height], [-1, 0, height], [0, 1, -height], [0, -1, -height]]
+    fitted = _capsule(np.array([*circle, [0, 0, 0.5], [0, 0, -0.5]]), np.array([0, 0, 1]))
+    assert (fitted.shape, fitted.size) == (shape, pytest.approx(size))
+    assert fitted.volume == pytest.approx(np.pi * (4 / 3 + 2 * height))

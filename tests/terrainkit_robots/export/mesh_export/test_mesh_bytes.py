@@ -1,31 +1,26 @@
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.description.model import MeshFile, Source
 from terrainkit_robots.export.mesh_export import mesh_bytes as module
 from terrainkit_robots.export.mesh_export.mesh_bytes import has_no_volume, mesh_bytes, scaled
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.mesh.surface import Surface, binary_stl, signed_volume, welded
+from tests.terrainkit_robots.export.made_models import mesh, stl_of, surface_of
 
 # a wedge: no two of its axes are alike, so that a mirror or a turn shows
 WEDGE = trimesh.convex.convex_hull(
     [(0, 0, 0), (3, 0, 0), (0, 2, 0), (0, 0, 1), (3, 0, 0.5), (1, 1, 1)]
 )
-SURFACE = Surface(points=np.asarray(WEDGE.vertices), faces=np.asarray(WEDGE.faces))
+SURFACE = surface_of(WEDGE)
 STL = binary_stl(SURFACE)
 
 
-def use_of(name, scale=(1.0, 1.0, 1.0)):
-    return MeshFile(
-        source=Source(file=Path("robot.urdf"), line=1), filename=name, path=Path(name), scale=scale
-    )
-
-
-def content(data, name, scale=(1.0, 1.0, 1.0)):
-    return mesh_bytes(Meshes({Path(name): data}), use_of(name, scale))
+def content(data, name="a.stl", scale=(1.0, 1.0, 1.0)):
+    return mesh_bytes(Meshes({Path(name): data}), mesh(name, scale).mesh)
 
 
 def read(packed):
@@ -34,109 +29,87 @@ def read(packed):
     return welded(Surface(points=surface.points * packed.scale, faces=surface.faces))
 
 
+def assert_wedge(packed, scale):
+    """Compare bounds and volume; a surface that is inside out has a negative one."""
+    surface, corners = read(packed), WEDGE.vertices * scale
+    assert surface.points.min(axis=0) == pytest.approx(corners.min(axis=0))
+    assert surface.points.max(axis=0) == pytest.approx(corners.max(axis=0))
+    volume = WEDGE.volume * abs(np.prod(scale))
+    assert signed_volume(surface) == pytest.approx(volume, rel=1e-6)
+
+
+def test_valid_binary_stl_is_unchanged():
+    data = b"x" * 80 + STL[80:]
+    packed = content(data, "a.STL", scale=(0.001, 0.002, 0.003))
+    assert (packed.data, packed.scale, packed.change) == (data, (0.001, 0.002, 0.003), "")
+    assert content(b"solid".ljust(80) + STL[80:]).data == STL  # it looks like text
+
+
 def msh():
     counts = np.array([len(SURFACE.points), 0, 0, len(SURFACE.faces)], "<i4")
     points, faces = SURFACE.points.astype("<f4"), SURFACE.faces.astype("<i4")
     return counts.tobytes() + points.tobytes() + faces.tobytes()
 
 
-class TestFormats:
-    def test_valid_binary_stl_is_unchanged(self):
-        data = b"x" * 80 + STL[80:]
-        packed = content(data, "a.STL", scale=(0.001, 0.002, 0.003))
-        assert packed.data == data
-        assert packed.scale == (0.001, 0.002, 0.003)
-        assert not packed.change
-
-    def test_stl_that_looks_like_text(self):
-        packed = content(b"solid".ljust(80) + STL[80:], "a.stl")
-        assert packed.data == STL
-
-    @pytest.mark.parametrize("suffix", ["obj", "ply", "glb", "stl_ascii"])
-    def test_formats_keep_shape_and_size(self, suffix):
-        data = WEDGE.export(file_type=suffix)
-        name = f"a.{suffix.removesuffix('_ascii')}"
-        self.assert_same(content(data if isinstance(data, bytes) else data.encode(), name))
-
-    def test_mujoco_mesh(self):
-        self.assert_same(content(msh(), "a.msh"))
-
-    def test_collada_with_unit_and_node(self):
-        points = " ".join(f"{x * 1000:.9g}" for x in SURFACE.points.ravel())
-        faces = " ".join(map(str, SURFACE.faces.ravel()))
-        data = f"""<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">
-          <asset><unit meter="0.001"/><up_axis>Z_UP</up_axis></asset>
-          <library_geometries><geometry id="g"><mesh>
-            <source id="p"><float_array>{points}</float_array>
-              <technique_common><accessor stride="3"/></technique_common></source>
-            <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-            <triangles><input semantic="VERTEX" source="#v" offset="0"/><p>{faces}</p></triangles>
-          </mesh></geometry></library_geometries>
-          <library_visual_scenes><visual_scene id="s"><node>
-            <translate>0 0 500</translate><instance_geometry url="#g"/>
-          </node></visual_scene></library_visual_scenes>
-          <scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
-        surface = read(content(data.encode(), "a.dae"))
-        assert surface.points.min(axis=0) == pytest.approx([0, 0, 0.5])
-        assert surface.points.max(axis=0) == pytest.approx([3, 2, 1.5])
-        assert signed_volume(surface) == pytest.approx(WEDGE.volume, rel=1e-6)
-
-    def assert_same(self, packed):
-        surface = read(packed)
-        assert packed.data[:6] == b"binary"
-        assert surface.points.min(axis=0) == pytest.approx(WEDGE.bounds[0])
-        assert surface.points.max(axis=0) == pytest.approx(WEDGE.bounds[1])
-        assert signed_volume(surface) == pytest.approx(WEDGE.volume, rel=1e-6)
-
-    def test_bytes_are_deterministic(self):
-        data = WEDGE.export(file_type="obj").encode()
-        assert content(data, "a.obj").data == content(data, "a.obj").data
+FORMATS = {name: WEDGE.export(file_type=name) for name in ("obj", "ply", "glb")}
+FORMATS |= {"stl": WEDGE.export(file_type="stl_ascii"), "msh": msh()}
 
 
-class TestMirroredScale:
-    @pytest.mark.parametrize("scale", [(1, -1, 1), (-0.5, 2, 1), (-1, -1, -2), (-1, -1, 1)])
-    def test_mirrored_mesh_faces_outward(self, scale):
-        packed = content(STL, "a.stl", scale)
-        assert packed.scale == (1, 1, 1)
-        surface = read(packed)
-        corners = WEDGE.vertices * scale
-        assert surface.points.min(axis=0) == pytest.approx(corners.min(axis=0))
-        assert surface.points.max(axis=0) == pytest.approx(corners.max(axis=0))
-        # positive: not inside out
-        volume = WEDGE.volume * abs(np.prod(scale))
-        assert signed_volume(surface) == pytest.approx(volume, rel=1e-6)
-
-    def test_scaled_surface(self):
-        mirrored = scaled(SURFACE, (1, -1, 1))
-        assert signed_volume(mirrored) == pytest.approx(WEDGE.volume)
-        assert scaled(SURFACE, (1, 2, 1)).faces is SURFACE.faces
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_formats_become_binary_stl(suffix):
+    text = FORMATS[suffix]
+    data = text.encode() if isinstance(text, str) else text
+    packed = content(data, f"a.{suffix}", (1, 2, 1))
+    assert_wedge(packed, (1, 2, 1))
+    assert packed.data[:6] == b"binary"
+    assert content(data, f"a.{suffix}").data == packed.data
+    spec = mujoco.MjSpec()
+    spec.add_mesh(name="m", file="a.stl")
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="m")
+    spec.assets = {"a.stl": packed.data}
+    assert spec.compile().nmesh == 1
 
 
-class TestTooManyFaces:
-    def test_mesh_is_decimated_with_note(self, monkeypatch):
-        monkeypatch.setattr(module, "MAX_FACES", 1000)
-        ball = trimesh.creation.icosphere(subdivisions=4, radius=0.1)
-        data = binary_stl(Surface(points=ball.vertices, faces=ball.faces))
-        packed = content(data, "a.stl", (1, 1, -1))
-        surface = read(packed)
-        assert len(surface.faces) <= 1000
-        assert packed.change == f"was decimated from 5,120 to {len(surface.faces)} faces"
-        assert signed_volume(surface) == pytest.approx(ball.volume, rel=0.05)
+@pytest.mark.parametrize("scale", [(1, -1, 1), (-0.5, 2, 1), (-1, -1, -2), (-1, -1, 1)])
+def test_mirrored_mesh_faces_outward(scale):
+    packed = content(STL, scale=scale)
+    assert packed.scale == (1, 1, 1)
+    assert_wedge(packed, scale)
 
 
-class TestWithoutVolume:
-    @pytest.mark.parametrize(
-        ("scale", "flat"),
-        [((1, 1, 1), False), ((1, 1, 0), True), ((1, 1e-6, 1), True), ((1e-6, 1e-6, 1e-6), True)],
-    )
-    def test_scale_makes_mesh_flat(self, scale, flat):
-        meshes = Meshes({Path("a.stl"): STL})
-        assert has_no_volume(meshes, use_of("a.stl", scale)) is flat
+def test_scaled_surface():
+    assert signed_volume(scaled(SURFACE, (1, -1, 1))) == pytest.approx(WEDGE.volume)
+    assert scaled(SURFACE, (1, 2, 1)).faces is SURFACE.faces
 
-    def test_flat_mesh_is_an_error(self):
-        with pytest.raises(MeshError, match="is flat"):
-            content(STL, "a.stl", (1, 1, 0))
 
-    def test_missing_mesh_is_an_error(self):
-        with pytest.raises(MeshError, match="does not exist"):
-            mesh_bytes(Meshes(), use_of("nowhere.stl"))
+def test_mesh_with_too_many_faces_is_decimated(monkeypatch):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
+    monkeypatch.setattr(module, "MAX_FACES", 1280)
+    assert content(stl_of(ball)).change == ""
+    monkeypatch.setattr(module, "MAX_FACES", 1279)
+    packed = content(stl_of(ball), scale=(1, 1, -1))
+    count = len(read(packed).faces)
+    assert packed.change == f"was decimated from 1,280 to {count:,} faces"
+    assert signed_volume(read(packed)) == pytest.approx(ball.volume, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("scale", "flat"),
+    [
+        ((1, 1, 1), False),
+        ((1, 1, 0), True),
+        ((1, 1e-6, 1), True),
+        ((0.78e-5,) * 3, False),
+        ((0.77e-5,) * 3, True),
+    ],
+)
+def test_scale_makes_mesh_flat(scale, flat):
+    """The wedge has 2.167 m3, and the smallest volume is 1e-15 m3."""
+    assert has_no_volume(Meshes({Path("a.stl"): STL}), mesh("a.stl", scale).mesh) is flat
+
+
+def test_meshes_without_volume_are_errors():
+    with pytest.raises(MeshError, match="is flat"):
+        content(STL, scale=(1, 1, 0))
+    with pytest.raises(MeshError, match="does not exist"):
+        mesh_bytes(Meshes(), mesh("nowhere.stl").mesh)

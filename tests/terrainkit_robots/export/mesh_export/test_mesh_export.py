@@ -1,218 +1,139 @@
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 import trimesh
 
-from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.description.model import Geometry, Link, MeshFile, RobotModel, Source
 from terrainkit_robots.description.xml.document import RobotFileError
+from terrainkit_robots.export.mesh_export import mesh_bytes
 from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.mesh.surface import Surface, binary_stl, signed_volume, welded
-from terrainkit_robots.quiet_mujoco import quiet_mujoco
-
-SOURCE = Source(file=Path("robot.urdf"), line=1)
-
-
-def stl_of(mesh):
-    return binary_stl(Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces)))
-
+from terrainkit_robots.mesh.surface import signed_volume, welded
+from tests.terrainkit_robots.export.made_models import at, link, mesh, model, shape, stl_of
 
 BOX = stl_of(trimesh.creation.box([0.1, 0.2, 0.3]))
 BALL = stl_of(trimesh.creation.icosphere(subdivisions=2, radius=0.1))
+FILES = {
+    "box.stl": BOX,
+    "sub/box.stl": BALL,
+    "copy.stl": BOX,
+    "empty.stl": b"",
+    "cut.stl": BOX[:-1],
+}
 
 
-def mesh(name, scale=(1.0, 1.0, 1.0), **fields):
-    file = MeshFile(source=SOURCE, filename=f"package://r/{name}", path=Path(name), scale=scale)
-    return Geometry(source=SOURCE, shape="mesh", mesh=file, **fields)
+def packed(*, visuals=(), collisions=(), **options):
+    robot = model(link("leg", visuals=visuals, collisions=collisions))
+    return export_meshes(robot, Meshes({Path(k): data for k, data in FILES.items()}), **options)
 
 
-def shape(kind, *size, **fields):
-    return Geometry(source=SOURCE, shape=kind, size=size, **fields)
+def visuals(done):
+    return done.model.links[0].visuals
 
 
-def robot(*, visuals=(), collisions=()):
-    link = Link(name="leg", source=SOURCE, visuals=tuple(visuals), collisions=tuple(collisions))
-    return RobotModel(name="r", kind="urdf", file=Path("robot.urdf"), source=SOURCE, links=(link,))
+def collisions(done):
+    return done.model.links[0].collisions
 
 
-def packed(*, visuals=(), collisions=(), **contents):
-    held = {Path(name.replace("__", ".")): data for name, data in contents.items()}
-    return export_meshes(robot(visuals=visuals, collisions=collisions), Meshes(held))
+def test_names_are_relative():
+    done = packed(visuals=[mesh("box.stl", (2, 2, 2))])
+    (visual,) = visuals(done)
+    assert (done.files, done.changes) == ({"meshes/box.stl": BOX}, ())
+    assert (visual.mesh.filename, visual.mesh.path) == ("meshes/box.stl", Path("meshes/box.stl"))
+    assert (visual.mesh.scale, visual.mesh.found_by) == ((2, 2, 2), "path")
 
 
-class TestNames:
-    def test_names_are_relative(self):
-        done = packed(visuals=[mesh("a.stl", (2, 2, 2))], a__stl=BOX)
-        (visual,) = done.model.links[0].visuals
-        assert done.files == {"meshes/a.stl": BOX}
-        assert visual.mesh.filename == "meshes/a.stl"
-        assert visual.mesh.path == Path("meshes/a.stl")
-        assert visual.mesh.scale == (2, 2, 2)
-        assert not done.changes
-
-    def test_equal_content_is_stored_once(self):
-        shapes = [mesh("a.stl"), mesh("b/c.stl"), mesh("a.stl", (1, 1, 2))]
-        held = {Path("a.stl"): BOX, Path("b/c.stl"): BOX}
-        done = export_meshes(robot(visuals=shapes, collisions=shapes), Meshes(held), folder="m")
-        assert list(done.files) == ["m/a.stl"]
-        assert {each.mesh.filename for each in done.model.links[0].visuals} == {"m/a.stl"}
-
-    def test_different_files_with_same_name(self):
-        held = {Path("a/hip.stl"): BOX, Path("b/hip.stl"): BALL}
-        done = export_meshes(robot(visuals=[mesh("a/hip.stl"), mesh("b/hip.stl")]), Meshes(held))
-        assert done.files == {"meshes/hip.stl": BOX, "meshes/hip_2.stl": BALL}
-
-    def test_mirrored_mesh_is_separate_file(self):
-        done = packed(visuals=[mesh("a.stl"), mesh("a.stl", (1, -1, 1))], a__stl=BALL)
-        assert list(done.files) == ["meshes/a.stl", "meshes/a_2.stl"]
-        assert [v.mesh.scale for v in done.model.links[0].visuals] == [(1, 1, 1), (1, 1, 1)]
+def test_equal_content_is_stored_once():
+    shapes = [mesh("box.stl"), mesh("copy.stl"), mesh("sub/box.stl"), mesh("box.stl", (1, 1, 2))]
+    done = packed(visuals=shapes, collisions=shapes, folder="m")
+    assert done.files == {"m/box.stl": BOX, "m/box_2.stl": BALL}
+    names = ["m/box.stl", "m/box.stl", "m/box_2.stl", "m/box.stl"]
+    assert [[each.mesh.filename for each in of(done)] for of in (visuals, collisions)] == [
+        names
+    ] * 2
 
 
-class TestRemoved:
-    def test_missing_visual_mesh(self):
-        done = packed(visuals=[mesh("a.stl"), shape("sphere", 0.1)])
-        assert done.changes == ("removed the visual mesh a.stl of leg: it does not exist",)
-        assert [each.shape for each in done.model.links[0].visuals] == ["sphere"]
-
-    def test_flat_visual_mesh(self):
-        done = packed(visuals=[mesh("a.stl", (1, 0, 1))] * 2, a__stl=BOX)
-        assert done.changes == ("removed the visual mesh a.stl of leg: it is flat",)
-        assert not done.model.links[0].visuals
-        assert not done.files
-
-    @pytest.mark.parametrize(
-        ("given", "change"),
-        [
-            (shape("plane"), "removed a plane of leg: it has no valid size"),
-            (
-                shape("unknown"),
-                "removed a geometry of unknown shape of leg: it has no valid size",
-            ),
-            (shape("box", 1, 0, 1), "removed a box of leg: its size is 1 0 1"),
-            (
-                shape("sphere", -1),
-                "removed a sphere of leg: it has no valid size",
-            ),
-            (
-                shape("cylinder", float("nan"), 1),
-                "removed a cylinder of leg: it has no valid size",
-            ),
-        ],
-    )
-    def test_geometry_without_size(self, given, change):
-        done = packed(collisions=[given, shape("sphere", 0.1)])
-        assert done.changes == (change,)
-        assert [each.shape for each in done.model.links[0].collisions] == ["sphere"]
+def test_mirrored_mesh_is_separate_file():
+    done = packed(visuals=[mesh("sub/box.stl"), mesh("sub/box.stl", (1, -1, 1))])
+    assert list(done.files) == ["meshes/box.stl", "meshes/box_2.stl"]
+    assert [visual.mesh.scale for visual in visuals(done)] == [(1, 1, 1), (1, 1, 1)]
 
 
-class TestCollisionMeshes:
-    @pytest.mark.parametrize(
-        ("data", "reason"),
-        [(None, "does not exist"), (b"", "is empty"), (BOX[:-1], "header declares")],
-    )
-    def test_unreadable_mesh_is_one_line_error(self, data, reason):
-        contents = {} if data is None else {"a__stl": data}
-        with pytest.raises(RobotFileError, match=reason) as error:
-            packed(collisions=[mesh("a.stl")], **contents)
-        assert "package://r/a.stl of leg" in str(error.value)
-        assert "\n" not in str(error.value)
-
-    def test_flat_mesh_becomes_box(self):
-        origin = np.eye(4)
-        origin[:3, 3] = [1, 2, 3]
-        done = packed(collisions=[mesh("a.stl", (1, 1, 0), origin=origin)], a__stl=BOX)
-        (box,) = done.model.links[0].collisions
-        assert box.shape == "box"
-        assert sorted(box.size) == pytest.approx([0.0005, 0.05, 0.1])
-        assert box.origin[:3, 3] == pytest.approx([1, 2, 3])
-        assert box.mesh is None
-        assert "by a box of 1 mm thickness" in done.changes[0]
-
-    def test_mesh_without_surface_is_removed(self):
-        done = packed(collisions=[mesh("a.stl", (1, 0, 0))], a__stl=BOX)
-        assert not done.model.links[0].collisions
-        assert "it has no surface" in done.changes[0]
-
-    def test_fitted_mesh_is_exported(self):
-        done = packed(collisions=[mesh("a.stl", fit_to_mesh=True)], a__stl=BOX)
-        assert not done.model.links[0].collisions[0].fit_to_mesh
-        assert "instead of MuJoCo's fitted primitive" in done.changes[0]
+@pytest.mark.parametrize(
+    ("given", "change"),
+    [
+        (mesh("a/no.stl"), "the visual mesh no.stl of leg: it does not exist"),
+        (mesh("box.stl", (1, 0, 1)), "the visual mesh box.stl of leg: it is flat"),
+        (shape("plane"), "a plane of leg: it has no valid size"),
+        (shape("unknown"), "a geometry of unknown shape of leg: it has no valid size"),
+        (shape("box", 1, 0, 1), "a box of leg: its size is 1 0 1"),
+        (shape("sphere", -1), "a sphere of leg: it has no valid size"),
+        (shape("cylinder", float("nan"), 1), "a cylinder of leg: it has no valid size"),
+        (shape("cylinder", 1, 0), "a cylinder of leg: its size is 1 0"),
+    ],
+)
+def test_invalid_visuals_are_removed_and_told_once(given, change):
+    done = packed(visuals=[given, given, shape("sphere", 0.1)])
+    assert done.changes == (f"removed {change}",)
+    assert [each.shape for each in visuals(done)] == ["sphere"]
+    assert done.files == {}
 
 
-class TestPrimitives:
-    def test_primitives_are_unchanged(self):
-        shapes = [shape("box", 1, 2, 3), shape("cylinder", 1, 2), shape("capsule", 1, 2)]
-        done = packed(visuals=shapes)
-        assert [(s.shape, s.size) for s in done.model.links[0].visuals] == [
-            (s.shape, s.size) for s in shapes
-        ]
-
-    def test_capsule_without_length_is_sphere(self):
-        (done,) = packed(visuals=[shape("capsule", 0.1, 0)]).model.links[0].visuals
-        assert (done.shape, done.size) == ("sphere", (0.1,))
-
-    def test_ellipsoid_has_mesh(self):
-        done = packed(collisions=[shape("ellipsoid", 0.1, 0.2, 0.3)])
-        (ellipsoid,) = done.model.links[0].collisions
-        assert (ellipsoid.shape, ellipsoid.size) == ("ellipsoid", (0.1, 0.2, 0.3))
-        assert ellipsoid.mesh.filename == "meshes/leg_ellipsoid.stl"
-        held = Meshes({Path(name): data for name, data in done.files.items()})
-        surface = welded(held.surface(ellipsoid.mesh.path))
-        assert np.abs(surface.points).max(axis=0) == pytest.approx([0.1, 0.2, 0.3], rel=1e-3)
-        volume = 4 / 3 * np.pi * 0.1 * 0.2 * 0.3
-        assert signed_volume(surface) == pytest.approx(volume, rel=0.015)
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("no.stl", "does not exist"), ("empty.stl", "is empty"), ("cut.stl", "header declares")],
+)
+def test_unreadable_collision_mesh_is_one_line_error(name, reason):
+    with pytest.raises(RobotFileError, match=f"mesh package://r/{name} of leg .*{reason}") as error:
+        packed(collisions=[mesh(name)])
+    assert "\n" not in str(error.value)
 
 
-@pytest.fixture(scope="module", params=["go2/urdf/go2.urdf", "h1/urdf/h1.urdf"])
-def source(robot_file, request):
-    return load_robot(robot_file(request.param))
+def test_flat_collision_mesh_becomes_box():
+    """Of a line, nothing remains; a strip is wide enough from half a millimeter on."""
+    done = packed(collisions=[mesh("box.stl", (1, 1, 0), origin=at(1, 2, 3), fit_to_mesh=True)])
+    (box,) = collisions(done)
+    assert (box.shape, box.mesh, box.fit_to_mesh) == ("box", None, False)
+    assert sorted(box.size) == pytest.approx([0.0005, 0.05, 0.1])
+    assert box.origin[:3, 3] == pytest.approx([1, 2, 3])
+    told = "replaced the flat collision mesh box.stl of leg by a box of 1 mm thickness"
+    assert done.changes == (told,)
+    for width, change in ((0.011, told), (0.009, None), (0.0, None)):
+        done = packed(collisions=[mesh("box.stl", (1, width / 2, 0))])
+        removed = "removed the collision mesh box.stl of leg: it has no surface"
+        assert done.changes == (change or removed,)
+        assert len(collisions(done)) == (change is not None)
 
 
-@pytest.fixture(scope="module")
-def done(source):
-    return export_meshes(source, Meshes())
+def test_fitted_mesh_is_exported():
+    done = packed(collisions=[mesh("box.stl", fit_to_mesh=True)])
+    assert not collisions(done)[0].fit_to_mesh
+    assert done.changes == ("leg collides with mesh box.stl instead of MuJoCo's fitted primitive",)
 
 
-def corners(meshes, mesh):
-    """Return the corners of triangles, of which there may be fewer than of points."""
-    return meshes.vertices(mesh)[meshes.surface(mesh.path).faces].reshape(-1, 3)
+def test_large_mesh_is_decimated(monkeypatch):
+    monkeypatch.setattr(mesh_bytes, "MAX_FACES", 100)
+    (change,) = packed(visuals=[mesh("sub/box.stl")] * 2).changes
+    assert change.startswith("mesh box.stl was decimated from 320 to ")
 
 
-class TestRobots:
-    def test_mujoco_loads_every_file(self, done):
-        spec = mujoco.MjSpec()
-        for k, file in enumerate(done.files):
-            spec.add_mesh(name=f"m{k}", file=file)
-            spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"m{k}")
-        spec.assets = dict(done.files)
-        with quiet_mujoco():
-            model = spec.compile()
-        assert model.nmesh == len(done.files) > 0
-
-    def test_bounding_boxes_are_unchanged(self, source, done):
-        before = Meshes()
-        after = Meshes({Path(file): data for file, data in done.files.items()})
-        pairs = {
-            first.mesh.path: (corners(before, first.mesh), corners(after, second.mesh))
-            for old, new in zip(source.links, done.model.links, strict=True)
-            for first, second in zip(old.visuals, new.visuals, strict=True)
-            if first.mesh is not None
-        }
-        assert len(pairs) > 5
-        for a, b in pairs.values():
-            assert b.min(axis=0) == pytest.approx(a.min(axis=0), abs=1e-6)
-            assert b.max(axis=0) == pytest.approx(a.max(axis=0), abs=1e-6)
-
-    def test_files_are_deterministic_and_unique(self, source, done):
-        again = export_meshes(source, Meshes())
-        assert dict(again.files) == dict(done.files)
-        assert list(again.files) == list(done.files)
-        assert len(set(done.files.values())) == len(done.files)
+def test_primitives():
+    given = [shape("box", 1, 2, 3, mesh=mesh("box.stl").mesh), shape("capsule", 1, 2)]
+    done = packed(visuals=[*given, shape("capsule", 0.1, 0)])
+    assert [(each.shape, each.size, each.mesh) for each in visuals(done)] == [
+        ("box", (1, 2, 3), None),
+        ("capsule", (1, 2), None),
+        ("sphere", (0.1,), None),
+    ]
 
 
-def test_links_without_geometry():
-    (link,) = export_meshes(robot(), Meshes()).model.links
-    assert link.name == "leg"
+def test_ellipsoid_has_mesh():
+    done = packed(collisions=[shape("ellipsoid", 0.1, 0.2, 0.3)])
+    (ellipsoid,) = collisions(done)
+    assert (ellipsoid.shape, ellipsoid.size) == ("ellipsoid", (0.1, 0.2, 0.3))
+    assert list(done.files) == [ellipsoid.mesh.filename] == ["meshes/leg_ellipsoid.stl"]
+    held = Meshes({Path(name): data for name, data in done.files.items()})
+    surface = welded(held.surface(ellipsoid.mesh.path))
+    assert np.abs(surface.points).max(axis=0) == pytest.approx([0.1, 0.2, 0.3], rel=1e-3)
+    volume = 4 / 3 * np.pi * 0.1 * 0.2 * 0.3
+    assert signed_volume(surface) == pytest.approx(volume, rel=0.015)

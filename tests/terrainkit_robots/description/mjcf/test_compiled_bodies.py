@@ -1,0 +1,280 @@
+"""Poses, inertias, joints and shapes are those that MuJoCo compiles."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from terrainkit_robots.transforms import quat_to_matrix
+from tests.terrainkit_robots.description.made_robots import body, codes, link, mjcf, read
+
+EXACT = 1e-9 if int(mujoco.__version__.split(".")[0]) > 3 else 1e-6
+"""MuJoCo 3 finds the principal axes of an inertia less exactly."""
+
+NO_SCALE = not hasattr(mujoco.MjSpec().worldbody.add_frame(), "scale")
+needs_scale = pytest.mark.skipif(NO_SCALE, reason="frames of MuJoCo before 3.16 have no scale")
+
+EVERYTHING = """
+<mujoco model="everything">
+  <compiler angle="degree" eulerseq="ZYx" autolimits="true"/>
+  <option><flag contact="enable"/></option>
+  <default>
+    <joint damping="0.5" armature="0.01" frictionloss="0.2"/>
+    <geom density="500"/>
+    <default class="limb">
+      <joint axis="0 1 0" range="-30 60" actuatorfrcrange="-20 20"/>
+      <geom type="capsule" size="0.02"/>
+      <default class="heavy"><geom density="2000" pos="0 0 0.1"/></default>
+    </default>
+  </default>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body name="trunk" pos="0 0 1" euler="10 20 30">
+      <freejoint name="root"/>
+      <inertial pos="0.1 0 0" quat="1 2 3 4" mass="3" diaginertia="0.1 0.2 0.25"/>
+      <geom type="box" size="0.1 0.2 0.3" euler="0 0 45"/>
+      <frame pos="0 0 0.5" axisangle="0 0 1 90" childclass="limb">
+        <geom fromto="0 0 0 0.1 0.2 0.3"/>
+        <body name="framed" pos="1 0 0">
+          <inertial pos="0 0 0.1" mass="1" fullinertia="0.1 0.2 0.25 0.01 0.02 -0.03"/>
+          <frame euler="0 90 0"><joint name="in_frame" pos="0.1 0 0"/></frame>
+          <frame pos="0 0 1"><frame zaxis="1 1 0"><geom type="sphere" size="0.1"/></frame></frame>
+        </body>
+      </frame>
+      <body name="leg" childclass="limb" pos="0 0.1 0" xyaxes="0 1 0 -1 0 0">
+        <joint name="swing"/>
+        <joint name="lift" axis="1 0 0" ref="15" pos="0 0 0.05"/>
+        <joint name="slide" type="slide" range="-0.1 0.2" ref="0.05" axis="0 0 3"/>
+        <geom fromto="0 0 0 0 0 -0.3"/>
+        <geom class="heavy" type="sphere" size="0.05"/>
+        <geom type="cylinder" fromto="0.1 0 0 0 0 0.2" size="0.03" mass="0.7"/>
+        <geom type="box" fromto="0.1 0.1 0 0 0 0.2" size="0.03"/>
+        <geom type="ellipsoid" fromto="0 0 0.3 0 0 0.5" size="0.03"/>
+        <geom type="ellipsoid" size="0.1 0.2 0.3" group="1" contype="0" conaffinity="0"/>
+        <geom type="sphere" size="0.3" mass="0"/>
+        <body name="foot" pos="0 0 -0.3"><geom type="sphere" size="0.02"/></body>
+        <body name="hand" pos="0 0 -0.1"><joint type="ball" name="wrist" class="main"/>
+          <geom size="0.1 0.2"/></body>
+      </body>
+      <replicate count="3" offset="0 0.1 0" euler="0 0 20">
+        <body name="fin"><joint name="flap" class="limb" range="0 10"/><geom size="0.01"/></body>
+      </replicate>
+    </body>
+    <body name="post" pos="2 0 0"><geom type="cylinder" size="0.1 0.2"/></body>
+  </worldbody>
+  <contact><exclude body1="trunk" body2="leg"/></contact>
+</mujoco>
+"""
+
+SCALED = """
+<mujoco>
+  <compiler angle="radian"/>
+  <worldbody>
+    <frame pos="1 0 0" scale="2 2 2" {extra}>
+      <body name="a" pos="1 0 0">
+        <joint name="h" pos="0.1 0 0" range="-1 1" actuatorfrcrange="-1 1" damping="1"
+          armature="1" frictionloss="5"/>
+        <joint name="s" type="slide" ref="0.1" range="-1 1" actuatorfrcrange="-2 2" damping="3"
+          armature="4" frictionloss="6"/>
+        <inertial pos="1 1 1" mass="1" diaginertia="1 1 1"/>
+        <geom type="box" size="1 2 3" pos="1 0 0"/>
+        <body name="b" pos="0 1 0"><geom size="0.5"/>
+          <frame pos="1 0 0" scale="0.5 0.5 0.5"><geom size="1" pos="1 1 0"/></frame></body>
+      </body>
+      <frame pos="0 0 1"><body name="c"><geom size="1"/>
+        <joint name="k" actuatorfrcrange="-1 1" armature="1"/></body></frame>
+    </frame>
+  </worldbody>
+</mujoco>
+"""
+
+
+def compiled(text):
+    with quiet_mujoco():
+        return mujoco.MjModel.from_xml_string(text)
+
+
+def pose(pos, quat):
+    whole = np.eye(4)
+    whole[:3, :3], whole[:3, 3] = quat_to_matrix(quat), pos
+    return whole
+
+
+def same(ours, theirs):
+    np.testing.assert_allclose(ours, theirs, atol=EXACT)
+
+
+def assert_compiled(text):
+    """Compare everything that the compiler has with the robot."""
+    robot, model = read(text), compiled(text)
+    assert robot.problems == ()
+    links = [each for each in robot.links if not each.virtual]
+    assert [each.name for each in links] == [model.body(k).name for k in range(1, model.nbody)]
+    virtual = {each.name for each in robot.links if each.virtual}
+    above = {each.child: each for each in robot.joints}
+    for k, each in enumerate(links, 1):
+        first = above[each.name]
+        while first.parent in virtual:
+            first = above[first.parent]
+        assert first.parent == model.body(model.body_parentid[k]).name
+        same(first.origin, pose(model.body_pos[k], model.body_quat[k]))
+        assert_inertia(each.inertial, model, k)
+        assert_shapes(each, model, np.flatnonzero(model.geom_bodyid == k))
+    moving = [each for each in robot.joints if each.kind != "fixed"]
+    for each, k in zip(moving, range(model.njnt), strict=True):
+        assert_joint(each, model, k)
+
+
+def assert_inertia(inertial, model, k):
+    if inertial is None:
+        assert model.body_mass[k] == 0
+        return
+    ours, theirs = inertial.origin, pose(model.body_ipos[k], model.body_iquat[k])
+    same(inertial.mass, model.body_mass[k])
+    same(ours[:3, 3], theirs[:3, 3])
+    same(
+        ours[:3, :3] @ inertial.inertia @ ours[:3, :3].T,
+        theirs[:3, :3] @ np.diag(model.body_inertia[k]) @ theirs[:3, :3].T,
+    )
+
+
+def assert_shapes(link, model, geoms):
+    shapes = sorted((*link.collisions, *link.visuals), key=lambda shape: shape.source.line)
+    for shape, g in zip(shapes, geoms, strict=True):
+        same(shape.origin, pose(model.geom_pos[g], model.geom_quat[g]))
+        same(shape.size, model.geom_size[g][: len(shape.size)])
+
+
+def assert_joint(joint, model, k):
+    dof, free = model.jnt_dofadr[k], {0: "floating", 1: "ball"}.get(model.jnt_type[k])
+    if free:
+        assert joint.kind == free
+        return
+    same(joint.direction, model.jnt_axis[k])
+    same(joint.anchor, model.jnt_pos[k])
+    same(joint.reference, model.qpos0[model.jnt_qposadr[k]])
+    same(joint.damping, model.dof_damping.reshape(model.nv, -1)[dof, 0])
+    same(joint.armature, model.dof_armature[dof])
+    same(joint.friction, model.dof_frictionloss[dof])
+    if model.jnt_limited[k]:
+        same((joint.limit.lower, joint.limit.upper), model.jnt_range[k])
+    if model.jnt_actfrclimited[k]:
+        same(joint.effort, abs(model.jnt_actfrcrange[k]).max())
+
+
+def test_model_matches_mujoco():
+    assert_compiled(EVERYTHING)
+
+
+@needs_scale
+@pytest.mark.parametrize("extra", ["", 'scaling="geometry"', 'massscale="3"'])
+def test_scaled_frames_match_mujoco(extra):
+    assert_compiled(SCALED.format(extra=extra))
+
+
+@needs_scale
+@pytest.mark.parametrize(
+    ("scale", "mean"), [("8 1 1", 2), ("2 2 16", 4), ("-8 1 1", 2), ("-3 -3 -3", 3), ("0 1 1", 1)]
+)
+def test_frame_scale_that_is_not_uniform_is_replaced_by_its_mean(scale, mean):
+    robot = read(mjcf(f'<frame scale="{scale}"><body name="a"><geom size="1"/></body></frame>'))
+    (problem,) = robot.problems
+    assert problem.message == (
+        f"scale of <frame>: got {scale}; expected equal positive factors; {mean} is used for all "
+        "axes"
+    )
+    assert link(robot).collisions[0].size == pytest.approx((mean,))
+
+
+@pytest.mark.parametrize(
+    "compiler",
+    [
+        'inertiafromgeom="true"',
+        'inertiafromgeom="false"',
+        'inertiagrouprange="0 1"',
+        'inertiagrouprange="2 3"',
+        'settotalmass="7"',
+        'boundmass="1.5" boundinertia="2"',
+    ],
+)
+def test_masses_follow_compiler_settings(compiler):
+    """Body b has no inertial of its own; of a, MuJoCo may use either."""
+    inside = """<freejoint/><inertial pos="1 0 0" mass="2" diaginertia="1 1 1"/>
+      <geom size="1" mass="3"/><geom size="1" group="2" mass="4"/>
+      <body name="b"><geom size="1" mass="5"/><geom size="2" group="3" mass="6"/></body>"""
+    assert_compiled(body(inside, f"<compiler {compiler}/>"))
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        'type="sphere" size="0.3"',
+        'type="box" size="0.1 0.2 0.3"',
+        'type="ellipsoid" size="0.1 0.2 0.3"',
+        'type="cylinder" size="0.1 0.4"',
+        'type="capsule" size="0.1 0.4"',
+        'type="box" size="0.1 0.2 0.3" shellinertia="true"',
+    ],
+)
+def test_geom_inertia_matches_mujoco(shape):
+    turned = f'<geom {shape} euler="20 30 40"/>'
+    assert_compiled(body(f'<joint/>{turned}<geom {shape} pos="0.3 -0.2 0.5" mass="2"/>'))
+
+
+def test_mass_from_mesh_is_nan():
+    mesh = '<body name="{}"><joint/><geom type="mesh" mesh="m"{}/></body>'
+    inside = mesh.format("a", "") + mesh.format("b", ' mass="0"') + mesh.format("c", ' mass="2"')
+    robot = read(mjcf(inside, '<asset><mesh name="m" file="m.stl"/></asset>'))
+    unknown, none, known = (link(robot, name).inertial for name in "abc")
+    assert np.isnan(unknown.mass)
+    assert none is None
+    assert known.mass == 2
+    assert np.isnan(known.inertia).all()
+
+
+def test_geoms_without_mass_give_no_inertial():
+    assert link(read(body(""))).inertial is None
+    assert link(read(body('<geom size="1" density="0"/>'))).inertial is None
+    assert link(read(body('<geom size="1" density="0" mass="2"/>'))).inertial.mass == 2
+
+
+def test_invalid_geoms_keep_their_values():
+    """Their masses are not compiled: the first has no valid size, and the second is negative."""
+    robot = read(
+        body(
+            '<geom size="-1" mass="5"/><geom size="1" mass="-2"/><geom size="1" mass="3"/>'
+            '<geom type="capsule" size="0.1 0" pos="1 2 3"/>'
+        )
+    )
+    assert robot.problems == ()
+    shapes = link(robot).collisions
+    assert [shape.size for shape in shapes] == [(-1,), (1,), (1,), (0.1, 0)]
+    assert shapes[3].origin[:3, 3].tolist() == [1, 2, 3]
+    assert link(robot).inertial.mass == pytest.approx(1)
+
+
+def test_negative_density_is_an_unknown_mass():
+    assert np.isnan(link(read(body('<geom size="1" density="-1"/>'))).inertial.mass)
+
+
+@pytest.mark.parametrize(
+    ("inside", "says"),
+    [
+        ('<geom size="1" type="capsule" fromto="1 1 1 1 1 1"/>', "<geom>: the two points of"),
+        ('<geom size="1" axisangle="0 0 0 1"/>', "<geom>: there is no orientation: axisangle"),
+        ('<site name="imu" axisangle="0 0 0 1"/>', "<site>: there is no orientation"),
+        ('<frame zaxis="0 0 0"><body/></frame>', "<frame>: there is no orientation"),
+        ('<inertial pos="0 0 0" mass="1" zaxis="0 0 0"/>', "<inertial>: there is no orientation"),
+    ],
+)
+def test_invalid_orientations_are_reported(inside, says):
+    robot = read(body(inside))
+    assert codes(robot) == ["XML011"]
+    assert robot.problems[0].message.startswith(says)
+
+
+def test_long_chain_of_joints_is_compiled_without_them():
+    """MuJoCo's compiler would need minutes for these 4,600 degrees of freedom."""
+    joints = "<joint/>" * 20
+    robot = read(mjcf(f"<body>{joints}" * 230 + "</body>" * 230))
+    assert (robot.problems, len(robot.joints)) == ((), 4600)

@@ -1,0 +1,27 @@
+from pathlib import Path
+
+import pytest
+
+from tests.terrainkit_robots.description.made_robots import read
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "kind", "codes"),
+    [
+        ("r.urdf", '<robot name="r"/>', "urdf", []),
+        ("r.xml", '<robot name="r"/>', "urdf", []),
+        ("r.urdf", "<mujoco/>", "mjcf", []),
+        ("r.urdf", "<sdf/>", "urdf", ["XML002"]),
+        ("r.xml", "<sdf/>", "mjcf", ["XML002"]),
+        ("r.xacro", "<sdf/>", "xacro", ["XML002"]),
+        ("r.urdf", "", "urdf", ["XML001"]),
+        ("r.xml", "", "mjcf", ["XML001"]),
+    ],
+)
+def test_kind_is_that_of_root_or_file(name, text, kind, codes):
+    model = read(text, Path(name))
+    assert (model.kind, [problem.code for problem in model.problems]) == (kind, codes)
+    assert (model.links, model.file, model.sources) == ((), Path(name), (Path(name),))
+    for problem in model.problems:
+        if problem.code == "XML002":
+            assert problem.message.endswith("got <sdf>; expected <robot> (URDF) or <mujoco> (MJCF)")
