@@ -11,7 +11,7 @@ import pytest
 from hypothesis import settings
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.files import isolated
+from terrainkit.files import child_process
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
 
 # Before torch is imported: its threads would otherwise spin while they wait for one another, which
@@ -123,7 +123,7 @@ def import_in_process(monkeypatch):
 
     def run(command, **_options):
         try:
-            isolated.main(*command[-2:])
+            child_process.main(*command[-2:])
         except SystemExit as error:
             stderr = str(error.code).encode()
             raise subprocess.CalledProcessError(1, command, stderr=stderr) from None
@@ -133,5 +133,5 @@ def import_in_process(monkeypatch):
         TimeoutExpired=subprocess.TimeoutExpired,
         CalledProcessError=subprocess.CalledProcessError,
     )
-    monkeypatch.setattr(isolated, "subprocess", child)
+    monkeypatch.setattr(child_process, "subprocess", child)
     monkeypatch.setattr(resource, "setrlimit", lambda *_: None)

@@ -253,10 +253,10 @@ class CheckMap(Command):
     """With --robot: limits that replace the derived limits, such as `step_up=0.2 gap=0.4`."""
 
     def run(self) -> int:
-        """Print the issues and the largest seam, and return 1 if there are issues."""
+        """Print the issues and the largest patch edge, and return 1 if there are issues."""
         from terrainkit.export.npz import read_mesh
         from terrainkit.feasibility import assess_map
-        from terrainkit.map.seams import Seams, cliffs_text, seam_text
+        from terrainkit.map.patch_edges import PatchEdges, cliffs_text, edge_text
         from terrainkit.map.validate import validate
         from terrainkit_cli.feasibility_command import print_impassable, robot_limits
         from terrainkit_robots.text import count
@@ -269,10 +269,10 @@ class CheckMap(Command):
         for issue in issues:
             render.result(f"{issue.check}: {issue.message}")
         if not any(issue.check == "finite" for issue in issues):
-            seams = Seams(terrain_map=terrain_map)
-            if largest := seams.largest():
-                render.result(f"largest seam: {seam_text(largest, terrain_map.patch_names)}")
-            if cliffs := seams.cliffs():
+            edges = PatchEdges(terrain_map=terrain_map)
+            if largest := edges.max():
+                render.result(f"largest patch edge: {edge_text(largest, terrain_map.patch_names)}")
+            if cliffs := edges.cliffs():
                 render.result(f"cliffs: {cliffs_text(cliffs, terrain_map.patch_names)}")
         # The path over a map with issues would be of no use.
         blocked = 0

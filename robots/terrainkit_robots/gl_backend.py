@@ -7,7 +7,7 @@ runs in a child process, one for each backend that is tried.
 import os
 import sys
 
-from terrainkit.files.isolated import import_path
+from terrainkit.files.child_process import import_path
 
 
 def backends() -> tuple[str, ...]:

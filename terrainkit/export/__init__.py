@@ -15,7 +15,7 @@ from terrainkit.export.npz import is_map_file
 from terrainkit.export.requirements import require_finite
 from terrainkit.files.atomic_write import atomic_write, check_target
 from terrainkit.files.memory import check_memory
-from terrainkit.files.suffixes import find_module, modules_by_suffix
+from terrainkit.files.suffix import find_module, modules_by_suffix
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap

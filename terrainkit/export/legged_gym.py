@@ -46,7 +46,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     first_patch = np.array([*np.add(terrain_map.grid.lower, config.border), 0.0])
     tops = top_heights(terrain_map)
     arrays = {
-        "heights": corner_heights(tops).astype(np.float32),
+        "heights": heights_at_corners(tops).astype(np.float32),
         "x_edges": x_edges(tops, config.wall_threshold),
         "cell": np.float64(config.cell),
         "border": np.float64(config.border),
@@ -73,7 +73,7 @@ def top_heights(terrain_map: "TerrainMap") -> NDArray[np.float64]:
     return terrain_map.scan(np.stack([x, y, np.full_like(x, 1e4)], axis=-1))
 
 
-def corner_heights(heights: NDArray[np.float64]) -> NDArray[np.float64]:
+def heights_at_corners(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the largest of the heights of the cells at each corner [m], shape (nx + 1, ny + 1).
 
     LeggedRobot reads the smallest of three corners of a cell. With the largest heights there, it

@@ -41,7 +41,7 @@ class Terrain:
             _require_no_solids(data)
         self.cfg, self.num_robots, self.type = cfg, num_robots, cfg.mesh_type
         self.env_origins, self.terrain_type = data["env_origins"], data["terrain_type"]
-        _set_layout(cfg, data)
+        _update_cfg(cfg, data)
         self.env_length, self.env_width = cfg.terrain_length, cfg.terrain_width
         self.length_per_env_pixels = round(self.env_length / cfg.horizontal_scale)
         self.width_per_env_pixels = round(self.env_width / cfg.horizontal_scale)
@@ -53,7 +53,7 @@ class Terrain:
         shift = np.array([cfg.border_size, cfg.border_size, 0.0], dtype=np.float32)
         self.vertices, self.triangles = data["vertices"] + shift, data["triangles"]
         width = getattr(cfg, "edge_width_thresh", 0.05)  # the default of extreme-parkour
-        self.x_edge_mask = _widened(data["x_edges"], round(width / cfg.horizontal_scale))
+        self.x_edge_mask = _dilate(data["x_edges"], round(width / cfg.horizontal_scale))
         if hasattr(cfg, "num_goals"):
             self.goals = _padded(data["goals"])
             self.num_goals = cfg.num_goals = self.goals.shape[2]
@@ -117,7 +117,7 @@ def _require_no_solids(data: Any) -> None:
         raise ValueError(f"got a heightfield with {count} solids; expected a triangle mesh")
 
 
-def _set_layout(cfg: Any, data: Any) -> None:
+def _update_cfg(cfg: Any, data: Any) -> None:
     cfg.num_rows, cfg.num_cols = data["env_origins"].shape[:2]
     cfg.num_sub_terrains = cfg.num_rows * cfg.num_cols
     cfg.terrain_length, cfg.terrain_width = data["patch_size"].tolist()
@@ -131,7 +131,7 @@ def _set_contact(params: Any, data: Any) -> None:
         setattr(params, name, float(data[name]))
 
 
-def _widened(mask: Any, width: int) -> Any:
+def _dilate(mask: Any, width: int) -> Any:
     """Return whether each sample is within `width` samples along x of one in the mask."""
     result = mask.copy()
     for k in range(1, width + 1):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from terrainkit.errors import ExportError
-from terrainkit.export.requirements import warn_about_losses
+from terrainkit.export.requirements import warn_about_loss
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def export(
         closed: Add sides and a bottom to make a watertight solid.
         y_up: Rotate the map so that y is up, as glTF viewers expect; by default z is up.
     """
-    warn_about_losses(terrain_map, "a mesh file")
+    warn_about_loss(terrain_map, "a mesh file")
     mesh = terrain_map.mesh(merged=not full, closed=closed)
     if y_up:
         y, z = mesh.vertices[:, 1].copy(), mesh.vertices[:, 2].copy()

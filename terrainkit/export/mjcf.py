@@ -308,7 +308,7 @@ def _remaining_parts(terrain_map: "TerrainMap", decomposition: BoxDecomposition)
     A heightfield costs time wherever a robot is above it, even if its ground there is far below.
     """
     edges_x, edges_y = _part_edges(terrain_map)
-    uncovered = np.pad(~decomposition.covered, _MARGIN, mode="edge")[: edges_x[-1], : edges_y[-1]]
+    uncovered = np.pad(~decomposition.box_mask, _MARGIN, mode="edge")[: edges_x[-1], : edges_y[-1]]
     patches = np.logical_or.reduceat(uncovered, edges_x[:-1], axis=0)
     patches = np.logical_or.reduceat(patches, edges_y[:-1], axis=1)
     row, col = np.nonzero(patches)
@@ -467,7 +467,7 @@ def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> Height
     heights, tops = np.ascontiguousarray(terrain_map.heights), None
     decomposition = collision_boxes(terrain_map, collision)
     if decomposition is not None:
-        tops = np.where(decomposition.covered, heights, np.float32(-np.inf))
+        tops = np.where(decomposition.box_mask, heights, np.float32(-np.inf))
         heights = without_boxes(heights, decomposition)
     solids = terrain_map.solids
     collides, visible = solids.select(solids.collides), solids.select(solids.visible)
@@ -475,8 +475,8 @@ def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> Height
         heights=heights,
         first_sample=terrain_map.first_sample,
         cell=terrain_map.grid.cell,
-        box_tops=tops,
-        colliding=SolidRaster(collides) if len(collides) else None,
+        box_top=tops,
+        collision=SolidRaster(collides) if len(collides) else None,
         visible=SolidRaster(visible) if len(visible) else None,
     )
 
@@ -491,5 +491,5 @@ def without_boxes(
         decomposition: The boxes, and the cells that they cover.
     """
     # A sample influences the cells around it, so it is lowered only if boxes cover all of them.
-    lowered = np.logical_and.reduce(neighborhood(decomposition.covered))
+    lowered = np.logical_and.reduce(neighborhood(decomposition.box_mask))
     return np.where(lowered, heights.min() - np.float32(THICKNESS / 2), heights)

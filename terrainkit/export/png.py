@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from terrainkit.errors import ExportError
-from terrainkit.export.requirements import require_no_solids, warn_about_losses
+from terrainkit.export.requirements import require_no_solids, warn_about_loss
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
@@ -34,7 +34,7 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
     import cv2
 
     require_no_solids(terrain_map, "an image of heights")
-    warn_about_losses(terrain_map, "an image of heights")
+    warn_about_loss(terrain_map, "an image of heights")
     heights, config = terrain_map.heights, terrain_map.config
     scale, low = scale_and_offset(terrain_map)
     # Image rows go down, y goes up.

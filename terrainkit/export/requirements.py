@@ -64,7 +64,7 @@ def require_whole_solids(terrain_map: TerrainMap, what: str) -> None:
         )
 
 
-def warn_about_losses(terrain_map: TerrainMap, what: str) -> None:
+def warn_about_loss(terrain_map: TerrainMap, what: str) -> None:
     """Warn if the map has several frictions or partial solids, which `what` cannot represent."""
     if count := _num_partial_solids(terrain_map):
         warnings.warn(

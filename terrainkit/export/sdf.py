@@ -108,7 +108,7 @@ def _add_shapes(link: ET.Element, solids: Solids, contact: dict[str, float]) -> 
 
 def _add_hulls(link: ET.Element, solids: Solids, contact: dict[str, float], path: Path) -> None:
     """Add the hulls: one mesh for all hulls with the same friction and flags."""
-    hulls = solids.select(solids.kinds == 2)
+    hulls = solids.select(solids.types == 2)
     meshes = list(solid_meshes(hulls))
     friction = np.where(np.isnan(hulls.friction), contact["static_friction"], hulls.friction)
     keys = list(

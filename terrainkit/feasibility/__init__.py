@@ -7,13 +7,13 @@ the robot; the demand of a patch is the largest ratio on the path where it is sm
 from terrainkit.feasibility.assess import PatchFeasibility, assess_map, assess_patch
 from terrainkit.feasibility.limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
-from terrainkit.feasibility.solve import SolvedTerrain, solve_ranges
+from terrainkit.feasibility.solve import TerrainSolution, solve_ranges
 
 __all__ = [
     "MAX_DEMAND",
     "PatchFeasibility",
     "RobotLimits",
-    "SolvedTerrain",
+    "TerrainSolution",
     "assess_map",
     "assess_patch",
     "solve_ranges",

@@ -146,7 +146,7 @@ def _segments(patch: Patch, columns: Columns) -> list[Segment]:
 
 def _far_edge(patch: Patch, columns: Columns) -> IntArray:
     """Return the nodes on the sides of the patch that are farthest from the spawn origin."""
-    is_far = patch.far_sides
+    is_far = patch.far_edges
     node = np.arange(columns.floor.size).reshape(columns.floor.shape)
     sides = [node[0], node[-1], node[:, 0], node[:, -1]]
     wanted = [is_far[0, 0], is_far[1, 0], is_far[0, 1], is_far[1, 1]]
@@ -218,7 +218,7 @@ def _check_goals(patch: Patch, threshold: float) -> None:
         raise ConfigError(f"{patch.terrain}: got a goal outside of its patch; expected it inside")
     ground = surface_at(patch.heights, index, threshold=threshold).height
     solids = SolidIndex(patch.solids.select(patch.solids.collides))
-    floor, ceiling = np.moveaxis(free_intervals(ground, solids.spans(goals[:, :2])), -1, 0)
+    floor, ceiling = np.moveaxis(free_intervals(ground, solids.intervals(goals[:, :2])), -1, 0)
     z = goals[:, 2:3]
     is_free = ((floor - GOAL_TOLERANCE <= z) & (z <= ceiling + GOAL_TOLERANCE)).any(axis=1)
     if not is_free.all():

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
-from terrainkit.feasibility.slopes import Slopes, step
+from terrainkit.feasibility.gradient import Gradient, step
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,18 +47,18 @@ class Edges:
         return type(self)(**{name: values[index] for name, values in vars(self).items()})
 
 
-def step_edges(columns: Columns, slopes: Slopes) -> Edges:
+def step_edges(columns: Columns, gradient: Gradient) -> Edges:
     """Return the edges between the nodes of neighboring columns.
 
     Args:
         columns: The columns.
-        slopes: Slope at each node.
+        gradient: Slope at each node.
 
     Returns:
         The edges toward x and y, and then their opposites in the same order.
     """
     parts = [
-        _steps(columns, slopes, axis, k, other)
+        _steps(columns, gradient, axis, k, other)
         for axis in (0, 1)
         for k in range(columns.floor.shape[2])
         for other in range(columns.floor.shape[2])
@@ -74,13 +74,13 @@ def step_edges(columns: Columns, slopes: Slopes) -> Edges:
     return Edges.concatenate([one_way, back])
 
 
-def _steps(columns: Columns, slopes: Slopes, axis: int, k: int, other: int) -> Edges:
+def _steps(columns: Columns, gradient: Gradient, axis: int, k: int, other: int) -> Edges:
     """Return the edges along an axis from intervals `k` to intervals `other` of the next column."""
     here = (slice(None, -1), slice(None), k) if axis == 0 else (slice(None), slice(None, -1), k)
     there = (slice(1, None), slice(None), other)
     if axis == 1:
         there = (slice(None), slice(1, None), other)
-    slope = slopes.x if axis == 0 else slopes.y
+    slope = gradient.x if axis == 0 else gradient.y
     node = np.arange(columns.floor.size).reshape(columns.floor.shape)
     z, next_z = columns.floor[here], columns.floor[there]
     clearance = np.minimum(columns.ceiling[here], columns.ceiling[there]) - np.maximum(z, next_z)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from terrainkit.feasibility.columns import Columns, FloatArray
 from terrainkit.feasibility.edges import Edges, step_edges
 from terrainkit.feasibility.footholds import foothold_sizes
+from terrainkit.feasibility.free_width import FreeWidth
+from terrainkit.feasibility.gradient import gradient_of
 from terrainkit.feasibility.limits import RobotLimits
-from terrainkit.feasibility.passages import Passages
-from terrainkit.feasibility.slopes import slopes_of
 
 DIGITS = 6
 """Digits of a demand, so that a step of exactly the limit is not above it."""
@@ -34,7 +34,7 @@ class FootholdGraph:
     steps: Edges
     """Edges between the nodes of neighboring columns, in both directions."""
 
-    passages: Passages
+    free_width: FreeWidth
     """The free width between walls."""
 
     quantities: dict[str, FloatArray]
@@ -55,24 +55,24 @@ class FootholdGraph:
             limits: The limits of the robot.
             excluded: Nodes that no path may use, shape (nx, ny, m); None for none.
         """
-        slopes = slopes_of(columns.floor, columns.spacing)
-        steps, passages = step_edges(columns, slopes), Passages.build(columns, limits)
+        gradient = gradient_of(columns.floor, columns.spacing)
+        steps, free_width = step_edges(columns, gradient), FreeWidth.build(columns, limits)
         quantities = {
-            "slope": slopes.grade(columns.spacing),
+            "slope": gradient.slope(columns.spacing),
             "foothold": foothold_sizes(columns, steps, limits),
-            "body_width": passages.node_widths(),
+            "body_width": free_width.at_nodes(),
             "crouched_height": columns.ceiling - columns.floor,
         }
         flat = {name: values.reshape(-1) for name, values in quantities.items()}
         demands = [ratio(name, values, limits) for name, values in flat.items()]
-        demand = largest(demands)
+        demand = max_ratio(demands)
         if excluded is not None:
             demand[excluded.reshape(-1)] = np.inf
         return cls(
             columns=columns,
             limits=limits,
             steps=steps,
-            passages=passages,
+            free_width=free_width,
             quantities=flat,
             node_demand=demand,
         )
@@ -88,7 +88,7 @@ class FootholdGraph:
         """
         nodes = np.maximum(self.node_demand[edges.start], self.node_demand[edges.end])
         ratios = [ratio(name, values, self.limits) for name, values in _quantities(edges)]
-        return largest([nodes, *ratios])
+        return max_ratio([nodes, *ratios])
 
     def blocking(self, edge: Edges) -> tuple[str, float]:
         """Return the limit and the quantity of the largest demand of a single edge."""
@@ -137,7 +137,7 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
     return result
 
 
-def largest(ratios: list[FloatArray]) -> FloatArray:
+def max_ratio(ratios: list[FloatArray]) -> FloatArray:
     """Return the largest ratio of each node or edge, rounded to `DIGITS`.
 
     Args:

@@ -1,4 +1,4 @@
-"""Gap edges: from one region to another, over ground without a foothold."""
+"""Gap edges: from one component to another, over ground without a foothold."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -15,19 +15,19 @@ _MAX_PAIRS = 100_000
 """Pairs of nodes that are compared at once, to bound the memory."""
 
 _MAX_ENDS = 4
-"""Largest number of gaps from a node to a region; the easiest are kept. Easy steps join the
-nodes of a region, so it does not matter where a gap ends, unless there is a wall in between."""
+"""Largest number of gaps from a node to a component; the easiest are kept. Easy steps join the
+nodes of a component, so it does not matter where a gap ends, unless there is a wall in between."""
 
 _MAX_SEARCHED_ENDS = 16
-"""The same where one gap into each region is enough: most are not evaluated."""
+"""The same where one gap into each component is enough: most are not evaluated."""
 
 _MORE = 8
-"""Factor by which more gaps into a region are tried where the easiest gaps lead through a wall."""
+"""Factor by which more gaps into a component are tried where the easiest lead through a wall."""
 
 
 def gap_edges(
     graph: FootholdGraph,
-    regions: IntArray,
+    components: IntArray,
     starts: NDArray[np.bool_],
     ends: NDArray[np.bool_],
     max_demand: float,
@@ -36,29 +36,29 @@ def gap_edges(
 ) -> Edges:
     """Return the edges over gaps with a demand below `max_demand`.
 
-    An edge joins two regions. In between, the body passes above the higher one of both nodes, over
+    An edge joins two components. In between, the body passes above the higher node, over
     any hurdle, and below any solid.
 
     Args:
         graph: The graph.
-        regions: Region of each node, which steps join below `max_demand`, shape (nodes,).
+        components: Component of each node, which steps join below `max_demand`, shape (nodes,).
         starts: Nodes where an edge may start, shape (nodes,).
         ends: Nodes where an edge may end, shape (nodes,).
         max_demand: Demand above which an edge is of no use.
-        one_each: Whether one edge into each region is enough; then not all are searched.
+        one_each: Whether one edge into each component is enough; then not all are searched.
     """
     parts = [graph.steps.select(slice(0))]
-    is_entered = np.zeros(len(regions), dtype=bool)
-    for batch in _batches(_pairs(graph, regions, starts, ends, max_demand)):
-        pairs = batch.select(~is_entered[regions[batch.end]]) if one_each else batch
+    is_entered = np.zeros(len(components), dtype=bool)
+    for batch in _batches(_pairs(graph, components, starts, ends, max_demand)):
+        pairs = batch.select(~is_entered[components[batch.end]]) if one_each else batch
         number = _MAX_SEARCHED_ENDS if one_each else _MAX_ENDS
-        pairs = pairs.select(_easiest(graph, pairs, number, regions[pairs.end], pairs.start))
+        pairs = pairs.select(_best_pairs(graph, pairs, number, components[pairs.end], pairs.start))
         number = 1 if one_each else len(pairs.start)
         while len(pairs.start):
-            order = _easiest(graph, pairs, number, regions[pairs.end])
+            order = _best_pairs(graph, pairs, number, components[pairs.end])
             parts.append(_evaluate(graph, pairs.select(order), max_demand))
-            is_entered[regions[parts[-1].end]] = True
-            is_left = ~is_entered[regions[pairs.end]]
+            is_entered[components[parts[-1].end]] = True
+            is_left = ~is_entered[components[pairs.end]]
             is_left[order] = False
             pairs, number = pairs.select(is_left), number * _MORE
     return Edges.concatenate(parts)
@@ -79,7 +79,7 @@ def _batches(parts: Iterable[Edges]) -> Iterator[Edges]:
 
 def _pairs(
     graph: FootholdGraph,
-    regions: IntArray,
+    components: IntArray,
     starts: NDArray[np.bool_],
     ends: NDArray[np.bool_],
     max_demand: float,
@@ -110,7 +110,7 @@ def _pairs(
         which, move = np.nonzero(end >= 0)
         begin, end, width = start[first + which], end[which, move], gap[move]
         rise = floor[end] - floor[begin]
-        useful = (rise < max_rise) & (-rise < max_drop) & (regions[begin] != regions[end])
+        useful = (rise < max_rise) & (-rise < max_drop) & (components[begin] != components[end])
         none = np.full(np.count_nonzero(useful), np.inf)
         yield Edges(
             start=begin[useful],
@@ -137,7 +137,7 @@ def _offsets(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
     return moves[useful], gaps[useful]
 
 
-def _easiest(graph: FootholdGraph, pairs: Edges, number: int, *keys: IntArray) -> IntArray:
+def _best_pairs(graph: FootholdGraph, pairs: Edges, number: int, *keys: IntArray) -> IntArray:
     """Return, for each combination of keys, the pairs with the `number` smallest demands."""
     order = np.lexsort((graph.demand(pairs), *keys))
     same = [key[order[number:]] == key[order[:-number]] for key in keys]
@@ -164,13 +164,13 @@ def _between(graph: FootholdGraph, start: IntArray, end: IntArray) -> tuple[Floa
     level = np.maximum(floor[start], floor[end])
     top, clearance = level.copy(), np.full(len(start), np.inf)
     for a, b, inside in _line(columns, start, end):
-        above, free = _passed(graph, (a, b), level[inside], floor[start[inside]])
+        above, free = _pass_columns(graph, (a, b), level[inside], floor[start[inside]])
         top[inside] = np.maximum(top[inside], above)
         clearance[inside] = np.minimum(clearance[inside], free)
     return top, clearance
 
 
-def _passed(
+def _pass_columns(
     graph: FootholdGraph, place: tuple[IntArray, IntArray], level: FloatArray, start: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the height at which the body passes each column, and the clearance there [m].
@@ -212,7 +212,7 @@ def _with_width(graph: FootholdGraph, edges: Edges, max_demand: float) -> Edges:
         return edges
     i, j, inside = (np.concatenate(each) for each in zip(*lines, strict=True))
     width = edges.width.copy()
-    found = graph.passages.widths(i, j, level[inside], edges.clearance[inside])
+    found = graph.free_width.at(i, j, level[inside], edges.clearance[inside])
     np.minimum.at(width, inside, found)
     edges = replace(edges, width=width)
     return edges.select(graph.demand(edges) < max_demand)

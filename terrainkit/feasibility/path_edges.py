@@ -4,10 +4,10 @@ import numpy as np
 
 from terrainkit.feasibility.bottleneck import Segment, bottleneck
 from terrainkit.feasibility.columns import FloatArray
+from terrainkit.feasibility.components import Components
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.gaps import gap_edges
-from terrainkit.feasibility.regions import Regions
 
 MAX_DEMAND = 2.0
 """Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""
@@ -38,8 +38,8 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
         if least > MAX_DEMAND:
             reach = next(each for each in _REACHES if each > searched)
         is_usable = step_demand < reach
-        regions = Regions.build(steps, is_usable, num_nodes)
-        found, is_path = _crossed(graph, regions, _below(graph, gaps, reach), segment, reach)
+        components = Components.build(steps, is_usable, num_nodes)
+        found, is_path = _search_gaps(graph, components, _below(graph, gaps, reach), segment, reach)
         if is_path:
             gaps, edges = found, Edges.concatenate([steps.select(is_usable), found])
             least = bottleneck(edges, graph.demand(edges), segment, num_nodes)
@@ -49,26 +49,26 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
     usable = steps.select(is_usable)
     if least == without_gaps:
         return usable
-    # One gap into each region is enough to find the demand; a path may need to go far to it.
+    # One gap into each component is enough to find the demand; a path may need to go far to it.
     above = np.nextafter(least, np.inf)
-    gaps, regions = _below(graph, gaps, above), Regions.build(steps, is_usable, num_nodes)
-    is_reached = regions.reached(segment[0], gaps)
-    more = gap_edges(graph, regions.labels, is_reached, is_reached, above)
+    gaps, components = _below(graph, gaps, above), Components.build(steps, is_usable, num_nodes)
+    is_reached = components.reached(segment[0], gaps)
+    more = gap_edges(graph, components.labels, is_reached, is_reached, above)
     return Edges.concatenate([usable, gaps, more])
 
 
-def _crossed(
-    graph: FootholdGraph, regions: Regions, gaps: Edges, segment: Segment, max_demand: float
+def _search_gaps(
+    graph: FootholdGraph, components: Components, gaps: Edges, segment: Segment, max_demand: float
 ) -> tuple[Edges, bool]:
     """Add the gaps that lead on from `gaps`; return them and whether a path reaches a target."""
     start, targets = segment
-    is_searched = np.zeros(len(regions.labels), dtype=bool)
+    is_searched = np.zeros(len(components.labels), dtype=bool)
     while True:
-        is_reached = regions.reached(start, gaps)
+        is_reached = components.reached(start, gaps)
         if is_reached[targets].any():
             return gaps, True
         starts = is_reached & ~is_searched
-        found = gap_edges(graph, regions.labels, starts, ~is_reached, max_demand, one_each=True)
+        found = gap_edges(graph, components.labels, starts, ~is_reached, max_demand, one_each=True)
         if not len(found.start):
             return gaps, False
         gaps, is_searched = Edges.concatenate([gaps, found]), is_reached

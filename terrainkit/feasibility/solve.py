@@ -34,7 +34,7 @@ _SAMPLES = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class SolvedTerrain:
+class TerrainSolution:
     """A sub-terrain with solved ranges."""
 
     sub_terrain: SubTerrain
@@ -47,7 +47,7 @@ class SolvedTerrain:
     """Demands at difficulty 0 and 1. They are above the requested demands if no value is easy
     enough, and below if the demand changes in steps, or no value reaches them."""
 
-    elements: "tuple[SolvedTerrain, ...]" = ()
+    elements: "tuple[TerrainSolution, ...]" = ()
     """The elements of a course, each solved on its own."""
 
 
@@ -58,7 +58,7 @@ def solve_ranges(
     *,
     progress: "Progress | None" = None,
     executor: "Executor | None" = None,
-) -> list[SolvedTerrain]:
+) -> list[TerrainSolution]:
     """Return the sub-terrains of `config` with ranges that lead from one demand to another.
 
     For each demand, all ranges of a terrain are interpolated or extrapolated together, as they are
@@ -90,7 +90,7 @@ def solve_ranges(
     steps = progress(indices, len(jobs)) if progress else indices
     solved = {key: result for key, _, result in zip(jobs, steps, results, strict=True)}
     return [
-        _solved(sub_terrain, [solved[_key(part)] for part in each])
+        _solution(sub_terrain, [solved[_key(part)] for part in each])
         for sub_terrain, each in zip(config.sub_terrains, parts, strict=True)
     ]
 
@@ -116,22 +116,22 @@ def _key(part: SubTerrain) -> str:
     return repr(replace(part, name=part.terrain, proportion=1.0))
 
 
-def _solved(
+def _solution(
     sub_terrain: SubTerrain, results: list[tuple[Mapping[str, Range], Range]]
-) -> SolvedTerrain:
+) -> TerrainSolution:
     """Return a sub-terrain with the ranges and demands of its parts."""
     name = _table_name(sub_terrain)
     if name is None:
         ((ranges, demand),) = results
-        return SolvedTerrain(sub_terrain=_with(sub_terrain, ranges), ranges=ranges, demand=demand)
+        return TerrainSolution(sub_terrain=_with(sub_terrain, ranges), ranges=ranges, demand=demand)
     elements = tuple(
-        SolvedTerrain(sub_terrain=_with(element, ranges), ranges=ranges, demand=demand)
+        TerrainSolution(sub_terrain=_with(element, ranges), ranges=ranges, demand=demand)
         for element, (ranges, demand) in zip(_value(sub_terrain, name), results, strict=True)
     )
     course = _with(sub_terrain, {name: tuple(each.sub_terrain for each in elements)})
     # A course demands as much as the hardest of its elements.
     low, high = np.max([each.demand for each in elements], axis=0).tolist()
-    return SolvedTerrain(sub_terrain=course, demand=(low, high), elements=elements)
+    return TerrainSolution(sub_terrain=course, demand=(low, high), elements=elements)
 
 
 def _solve(
@@ -163,7 +163,7 @@ def _solve(
             cache[end, difficulty] = demand
         return cache[end, difficulty]
 
-    easy, hard = (_largest(partial(demand_at, end), demand[int(end)]) for end in (0.0, 1.0))
+    easy, hard = (_max_difficulty(partial(demand_at, end), demand[int(end)]) for end in (0.0, 1.0))
     if not ranges or easy >= hard:
         return {}, (demand_at(0.0, 0.0), demand_at(1.0, 1.0))
     solved = {name: (r.at(easy, grid), r.at(hard, grid)) for name, r in ranges.items()}
@@ -175,14 +175,14 @@ class _ParameterRange:
     """A parameter that depends on the difficulty."""
 
     parameter: Parameter
-    ends: Range
+    endpoints: Range
 
     def at(self, difficulty: float, grid: Grid) -> float:
         """Return the value at a difficulty, which may be outside of 0 to 1.
 
         Lengths that snap to cells are whole cells; others have 4 digits.
         """
-        value: float = at_difficulty(self.ends, difficulty)
+        value: float = at_difficulty(self.endpoints, difficulty)
         if self.parameter.snap == "cells":
             return grid.length(grid.cells(value, minimum=0 if self.parameter.allow_zero else 1))
         return value if isinstance(value, int) else float(f"{value:.4g}")
@@ -194,7 +194,7 @@ def _ranges(sub_terrain: SubTerrain) -> dict[str, _ParameterRange]:
     for name, parameter in parameters_of(sub_terrain.terrain_class).items():
         value = _value(sub_terrain, name)
         if isinstance(value, tuple) and not parameter.is_vector and value[0] != value[1]:
-            ranges[name] = _ParameterRange(parameter=parameter, ends=value)
+            ranges[name] = _ParameterRange(parameter=parameter, endpoints=value)
     return ranges
 
 
@@ -233,7 +233,7 @@ def _is_same(first: Patch, second: Patch) -> bool:
     return len(points[0]) == len(points[1]) and np.allclose(points[0] + shift, points[1], atol=1e-4)
 
 
-def _largest(demand_at: Callable[[float], float], max_demand: float) -> float:
+def _max_difficulty(demand_at: Callable[[float], float], max_demand: float) -> float:
     """Return the largest difficulty that demands at most `max_demand`, or else the closest.
 
     If no difficulty is easy enough, the result is the easiest valid one; if all are, the hardest.

@@ -15,7 +15,7 @@ MAX_PER_AXIS = 200
 """Largest number of elements along an axis of a patch."""
 
 
-def number_that_fits(name: str, pitch: float, extent: float) -> int:
+def max_number(name: str, pitch: float, extent: float) -> int:
     """Return how many elements of length `pitch` fit in `extent` [m].
 
     Args:

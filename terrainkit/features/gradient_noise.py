@@ -79,15 +79,15 @@ def fractal_noise(
     return total
 
 
-def unit_relief(
+def unit_heights(
     grid: Grid, noise: NDArray[np.float64], platform: float, blend: float
 ) -> NDArray[np.float64]:
-    """Return :func:`faded_relief` with its largest absolute value scaled to 1."""
-    relief = faded_relief(grid, noise, platform, blend)
+    """Return :func:`fade_heights` with its largest absolute value scaled to 1."""
+    relief = fade_heights(grid, noise, platform, blend)
     return np.asarray(relief / max(np.abs(relief).max(), 1e-12))
 
 
-def faded_relief(
+def fade_heights(
     grid: Grid, noise: NDArray[np.float64], platform: float, blend: float
 ) -> NDArray[np.float64]:
     """Return heights faded to 0 at the platform and at the outermost cells.

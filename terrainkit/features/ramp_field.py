@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import make_ramps, number_that_fits
+from terrainkit.features.blocks import make_ramps, max_number
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -26,15 +26,15 @@ class RampField(FlatTerrain, Lane):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the ramps, in as many whole rows as fit."""
-        lower, i, j = self._cells(grid)
-        rise = self.grade * self.ramp_size()[0] * self.raised_corners(i, j)
+        lower, i, j = self._ramp_grid(grid)
+        rise = self.grade * self.ramp_size()[0] * self.high_corners(i, j)
         return make_ramps(lower, lower + np.array(self.ramp_size()), rise)
 
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of the flat strip behind the ramps."""
-        lower, _, _ = self._cells(grid)
+        lower, _, _ = self._ramp_grid(grid)
         return lane_goals(grid, (lower[:, 0].max() + self.ramp_size()[0] + grid.upper[0]) / 2)
 
     @abstractmethod
@@ -42,7 +42,7 @@ class RampField(FlatTerrain, Lane):
         """Return the sides of a ramp along x and y [m]."""
 
     @abstractmethod
-    def raised_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
+    def high_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
         """Return the corners of each ramp that are raised, counterclockwise, 0 or 1.
 
         Args:
@@ -50,7 +50,7 @@ class RampField(FlatTerrain, Lane):
             j: Number of each ramp along y, shape (n,).
         """
 
-    def _cells(
+    def _ramp_grid(
         self, grid: Grid
     ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
         """Return as many ramps as fit along x between two strips, and along y.
@@ -65,7 +65,7 @@ class RampField(FlatTerrain, Lane):
         name, size = self.kind(), self.ramp_size()
         first = grid.length(grid.cells(self.start))
         extent = grid.size[0] - first - grid.length(grid.cells(self.end)), grid.size[1]
-        nx, ny = (number_that_fits(name, side, n) for side, n in zip(size, extent, strict=True))
+        nx, ny = (max_number(name, side, n) for side, n in zip(size, extent, strict=True))
         if min(nx, ny) < 1:
             raise ConfigError(
                 f"{name}: got elements of {size[0]:g} m x {size[1]:g} m between strips of "

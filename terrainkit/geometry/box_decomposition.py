@@ -12,7 +12,7 @@ from terrainkit.files.memory import check_memory
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh.closed import THICKNESS
 from terrainkit.geometry.mesh.node_grid import NodeGrid
-from terrainkit.geometry.rectangle_cover import Span, rectangle_cover
+from terrainkit.geometry.rectangle_decomposition import Span, decompose_rectangles
 from terrainkit.geometry.walls import flat_corners
 
 MAX_HEIGHTS_PER_BLOCK = 50
@@ -30,7 +30,7 @@ Heights differ along x, with the difficulty, so that mostly level ground merges 
 boxes of all heights merge, and fewer of them save more time."""
 
 _Cell = TypeVar("_Cell", bound=np.generic)
-_Covers = dict[tuple[tuple[int, ...], bytes, bytes], list[tuple[int, Span]]]
+_Cache = dict[tuple[tuple[int, ...], bytes, bytes], list[tuple[int, Span]]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,7 +49,7 @@ class BoxDecomposition:
     friction: NDArray[np.float32]
     """Friction of each box, shape (n,)."""
 
-    covered: NDArray[np.bool_]
+    box_mask: NDArray[np.bool_]
     """Whether the whole cell is the top of a box, shape (nx, ny). The others need a heightfield."""
 
 
@@ -63,7 +63,7 @@ def decompose_boxes(
     """Return the flat parts of the ground as boxes.
 
     A cell is flat if the ground is level in its whole square. Within a patch,
-    :func:`.rectangle_cover` finds the boxes of each height, which may extend under higher ground.
+    :func:`.decompose_rectangles` finds the boxes of a height, which may extend under higher ground.
     Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTHS`
     unless that doubles their number. They are sorted by their centers, since MuJoCo's bounding
     volume hierarchy keeps this order for boxes with equal centers along an axis.
@@ -96,16 +96,16 @@ def decompose_boxes(
     ]
     differ_x = (flat[1:] != flat[:-1]) | (low[1:] != low[:-1])
     differ_y = (flat[:, 1:] != flat[:, :-1]) | (low[:, 1:] != low[:, :-1])
-    cache: _Covers = {}
+    cache: _Cache = {}
     boxes = []
     for i0, i1 in itertools.pairwise(edges[0]):
         for j0, j1 in itertools.pairwise(edges[1]):
             if not flat[i0:i1, j0:j1].any():
                 continue
-            x = _first_cells(i0, i1, differ_x[i0 : i1 - 1, j0:j1].any(axis=1))
-            y = _first_cells(j0, j1, differ_y[i0:i1, j0 : j1 - 1].any(axis=0))
+            x = _cell_edges(i0, i1, differ_x[i0 : i1 - 1, j0:j1].any(axis=1))
+            y = _cell_edges(j0, j1, differ_y[i0:i1, j0 : j1 - 1].any(axis=0))
             cells = np.ix_(x[:-1], y[:-1])
-            for top, span in _cover_block(flat[cells], low[cells], cache):
+            for top, span in _decompose_block(flat[cells], low[cells], cache):
                 a, b, c, d = span
                 boxes.append((top, x[a], x[b], y[c], y[d], friction[i0, j0]))
     table = np.array(boxes, dtype=np.float64).reshape(-1, 6)
@@ -175,8 +175,8 @@ def neighborhood(values: NDArray[_Cell]) -> list[NDArray[_Cell]]:
     return [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3)]
 
 
-def _cover_block(
-    flat: NDArray[np.bool_], low: NDArray[np.float32], cache: _Covers
+def _decompose_block(
+    flat: NDArray[np.bool_], low: NDArray[np.float32], cache: _Cache
 ) -> Iterator[tuple[float, Span]]:
     """Yield the top and the span of each box of a block of cells, in the order of their tops.
 
@@ -187,12 +187,14 @@ def _cover_block(
     ranks = ranks.reshape(low.shape)
     key = (low.shape, flat.tobytes(), ranks.tobytes())
     if key not in cache:
-        cache[key] = list(_cover_ranks(flat, ranks))
+        cache[key] = list(_decompose_heights(flat, ranks))
     for rank, span in cache[key]:
         yield float(heights[rank]), span
 
 
-def _cover_ranks(flat: NDArray[np.bool_], ranks: NDArray[np.int64]) -> Iterator[tuple[int, Span]]:
+def _decompose_heights(
+    flat: NDArray[np.bool_], ranks: NDArray[np.int64]
+) -> Iterator[tuple[int, Span]]:
     """Yield the rank of the top and the span of each box, in the order of their tops."""
     tops = np.unique(ranks[flat]).tolist()
     part = (slice(0, flat.shape[0]), slice(0, flat.shape[1]))
@@ -201,11 +203,11 @@ def _cover_ranks(flat: NDArray[np.bool_], ranks: NDArray[np.int64]) -> Iterator[
         if len(tops) > MAX_HEIGHTS_PER_BLOCK:
             part = _bounds(required.any(axis=1)), _bounds(required.any(axis=0))
         i, j = part[0].start, part[1].start
-        for a, b, c, d in rectangle_cover(required[part], ranks[part] >= top):
+        for a, b, c, d in decompose_rectangles(required[part], ranks[part] >= top):
             yield top, (i + a, i + b, j + c, j + d)
 
 
-def _first_cells(start: int, stop: int, differ: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _cell_edges(start: int, stop: int, differ: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the cells from `start` that differ from the previous cell, and `stop`."""
     return np.concatenate([[start], np.flatnonzero(differ) + start + 1, [stop]])
 
@@ -282,5 +284,5 @@ def _make_boxes(
         centers=(lower + upper) / 2,
         half_sizes=(upper - lower) / 2,
         friction=friction.astype(np.float32),
-        covered=flat,
+        box_mask=flat,
     )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.files.isolated import ProcessLimits, run_isolated
+from terrainkit.files.child_process import ProcessLimits, run_in_process
 
 SEARCH: Mapping[str, float | int | bool] = {
     "preprocess_resolution": 30,
@@ -41,9 +41,9 @@ def convex_decomposition(
         parameters: Parameters of `coacd.run_coacd`.
 
     Raises:
-        IsolatedError: if CoACD fails, crashes, or exceeds a limit.
+        ProcessError: if CoACD fails, crashes, or exceeds a limit.
     """
-    arrays = run_isolated(_run_coacd, vertices, faces, dict(parameters), limits=LIMITS)
+    arrays = run_in_process(_run_coacd, vertices, faces, dict(parameters), limits=LIMITS)
     number = len(arrays) // 2
     return [(arrays[f"vertices_{k}"], arrays[f"faces_{k}"]) for k in range(number)]
 

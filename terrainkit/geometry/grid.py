@@ -96,9 +96,9 @@ class Grid:
             inner: Cells of the centered block along x and y.
             value: Returns the values of rings, given their numbers.
         """
-        return value(np.arange(max(self.margins(inner)) + 1))[self.rings(inner)]
+        return value(np.arange(max(self.margin(inner)) + 1))[self.rings(inner)]
 
-    def margins(self, inner: tuple[int, int]) -> tuple[int, int]:
+    def margin(self, inner: tuple[int, int]) -> tuple[int, int]:
         """Return the cells along x and y between the centered block `inner` and the edge."""
         return (self.shape[0] - inner[0]) // 2, (self.shape[1] - inner[1]) // 2
 

@@ -59,7 +59,7 @@ class SolidIndex:
         self._solids = solid[order]
         self._ends = np.cumsum(np.bincount(bins, minlength=int(self._shape.prod())))
 
-    def spans(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
+    def intervals(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the parts of the vertical lines through `xy` that solids occupy.
 
         Args:
@@ -77,7 +77,7 @@ class SolidIndex:
             np.cumsum(counts), np.arange(_MAX_PAIRS, counts.sum() + 1, _MAX_PAIRS)
         )
         blocks = np.split(np.arange(len(xy)), np.unique(cuts))
-        parts = [self._line_spans(xy, counts, starts, block) for block in blocks]
+        parts = [self._line_intervals(xy, counts, starts, block) for block in blocks]
         line, bottom, top = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         order = np.lexsort((bottom, line))
         line = line[order]
@@ -95,7 +95,7 @@ class SolidIndex:
         ends = np.concatenate([[0], self._ends])
         return np.where(inside, ends[bins + 1] - ends[bins], 0), ends[bins]
 
-    def _line_spans(
+    def _line_intervals(
         self,
         xy: NDArray[np.float64],
         counts: NDArray[np.int64],

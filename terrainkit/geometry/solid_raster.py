@@ -39,7 +39,7 @@ class SolidRaster:
         for (i0, j0), (i1, j1) in zip(first, last, strict=True):
             covered[i0 : i1 + 1, j0 : j1 + 1] = True
         pixels = np.argwhere(covered)
-        spans = SolidIndex(solids).spans(self._corner + (pixels + 0.5) * PIXEL)
+        spans = SolidIndex(solids).intervals(self._corner + (pixels + 0.5) * PIXEL)
         # Row 0 of the table has no solids; NaN compares as False.
         self._spans = np.full((len(pixels) + 1, *spans.shape[1:]), np.nan, dtype=np.float32)
         self._spans[1:] = spans

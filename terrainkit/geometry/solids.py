@@ -80,7 +80,7 @@ class Solids:
         parts = [part for part in parts if len(part)]
         if not parts:
             return cls.empty()
-        kind = np.concatenate([part.kinds for part in parts])
+        kind = np.concatenate([part.types for part in parts])
         order = np.argsort(kind, kind="stable")
         arrays: dict[str, Any] = {
             name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])
@@ -106,7 +106,7 @@ class Solids:
             **{name: getattr(self, name)[mask] for name in _PER_SOLID},
         )
 
-    def differing(self, other: "Solids", tolerance: float) -> list[str]:
+    def diff(self, other: "Solids", tolerance: float) -> list[str]:
         """Return the names of the arrays that differ in shape, or by more than `tolerance`."""
         pairs = [(name, array, getattr(other, name)) for name, array in vars(self).items()]
         return [
@@ -115,7 +115,7 @@ class Solids:
             if a.shape != b.shape or not np.allclose(a, b, rtol=0, atol=tolerance, equal_nan=True)
         ]
 
-    def transformed(self, rotation: ArrayLike, translation: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
+    def transform(self, rotation: ArrayLike, translation: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
         """Return the solids moved by p -> rotation @ p + translation.
 
         Args:
@@ -140,7 +140,7 @@ class Solids:
         )
 
     @property
-    def kinds(self) -> NDArray[np.int8]:
+    def types(self) -> NDArray[np.int8]:
         """Kind of each solid, shape (n,): 0 for a box, 1 for a cylinder, 2 for a hull."""
         counts = [len(self.boxes), len(self.cylinders), len(self.hull_counts)]
         return np.repeat(np.arange(3, dtype=np.int8), counts)

@@ -121,9 +121,9 @@ class HeightfieldSurface:
     """Position of `heights[0, 0]` [m]."""
     cell: float
     """Distance between samples [m]."""
-    box_tops: NDArray[np.float32] | None = None
+    box_top: NDArray[np.float32] | None = None
     """Top of the box around each sample, -inf without one [m], shape (nx, ny)."""
-    colliding: SolidRaster | None = None
+    collision: SolidRaster | None = None
     """The solids that collide."""
     visible: SolidRaster | None = None
     """The solids that height scans see."""
@@ -145,7 +145,7 @@ class HeightfieldSurface:
             scan: Return what a height scan sees, not what robots collide with.
         """
         height = self._height_without_solids(x, y)
-        solids = self.visible if scan else self.colliding
+        solids = self.visible if scan else self.collision
         return height if solids is None else np.maximum(height, solids.top(x, y, z))
 
     def _height_without_solids(
@@ -167,8 +167,8 @@ class HeightfieldSurface:
         side = flat[corner + np.where(u > v, ny, 1)]  # the triangle's corner off the diagonal
         high, low = np.maximum(u, v), np.minimum(u, v)
         height: NDArray[np.float32] = near + high * (side - near) + low * (far - side)
-        if self.box_tops is None:
+        if self.box_top is None:
             return height
         nearest = (i + (u >= 0.5)) * ny + j + (v >= 0.5)
-        above: NDArray[np.float32] = np.maximum(self.box_tops.reshape(-1)[nearest], height)
-        return above
+        top: NDArray[np.float32] = np.maximum(self.box_top.reshape(-1)[nearest], height)
+        return top

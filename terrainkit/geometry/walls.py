@@ -76,21 +76,21 @@ def center_heights(corners: NDArray[np.floating], walls: NDArray[np.bool_]) -> N
 
 
 def _connected(walls: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    joined = np.eye(4, dtype=bool)
+    connected = np.eye(4, dtype=bool)
     # Corners are at most three edges apart, and a pass may join only one of them.
     for _ in range(3):
         for k in range(4):
             if not walls[k]:
-                joined[k] = joined[(k + 1) % 4] = joined[k] | joined[(k + 1) % 4]
-    return joined
+                connected[k] = connected[(k + 1) % 4] = connected[k] | connected[(k + 1) % 4]
+    return connected
 
 
-def _center_weights(joined: NDArray[np.bool_]) -> NDArray[np.float64]:
-    weights = joined.astype(float)
+def _center_weights(connected: NDArray[np.bool_]) -> NDArray[np.float64]:
+    weights = connected.astype(float)
     for k in range(4):
-        if joined[k].sum() == 3:
+        if connected[k].sum() == 3:
             # Three corners define a plane; at the center it is midway between the outer two.
-            missing = int(np.flatnonzero(~joined[k])[0])
+            missing = int(np.flatnonzero(~connected[k])[0])
             weights[k, (missing + 2) % 4] = 0.0
     weights /= weights.sum(axis=1, keepdims=True)
     return weights
@@ -117,4 +117,4 @@ def _flat_cases() -> NDArray[np.bool_]:
 
 @cache
 def _center_cases() -> NDArray[np.float64]:
-    return np.array([_center_weights(joined) for joined in _connected_cases()])
+    return np.array([_center_weights(connected) for connected in _connected_cases()])

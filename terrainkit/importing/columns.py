@@ -106,11 +106,11 @@ def _intersections(
             triangle = each[k]
             width = (j1 - j0)[triangle]
             i, j = first[triangle] + local // width, j0[triangle] + local % width
-            inside, z = _intersect(corners[triangle], sign[triangle], x[i], y[j])
+            inside, z = _cross(corners[triangle], sign[triangle], x[i], y[j])
             yield (i * len(y) + j)[inside], z[inside], sign[triangle][inside]
 
 
-def _intersect(
+def _cross(
     corners: Array, sign: NDArray[np.int64], x: Array, y: Array
 ) -> tuple[NDArray[np.bool_], Array]:
     """Return whether each vertical line crosses its triangle, and at which z.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
-from terrainkit.files.isolated import IsolatedError
+from terrainkit.files.child_process import ProcessError
 from terrainkit.geometry.convex_decomposition import SEARCH, convex_decomposition
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh import closed_mesh, merged_mesh
@@ -61,7 +61,7 @@ def overhang_solids(
     if not bodies:
         raise HeightFileError(f"{path}: solids: got a mesh without closed bodies that overhang")
     whole = manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
-    parts = whole ^ _space_above(columns, grid, threshold, vertices[:, 2].max())
+    parts = whole ^ _upper_space(columns, grid, threshold, vertices[:, 2].max())
     # CoACD is exact only without the slivers that the cut leaves. As an original, coplanar faces of
     # different bodies merge.
     parts = parts.as_original().simplify(_TOLERANCE).decompose()
@@ -89,7 +89,7 @@ def _closed_bodies(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> I
             yield solid
 
 
-def _space_above(columns: Columns, grid: Grid, threshold: float, max_z: float) -> Any:
+def _upper_space(columns: Columns, grid: Grid, threshold: float, max_z: float) -> Any:
     """Return the space above the cut as a manifold; elsewhere the cut is above the mesh."""
     from scipy.ndimage import (
         binary_dilation,
@@ -125,7 +125,7 @@ def _decompose(path: Path, part: Any) -> list[NDArray[np.float64]]:
     faces = part.to_mesh64().tri_verts.astype(np.int32)
     try:
         found = convex_decomposition(_points(part), faces, PARAMETERS)
-    except IsolatedError as error:
+    except ProcessError as error:
         raise HeightFileError(f"{path}: solids: CoACD failed: {error}") from None
     return [vertices for vertices, _ in found]
 

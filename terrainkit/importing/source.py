@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
-from terrainkit.files.isolated import IsolatedError, run_isolated
-from terrainkit.files.suffixes import find_module
+from terrainkit.files.child_process import ProcessError, run_in_process
+from terrainkit.files.suffix import find_module
 from terrainkit.importing.options import Missing, ReadOptions
 
 Array = NDArray[np.float64]
@@ -97,8 +97,8 @@ def decode(function: Callable[[Path], Mapping[str, Any]], path: Path) -> dict[st
         HeightFileError: if the file cannot be decoded within the limits.
     """
     try:
-        return run_isolated(function, path)
-    except IsolatedError as error:
+        return run_in_process(function, path)
+    except ProcessError as error:
         raise HeightFileError(f"{path}: cannot be read: {error}") from None
 
 

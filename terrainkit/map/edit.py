@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.generation import pad_poses
-from terrainkit.map.patch import find_origin, with_headings
+from terrainkit.map.patch import find_origin, with_heading
 from terrainkit.map.spawn import find_spawn, sample_spawns
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain.patch_geometry import checked_heights
@@ -99,4 +99,4 @@ def place_patch_spawns(
         rng = partial(np.random.default_rng, [config.seed, row, col])
         origin = find_origin(config, f"patch ({row}, {col})", grid, block, near, (x, y))
         positions = sample_spawns(config, grid, block, near, origin, rng)
-    return with_headings(positions, goals)
+    return with_heading(positions, goals)

@@ -18,7 +18,7 @@ from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types, terrain_and_difficulty
 from terrainkit.map.patch import Patch, build_patch
-from terrainkit.map.seams import Seams, cliffs_text
+from terrainkit.map.patch_edges import PatchEdges, cliffs_text
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain.patch_geometry import uniform_friction
 
@@ -200,7 +200,7 @@ def _warnings(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
             f"cells of {config.cell:g} m or height steps are too coarse for a range: "
             f"{listing(collapsed)} on every patch"
         )
-    if cliffs := Seams(terrain_map=terrain_map).cliffs():
+    if cliffs := PatchEdges(terrain_map=terrain_map).cliffs():
         text = cliffs_text(cliffs, terrain_map.patch_names)
         yield f"cliffs between patches: {text}; a robot cannot climb them"
 

@@ -92,7 +92,7 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
     if _difference(a.difficulty, b.difficulty).any():
         yield f"difficulty {a.difficulty:g} -> {b.difficulty:g}"
     if a.parameters != b.parameters:
-        yield f"parameters differ: {listing(a.parameters.differing(b.parameters))}"
+        yield f"parameters differ: {listing(a.parameters.diff(b.parameters))}"
     difference = _difference(a.heights, b.heights)
     if difference.any():
         number = int((difference != 0).sum())
@@ -101,10 +101,10 @@ def _diff_patches(a: Patch, b: Patch) -> Iterator[str]:
     if not np.array_equal(a.friction, b.friction):
         number = int((a.friction != b.friction).sum())
         yield f"friction differs in {number:,} of {a.friction.size:,} cells"
-    solids = [p.solids.transformed(np.eye(3), np.negative([*p.grid.lower, 0])) for p in (a, b)]
+    solids = [p.solids.transform(np.eye(3), np.negative([*p.grid.lower, 0])) for p in (a, b)]
     if len(a.solids) != len(b.solids):
         yield f"{len(a.solids)} -> {len(b.solids)} solids"
-    elif changed := solids[0].differing(solids[1], TOLERANCE):
+    elif changed := solids[0].diff(solids[1], TOLERANCE):
         yield f"solids differ: {listing(changed)}"
     shift = np.array([*a.grid.lower, 0, 0]) - [*b.grid.lower, 0, 0]
     moved = float(np.linalg.norm(_difference(a.origin, b.origin + shift[:3])))

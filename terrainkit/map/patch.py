@@ -56,7 +56,7 @@ class PatchParameters:
     realized: Mapping[str, Value]
     """Values after snapping to the cells, by name; (x, y) where the two axes differ."""
 
-    def differing(self, other: "PatchParameters") -> list[str]:
+    def diff(self, other: "PatchParameters") -> list[str]:
         """Return the names of the parameters that differ between this and `other`."""
         pairs = (self.requested, other.requested), (self.realized, other.realized)
         names = dict.fromkeys([*self.requested, *other.requested])
@@ -113,7 +113,7 @@ class Patch:
         return self.spawns[0, :3]
 
     @property
-    def far_sides(self) -> NDArray[np.bool_]:
+    def far_edges(self) -> NDArray[np.bool_]:
         """Which sides are farthest from the spawn origin, up to 1.5 cells.
 
         Shape (2, 2): the lower sides along x and y, then the upper ones.
@@ -178,7 +178,7 @@ def _build_patch(
         return patch_rng(config, terrain, row, col).spawn(stream + 1)[stream]
 
     with plugin_errors(plugin):
-        _check_slopes(terrain, config)
+        _check_slope(terrain, config)
         rng: Any = patch_rng(config, terrain, row, col) if terrain.has_random_heights else None
         heights = terrain.build(grid, rng)
         friction = sub_terrain.friction_at(difficulty)
@@ -207,7 +207,7 @@ def _build_patch(
         friction=geometry.friction,
         solids=solids,
         goals=goals,
-        spawns=with_headings(spawns, goals, geometry.heading),
+        spawns=with_heading(spawns, goals, geometry.heading),
         spawn_offset=spawn_offset + max(abs(x - position[0]), abs(y - position[1])),
     )
 
@@ -356,7 +356,7 @@ _NO_SOLIDS = Solids.empty()
 _NO_GOALS = np.empty((0, 4))
 
 
-def with_headings(
+def with_heading(
     positions: NDArray[np.float64], goals: NDArray[np.float32], default: float = 0.0
 ) -> NDArray[np.float32]:
     """Return spawn positions with headings toward the first goal.
@@ -377,7 +377,7 @@ def with_headings(
     return spawns
 
 
-def _check_slopes(terrain: Terrain, config: MapConfig) -> None:
+def _check_slope(terrain: Terrain, config: MapConfig) -> None:
     """Raise ConfigError if a slope is so steep that the map would turn it into walls."""
     values: Any = terrain.requested()
     for name, parameter in terrain.declarations().items():

@@ -126,7 +126,7 @@ def _is_free(config: MapConfig, origins: NDArray[np.float64], solids: Solids) ->
     low, high = (f(origins[:, :2], axis=0) for f in (np.min, np.max))
     margin = config.spawn_radius + 1e-3
     solids = solids.select(((lower <= high + margin) & (upper >= low - margin)).all(axis=1))
-    spans = SolidIndex(solids, radius=config.spawn_radius).spans(origins[:, :2])
+    spans = SolidIndex(solids, radius=config.spawn_radius).intervals(origins[:, :2])
     bottom, top = np.moveaxis(spans, -1, 0)
     z = origins[:, 2:]
     is_blocked = (top > z + CONTACT) & (bottom < z + config.spawn_headroom)
@@ -154,11 +154,11 @@ def _height_range(
     if low == high:
         return low, high
     x, y = (np.arange(*span) - p for span, p in zip(spans, index, strict=True))
-    square = square[_touches_disk(x[:, None], y[None, :], radius)]
+    square = square[_reaches_disk(x[:, None], y[None, :], radius)]
     return float(square.min()), float(square.max())
 
 
-def _touches_disk(
+def _reaches_disk(
     x: NDArray[np.floating], y: NDArray[np.floating], radius: float
 ) -> NDArray[np.bool_]:
     """Return whether samples at these offsets [cells] influence the surface of the disk.
@@ -184,7 +184,7 @@ def _flat_cells(heights: NDArray[np.float32], radius: float, tolerance: float) -
     # OpenCV erodes a row in time independent of the kernel's length, so going through the disk row
     # by row costs time proportional to the radius, not to its square.
     for di in range(-margin, margin + 1):
-        influential = offsets[_touches_disk(np.array(float(di)), offsets, radius)]
+        influential = offsets[_reaches_disk(np.array(float(di)), offsets, radius)]
         if not len(influential):
             continue
         kernel = np.ones((1, len(influential)), dtype=np.uint8)

@@ -130,7 +130,7 @@ class TerrainMap:
         direction = convert("direction", direction, Direction)
         starts, shape = _points("points", points, 3)
         ground = self._surface_at(starts[:, :2]).height
-        spans = self._visible.spans(starts[:, :2])
+        spans = self._visible.intervals(starts[:, :2])
         return first_surface(ground, spans, starts[:, 2], direction).reshape(shape)
 
     def clearance(self, xy: ArrayLike) -> NDArray[np.float64]:
@@ -144,7 +144,7 @@ class TerrainMap:
         """
         points, shape = _points("xy", xy, 2)
         ground = self._surface_at(points).height
-        return clearance(ground, self._colliding.spans(points)).reshape(shape)
+        return clearance(ground, self._collision_index.intervals(points)).reshape(shape)
 
     def intervals(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the free intervals above the ground at `xy`, between the solids that collide.
@@ -158,7 +158,7 @@ class TerrainMap:
         """
         points, shape = _points("xy", xy, 2)
         ground = self._surface_at(points).height
-        intervals = free_intervals(ground, self._colliding.spans(points))
+        intervals = free_intervals(ground, self._collision_index.intervals(points))
         return intervals.reshape(*shape, *intervals.shape[1:])
 
     def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
@@ -172,12 +172,12 @@ class TerrainMap:
                 the solids.
         """
         from terrainkit.geometry.mesh import closed_mesh
-        from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes, united
+        from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes, union
 
         ground = self.ground_mesh(merged=merged)
         meshes = solid_meshes(self.solids.select(self.solids.collides))
         if closed:
-            return united([closed_mesh(ground), *meshes])
+            return union([closed_mesh(ground), *meshes])
         return concatenate_meshes(chain([ground], meshes)) if self.solids.collides.any() else ground
 
     def ground_mesh(self, *, merged: bool = True) -> "TriMesh":
@@ -326,7 +326,7 @@ class TerrainMap:
         return SolidIndex(self.solids.select(self.solids.visible))
 
     @cached_property
-    def _colliding(self) -> SolidIndex:
+    def _collision_index(self) -> SolidIndex:
         return SolidIndex(self.solids.select(self.solids.collides))
 
     def _surface_at(self, points: NDArray[np.float64]) -> "SurfacePoints":

@@ -123,11 +123,11 @@ def _compare(patch: Patch, expected: Patch, location: str) -> Iterator[str]:
     if patch.parameters != expected.parameters:
         yield (
             f"{location}: the recorded parameters differ from its config: "
-            f"{listing(patch.parameters.differing(expected.parameters))}"
+            f"{listing(patch.parameters.diff(expected.parameters))}"
         )
     is_same = {
         "friction coefficients": np.allclose(patch.friction, expected.friction, atol=1e-6),
-        "solids": not patch.solids.differing(expected.solids, TOLERANCE),
+        "solids": not patch.solids.diff(expected.solids, TOLERANCE),
         "goals": _same_poses(patch.goals, expected.goals),
         "spawn positions": _same_poses(patch.spawns[1:], expected.spawns[1:]),
     }

@@ -21,4 +21,4 @@ class Mirror(Overlay):
         signs = np.array([1 - 2 * (self.axis == axis) for axis in "xy"])
         if self.axis == "random":
             signs = 1 - 2 * rng.integers(0, 2, 2)
-        return patch.transformed(np.diag(signs))
+        return patch.transform(np.diag(signs))

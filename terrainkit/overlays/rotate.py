@@ -35,4 +35,4 @@ class Rotate(Overlay):
                 "or a square patch"
             )
         quarter = np.array([[0, -1], [1, 0]])
-        return patch.transformed(np.linalg.matrix_power(quarter, turns))
+        return patch.transform(np.linalg.matrix_power(quarter, turns))

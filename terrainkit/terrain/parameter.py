@@ -48,7 +48,7 @@ class Parameter:
     is_grade: bool = False
     """Whether it is a rise over run, which must not exceed the map's slope_threshold."""
 
-    slopes_away: bool = False
+    sloped_edge: bool = False
     """Whether the ground beyond a flat part may slope. The slope starts at the center of the
     outermost cell, so the flat part is half a cell shorter on each sloping side."""
 
@@ -107,9 +107,9 @@ class Parameter:
             return value
         if self.snap == "cells":
             count = grid.cells(value, minimum=0 if self.allow_zero else 1)
-            return grid.length(count - self.slopes_away / 2)
+            return grid.length(count - self.sloped_edge / 2)
         counts = grid.centered(value)
-        x, y = (grid.length(count - self.slopes_away) for count in counts)
+        x, y = (grid.length(count - self.sloped_edge) for count in counts)
         return x if x == y else (x, y)
 
     def deviates(self, requested: Value, realized: Value, cell: float) -> bool:
@@ -126,7 +126,7 @@ class Parameter:
         snapping = 0.05 * requested
         if self.snap != "none":
             snapping = cell if self.snap == "centered" else cell / 2
-        if self.slopes_away:
+        if self.sloped_edge:
             snapping *= 2
         x, y = realized if isinstance(realized, tuple) else (realized, realized)
         allowed = max(snapping, self.tolerance if x and y else 0.0)
@@ -157,10 +157,10 @@ def length(
     hard: float | None = None,
     *,
     allow_zero: bool = False,
-    slopes_away: bool = False,
+    sloped_edge: bool = False,
 ) -> Any:
     """Declare a horizontal length [m], which snaps to whole cells, at least one by default."""
-    return _field(easy, hard, snap="cells", allow_zero=allow_zero, slopes_away=slopes_away)
+    return _field(easy, hard, snap="cells", allow_zero=allow_zero, sloped_edge=sloped_edge)
 
 
 def size(easy: float, hard: float | None = None) -> Any:
@@ -168,9 +168,9 @@ def size(easy: float, hard: float | None = None) -> Any:
     return _field(easy, hard, allow_zero=False)
 
 
-def platform(side: float, *, slopes_away: bool = False) -> Any:
+def platform(side: float, *, sloped_edge: bool = False) -> Any:
     """Declare the side of a square at the center of the patch [m], which stays centered."""
-    return _field(side, snap="centered", allow_zero=False, slopes_away=slopes_away)
+    return _field(side, snap="centered", allow_zero=False, sloped_edge=sloped_edge)
 
 
 def scalar(easy: float, hard: float | None = None, *, allow_zero: bool = True) -> Any:

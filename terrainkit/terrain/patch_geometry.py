@@ -48,7 +48,7 @@ class PatchGeometry:
     heading: float = 0.0
     """Heading of a robot on a patch without goals [rad]."""
 
-    def transformed(self, matrix: ArrayLike) -> Self:
+    def transform(self, matrix: ArrayLike) -> Self:
         """Return the patch rotated or reflected about its center.
 
         Args:
@@ -68,7 +68,7 @@ class PatchGeometry:
             self,
             heights=_rotate_grid(self.heights, matrix),
             friction=_rotate_grid(self.friction, matrix),
-            solids=self.solids.transformed(rotation, center3 - rotation @ center3),
+            solids=self.solids.transform(rotation, center3 - rotation @ center3),
             goals=goals,
             spawn=(x, y),
             heading=float(_rotate_heading(np.array(self.heading), matrix)),

@@ -29,7 +29,7 @@ class ContinuousRamps(RampField):
         """Return the length and the width."""
         return self.length, self.width
 
-    def raised_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
+    def high_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
         """Return the raised corners of each ramp: alternately the corners at low and at high x.
 
         Args:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.gradient_noise import fractal_noise, unit_relief
+from terrainkit.features.gradient_noise import fractal_noise, unit_heights
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
 
@@ -32,5 +32,5 @@ class Contour(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the noise, rounded to whole steps."""
         noise = fractal_noise(grid, self.wavelength, 2, rng, gain=0.3)
-        relief = unit_relief(grid, noise, self.platform, 1.0)
+        relief = unit_heights(grid, noise, self.platform, 1.0)
         return self.step_height * np.rint(self.number * relief)

@@ -11,7 +11,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors, prefixed_errors
-from terrainkit.features.blocks import number_that_fits
+from terrainkit.features.blocks import max_number
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, check_solids
@@ -150,7 +150,7 @@ class Course(Lane):
         """Return the heights of the elements, and 0 between them."""
         ground = np.zeros(grid.shape, np.float32)
         # Solids and goals get the first child of this generator. It decides on the order.
-        for k, span in self._layout(grid, rng.spawn(1)[0]):
+        for k, span in self._element_slices(grid, rng.spawn(1)[0]):
             with _element_errors(k, self._terrains[k]):
                 ground[span] = self._terrains[k].build(_block(grid, span), _child(rng))
         return ground
@@ -158,7 +158,7 @@ class Course(Lane):
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the solids of the elements."""
         solids = []
-        for k, span in self._layout(grid, rng):
+        for k, span in self._element_slices(grid, rng):
             with _element_errors(k, terrain := self._terrains[k]):
                 solids.append(terrain.solids(_block(grid, span), heights[span], _child(rng)))
                 if registry.plugin_name(type(terrain)):
@@ -169,7 +169,7 @@ class Course(Lane):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each platform except the spawn platform."""
-        spans = [span for _, span in self._layout(grid, rng)]
+        spans = [span for _, span in self._element_slices(grid, rng)]
         begin, end = [0, *(each.stop for each in spans)], [*(each.start for each in spans)]
         middle = np.add(begin, [*end, grid.shape[0]]) / 2
         goals = lane_goals(grid, grid.lower[0] + grid.cell * middle)
@@ -181,7 +181,7 @@ class Course(Lane):
     def _terrains(self) -> tuple[Terrain, ...]:
         return tuple(each.at(1.0) for each in self.elements)
 
-    def _layout(self, grid: Grid, rng: np.random.Generator) -> list[tuple[int, slice]]:
+    def _element_slices(self, grid: Grid, rng: np.random.Generator) -> list[tuple[int, slice]]:
         """Return the elements along the lane: index into `elements`, and cells along x."""
         cells = self._element_cells(grid)
         start, platform = grid.cells(self.start), grid.cells(self.platform)
@@ -189,7 +189,7 @@ class Course(Lane):
         if self.order == "random":
             slot = grid.cells(self.slot_length)
             free = grid.length(grid.shape[0] - 2 * start + platform)
-            number = number_that_fits("course", grid.length(slot + platform), free)
+            number = max_number("course", grid.length(slot + platform), free)
             weights = np.array([each.proportion for each in self.elements])
             order = rng.choice(len(cells), number, p=weights / weights.sum()).tolist()
             slots = [slot] * number

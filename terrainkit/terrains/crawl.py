@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import number_that_fits
+from terrainkit.features.blocks import max_number
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
@@ -59,7 +59,7 @@ class Crawl(FlatTerrain, Lane):
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the first edge and the depth of each bar along x [m]."""
         start, pitch = grid.length(grid.cells(self.start)), self.max_depth + self.spacing
-        number = number_that_fits("crawl", pitch, grid.size[0] - start)
+        number = max_number("crawl", pitch, grid.size[0] - start)
         if self.min_depth > self.max_depth or not number:
             raise ConfigError(
                 f"crawl: got min_depth {self.min_depth:g} m, max_depth {self.max_depth:g} m and "

@@ -28,7 +28,7 @@ class CrossingRamps(RampField):
         """Return the side, twice."""
         return self.side, self.side
 
-    def raised_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
+    def high_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
         """Return the raised corners of each ramp, a quarter turn from its neighbors.
 
         Args:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.erosion import erode
-from terrainkit.features.gradient_noise import fractal_noise, unit_relief
+from terrainkit.features.gradient_noise import fractal_noise, unit_heights
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
 
@@ -28,11 +28,11 @@ class Eroded(Terrain):
     iterations: int = parameter.count(30)
     """Number of iterations of the erosion; each is a shower of rain."""
 
-    platform: float = parameter.platform(2.0, slopes_away=True)
+    platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the eroded noise, scaled to the amplitude."""
         noise = fractal_noise(grid, self.wavelength, 5, rng)
         noise = erode(noise, grid.cell, self.iterations)
-        return self.amplitude * unit_relief(grid, noise, self.platform, 1.0)
+        return self.amplitude * unit_heights(grid, noise, self.platform, 1.0)

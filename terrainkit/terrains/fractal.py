@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.gradient_noise import fractal_noise, unit_relief
+from terrainkit.features.gradient_noise import fractal_noise, unit_heights
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
 
@@ -26,10 +26,10 @@ class Fractal(Terrain):
     octaves: int = parameter.count(5)
     """Number of octaves. Each halves the wavelength and the amplitude of the previous octave."""
 
-    platform: float = parameter.platform(2.0, slopes_away=True)
+    platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the noise, scaled to the amplitude."""
         noise = fractal_noise(grid, self.wavelength, self.octaves, rng)
-        return self.amplitude * unit_relief(grid, noise, self.platform, 1.0)
+        return self.amplitude * unit_heights(grid, noise, self.platform, 1.0)

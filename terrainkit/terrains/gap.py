@@ -30,7 +30,7 @@ class Gap(Terrain):
     def realized(self, grid: Grid) -> dict[str, Value]:
         """Return the realized parameters: the gap ends at the edge of the patch."""
         width, block = grid.cells(self.width, minimum=0), grid.centered(self.platform)
-        x, y = (grid.length(min(width, margin)) for margin in grid.margins(block))
+        x, y = (grid.length(min(width, margin)) for margin in grid.margin(block))
         return super().realized(grid) | {"width": x if x == y else (x, y)}
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:

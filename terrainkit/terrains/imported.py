@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.gradient_noise import faded_relief
+from terrainkit.features.gradient_noise import fade_heights
 from terrainkit.geometry.grid import Grid
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, read_raster
@@ -49,7 +49,7 @@ class Imported(Terrain):
     vertical_exaggeration: float = parameter.scalar(0.2, 1.0)
     """Factor of the heights; 1 keeps the heights of the file."""
 
-    platform: float = parameter.platform(2.0, slopes_away=True)
+    platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     file_cell: float = parameter.scalar(0.0)
@@ -98,7 +98,7 @@ class Imported(Terrain):
         )
         ground = raster.heights(x, y)
         relief = ground - ground[grid.shape[0] // 2, grid.shape[1] // 2]
-        return self.vertical_exaggeration * faded_relief(grid, relief, self.platform, 1.0)
+        return self.vertical_exaggeration * fade_heights(grid, relief, self.platform, 1.0)
 
     def _read(self, cell: float) -> tuple[Raster, str]:
         path = Path(self.file) if self.file else _EXAMPLE

@@ -35,7 +35,7 @@ class KRails(Lane):
     panel: float = parameter.size(1.2)
     """Side of a panel [m]."""
 
-    start: float = parameter.length(2.0, slopes_away=True)
+    start: float = parameter.length(2.0, sloped_edge=True)
     """Length of the flat start along x [m]."""
 
     end: float = parameter.size(1.0)
@@ -62,8 +62,8 @@ class KRails(Lane):
         rails = make_standing_boxes(center, (length, self.height), self.height, yaw=yaw)
         slope = np.hypot(1.0, self.grade)
         axes = np.array([[1.0, 0.0, -self.grade], [0.0, slope, 0.0], [self.grade, 0.0, 1.0]])
-        up = rails.transformed(axes / slope, (first, grid.center[1], 0.0))
-        down = up.transformed(np.diag([-1.0, 1.0, 1.0]), (2 * ridge, 0.0, 0.0))
+        up = rails.transform(axes / slope, (first, grid.center[1], 0.0))
+        down = up.transform(np.diag([-1.0, 1.0, 1.0]), (2 * ridge, 0.0, 0.0))
         return Solids.concatenate([up, down])
 
     def goals(

@@ -92,7 +92,7 @@ class Ladder(Terrain):
             rpy=(0.0, np.pi / 2 - self.angle, 0.0),
         )
         up = Solids.concatenate([rungs, rails])
-        down = up.transformed(np.diag([-1.0, 1.0, 1.0]), (2 * grid.center[0], 0.0, 0.0))
+        down = up.transform(np.diag([-1.0, 1.0, 1.0]), (2 * grid.center[0], 0.0, 0.0))
         return Solids.concatenate([up, down])
 
     def goals(

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import make_walls, number_that_fits
+from terrainkit.features.blocks import make_walls, max_number
 from terrainkit.features.maze_layout import MazeLayout, sample_maze
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -45,7 +45,7 @@ class Maze(FlatTerrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the walls, one box for each straight run."""
-        maze = self._layout(grid, rng)
+        maze = self._sample(grid, rng)
         pitch, half = self.corridor + self.thickness, self.thickness / 2
         parts, size = [], (self.thickness, self.height)
         for axis, walls in ((0, maze.walls_x), (1, maze.walls_y.T)):
@@ -61,7 +61,7 @@ class Maze(FlatTerrain):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in each cell on the path, and one in the exit."""
-        maze = self._layout(grid, rng)
+        maze = self._sample(grid, rng)
         shape = np.array([maze.walls_y.shape[0], maze.walls_x.shape[1]])
         path = maze.path((shape[0] // 2, shape[1] // 2)) + 0.5 - shape / 2
         pitch = self.corridor + self.thickness
@@ -71,11 +71,11 @@ class Maze(FlatTerrain):
         heading = np.arctan2(*np.diff(xy, axis=0, append=xy[-1:] + np.array([1.0, 0.0])).T[::-1])
         return np.column_stack([xy, np.full(len(xy), np.nan), heading])
 
-    def _layout(self, grid: Grid, rng: np.random.Generator) -> MazeLayout:
+    def _sample(self, grid: Grid, rng: np.random.Generator) -> MazeLayout:
         """Return the maze without the walls in the clearing."""
         pitch, half = self.corridor + self.thickness, self.thickness / 2
         nx, ny = (
-            min(self.number, number_that_fits("maze", pitch, length - self.thickness))
+            min(self.number, max_number("maze", pitch, length - self.thickness))
             for length in grid.size
         )
         if min(nx, ny) < 2:

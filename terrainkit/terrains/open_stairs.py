@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import make_blocks, number_that_fits
+from terrainkit.features.blocks import make_blocks, max_number
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -67,5 +67,5 @@ class OpenStairs(FlatTerrain, Lane):
                 f"open_stairs: two strips of {self.start:g} m leave no tread of {self.tread:g} m "
                 f"in a patch {grid.size[0]:g} m long"
             )
-        number = number_that_fits("open_stairs", 2 * self.tread, length - self.tread)
+        number = max_number("open_stairs", 2 * self.tread, length - self.tread)
         return grid.lower[0] + start, grid.upper[0] - start, number

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.gradient_noise import perlin_noise, unit_relief
+from terrainkit.features.gradient_noise import perlin_noise, unit_heights
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import Terrain, parameter
 
@@ -23,10 +23,10 @@ class Perlin(Terrain):
     wavelength: float = parameter.scalar(1.5, allow_zero=False)
     """Distance between two random gradients [m]; about the diameter of a hill."""
 
-    platform: float = parameter.platform(2.0, slopes_away=True)
+    platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the noise, scaled to the amplitude."""
         noise = perlin_noise(grid, self.wavelength, rng)
-        return self.amplitude * unit_relief(grid, noise, self.platform, self.wavelength / 2)
+        return self.amplitude * unit_heights(grid, noise, self.platform, self.wavelength / 2)

@@ -25,7 +25,7 @@ class PyramidSlope(Terrain):
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the sides."""
 
-    platform: float = parameter.platform(3.0, slopes_away=True)
+    platform: float = parameter.platform(3.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     inverted: bool = parameter.switch()
@@ -34,7 +34,7 @@ class PyramidSlope(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slopes, which fall by `grade * cell` from ring to ring."""
         platform = grid.centered(self.platform)
-        run = min(grid.margins(platform))
+        run = min(grid.margin(platform))
         if run == 0:
             raise ConfigError(
                 f"pyramid_slope: a platform of {self.platform:g} m leaves no slope in a patch of "

@@ -38,7 +38,7 @@ class PyramidStairs(Terrain):
         """Return the treads, counted outward from the platform."""
         width = grid.cells(self.step_width)
         platform = grid.centered(self.platform)
-        risers = min(grid.margins(platform)) // width
+        risers = min(grid.margin(platform)) // width
         if risers == 0:
             raise ConfigError(
                 f"pyramid_stairs: no step of {self.step_width:g} m fits between the platform of "

@@ -24,7 +24,7 @@ class RandomGrid(Terrain):
     block: float = parameter.length(0.4)
     """Side of a block [m]."""
 
-    platform: float = parameter.platform(2.0, slopes_away=True)
+    platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.gradient_noise import fractal_noise, unit_relief
+from terrainkit.features.gradient_noise import fractal_noise, unit_heights
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_hulls
@@ -42,13 +42,13 @@ class Rocks(Terrain):
     amplitude: float = parameter.height(0.02, 0.1)
     """Largest height of the ground above or below 0 [m]."""
 
-    platform: float = parameter.platform(2.0, slopes_away=True)
+    platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center without rocks [m]."""
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the rough ground."""
         noise = fractal_noise(grid, 1.5, 4, rng)
-        return self.amplitude * unit_relief(grid, noise, self.platform, 0.5)
+        return self.amplitude * unit_heights(grid, noise, self.platform, 0.5)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the rocks: random points on ellipsoids around samples of the ground."""

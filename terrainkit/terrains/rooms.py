@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import make_walls, number_that_fits
+from terrainkit.features.blocks import make_walls, max_number
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.terrain import FlatTerrain, parameter
@@ -66,7 +66,7 @@ class Rooms(FlatTerrain):
     def _counts(self, grid: Grid) -> tuple[int, int]:
         """Return the number of rooms along x and y."""
         pitch = self.side + self.thickness
-        x, y = (number_that_fits("rooms", pitch, n - self.thickness) for n in grid.size)
+        x, y = (max_number("rooms", pitch, n - self.thickness) for n in grid.size)
         return x, y
 
     def _lines(

@@ -26,7 +26,7 @@ class Rough(Terrain):
     spacing: float = parameter.scalar(0.2, allow_zero=False)
     """Distance between two random heights [m]; heights in between are interpolated."""
 
-    platform: float = parameter.platform(2.0, slopes_away=True)
+    platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     def realized(self, grid: Grid) -> dict[str, Value]:

@@ -32,7 +32,7 @@ class RoughSlope(Terrain):
     spacing: float = parameter.scalar(0.2, allow_zero=False)
     """Distance between two random heights [m]; heights in between are interpolated."""
 
-    platform: float = parameter.platform(3.0, slopes_away=True)
+    platform: float = parameter.platform(3.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     inverted: bool = parameter.switch()

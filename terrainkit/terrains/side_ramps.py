@@ -62,7 +62,7 @@ class SideRamps(Lane):
                 f"lower side above the floor of the pit, {self.depth:g} m deep"
             )
         edges = self._slots(grid)
-        side = self._sides(edges)
+        side = self._side_signs(edges)
         low, high = (grid.center[1] + side * self.offset + w * self.width / 2 for w in (-1, 1))
         return make_ramps(
             np.column_stack([edges[:-1] + self.gap, low]),
@@ -77,10 +77,10 @@ class SideRamps(Lane):
         """Return a goal in the middle of each ramp, and one behind the pit."""
         edges = self._slots(grid)
         x = [*(edges[:-1] + self.gap + edges[1:]) / 2, (edges[-1] + self.gap + grid.upper[0]) / 2]
-        y = grid.center[1] + np.append(self._sides(edges), 0.0) * self.offset
+        y = grid.center[1] + np.append(self._side_signs(edges), 0.0) * self.offset
         return np.column_stack([x, y, 0 * y, 0 * y])
 
-    def _sides(self, edges: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _side_signs(self, edges: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return 1 for each ramp on the left, and -1 for each on the right."""
         is_first = np.arange(len(edges) - 1) % 2 == 0
         return np.where(is_first == (self.first_side == "left"), 1.0, -1.0)

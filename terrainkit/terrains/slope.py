@@ -25,7 +25,7 @@ class Slope(Terrain):
     grade: float = parameter.grade(0.0, 0.4)
     """Rise over run of the slope."""
 
-    landing: float = parameter.length(2.0, slopes_away=True)
+    landing: float = parameter.length(2.0, sloped_edge=True)
     """Length along x of the flat strip at each end [m]."""
 
     inverted: bool = parameter.switch()

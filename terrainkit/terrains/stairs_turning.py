@@ -38,12 +38,12 @@ class StairsTurning(Terrain):
     def spawn(self, grid: Grid) -> tuple[float, float]:
         """Return the middle of the flat start in front of the first flight."""
         landing = grid.cells(self.landing)
-        start, y = grid.length(grid.cells(self.start)), self._first_cells(grid)[1] + landing / 2
+        start, y = grid.length(grid.cells(self.start)), self._first_cell(grid)[1] + landing / 2
         return grid.lower[0] + start / 2, grid.lower[1] + grid.length(y)
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the flights, counterclockwise from the landing at low x and low y."""
-        number, (i, j) = self._treads(grid), self._first_cells(grid)
+        number, (i, j) = self._tread_count(grid), self._first_cell(grid)
         tread, landing = grid.cells(self.tread), grid.cells(self.landing)
         side = 2 * landing + number * tread
         up = np.repeat(np.arange(1, number + 1), tread)
@@ -66,14 +66,14 @@ class StairsTurning(Terrain):
     ) -> NDArray[np.floating]:
         """Return a goal on each landing, counterclockwise; the last is on the ground."""
         landing = grid.cells(self.landing)
-        first = np.array(self._first_cells(grid)) + landing / 2
-        across = landing + self._treads(grid) * grid.cells(self.tread)
+        first = np.array(self._first_cell(grid)) + landing / 2
+        across = landing + self._tread_count(grid) * grid.cells(self.tread)
         corners = np.array([[1, 0], [1, 1], [0, 1], [0, 0]])
         xy = np.array(grid.lower) + (first + corners * across) * grid.cell
         heading = np.array([0.0, 0.5, 1.0, -0.5]) * np.pi
         return np.column_stack([xy, np.full(4, np.nan), heading])
 
-    def _treads(self, grid: Grid) -> int:
+    def _tread_count(self, grid: Grid) -> int:
         """Return the number of treads of a flight."""
         start, landing = grid.cells(self.start), grid.cells(self.landing)
         free = min(grid.shape[0] - start - 1, grid.shape[1] - 2) - 2 * landing
@@ -86,7 +86,7 @@ class StairsTurning(Terrain):
             )
         return number
 
-    def _first_cells(self, grid: Grid) -> tuple[int, int]:
+    def _first_cell(self, grid: Grid) -> tuple[int, int]:
         """Return the index of the first cell of the loop along x and y."""
-        side = 2 * grid.cells(self.landing) + self._treads(grid) * grid.cells(self.tread)
+        side = 2 * grid.cells(self.landing) + self._tread_count(grid) * grid.cells(self.tread)
         return grid.cells(self.start), (grid.shape[1] - side) // 2

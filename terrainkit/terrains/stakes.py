@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.blocks import SINK, number_that_fits
+from terrainkit.features.blocks import SINK, max_number
 from terrainkit.features.pit_ground import pit_around, pit_bounds
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders
@@ -46,7 +46,7 @@ class Stakes(Terrain):
         radius, pitch = self.diameter / 2, self.diameter + self.gap
         row = pitch * math.sqrt(3) / 2
         half = [
-            number_that_fits("stakes", p, n / 2) + 1
+            max_number("stakes", p, n / 2) + 1
             for p, n in zip((row, pitch), high - low, strict=True)
         ]
         i, j = np.meshgrid(*(np.arange(-n, n + 1) for n in half), indexing="ij")

@@ -39,7 +39,7 @@ class Star(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return `-depth`, and 0 on the platform and the rim."""
         rim, platform = grid.cells(self.rim), grid.centered(self.platform)
-        if rim >= min(grid.margins(platform)):
+        if rim >= min(grid.margin(platform)):
             raise ConfigError(
                 f"star: got a rim of {self.rim:g} m and a platform of {self.platform:g} m; "
                 f"expected a pit between them in a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"

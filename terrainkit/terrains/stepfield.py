@@ -43,9 +43,9 @@ class Stepfield(Lane):
         ridge = np.stack([0 * x, 1 - np.abs(2 * x - 1), 1 - np.abs(x - y)])
         hill = np.rint(2 * np.choose(kind, ridge))
         levels = 1 + hill + np.floor(rng.random(kind.shape) * np.where(kind == 0, 4, 2))
-        levels = np.minimum(levels, _min_neighbor(levels) + 2)
+        levels = np.minimum(levels, _min_of_neighbors(levels) + 2)
         ground = np.zeros(grid.shape)
-        i, j = grid.cells(self.start), self._first_across(grid)
+        i, j = grid.cells(self.start), self._first_cell_y(grid)
         block = np.kron(levels, np.ones((side, side)))
         ground[i : i + block.shape[0], j : j + block.shape[1]] = self.unit * block
         return ground
@@ -56,7 +56,7 @@ class Stepfield(Lane):
         """Return a goal on a last post of each field but the last, and one behind the fields."""
         side, (nx, ny) = grid.cells(self.post), self._counts(grid)
         end = grid.cells(self.start) + _POSTS * side * np.arange(1, nx + 1)
-        middle = self._first_across(grid) + _POSTS * side * ny // 2
+        middle = self._first_cell_y(grid) + _POSTS * side * ny // 2
         x = grid.lower[0] + grid.cell * np.append(
             end[:-1] - side / 2, (end[-1] + grid.shape[0]) / 2
         )
@@ -65,7 +65,7 @@ class Stepfield(Lane):
         goals[:-1, 1] = grid.lower[1] + grid.cell * (middle - side / 2)
         return goals
 
-    def _first_across(self, grid: Grid) -> int:
+    def _first_cell_y(self, grid: Grid) -> int:
         """Return the first cell of the fields along y; the fields are centered."""
         return (grid.shape[1] - self._counts(grid)[1] * _POSTS * grid.cells(self.post)) // 2
 
@@ -83,7 +83,7 @@ class Stepfield(Lane):
         return nx, ny
 
 
-def _min_neighbor(levels: NDArray[np.float64]) -> NDArray[np.float64]:
+def _min_of_neighbors(levels: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the lowest of the eight neighbors of each post; the ground around is at level 0."""
     padded = np.pad(levels, 1)
     shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]

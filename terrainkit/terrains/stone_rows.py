@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.features.blocks import SINK, make_blocks, max_number
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between, pit_bounds
 from terrainkit.geometry.grid import Grid
@@ -73,7 +73,7 @@ class StoneRows(Lane):
         """Return the first edge of each pair of stones along x [m]."""
         low, high = pit_bounds(grid, self.start)
         pitch, (length, width) = self.stone + self.gap, high - low
-        number = number_that_fits("stone_rows", pitch, length - self.gap)
+        number = max_number("stone_rows", pitch, length - self.gap)
         if number < 1 or 2 * self.stone + self.row_gap > width:
             raise ConfigError(
                 f"stone_rows: got stone {self.stone:g} m, gap {self.gap:g} m and row_gap "

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.blocks import SINK, make_blocks, number_that_fits
+from terrainkit.features.blocks import SINK, make_blocks, max_number
 from terrainkit.features.pit_ground import pit_around, pit_bounds
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -49,7 +49,7 @@ class StonesEverywhere(Terrain):
         """Return the stones, on a lattice around the center of the patch."""
         low, high = pit_bounds(grid)
         pitch = self.stone + self.gap
-        half = [number_that_fits("stones_everywhere", pitch, n / 2) + 1 for n in high - low]
+        half = [max_number("stones_everywhere", pitch, n / 2) + 1 for n in high - low]
         index = np.stack(np.meshgrid(*(np.arange(-n, n + 1) for n in half), indexing="ij"), -1)
         draws = 2 * rng.random((*index.shape[:2], 3)) - 1
         center = np.array(grid.center) + index * pitch + draws[..., :2] * self.shift

@@ -28,7 +28,7 @@ class Wave(Terrain):
     number: int = parameter.count(4)
     """Waves along each side of the patch."""
 
-    platform: float = parameter.platform(1.5, slopes_away=True)
+    platform: float = parameter.platform(1.5, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
     def realized(self, grid: Grid) -> dict[str, Value]:

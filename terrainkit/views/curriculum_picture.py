@@ -1,10 +1,10 @@
-"""The picture of the statistics of patches: a heat map of success and visits."""
+"""The picture of the statistics of patches: a heatmap of success and visits."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.curriculum.statistics import PatchStatistics
-from terrainkit.views.heat_map import HeatMapRow, draw_heat_map
+from terrainkit.views.heatmap import HeatmapRow, draw_heatmap
 
 _MAX_LABEL = 40
 """Longest label of a column, in characters."""
@@ -29,5 +29,5 @@ def draw_statistics(statistics: PatchStatistics, terrain_names: NDArray[np.str_]
     ):
         label = f"{column}  {', '.join(dict.fromkeys(terrain_names[:, column]))}"
         texts = [f"{n:.0f}" if n < 10_000 else f"{n / 1000:.0f}k" for n in visits]
-        rows.append(HeatMapRow(label=label[:_MAX_LABEL], success=rates, texts=texts))
-    return draw_heat_map("color: success (red 0, green 1); number: episodes", rows)
+        rows.append(HeatmapRow(label=label[:_MAX_LABEL], success=rates, texts=texts))
+    return draw_heatmap("color: success (red 0, green 1); number: episodes", rows)

@@ -63,9 +63,9 @@ def show_map(server: "viser.ViserServer", terrain_map: "TerrainMap") -> "viser.F
     _add_ground(server, terrain_map)
     parts = {
         "solids": _add_solids(server, terrain_map),
-        "spawns": _add_headings(server, "spawns", terrain_map.spawns, _SPAWN_COLOR),
+        "spawns": _add_arrows(server, "spawns", terrain_map.spawns, _SPAWN_COLOR),
         "goals": [
-            *_add_headings(server, "goals", terrain_map.goals, _GOAL_COLOR),
+            *_add_arrows(server, "goals", terrain_map.goals, _GOAL_COLOR),
             *_add_goal_order(server, terrain_map),
         ],
         "labels": _add_labels(server, terrain_map),
@@ -196,7 +196,7 @@ def _shaded_glb(
     return bytes(mesh.export(file_type="glb", tree_postprocessor=disable_lights))
 
 
-def _add_headings(
+def _add_arrows(
     server: "viser.ViserServer",
     name: str,
     positions: NDArray[np.float32],

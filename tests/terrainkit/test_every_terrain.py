@@ -20,7 +20,7 @@ from terrainkit import MapConfig, SubTerrain, TerrainkitError, generate
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
 from terrainkit.map.measured_difficulty import measured_difficulty
-from terrainkit.map.seams import Seams
+from terrainkit.map.patch_edges import PatchEdges
 from terrainkit.map.validate import validate
 from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.parameter import MAX_VALUE, parameters_of
@@ -192,8 +192,8 @@ def test_every_terrain_map_is_valid(terrain, given_parameters, grid):
     assert terrain_map.difficulty.ravel().tolist() == [0.0, 0.5, 1.0]
     # The mesh, the spawn origins, and a second build of each patch. Some parameters do not fit.
     assert [issue for issue in validate(terrain_map) if issue.check != "realized"] == []
-    cliffs = Seams(terrain_map=terrain_map).cliffs()
-    assert [seam for seam in cliffs if None not in seam.patches] == []
+    cliffs = PatchEdges(terrain_map=terrain_map).cliffs()
+    assert [edge for edge in cliffs if None not in edge.patches] == []
 
 
 @coarse
@@ -202,7 +202,7 @@ def test_every_terrain_map_is_valid(terrain, given_parameters, grid):
 def test_every_terrain_platform_is_flat_as_recorded(terrain, block, grid):
     declared = parameters_of(registry.get_terrain(terrain))
     # By default, steps below 0.075 m are ramps, which start half a cell earlier.
-    threshold = 0.75 if declared[block].slopes_away else 0.05
+    threshold = 0.75 if declared[block].sloped_edge else 0.05
     for parameters in ({}, {"inverted": True}) if "inverted" in declared else ({},):
         terrain_map = map_of(terrain, parameters, grid, slope_threshold=threshold)
         for row in range(3):
@@ -213,7 +213,7 @@ def test_every_terrain_platform_is_flat_as_recorded(terrain, block, grid):
                 for margin, outline in ((-1e-3, OUTLINE), (1e-2, OUTLINE))
             )
             assert np.ptp(inside) < 1e-5
-            if row == 2 and declared[block].slopes_away:
+            if row == 2 and declared[block].sloped_edge:
                 assert np.ptp([*outside, inside[0]]) > 1e-4
 
 
@@ -410,7 +410,7 @@ def test_every_terrain_is_realized_within_a_cell(terrain, given_parameters):
                 assert np.array(realized[name]) == pytest.approx(requested[name], rel=0.05)
             else:
                 off = np.abs(np.array(realized[name]) - requested[name])
-                assert off.max() <= (1 + parameter.slopes_away) * cell + 1e-9
+                assert off.max() <= (1 + parameter.sloped_edge) * cell + 1e-9
 
 
 @pytest.mark.parametrize("terrain", registry.terrain_names())

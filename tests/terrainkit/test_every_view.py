@@ -107,7 +107,7 @@ def test_every_view_is_the_same_surface(sub_terrain, patch_size, cell, tmp_path)
     path = terrain_map.save(tmp_path / "map.xml", collision="boxes")
     model = mujoco.MjModel.from_xml_path(str(path))
     # A heightfield of MuJoCo has slopes in the place of walls.
-    exact = ~is_near_wall(terrain_map, xy) | terrain_map.boxes().covered.all()
+    exact = ~is_near_wall(terrain_map, xy) | terrain_map.boxes().box_mask.all()
     for direction, sign in (("down", -1), ("up", 1)):
         assert_close(terrain_map.scan(starts, direction), expected[direction])
         assert_close(cast_rays(mesh, starts, sign), expected[direction])

@@ -92,8 +92,10 @@ def test_check_map_prints_the_largest_seam(terrainkit):
     terrainkit("generate", "-o", "a.npz", "--terrain", "stairs", *options)
     run = terrainkit("check-map", "a.npz")
     assert run.returncode == 0
-    assert "largest seam: 1.61 m between stairs (0, 0) and the border\n" in run.stdout
-    assert "cliffs: 2 seams, up to 1.61 m between stairs (0, 0) and the border\n" in run.stdout
+    assert "largest patch edge: 1.61 m between stairs (0, 0) and the border\n" in run.stdout
+    assert (
+        "cliffs: 2 patch edges, up to 1.61 m between stairs (0, 0) and the border\n" in run.stdout
+    )
 
 
 def test_check_map_reports_issues(terrainkit, tmp_path, small_map):

@@ -15,7 +15,7 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.files.isolated import ProcessLimits
+from terrainkit.files.child_process import ProcessLimits
 
 LIMITS = ProcessLimits(seconds=30.0, memory=2 << 30)
 """Limits of loading a model and of its first call. Later calls have the same time limit."""

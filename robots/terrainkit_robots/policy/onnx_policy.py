@@ -13,7 +13,7 @@ import onnxruntime
 import torch
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.files.isolated import IsolatedError, run_isolated
+from terrainkit.files.child_process import ProcessError, run_in_process
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.export import JSON_FILE, METADATA_KEY, describe_policy
@@ -60,8 +60,10 @@ class OnnxPolicy:
         """
         self.__name__ = path.name
         try:
-            loaded = run_isolated(load_model, _read(path), path.parent, METADATA_KEY, limits=LIMITS)
-        except IsolatedError as error:
+            loaded = run_in_process(
+                load_model, _read(path), path.parent, METADATA_KEY, limits=LIMITS
+            )
+        except ProcessError as error:
             raise ConfigError(f"{path} is not a policy: {error}") from error
         self.num_obs, self.num_actions = loaded["sizes"].tolist()
         self.description = loaded["text"].tobytes()

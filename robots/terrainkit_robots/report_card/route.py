@@ -32,7 +32,7 @@ def patch_routes(patch: Patch) -> list[NDArray[np.float64]]:
         return [patch.goals[:, :2].astype(np.float64)]
     corners, routes = (patch.grid.lower, patch.grid.upper), []
     for side, axis in ((1, 0), (1, 1), (0, 0), (0, 1)):
-        if patch.far_sides[side, axis]:
+        if patch.far_edges[side, axis]:
             goal = patch.origin[:2].astype(np.float64)
             goal[axis] = corners[side][axis]
             routes.append(goal[None])

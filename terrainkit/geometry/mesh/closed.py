@@ -39,9 +39,9 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
     ]
     bottom = float(vertices[:, 2].min()) - THICKNESS
     center = (rim.min(axis=0) + rim.max(axis=0)) / 2
-    added = np.column_stack([np.vstack([rim, center]), np.full(len(rim) + 1, bottom)])
+    extra = np.column_stack([np.vstack([rim, center]), np.full(len(rim) + 1, bottom)])
     return TriMesh(
-        vertices=np.concatenate([vertices, added.astype(np.float32)]),
+        vertices=np.concatenate([vertices, extra.astype(np.float32)]),
         triangles=np.concatenate([triangles, *sides]).astype(np.int32),
     )
 

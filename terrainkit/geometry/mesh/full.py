@@ -37,14 +37,14 @@ def quad_faces(node_grid: NodeGrid, quads: NDArray[np.bool_]) -> tuple[RowBuffer
         quads: Mask of the quads.
 
     Returns:
-        Triangles, shape (nf, 3), and positions of the added vertices [m], shape (nv, 3).
+        Triangles, shape (nf, 3), and positions of the extra vertices [m], shape (nv, 3).
     """
     triangles, centers = RowBuffer(np.int32), RowBuffer(np.float32)
     _append_pairs(triangles, node_grid, quads & ~node_grid.has_wall)
     walled = np.flatnonzero(quads & node_grid.has_wall)
-    for faces, added in wall_quads(node_grid, walled, node_grid.vertex_count):
+    for faces, extra in wall_quads(node_grid, walled, node_grid.vertex_count):
         triangles.append(faces)
-        centers.append(added)
+        centers.append(extra)
     return triangles, centers
 
 

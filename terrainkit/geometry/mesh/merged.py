@@ -32,17 +32,17 @@ def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> T
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
-    triangles, added = _faces(node_grid, *_merge_quads(node_grid))
+    triangles, extra = _faces(node_grid, *_merge_quads(node_grid))
     blocks = [
         triangles[start : start + QUADS_PER_BLOCK]
         for start in range(0, len(triangles), QUADS_PER_BLOCK)
     ]
-    used = np.zeros(node_grid.vertex_count + len(added), dtype=bool)
+    used = np.zeros(node_grid.vertex_count + len(extra), dtype=bool)
     for block in blocks:
         used[block] = True
-    vertices = node_grid.vertices(used, added)
+    vertices = node_grid.vertices(used, extra)
     # Arrays that are no longer needed are freed, since they are larger than the mesh.
-    del node_grid, added
+    del node_grid, extra
     number = used.astype(np.int32)
     np.cumsum(number, out=number)
     for block in blocks:
@@ -80,22 +80,22 @@ def _faces(
     for rectangle in rectangles:
         rectangle.keep_corners(kept)
     for run in runs:
-        run.keep_ends(kept)
+        run.keep_endpoints(kept)
     # A rectangle adds its center; a wall the midpoints at its ends, and the centers of two strips.
     num_vertices = sum(len(each.i0) for each in rectangles) + 6 * sum(len(run.i) for run in runs)
     node_grid.check_memory(num_vertices + int(np.count_nonzero(kept)), single)
 
-    triangles, added = quad_faces(node_grid, single)
+    triangles, extra = quad_faces(node_grid, single)
     for run in runs:
-        triangles.append(run.panels())
+        triangles.append(run.triangles())
     for polygons in itertools.chain(
         (part.polygons(node_grid, kept) for each in rectangles for part in each.blocks()),
         *(run.strips(kept) for run in runs),
     ):
-        faces, centers = polygons.triangles(node_grid.vertex_count + len(added))
+        faces, centers = polygons.triangles(node_grid.vertex_count + len(extra))
         triangles.append(faces)
-        added.append(centers)
-    return triangles.array(), added.array()
+        extra.append(centers)
+    return triangles.array(), extra.array()
 
 
 def _corners(quads: Mask) -> Mask:

@@ -154,18 +154,18 @@ class NodeGrid:
         index = self.edges_x.size + np.searchsorted(self.edges_y, i * self.walls_y.shape[1] + j)
         return np.asarray(self.z.size + 2 * index)
 
-    def vertices(self, used: NDArray[np.bool_], added: NDArray[np.float32]) -> NDArray[np.float32]:
+    def vertices(self, used: NDArray[np.bool_], extra: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return the positions of the vertices that are used [m], shape (n, 3).
 
         Args:
-            used: Whether each node, midpoint and added vertex is used, in the order of the numbers.
-            added: Positions of the added vertices [m], shape (k, 3).
+            used: Whether each node, midpoint and extra vertex is used, in the order of the numbers.
+            extra: Positions of the extra vertices [m], shape (k, 3).
         """
         vertices, start = RowBuffer(np.float32), self.z.size
         for i, used_row in enumerate(used[:start].reshape(self.z.shape)):
             j = np.flatnonzero(used_row)
             vertices.append(np.column_stack([np.full(len(j), self.x[i]), self.y[j], self.z[i, j]]))
-        for block in itertools.chain(self.midpoints(), [added]):
+        for block in itertools.chain(self.midpoints(), [extra]):
             vertices.append(block[used[start : start + len(block)]])
             start += len(block)
         return vertices.array()

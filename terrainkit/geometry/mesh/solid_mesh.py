@@ -48,7 +48,7 @@ def concatenate_meshes(meshes: Iterable[TriMesh]) -> TriMesh:
     return TriMesh(vertices=vertices.array(), triangles=triangles.array())
 
 
-def united(meshes: list[TriMesh]) -> TriMesh:
+def union(meshes: list[TriMesh]) -> TriMesh:
     """Return the union of closed meshes as one watertight mesh, computed by manifold3d.
 
     Args:

@@ -41,10 +41,10 @@ def wall_quads(
     Args:
         node_grid: Nodes of the mesh.
         numbers: Flat index of each quad, shape (K,).
-        first: Number of the first added vertex.
+        first: Number of the first extra vertex.
 
     Yields:
-        Triangles, shape (T, 3), and positions of the added vertices [m], shape (V, 3).
+        Triangles, shape (T, 3), and positions of the extra vertices [m], shape (V, 3).
     """
     for start in range(0, len(numbers), QUADS_PER_BLOCK):
         quads = _Quads.from_grid(node_grid, numbers[start : start + QUADS_PER_BLOCK])
@@ -57,10 +57,10 @@ def wall_quads(
             (_saddles, quads.select(even_high)),
             (_saddles, quads.select(odd_high).rotate_corners()),
         ):
-            faces, added = build(part, first)
-            first += len(added)
+            faces, extra = build(part, first)
+            first += len(extra)
             if faces:
-                yield np.concatenate(faces), added
+                yield np.concatenate(faces), extra
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,7 +122,7 @@ def _fans(quads: _Quads, first: int) -> tuple[list[NDArray[np.int32]], NDArray[n
     line = _VerticalLine.from_heights(np.ascontiguousarray(heights.T), quads.center, first)
     cases = np.concatenate([quads.walls, line.rank])
     vertices = np.concatenate([quads.vertices, line.vertices])
-    return _instantiate(_fan_faces, cases, vertices), line.positions
+    return _make_triangles(_fan_faces, cases, vertices), line.positions
 
 
 def _saddles(quads: _Quads, first: int) -> tuple[list[NDArray[np.int32]], NDArray[np.float32]]:
@@ -133,11 +133,11 @@ def _saddles(quads: _Quads, first: int) -> tuple[list[NDArray[np.int32]], NDArra
     east = _VerticalLine.from_heights(quads.z[[2, 1, 3]], quads.center - offset, first)
     cases = np.concatenate([west.rank, east.rank])
     vertices = np.concatenate([quads.vertices, west.vertices, east.vertices])
-    triangles = _instantiate(_saddle_faces, cases, vertices)
+    triangles = _make_triangles(_saddle_faces, cases, vertices)
     return triangles, np.concatenate([west.positions, east.positions])
 
 
-def _instantiate(
+def _make_triangles(
     faces_of: Callable[..., Iterator[_Face]],
     cases: NDArray[np.integer],
     vertices: NDArray[np.int32],

@@ -38,7 +38,7 @@ class WallRuns:
         grid = self.node_grid
         return grid.midpoint_y(j, self.i) if self.axis else grid.midpoint_x(self.i, j)
 
-    def keep_ends(self, kept: Mask) -> None:
+    def keep_endpoints(self, kept: Mask) -> None:
         """Mark the nodes on both sides of both ends in `kept`."""
         nodes = kept.T if self.axis else kept
         for j in (self.j0, self.j1):
@@ -70,7 +70,7 @@ class WallRuns:
             clockwise=side != self.axis,
         )
 
-    def panels(self) -> Ids:
+    def triangles(self) -> Ids:
         """Return the two triangles of each wall, shape (2 n, 3)."""
         low0, low1 = self._midpoint(self.j0), self._midpoint(self.j1)
         halves = [(low0, low0 + 1, low1 + 1), (low0, low1 + 1, low1)]

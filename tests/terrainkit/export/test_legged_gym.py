@@ -11,7 +11,7 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.export.legged_gym import MODULE, corner_heights, x_edges
+from terrainkit.export.legged_gym import MODULE, heights_at_corners, x_edges
 
 
 def make_cfg(mesh_type="trimesh", **values):
@@ -136,9 +136,9 @@ def test_terrain_has_goals_of_extreme_parkour(load):
     assert not hasattr(load(terrain_map).Terrain(make_cfg()), "goals")
 
 
-def test_corner_heights_by_hand():
+def test_heights_at_corners_by_hand():
     heights = np.array([[0.0, 1.0], [2.0, 3.0]])
-    assert corner_heights(heights).tolist() == [[0, 1, 1], [2, 3, 3], [2, 3, 3]]
+    assert heights_at_corners(heights).tolist() == [[0, 1, 1], [2, 3, 3], [2, 3, 3]]
 
 
 def test_x_edges_are_widened_along_x(load):
@@ -148,9 +148,9 @@ def test_x_edges_are_widened_along_x(load):
     assert np.argwhere(edges).tolist() == [[5, 0], [5, 1]]
     assert not x_edges(heights, 0.5).any()  # no higher than a wall
     module = load(make_map("stairs"))
-    assert np.argwhere(module._widened(edges, 2)[:, :1])[:, 0].tolist() == [3, 4, 5, 6, 7]
+    assert np.argwhere(module._dilate(edges, 2)[:, :1])[:, 0].tolist() == [3, 4, 5, 6, 7]
     for cfg, width in ((make_cfg(), 0), (make_cfg(edge_width_thresh=0.2), 2)):
-        expected = module._widened(module.load()["x_edges"], width)
+        expected = module._dilate(module.load()["x_edges"], width)
         np.testing.assert_array_equal(module.Terrain(cfg).x_edge_mask, expected)
 
 
@@ -191,7 +191,7 @@ def test_add_heightfield_has_columns_along_x(load):
     assert (params.column_scale, params.row_scale, params.vertical_scale) == (0.1, 0.1, 0.001)
     assert (params.transform.p.x, params.transform.p.y) == (-2.0, -2.0)
     assert params.static_friction == 1.0
-    expected = corner_heights(terrain_map.heights.astype(float)) / 0.001
+    expected = heights_at_corners(terrain_map.heights.astype(float)) / 0.001
     assert buffer.reshape(281, 461) == pytest.approx(expected, abs=0.51)
 
 

@@ -242,8 +242,8 @@ def test_mjcf_surface_has_boxes_and_the_heightfield_below_them():
     lowered = [-0.5, -0.5, 0, 0, 0.05, 0.05, -0.5, -0.5, -0.5, -0.5]
     assert surface.heights[:, 1] == pytest.approx(lowered)
     tops = [0, 0, 0, -np.inf, -np.inf, 0.05, 0.05, 0.05, 0.05, 1.0]
-    assert surface.box_tops[:, 1] == pytest.approx(tops)
-    assert mjcf.collision_surface(plot(heights), "hfield").box_tops is None
+    assert surface.box_top[:, 1] == pytest.approx(tops)
+    assert mjcf.collision_surface(plot(heights), "hfield").box_top is None
 
 
 @pytest.mark.parametrize(("scan", "heights"), [(False, [0.6, 0, 0.7]), (True, [0.6, 0.6, 0])])
@@ -265,7 +265,7 @@ def test_mjcf_has_the_same_ground_away_from_walls(terrain_map, tmp_path, collisi
     assert set(model.geom_friction[:, 0]) == {0.8}
     if collision == "boxes":
         # The heightfield that holds what is not level leans over the cells next to it.
-        covered = terrain_map.boxes().covered
+        covered = terrain_map.boxes().box_mask
         assert_same_ground(model, terrain_map, ~binary_dilation(~covered, AROUND))
     else:
         assert model.ngeom == 1 + 4  # and the border

@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit.feasibility.edges import step_edges
 from terrainkit.feasibility.footholds import foothold_sizes
-from terrainkit.feasibility.slopes import slopes_of
+from terrainkit.feasibility.gradient import gradient_of
 from tests.limits import LIMITS, columns_of
 
 WIDE = replace(LIMITS, foothold=0.4)
@@ -13,7 +13,7 @@ WIDE = replace(LIMITS, foothold=0.4)
 
 def sizes(heights, limits=WIDE, ceiling=np.inf):
     columns = columns_of(heights, ceiling)
-    steps = step_edges(columns, slopes_of(columns.floor, 0.1))
+    steps = step_edges(columns, gradient_of(columns.floor, 0.1))
     found = foothold_sizes(columns, steps, limits)
     return found[..., 0] if np.ndim(heights) == 2 else found
 

@@ -47,7 +47,7 @@ def test_path_need_not_go_far_to_a_gap():
 
 
 def test_memory_of_noise_is_bounded():
-    """Noise makes a region of each place; pairs of them took 2 GB."""
+    """Noise makes a component of each place; pairs of them took 2 GB."""
     noise = make_overlay("noise", {"amplitude": 0.05})
     terrain = SubTerrain(terrain="slit", overlays=(noise,))
     config = MapConfig(terrains=(terrain,), rows=1, cols=1)

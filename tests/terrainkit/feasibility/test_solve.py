@@ -139,7 +139,7 @@ def test_patches_are_the_same_up_to_their_places():
     crawl = SubTerrain(terrain="crawl")
     config = MapConfig(terrains=(crawl,), rows=1, cols=2)
     first = build_patch(config, crawl, 0.5, 0, 0)
-    solids = first.solids.transformed(np.eye(3), [0, 8, 0])
+    solids = first.solids.transform(np.eye(3), [0, 8, 0])
     goals = first.goals + np.float32([0, 8, 0, 0])
     other = replace(first, grid=config.patch_grid(0, 1), solids=solids, goals=goals)
     assert _is_same(first, other)

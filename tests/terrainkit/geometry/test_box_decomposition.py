@@ -51,12 +51,12 @@ def patch(terrain, *, size=(6.0, 4.0), border=0.0, **parameters):
 @any_walls
 def test_boxes_match_covered_cells(heights, threshold):
     cover = cover_of(heights, threshold, tuple(np.array([0, n // 2, n]) for n in heights.shape))
-    on, off = (points_in_cells(cells) for cells in (cover.covered, ~cover.covered))
+    on, off = (points_in_cells(cells) for cells in (cover.box_mask, ~cover.box_mask))
     ground = surface_at(heights, on - 0.5, threshold=threshold).height
     np.testing.assert_allclose(top_at(cover, on), ground, atol=1e-6)
     ground = surface_at(heights, off - 0.5, threshold=threshold).height
     assert (top_at(cover, off) <= ground + 1e-6).all()
-    assert cover.covered.all() or threshold > 1  # else all steps are walls
+    assert cover.box_mask.all() or threshold > 1  # else all steps are walls
 
 
 @any_walls
@@ -71,8 +71,8 @@ def test_flat_cells_are_flat_everywhere(heights, threshold):
 
 def test_boxes_of_a_level_map(level_map):
     cover = level_map.boxes()
-    assert cover.covered.all()
-    place = points_in_cells(cover.covered, level_map.config.cell, level_map.grid.lower)
+    assert cover.box_mask.all()
+    place = points_in_cells(cover.box_mask, level_map.config.cell, level_map.grid.lower)
     np.testing.assert_allclose(top_at(cover, place), level_map.height(place), atol=1e-3)
     bottoms = cover.centers[:, 2] - cover.half_sizes[:, 2]
     np.testing.assert_allclose(bottoms, level_map.heights.min() - 1.0)
@@ -82,9 +82,9 @@ def test_boxes_of_a_level_map(level_map):
 
 def test_boxes_never_exceed_a_map_with_slopes(terrain_map):
     cover = terrain_map.boxes()
-    assert 0.5 < cover.covered.mean() < 1.0
+    assert 0.5 < cover.box_mask.mean() < 1.0
     cell, lower = terrain_map.config.cell, terrain_map.grid.lower
-    on, off = (points_in_cells(cells, cell, lower) for cells in (cover.covered, ~cover.covered))
+    on, off = (points_in_cells(cells, cell, lower) for cells in (cover.box_mask, ~cover.box_mask))
     np.testing.assert_allclose(top_at(cover, on), terrain_map.height(on), atol=1e-3)
     assert (top_at(cover, off) < terrain_map.height(off) + 1e-3).all()
 
@@ -128,7 +128,7 @@ def test_boxes_of_a_slope_with_walls_cover_its_flat_ends():
     # Both ends are at height 0, so one box reaches under the slope from one to the other.
     assert sorted(tops(cover).tolist()) == pytest.approx([-1.0, 0.0])
     # From the last of 15 flat cells, where the slope starts, to the first at the other end.
-    assert np.flatnonzero(~cover.covered.all(axis=1)).tolist() == list(range(14, 46))
+    assert np.flatnonzero(~cover.box_mask.all(axis=1)).tolist() == list(range(14, 46))
 
 
 def stripes(counts, axis):
@@ -158,7 +158,7 @@ def test_boxes_are_longer_where_that_halves_their_number():
 def test_boxes_of_many_heights_do_not_reach_under_each_other(number):
     heights = np.repeat(np.arange(number, dtype=np.float32)[:, None], 20, axis=1)
     cover = cover_of(heights, 0.075, cell=0.1)
-    assert cover.covered.all()
+    assert cover.box_mask.all()
     expected = np.ones(number) if number > 50 else np.arange(number, 0, -1)
     order = np.argsort(tops(cover))
     np.testing.assert_allclose(2 * cover.half_sizes[order, 0], 0.1 * expected)

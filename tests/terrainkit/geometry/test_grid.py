@@ -126,7 +126,7 @@ def test_whole_cells_rejects_uncountable_lengths(length):
 
 
 def test_grid_margins_are_cells_beyond_the_block():
-    assert Grid(shape=(80, 41), cell=0.1).margins((30, 11)) == (25, 15)
+    assert Grid(shape=(80, 41), cell=0.1).margin((30, 11)) == (25, 15)
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ PLATE = make_boxes((0, 0, 1), (2, 2, 0.1), rpy=(0, np.pi / 4, 0))  # falls with 
 TETRAHEDRON = make_hulls([[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]])
 
 
-def spans(solids, *xy, radius=0.0):
-    return SolidIndex(solids, radius=radius).spans(np.array(xy, dtype=float))
+def intervals(solids, *xy, radius=0.0):
+    return SolidIndex(solids, radius=radius).intervals(np.array(xy, dtype=float))
 
 
 @pytest.mark.parametrize(
@@ -52,24 +52,24 @@ def spans(solids, *xy, radius=0.0):
         (TETRAHEDRON, (-0.1, 0.25), 0.2, [0, 0.85 + 0.2 * np.sqrt(2)]),
     ],
 )
-def test_spans_of_a_solid(solid, xy, radius, expected):
-    found = spans(solid, xy, radius=radius)
+def test_intervals_of_a_solid(solid, xy, radius, expected):
+    found = intervals(solid, xy, radius=radius)
     if expected is None:
         assert found.shape[1] == 0
     else:
         assert found[0] == pytest.approx(np.array([expected]), abs=1e-6)
 
 
-def test_spans_are_in_the_order_of_their_bottoms():
+def test_intervals_are_in_the_order_of_their_bottoms():
     stack = make_boxes([[0, 0, 3], [0, 0, 1], [9, 0, 2]], (1, 1, 1))
-    found = spans(stack, (0, 0), (9, 0), (5, 5))
+    found = intervals(stack, (0, 0), (9, 0), (5, 5))
     expected = [[[0.5, 1.5], [2.5, 3.5]], [[1.5, 2.5], [np.nan] * 2], [[np.nan] * 2] * 2]
     np.testing.assert_array_equal(found, expected)
 
 
-def test_spans_without_solids_or_points():
-    assert spans(Solids.empty(), (0, 0)).shape == (1, 0, 2)
-    assert SolidIndex(CUBE).spans(np.empty((0, 2))).shape == (0, 0, 2)
+def test_intervals_without_solids_or_points():
+    assert intervals(Solids.empty(), (0, 0)).shape == (1, 0, 2)
+    assert SolidIndex(CUBE).intervals(np.empty((0, 2))).shape == (0, 0, 2)
 
 
 def random_solids(rng, number):
@@ -88,7 +88,7 @@ def random_solids(rng, number):
 
 
 @pytest.mark.parametrize("number", [1, 20])
-def test_spans_agree_with_mujoco(number):
+def test_intervals_agree_with_mujoco(number):
     rng = np.random.default_rng(number)
     solids = random_solids(rng, number)
     spec = mujoco.MjSpec()
@@ -105,7 +105,7 @@ def test_spans_agree_with_mujoco(number):
     mujoco.mj_forward(model, data)
 
     xy = rng.uniform(-4, 4, (300, 2))
-    found = spans(solids, *xy)
+    found = intervals(solids, *xy)
     hits = 0
     for (x, y), lines in zip(xy, found, strict=True):
         lines = lines[~np.isnan(lines[:, 0])]
@@ -127,9 +127,9 @@ def test_spans_agree_with_mujoco(number):
 @pytest.mark.parametrize(
     ("name", "value"), [("_MAX_PAIRS", 5), ("_MIN_BIN", 50.0), ("_MAX_BINS", 4)]
 )
-def test_spans_do_not_depend_on_blocks_and_bins(monkeypatch, name, value):
+def test_intervals_do_not_depend_on_blocks_and_bins(monkeypatch, name, value):
     rng = np.random.default_rng(0)
     solids, xy = random_solids(rng, 10), rng.uniform(-6, 6, (200, 2))
-    expected = spans(solids, *xy)
+    expected = intervals(solids, *xy)
     monkeypatch.setattr(solid_index, name, value)
-    np.testing.assert_array_equal(spans(solids, *xy), expected)
+    np.testing.assert_array_equal(intervals(solids, *xy), expected)

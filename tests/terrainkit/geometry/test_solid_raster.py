@@ -50,9 +50,9 @@ def test_solid_raster_agrees_with_the_index_within_a_pixel():
     xy, z = rng.uniform(-4, 4, (2000, 2)), rng.uniform(-3, 3, 2000)
 
     def exact(points):
-        spans = SolidIndex(solids).spans(points)
-        reached = spans[..., 0] <= z[:, None]
-        return np.max(spans[..., 1], axis=1, where=reached, initial=-np.inf)
+        intervals = SolidIndex(solids).intervals(points)
+        reached = intervals[..., 0] <= z[:, None]
+        return np.max(intervals[..., 1], axis=1, where=reached, initial=-np.inf)
 
     near = [
         exact(xy + PIXEL * np.array(step)) for step in ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1))

@@ -113,7 +113,7 @@ def mixed():
 
 
 def test_solids_are_ordered_by_kind_and_selected_together(mixed):
-    assert mixed.kinds.tolist() == [0, 0, 1, 1, 2, 2]
+    assert mixed.types.tolist() == [0, 0, 1, 1, 2, 2]
     np.testing.assert_allclose(mixed.friction, [0.7, 0.7, np.nan, np.nan, 0.1, 0.2], rtol=1e-6)
     assert mixed.collides.tolist() == [True, True, True, False, True, True]
     assert mixed.visible.all()
@@ -124,15 +124,15 @@ def test_solids_are_ordered_by_kind_and_selected_together(mixed):
     assert chosen.hulls()[0].tolist() == (TETRAHEDRON + 2).tolist()
     assert chosen.collides.tolist() == [True, False, True]
     both = Solids.concatenate([chosen, Solids.empty(), mixed.select(~mask)])
-    assert both.select(np.arange(6) % 2 == 0).differing(chosen, 0.0) == []
+    assert both.select(np.arange(6) % 2 == 0).diff(chosen, 0.0) == []
     assert mixed.select(mask | True) is mixed
 
 
 def test_solids_differ_by_more_than_a_tolerance(mixed):
     friction = mixed.friction + np.float32(0.01)
     other = replace(mixed, friction=friction, patch=mixed.patch[:3])
-    assert mixed.differing(other, 0.009) == ["friction", "patch"]
-    assert mixed.differing(other, 0.011) == ["patch"]
+    assert mixed.diff(other, 0.009) == ["friction", "patch"]
+    assert mixed.diff(other, 0.011) == ["patch"]
 
 
 @pytest.mark.parametrize(
@@ -202,7 +202,7 @@ def test_solids_transformed_bounds_follow_the_vertices(reflect):
     box = make_boxes((1, 2, 3), (2, 1, 0.5), rpy=(0.4, 0.2, 0.1))
     corners = np.stack(np.meshgrid(*[[-0.5, 0.5]] * 3), axis=-1).reshape(-1, 3) * (2, 1, 0.5)
     world = corners @ rotation_matrices(box.boxes[:, 6:])[0].T + (1, 2, 3)
-    moved = Solids.concatenate([box, make_hulls([world])]).transformed(matrix, (5, 0, 0))
+    moved = Solids.concatenate([box, make_hulls([world])]).transform(matrix, (5, 0, 0))
     expected = world @ matrix.T + (5, 0, 0)
     lower, upper = moved.bounds()
     assert lower == pytest.approx(np.tile(expected.min(axis=0), (2, 1)), abs=1e-5)

@@ -99,7 +99,7 @@ def test_surface_has_the_solids_that_collide_or_are_seen():
         heights=np.full((2, 2), 2.0, np.float32),
         first_sample=(0.0, 0.0),
         cell=1.0,
-        colliding=SimpleNamespace(top=lambda x, y, z: x + 10 * y + 100 * (z > 3)),
+        collision=SimpleNamespace(top=lambda x, y, z: x + 10 * y + 100 * (z > 3)),
         visible=SimpleNamespace(top=lambda x, y, z: 10 * x + y + 0 * z),
     )
     x, y = np.array([1, 0.5], np.float32), np.array([0, 0.5], np.float32)
@@ -119,10 +119,10 @@ FIELD = np.array([[0, 1, 5], [2, 4, 9], [3, 3, 7]], dtype=np.float32)
 NO_BOX = np.full((3, 3), -np.inf, np.float32)
 
 
-def heightfield(u, v, box_tops=None):
+def heightfield(u, v, box_top=None):
     """Return the height at a point in units of samples."""
     surface = HeightfieldSurface(
-        heights=FIELD, first_sample=(10.0, 20.0), cell=0.5, box_tops=box_tops
+        heights=FIELD, first_sample=(10.0, 20.0), cell=0.5, box_top=box_top
     )
     x, y = np.array([10 + 0.5 * u], np.float32), np.array([20 + 0.5 * v], np.float32)
     return surface.height(x, y).item()
@@ -141,7 +141,7 @@ def heightfield(u, v, box_tops=None):
 )
 def test_heightfield_is_two_triangles_per_cell(place, height):
     assert heightfield(*place) == height
-    assert heightfield(*place, box_tops=NO_BOX) == height
+    assert heightfield(*place, box_top=NO_BOX) == height
 
 
 @pytest.mark.parametrize(
@@ -150,4 +150,4 @@ def test_heightfield_is_two_triangles_per_cell(place, height):
 def test_heightfield_has_boxes_around_its_samples(place, height):
     tops = NO_BOX.copy()
     tops[1, 1], tops[1, 0] = 8.0, 1.0  # the second one is under the ground
-    assert heightfield(*place, box_tops=tops) == height
+    assert heightfield(*place, box_top=tops) == height

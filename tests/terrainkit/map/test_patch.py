@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, make_patch
 from terrainkit.errors import ConfigError
-from terrainkit.map.patch import PatchParameters, with_headings
+from terrainkit.map.patch import PatchParameters, with_heading
 from terrainkit.terrains.obstacles import Obstacles
 from terrainkit.terrains.rough import Rough
 
@@ -30,12 +30,12 @@ def test_make_patch_describes_itself():
 def test_spawns_head_to_the_first_goal():
     goals = np.array([[4.0, 3.0, 0.0, 1.0], [9.0, 9.0, 0.0, 0.0]], np.float32)
     positions = np.array([[1.0, 3.0, 0.5], [4.0, 1.0, 0.0], [5.0, 2.0, 0.0]])
-    spawns = with_headings(positions, goals, 0.7)
+    spawns = with_heading(positions, goals, 0.7)
     assert spawns[:, :3].tolist() == positions.tolist()
     assert spawns[:, 3] == pytest.approx([0.0, np.pi / 2, np.pi * 3 / 4])
-    assert with_headings(positions, goals[:0], 0.7)[:, 3] == pytest.approx([0.7] * 3)
+    assert with_heading(positions, goals[:0], 0.7)[:, 3] == pytest.approx([0.7] * 3)
     patch = make_patch(MapConfig(terrains=(SubTerrain(terrain="crawl"),), spawns_per_patch=3), 0, 0)
-    expected = with_headings(patch.spawns[:, :3].astype(float), patch.goals)
+    expected = with_heading(patch.spawns[:, :3].astype(float), patch.goals)
     assert patch.spawns == pytest.approx(expected, abs=1e-5)
 
 
@@ -49,11 +49,11 @@ def test_make_patch_records_requested_and_realized():
 def test_parameters_differ_by_request_or_realization():
     first = PatchParameters(requested={"a": 1, "b": 2}, realized={"a": 1, "b": 2})
     other = PatchParameters(requested={"a": 1, "b": 2, "c": 3}, realized={"a": 1.5, "b": 2})
-    assert first.differing(first) == []
-    assert first.differing(other) == other.differing(first) == ["a", "c"]
+    assert first.diff(first) == []
+    assert first.diff(other) == other.diff(first) == ["a", "c"]
 
 
-def test_far_sides_are_farthest_from_the_origin():
+def test_far_edges_are_farthest_from_the_origin():
     """Sides count that are nearer than the farthest one by up to 0.15 m."""
     patch = make_patch(
         MapConfig(patch_size=(8.0, 4.0), terrains=(SubTerrain(terrain="flat"),)), 0, 0
@@ -61,7 +61,7 @@ def test_far_sides_are_farthest_from_the_origin():
     sides = []
     for x, y in ((4.0, 2.0), (4.07, 2.0), (4.08, 2.0), (2.0, 0.5), (4.0, 7.9)):
         spawns = np.array([[x, y, 0, 0]], np.float32)
-        sides.append(dataclasses.replace(patch, spawns=spawns).far_sides.tolist())
+        sides.append(dataclasses.replace(patch, spawns=spawns).far_edges.tolist())
     assert sides == [
         [[True, False], [True, False]],
         [[True, False], [True, False]],

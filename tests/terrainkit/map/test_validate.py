@@ -103,7 +103,7 @@ def test_validate_compares_type_parameters_solids_and_goals():
     config = tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(crawl,))
     made = tk.generate(config)
     other = tk.MapConfig(rows=1, cols=1, border=0.0, terrains=(tk.SubTerrain(terrain="flat"),))
-    moved = made.solids.transformed(np.eye(3), [0, 0, 2e-3])
+    moved = made.solids.transform(np.eye(3), [0, 0, 2e-3])
     moved = replace(moved, patch=made.solids.patch)
     goals = made.goals + np.float32([0, 0, 2e-3, 0])
     friction = made.friction.copy()

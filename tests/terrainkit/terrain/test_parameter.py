@@ -104,14 +104,14 @@ def test_parameter_realized_snaps_to_cells(name, value, realized):
     assert HURDLE[name].realized(value, GRID) == realized
 
 
-def test_realized_length_is_shorter_where_ground_slopes_away():
+def test_realized_length_is_shorter_where_ground_sloped_edge():
     grid = Grid(shape=(80, 51), cell=0.1)
-    for snap, slopes_away, realized in (
+    for snap, sloped_edge, realized in (
         ("cells", True, 1.95),
         ("centered", True, (1.9, 2.0)),
         ("centered", False, (2.0, 2.1)),
     ):
-        length = Parameter(easy=1.0, hard=1.0, snap=snap, slopes_away=slopes_away)
+        length = Parameter(easy=1.0, hard=1.0, snap=snap, sloped_edge=sloped_edge)
         assert length.realized(2.0, grid) == realized
 
 
@@ -123,8 +123,8 @@ def test_realized_length_is_shorter_where_ground_slopes_away():
         ({"tolerance": 0.01}, 0.1),
         ({"snap": "cells"}, 0.05),
         ({"snap": "centered"}, 0.1),
-        ({"snap": "cells", "slopes_away": True}, 0.1),
-        ({"snap": "centered", "slopes_away": True}, 0.2),
+        ({"snap": "cells", "sloped_edge": True}, 0.1),
+        ({"snap": "centered", "sloped_edge": True}, 0.2),
     ],
 )
 def test_parameter_deviates_by_more_than_snapping(declared, allowed):

@@ -29,7 +29,7 @@ def test_transformed_moves_everything_alike(matrix):
         goals=np.array([[*peak, 2.0, 0.0]]),
         spawn=tuple(peak.tolist()),
         spawn_radius=0.5,
-    ).transformed(matrix)
+    ).transform(matrix)
     moved = matrix @ (peak - grid.center) + grid.center
     index = (moved - grid.lower) / grid.cell - 0.5
     assert surface_at(patch.heights, index[None], threshold=np.inf).height == pytest.approx(2.0)

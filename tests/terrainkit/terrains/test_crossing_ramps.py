@@ -12,7 +12,7 @@ def test_crossing_ramps_neighbors_are_a_quarter_turn_apart():
     center = np.column_stack([x.ravel(), y.ravel()])
 
     def slope(step):
-        low, high = (index.spans(center + sign * np.array(step))[:, 0, 1] for sign in (-1, 1))
+        low, high = (index.intervals(center + sign * np.array(step))[:, 0, 1] for sign in (-1, 1))
         return ((high - low) / 0.2).reshape(8, 13)
 
     along, across = slope([0.1, 0.0]), slope([0.0, 0.1])

@@ -26,6 +26,6 @@ def test_maze_goals_lead_through_open_cells(size):
         # No wall is on the straight lines from the spawn over the goals to the exit.
         xy = np.vstack([patch.origin[:2], patch.goals[:, :2]]).astype(float)
         way = [a + (b - a) * t for a, b in itertools.pairwise(xy) for t in np.linspace(0, 1, 50)]
-        assert np.isnan(SolidIndex(patch.solids).spans(np.array(way))).all()
+        assert np.isnan(SolidIndex(patch.solids).intervals(np.array(way))).all()
         _, upper = patch.solids.bounds()
         assert patch.goals[-1, 0] == pytest.approx(upper[:, 0].max() - 0.1, abs=1e-4)

@@ -93,7 +93,7 @@ def test_shaded_relief_is_brighter_toward_the_light():
 
 
 def test_preview_height_scale_includes_the_tops_of_solids(solid_map):
-    lifted = solid_map.solids.transformed(np.eye(3), np.array([0.0, 0.0, 3.0]))
+    lifted = solid_map.solids.transform(np.eye(3), np.array([0.0, 0.0, 3.0]))
     # The top of the cylinder is the highest.
     for solids, top in ((Solids.empty(), 0.0), (solid_map.solids, 0.7), (lifted, 3.7)):
         bar = color_bar(render_preview(dataclasses.replace(solid_map, solids=solids), 400))

@@ -12,7 +12,7 @@ import torch
 from onnx import TensorProto, helper, numpy_helper
 
 from terrainkit.errors import ConfigError
-from terrainkit.files.isolated import ProcessLimits
+from terrainkit.files.child_process import ProcessLimits
 from terrainkit_robots.policy import onnx_policy
 from terrainkit_robots.policy.evaluate import EvaluationConfig, evaluate
 from terrainkit_robots.policy.export import export_policy

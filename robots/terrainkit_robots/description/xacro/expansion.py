@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.files.isolated import import_path
+from terrainkit.files.child_process import import_path
 from terrainkit_robots.description.xacro.process import ORIGIN
 
 MAX_SECONDS = 8.0

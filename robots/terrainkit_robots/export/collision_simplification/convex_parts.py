@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.files.isolated import IsolatedError
+from terrainkit.files.child_process import ProcessError
 from terrainkit.geometry.convex_decomposition import SEARCH, convex_decomposition
 from terrainkit_robots.export.collision_simplification.decomposition_cache import (
     is_valid,
@@ -70,7 +70,7 @@ def _version() -> str:
 def _decompose(surface: Surface) -> tuple[Surface, ...]:
     try:
         found = convex_decomposition(surface.points, surface.faces, PARAMETERS)
-    except IsolatedError as error:
+    except ProcessError as error:
         raise MeshError(f"makes CoACD fail: {error}") from None
     parts = tuple(Surface(points=points, faces=faces) for points, faces in found)
     if not parts or not all(map(is_valid, parts)):

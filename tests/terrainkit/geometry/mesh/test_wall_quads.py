@@ -33,8 +33,8 @@ def test_wall_quads_of_no_quads_are_empty():
 def test_wall_quads_center_has_one_vertex_per_height(corners, centers):
     triangles, vertices = center_quad(corners)
     np.testing.assert_allclose(vertices, [(CELL, CELL, z) for z in centers], rtol=1e-6)
-    added = np.unique(triangles[triangles >= 100])
-    assert added.tolist() == list(range(100, 100 + len(centers)))
+    extra = np.unique(triangles[triangles >= 100])
+    assert extra.tolist() == list(range(100, 100 + len(centers)))
 
 
 @pytest.mark.parametrize("corners", [(1, 0, 1, 0), (0, 1, 0, 1), (3, 0, 2, 1), (0, 3, 1, 2)])

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.files.isolated import ProcessLimits
+from terrainkit.files.child_process import ProcessLimits
 from terrainkit.geometry import convex_decomposition
 from terrainkit_robots.export.collision_simplification import convex_parts as module
 from terrainkit_robots.export.collision_simplification.convex_parts import convex_parts

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.geometry.rectangle_cover import rectangle_cover
+from terrainkit.geometry.rectangle_decomposition import decompose_rectangles
 from tests.terrainkit.geometry.heightfields import MASKS, for_any
 
 
@@ -33,23 +33,23 @@ def cells(spans, shape):
         ("#...# #...#", "##### #...#", 2),
     ],
 )
-def test_rectangle_cover_is_minimal_for_simple_shapes(wanted, allowed, number):
+def test_rectangle_decomposition_is_minimal_for_simple_shapes(wanted, allowed, number):
     wanted, allowed = mask(wanted), mask(allowed)
-    spans = rectangle_cover(wanted, allowed)
+    spans = decompose_rectangles(wanted, allowed)
     count = cells(spans, wanted.shape)
     assert len(spans) == number
     assert (count[wanted] > 0).all()
     assert (count[~allowed] == 0).all()
 
 
-def test_rectangle_cover_spans_are_first_index_first():
-    assert rectangle_cover(mask(".... .###"), mask(".... .###")) == [(1, 2, 1, 4)]
+def test_rectangle_decomposition_spans_are_first_index_first():
+    assert decompose_rectangles(mask(".... .###"), mask(".... .###")) == [(1, 2, 1, 4)]
 
 
 @for_any(allowed=MASKS, seed=MASKS)
-def test_rectangle_cover_is_exact_and_not_redundant(allowed, seed):
+def test_rectangle_decomposition_is_exact_and_not_redundant(allowed, seed):
     wanted = allowed & np.resize(seed, allowed.shape)
-    spans = rectangle_cover(wanted, allowed)
+    spans = decompose_rectangles(wanted, allowed)
     count = cells(spans, wanted.shape)
     assert (count[wanted] > 0).all()
     assert (count[~allowed] == 0).all()
@@ -58,8 +58,8 @@ def test_rectangle_cover_is_exact_and_not_redundant(allowed, seed):
         assert (alone & wanted[i0:i1, j0:j1]).any()
 
 
-def test_rectangle_cover_of_large_shape_is_small():
+def test_rectangle_decomposition_of_large_shape_is_small():
     wanted = np.zeros((400, 300), dtype=bool)
     wanted[20:380, 30:60] = wanted[20:380, 200:230] = wanted[100:130, 30:230] = True
-    spans = rectangle_cover(wanted, wanted)
+    spans = decompose_rectangles(wanted, wanted)
     assert sorted(spans) == [(20, 380, 30, 60), (20, 380, 200, 230), (100, 130, 30, 230)]

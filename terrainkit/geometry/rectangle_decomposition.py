@@ -29,7 +29,7 @@ class _Rectangle(NamedTuple):
         return (i1 - i0) * (j1 - j0)
 
 
-def rectangle_cover(required: Mask, allowed: Mask) -> list[Span]:
+def decompose_rectangles(required: Mask, allowed: Mask) -> list[Span]:
     """Return few rectangles that cover all of `required` and nothing outside of `allowed`.
 
     The minimum cover is NP-hard. This is the greedy cover, which is at most ln(n) + 1 times as
@@ -47,21 +47,21 @@ def rectangle_cover(required: Mask, allowed: Mask) -> list[Span]:
     )
     present = np.zeros(count, dtype=bool)
     present[labels[required]] = True
-    spans: list[Span] = []
+    rectangles: list[Span] = []
     for k in np.flatnonzero(present).tolist():
         # OpenCV's x is the second index.
         j, i, width, height, area = stats[k].tolist()
         if area == width * height:
-            spans.append((i, i + height, j, j + width))
+            rectangles.append((i, i + height, j, j + width))
             continue
         part = slice(i, i + height), slice(j, j + width)
         inside = labels[part] == k
-        found = _cover_component(required[part] & inside, inside)
-        spans += [(i + i0, i + i1, j + j0, j + j1) for i0, i1, j0, j1 in found]
-    return spans
+        found = _decompose_component(required[part] & inside, inside)
+        rectangles += [(i + i0, i + i1, j + j0, j + j1) for i0, i1, j0, j1 in found]
+    return rectangles
 
 
-def _cover_component(required: Mask, allowed: Mask) -> list[Span]:
+def _decompose_component(required: Mask, allowed: Mask) -> list[Span]:
     required_rows, allowed_rows = _row_bits(required), _row_bits(allowed)
     # Bit i * width + j is cell (i, j). A rectangle's cells are counted from its first row.
     width = required.shape[1]
@@ -72,7 +72,7 @@ def _cover_component(required: Mask, allowed: Mask) -> list[Span]:
         covered = run * (first_column & ((1 << (i1 - i0) * width) - 1))
         span = i0, i1, (run & -run).bit_length() - 1, run.bit_length()
         candidates.append(_Rectangle(span, i0 * width, covered & (cells >> (i0 * width))))
-    return [rectangle.span for rectangle in _drop_redundant(_select_greedily(candidates, cells))]
+    return [rectangle.span for rectangle in _drop_redundant(_select(candidates, cells))]
 
 
 def _row_bits(mask: Mask) -> list[int]:
@@ -101,7 +101,7 @@ def _maximal_rectangles(required: list[int], allowed: list[int]) -> Iterator[tup
         above = allowed[i0]
 
 
-def _select_greedily(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
+def _select(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
     """Return rectangles in greedy order, each with the cells that it was the first to cover."""
     queue = [(-each.cells.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
     heapq.heapify(queue)

@@ -6,31 +6,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrainkit.files.isolated import IsolatedError, ProcessLimits, run_isolated
+from terrainkit.files.child_process import ProcessError, ProcessLimits, run_in_process
 
 pytestmark = pytest.mark.usefixtures("real_child")
 
 
-def test_isolated_returns_arrays():
+def test_child_process_returns_arrays():
     heights = np.arange(6.0).reshape(2, 3)
-    arrays = run_isolated(dict, [("heights", heights)])
+    arrays = run_in_process(dict, [("heights", heights)])
     assert list(arrays) == ["heights"]
     assert np.array_equal(arrays["heights"], heights)
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="Linux only")
-def test_isolated_address_space_does_not_depend_on_the_number_of_cpus(tmp_path, monkeypatch):
+def test_child_process_address_space_does_not_depend_on_the_number_of_cpus(tmp_path, monkeypatch):
     code = "import os\ndef threads():\n    return {'number': len(os.listdir('/proc/self/task'))}\n"
     (tmp_path / "own_threads.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
     threads = importlib.import_module("own_threads").threads
-    assert run_isolated(threads)["number"] == 1  # numpy of PyPI has one for each CPU
+    assert run_in_process(threads)["number"] == 1  # numpy of PyPI has one for each CPU
 
 
-def test_isolated_imports_nothing_from_the_current_folder(tmp_path, monkeypatch):
+def test_child_process_imports_nothing_from_the_current_folder(tmp_path, monkeypatch):
     (tmp_path / "numpy.py").write_text("raise SystemExit('stranger')")
     monkeypatch.chdir(tmp_path)
-    assert run_isolated(dict, [("a", np.ones(1))])["a"].tolist() == [1.0]
+    assert run_in_process(dict, [("a", np.ones(1))])["a"].tolist() == [1.0]
 
 
 @pytest.mark.parametrize(
@@ -47,17 +47,17 @@ def test_isolated_imports_nothing_from_the_current_folder(tmp_path, monkeypatch)
         ),
     ],
 )
-def test_isolated_failure_is_one_line(function, arguments, limits, reason):
-    with pytest.raises(IsolatedError, match=reason):
-        run_isolated(function, *arguments, limits=limits)
+def test_child_process_failure_is_one_line(function, arguments, limits, reason):
+    with pytest.raises(ProcessError, match=reason):
+        run_in_process(function, *arguments, limits=limits)
 
 
-def test_isolated_result_is_read_without_pickle():
-    with pytest.raises(IsolatedError, match=r"^the result cannot be read: .*allow_pickle=False"):
-        run_isolated(dict, [("a", np.array([print], dtype=object))])
+def test_child_process_result_is_read_without_pickle():
+    with pytest.raises(ProcessError, match=r"^the result cannot be read: .*allow_pickle=False"):
+        run_in_process(dict, [("a", np.array([print], dtype=object))])
 
 
-def test_isolated_rejects_result_with_damaged_header(tmp_path, monkeypatch):
+def test_child_process_rejects_result_with_damaged_header(tmp_path, monkeypatch):
     code = """
 import atexit, sys, zipfile
 def write():  # as a reader that was taken over
@@ -70,11 +70,11 @@ def damage():
     (tmp_path / "own_result.py").write_text(code)
     monkeypatch.syspath_prepend(tmp_path)
     damage = importlib.import_module("own_result").damage
-    with pytest.raises(IsolatedError, match=r"^the result cannot be read: "):
-        run_isolated(damage)
+    with pytest.raises(ProcessError, match=r"^the result cannot be read: "):
+        run_in_process(damage)
 
 
 @pytest.mark.usefixtures("import_in_process")
 def test_main_needs_memory():
-    with pytest.raises(IsolatedError, match=r"^needs more than 8 GB of memory$"):
-        run_isolated(np.zeros, 1 << 50)
+    with pytest.raises(ProcessError, match=r"^needs more than 8 GB of memory$"):
+        run_in_process(np.zeros, 1 << 50)

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from terrainkit.errors import ExportError
-from terrainkit.files.suffixes import find_module, modules_by_suffix
+from terrainkit.files.suffix import find_module, modules_by_suffix
 
 
 def test_find_module_ignores_the_case_of_the_suffix():

@@ -2,18 +2,18 @@ import cv2
 import numpy as np
 import pytest
 
-from terrainkit.views.heat_map import HeatMapRow, draw_heat_map
+from terrainkit.views.heatmap import HeatmapRow, draw_heatmap
 
 ROWS = [
-    HeatMapRow(label="ab", success=[0.0, 1.0, np.nan], texts=["1", "22", ""], note="xy"),
-    HeatMapRow(label="c", success=[0.5, 0.0, 0.0], texts=["", "", ""]),
+    HeatmapRow(label="ab", success=[0.0, 1.0, np.nan], texts=["1", "22", ""], note="xy"),
+    HeatmapRow(label="c", success=[0.5, 0.0, 0.0], texts=["", "", ""]),
 ]
 RED, GREEN, GRAY, WHITE = [62, 62, 201], [96, 168, 58], [225] * 3, [255] * 3
 LEFT, TOP, WIDTH, HEIGHT = 12 + 9 * 2 + 12, 12 + 2 * 28, 56, 28
 
 
 def draw(title="", note=""):
-    data = draw_heat_map(title, ROWS, note=note)
+    data = draw_heatmap(title, ROWS, note=note)
     return cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
 
 

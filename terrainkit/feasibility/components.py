@@ -1,4 +1,4 @@
-"""Regions: the nodes that steps join below some demand, and which of them a path reaches."""
+"""Components: the nodes that steps join below some demand, and which of them a path reaches."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -12,21 +12,21 @@ from terrainkit.feasibility.edges import Edges
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Regions:
+class Components:
     """The strongly connected components of the usable steps, and the steps from one to another.
 
-    A gap between two nodes of a region would not change the bottleneck.
+    A gap between two nodes of a component would not change the bottleneck.
     """
 
     labels: IntArray
-    """Region of each node, shape (nodes,)."""
+    """Component of each node, shape (nodes,)."""
 
     links: NDArray[np.int32]
-    """First and second region of the steps from one to another, shape (2, n)."""
+    """First and second component of the steps from one to another, shape (2, n)."""
 
     @classmethod
     def build(cls, steps: Edges, mask: NDArray[np.bool_], num_nodes: int) -> Self:
-        """Return the regions that usable steps form.
+        """Return the components that usable steps form.
 
         Args:
             steps: Edges between neighboring columns, in both directions.

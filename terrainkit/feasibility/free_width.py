@@ -1,4 +1,4 @@
-"""Passages: the free width between walls around each node."""
+"""FreeWidth: the free width between walls around each node."""
 
 import math
 from dataclasses import dataclass
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.gradient import SLOPE_LENGTH
 from terrainkit.feasibility.limits import RobotLimits
-from terrainkit.feasibility.slopes import SLOPE_LENGTH
 
 NUM_DIRECTIONS = 8
 """Number of directions in which a passage is measured."""
@@ -20,7 +20,7 @@ _TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Passages:
+class FreeWidth:
     """The free width between walls, at any column and height.
 
     It is the shortest line through the column that ends at a wall on both sides; widths of twice
@@ -45,7 +45,7 @@ class Passages:
 
     @classmethod
     def build(cls, columns: Columns, limits: RobotLimits) -> Self:
-        """Return the passages of the columns of a patch."""
+        """Return the free_width of the columns of a patch."""
         import cv2
 
         reach = math.ceil(limits.body_width / columns.spacing) + 1
@@ -67,17 +67,17 @@ class Passages:
             ),
         )
 
-    def node_widths(self) -> FloatArray:
+    def at_nodes(self) -> FloatArray:
         """Return the free width at each node [m], shape (nx, ny, m)."""
         floor, ceiling = self.columns.floor, self.columns.ceiling
         widths = np.full(floor.shape, 2 * self.limits.body_width)
         node = np.flatnonzero(~np.isnan(floor))
         z = floor.reshape(-1)[node]
         clearance = ceiling.reshape(-1)[node] - z
-        widths.reshape(-1)[node] = self.widths(*self.columns.column(node), z, clearance)
+        widths.reshape(-1)[node] = self.at(*self.columns.column(node), z, clearance)
         return widths
 
-    def widths(self, i: IntArray, j: IntArray, z: FloatArray, clearance: FloatArray) -> FloatArray:
+    def at(self, i: IntArray, j: IntArray, z: FloatArray, clearance: FloatArray) -> FloatArray:
         """Return the free width for robots at columns (i, j), shape (n,).
 
         Args:
@@ -142,7 +142,7 @@ class Passages:
         step_up = self.limits.step_up
         active, levels = np.arange(len(z)), [z]
         (i, j), (nx, ny) = place, columns.shape
-        for cell in _ray_cells(angle, max_width, columns.spacing):
+        for cell in _trace_ray(angle, max_width, columns.spacing):
             # Beyond the patch, the ground continues as at its edge.
             a = np.minimum(np.maximum(i + cell.i, 0), nx - 1)
             b = np.minimum(np.maximum(j + cell.j, 0), ny - 1)
@@ -196,7 +196,7 @@ class _Cell(NamedTuple):
 
 
 @cache
-def _ray_cells(angle: float, length: float, spacing: float) -> list[_Cell]:
+def _trace_ray(angle: float, length: float, spacing: float) -> list[_Cell]:
     """Return the cells that a ray of some length enters [m], in their order."""
     x, y = math.cos(angle), math.sin(angle)
     crossings = [

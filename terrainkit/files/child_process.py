@@ -33,11 +33,11 @@ class ProcessLimits:
     """Largest address space [bytes], where the operating system supports it."""
 
 
-class IsolatedError(TerrainkitError):
+class ProcessError(TerrainkitError):
     """The function failed, crashed, or exceeded a limit; the message is the reason in one line."""
 
 
-def run_isolated(
+def run_in_process(
     function: Callable[..., Mapping[str, Any]], *arguments: Any, limits: ProcessLimits | None = None
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays that a function returns by name, called in a child process.
@@ -50,7 +50,7 @@ def run_isolated(
         limits: Limits of the child process; None for the defaults.
 
     Raises:
-        IsolatedError: if the function fails, crashes, or exceeds a limit.
+        ProcessError: if the function fails, crashes, or exceeds a limit.
         MemoryLimitError: if the arrays do not fit in memory.
     """
     limits = limits or ProcessLimits()
@@ -74,15 +74,15 @@ def run_isolated(
             with np.load(result, allow_pickle=False) as arrays:
                 return dict(arrays)
         except subprocess.TimeoutExpired:
-            raise IsolatedError(f"takes more than {limits.seconds:g} s") from None
+            raise ProcessError(f"takes more than {limits.seconds:g} s") from None
         except subprocess.CalledProcessError as error:
             lines = error.stderr.decode(errors="replace").strip().splitlines()
             reason = lines[-1] if lines and error.returncode > 0 else "the process crashed"
-            raise IsolatedError(textwrap.shorten(reason, 200, placeholder="...")) from None
+            raise ProcessError(textwrap.shorten(reason, 200, placeholder="...")) from None
         except TerrainkitError:
             raise
         except Exception as error:  # damaged arrays raise various errors of zipfile and numpy
-            raise IsolatedError(f"the result cannot be read: {error}") from None
+            raise ProcessError(f"the result cannot be read: {error}") from None
 
 
 def import_path() -> str:

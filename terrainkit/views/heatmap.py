@@ -1,4 +1,4 @@
-"""Heat maps of success by terrain and level, as pictures."""
+"""Heatmaps of success by terrain and level, as pictures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ _EMPTY, _BLACK, _WHITE = (225, 225, 225), (0, 0, 0), (255, 255, 255)
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeatMapRow:
+class HeatmapRow:
     """The levels of a terrain or a test."""
 
     label: str
@@ -31,11 +31,11 @@ class HeatMapRow:
     """Text to the right of the cells."""
 
 
-def draw_heat_map(title: str, rows: Sequence[HeatMapRow], *, note: str = "") -> bytes:
-    """Return a heat map as the bytes of a PNG.
+def draw_heatmap(title: str, rows: Sequence[HeatmapRow], *, note: str = "") -> bytes:
+    """Return a heatmap as the bytes of a PNG.
 
     Args:
-        title: Text above the heat map.
+        title: Text above the heatmap.
         rows: Rows with the same number of levels.
         note: Heading of the notes.
 

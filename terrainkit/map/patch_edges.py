@@ -1,4 +1,4 @@
-"""Seams: height differences where two patches, or a patch and the border, meet."""
+"""Patch edges: height differences where two patches, or a patch and the border, meet."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from terrainkit.map.terrain_map import TerrainMap
 
 MIN_CLIFF_HEIGHT = 0.5
-"""Height difference that no leg bridges; a lower seam is never a cliff [m]."""
+"""Height difference that no leg bridges; a lower edge is never a cliff [m]."""
 
 Index = tuple[int, int]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seam:
+class PatchEdge:
     """The line along which two patches meet, or a patch and the border."""
 
     height: float
@@ -27,45 +27,45 @@ class Seam:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seams:
-    """The seams of a map."""
+class PatchEdges:
+    """The edges of a map."""
 
     terrain_map: TerrainMap
     """The map."""
 
-    def largest(self) -> Seam | None:
-        """Return the seam with the largest height difference; None without seams."""
-        return max(self._above(-1.0), key=lambda seam: seam.height, default=None)
+    def max(self) -> PatchEdge | None:
+        """Return the edge with the largest height difference; None without edges."""
+        return max(self._find_edges(-1.0), key=lambda edge: edge.height, default=None)
 
-    def cliffs(self) -> list[Seam]:
-        """Return the seams that are cliffs, the highest first.
+    def cliffs(self) -> list[PatchEdge]:
+        """Return the edges that are cliffs, the highest first.
 
-        A seam is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and higher than the largest steps
+        An edge is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and higher than the largest steps
         within the two patches added together. The holes of stepping stones, which end at the edge
-        of their patch, are therefore not cliffs, but the side of a flight of stairs is. A seam is
+        of their patch, are therefore not cliffs, but the side of a flight of stairs is. An edge is
         not a cliff if walls stand along its whole length on both sides.
         """
-        candidates = list(self._above(MIN_CLIFF_HEIGHT))
-        steps = {p: self._max_step(p) for p in {p for seam in candidates for p in seam.patches}}
+        candidates = list(self._find_edges(MIN_CLIFF_HEIGHT))
+        steps = {p: self._max_step(p) for p in {p for edge in candidates for p in edge.patches}}
         cliffs = [
-            seam
-            for seam in candidates
-            if seam.height > sum(steps[p] for p in seam.patches) and not self._is_walled(seam)
+            edge
+            for edge in candidates
+            if edge.height > sum(steps[p] for p in edge.patches) and not self._has_solids(edge)
         ]
-        return sorted(cliffs, key=lambda seam: -seam.height)
+        return sorted(cliffs, key=lambda edge: -edge.height)
 
-    def _above(self, limit: float) -> Iterator[Seam]:
-        for axis, heights in enumerate(self._seam_heights):
+    def _find_edges(self, limit: float) -> Iterator[PatchEdge]:
+        for axis, heights in enumerate(self._edge_heights):
             before, beside = (-1, 0) if axis == 0 else (0, -1)
             for i, j in np.argwhere(heights > limit).tolist():
                 patches = self._patch(i + before, j + beside), self._patch(i, j)
-                yield Seam(height=float(heights[i, j]), patches=patches)
+                yield PatchEdge(height=float(heights[i, j]), patches=patches)
 
     @cached_property
-    def _seam_heights(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Seams along x, shape (rows + 1, cols), and along y, shape (rows, cols + 1) [m].
+    def _edge_heights(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Edges along x, shape (rows + 1, cols), and along y, shape (rows, cols + 1) [m].
 
-        Where the map ends at a patch, there is no seam, and the height is -inf.
+        Where the map ends at a patch, there is no edge, and the height is -inf.
         """
         config, heights = self.terrain_map.config, self.terrain_map.heights
         (nx, ny), (x, y) = config.patch_shape, config.patch_edges
@@ -88,9 +88,9 @@ class Seams:
         steps = heights[1:] - heights[:-1], heights[:, 1:] - heights[:, :-1]
         return float(max(max(s.max(initial=0.0), -s.min(initial=0.0)) for s in steps))
 
-    def _is_walled(self, seam: Seam) -> bool:
-        """Return whether solids cover the samples on both sides of a seam between two patches."""
-        first, second = seam.patches
+    def _has_solids(self, edge: PatchEdge) -> bool:
+        """Return whether solids cover the samples on both sides of an edge between two patches."""
+        first, second = edge.patches
         if first is None or second is None:
             return False
         config = self.terrain_map.config
@@ -111,30 +111,30 @@ def _line_heights(heights: NDArray[np.float32], lines: NDArray[np.int64]) -> NDA
     return found
 
 
-def seam_text(seam: Seam, names: NDArray[np.str_]) -> str:
-    """Return a seam as text, such as "1.61 m between stairs (9, 2) and the border".
+def edge_text(edge: PatchEdge, names: NDArray[np.str_]) -> str:
+    """Return an edge as text, such as "1.61 m between stairs (9, 2) and the border".
 
     Args:
-        seam: The seam.
+        edge: The edge.
         names: Name of the sub-terrain of each patch, shape (rows, cols).
     """
     first, second = (
         "the border" if patch is None else f"{names[patch]} ({patch[0]}, {patch[1]})"
-        for patch in sorted(seam.patches, key=lambda patch: patch is None)
+        for patch in sorted(edge.patches, key=lambda patch: patch is None)
     )
-    return f"{seam.height:.2f} m between {first} and {second}"
+    return f"{edge.height:.2f} m between {first} and {second}"
 
 
-def cliffs_text(cliffs: list[Seam], names: NDArray[np.str_]) -> str:
+def cliffs_text(cliffs: list[PatchEdge], names: NDArray[np.str_]) -> str:
     """Return the number of cliffs, and the highest cliff of each pair of sub-terrains, as text.
 
     Args:
         cliffs: The cliffs, highest first.
         names: Name of the sub-terrain of each patch, shape (rows, cols).
     """
-    highest: dict[frozenset[str], Seam] = {}
-    for seam in cliffs:
-        pair = frozenset(str(names[p]) if p is not None else "" for p in seam.patches)
-        highest.setdefault(pair, seam)
-    count = f"{len(cliffs)} seams" if len(cliffs) > 1 else "1 seam"
-    return f"{count}, up to " + ", ".join(seam_text(seam, names) for seam in highest.values())
+    by_pair: dict[frozenset[str], PatchEdge] = {}
+    for edge in cliffs:
+        pair = frozenset(str(names[p]) if p is not None else "" for p in edge.patches)
+        by_pair.setdefault(pair, edge)
+    count = f"{len(cliffs)} patch edges" if len(cliffs) > 1 else "1 patch edge"
+    return f"{count}, up to " + ", ".join(edge_text(edge, names) for edge in by_pair.values())

@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from terrainkit.feasibility.passages import Passages
+from terrainkit.feasibility.free_width import FreeWidth
 from tests.limits import LIMITS, columns_of
 
 WIDE = replace(LIMITS, body_width=0.5)
 
 
 def widths(heights):
-    return Passages.build(columns_of(heights), WIDE).node_widths()[..., 0]
+    return FreeWidth.build(columns_of(heights), WIDE).at_nodes()[..., 0]
 
 
 @pytest.mark.parametrize("axis", [0, 1])
@@ -48,7 +48,7 @@ def test_width_between_roofs_lower_than_the_crouched_height(height, width):
     floor, ceiling = np.zeros((30, 30, 2)), np.full((30, 30, 2), np.inf)
     floor[..., 1], ceiling[..., 0] = 1.0, height
     floor[10:13, :, 1], ceiling[10:13, :, 0] = np.nan, np.inf
-    found = Passages.build(columns_of(floor, ceiling), WIDE).node_widths()[..., 0]
+    found = FreeWidth.build(columns_of(floor, ceiling), WIDE).at_nodes()[..., 0]
     assert found[10:13] == pytest.approx(width)
     assert found[20] == pytest.approx(1.0)
 
@@ -67,7 +67,7 @@ def test_ceilings_are_the_lowest_and_highest_within_the_body_width():
     floor[15, 15:17, 1] = 1.2, 2.1
     ceiling = np.full_like(floor, np.inf)
     ceiling[15, 15:17, 0] = 1.0, 2.0
-    ((lowest, highest),) = Passages.build(columns_of(floor, ceiling), WIDE).ceilings
+    ((lowest, highest),) = FreeWidth.build(columns_of(floor, ceiling), WIDE).ceilings
     assert lowest[15, [8, 9, 15, 21, 22, 23]].tolist() == [np.inf, 1, 1, 1, 2, np.inf]
     assert highest[15, [8, 9, 10, 15, 22, 23]].tolist() == [-np.inf, 1, 2, 2, 2, -np.inf]
     assert lowest[[8, 9, 21, 22], 15].tolist() == [np.inf, 1, 1, np.inf]

@@ -13,7 +13,7 @@ tread of twice this length is level ground between two steps."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Slopes:
+class Gradient:
     """The slope at each node: the change per column along x and y that continues on both sides."""
 
     x: FloatArray
@@ -26,7 +26,7 @@ class Slopes:
     """Larger slope along the two diagonals [m per column of the diagonal], shape (nx, ny, m). On
     the ridge of a pyramid, only a diagonal continues on both sides."""
 
-    def grade(self, spacing: float) -> FloatArray:
+    def slope(self, spacing: float) -> FloatArray:
         """Return the slope at each node.
 
         Args:
@@ -39,7 +39,7 @@ class Slopes:
         return np.maximum(np.hypot(self.x, self.y), self.diagonal / 2**0.5) / spacing
 
 
-def slopes_of(floor: FloatArray, spacing: float) -> Slopes:
+def gradient_of(floor: FloatArray, spacing: float) -> Gradient:
     """Return the slopes of floors.
 
     Args:
@@ -48,7 +48,7 @@ def slopes_of(floor: FloatArray, spacing: float) -> Slopes:
     """
     lag = max(1, round(SLOPE_LENGTH / spacing))
     diagonals = (_slope(floor, (lag, lag)), _slope(floor, (lag, -lag)))
-    return Slopes(
+    return Gradient(
         x=_slope(floor, (lag, 0)),
         y=_slope(floor, (0, lag)),
         diagonal=np.maximum(*np.abs(diagonals)),

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
-from terrainkit.feasibility.slopes import slopes_of, step
+from terrainkit.feasibility.gradient import gradient_of, step
 
 
 def grades(profile, spacing=0.1):
     floor = np.repeat(np.array(profile, float)[:, None], 3, axis=1)[..., None]
-    along_y = slopes_of(floor.swapaxes(0, 1), spacing).grade(spacing)[1, :, 0]
-    found = slopes_of(floor, spacing).grade(spacing)[:, 1, 0]
+    along_y = gradient_of(floor.swapaxes(0, 1), spacing).slope(spacing)[1, :, 0]
+    found = gradient_of(floor, spacing).slope(spacing)[:, 1, 0]
     assert found.tolist() == along_y.tolist()
     return found
 
@@ -36,9 +36,9 @@ def test_slope_of_fine_columns_is_compared_over_10_cm():
 def test_ridge_of_a_pyramid_continues_along_the_diagonal():
     i, j = np.mgrid[-4:5, -4:5]
     height = -0.03 * np.maximum(np.abs(i), np.abs(j))[..., None]
-    slopes = slopes_of(height, 0.1)
-    assert slopes.grade(0.1)[2, 2, 0] == pytest.approx(0.3 / 2**0.5)
-    assert slopes.grade(0.1)[2, 4, 0] == pytest.approx(0.3)
+    slopes = gradient_of(height, 0.1)
+    assert slopes.slope(0.1)[2, 2, 0] == pytest.approx(0.3 / 2**0.5)
+    assert slopes.slope(0.1)[2, 4, 0] == pytest.approx(0.3)
     assert slopes.diagonal[2, 2, 0] == pytest.approx(0.03)
 
 
