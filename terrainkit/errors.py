@@ -50,20 +50,20 @@ def is_built_in(item: Any) -> bool:
 
 
 @contextmanager
-def plugin_errors(plugin: str | None, *passed: type[BaseException]) -> Iterator[None]:
+def plugin_errors(plugin: str | None, *excluded: type[BaseException]) -> Iterator[None]:
     """Replace the exceptions of a plugin by a PluginError in one line.
 
     `SystemExit` is replaced, too. Signals, such as Ctrl-C, are not.
 
     Args:
         plugin: What the error names; None if the code is built in: its exceptions are not replaced.
-        passed: Classes of exceptions that are not replaced.
+        excluded: Classes of exceptions that are not replaced.
     """
     try:
         yield
     except BaseException as error:
         is_signal = not isinstance(error, Exception) and is_built_in(type(error))
-        if plugin is None or is_signal or isinstance(error, (KeyboardInterrupt, *passed)):
+        if plugin is None or is_signal or isinstance(error, (KeyboardInterrupt, *excluded)):
             raise
         import traceback
 

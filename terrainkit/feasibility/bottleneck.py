@@ -50,11 +50,11 @@ def bottleneck(edges: Edges, demand: FloatArray, segment: Segment, num_nodes: in
         return 0.0
     order = np.argsort(edges.start, kind="stable")
     rows = np.searchsorted(edges.start[order], np.arange(num_nodes + 1))
-    ends, demand = edges.end[order], demand[order]
+    end, demand = edges.end[order], demand[order]
     # A path is possible at every demand above the smallest one, so bisection finds it.
     levels = np.unique(demand[np.isfinite(demand)])
     number = bisect_left(
-        levels, True, key=lambda level: _reaches(rows, ends, demand <= level, start, targets)
+        levels, True, key=lambda level: _reaches(rows, end, demand <= level, start, targets)
     )
     return float(levels[number]) if number < len(levels) else float("inf")
 
@@ -94,13 +94,13 @@ def shortest_path(
 
 
 def _reaches(
-    rows: IntArray, ends: IntArray, mask: NDArray[np.bool_], start: int, targets: IntArray
+    rows: IntArray, end: IntArray, mask: NDArray[np.bool_], start: int, targets: IntArray
 ) -> bool:
     """Return whether usable edges lead from `start` to a target.
 
     Args:
         rows: Number of the first edge of each node, and the number of edges, shape (nodes + 1,).
-        ends: Second node of each edge, in the order of the first nodes.
+        end: Second node of each edge, in the order of the first nodes.
         mask: Which edges the path may use.
         start: The first node.
         targets: Nodes at which the path may end.
@@ -111,7 +111,7 @@ def _reaches(
     # No sorting is needed: the edges stay in the order of the rows when some are left out.
     before = np.concatenate([[0], np.cumsum(mask)])[rows].astype(np.int32)
     values, size = np.ones(int(before[-1])), len(rows) - 1
-    graph = csr_matrix((values, ends[mask].astype(np.int32), before), shape=(size, size))
+    graph = csr_matrix((values, end[mask].astype(np.int32), before), shape=(size, size))
     reached = breadth_first_order(graph, start, return_predecessors=False)
     return bool(np.isin(targets, reached).any())
 

@@ -119,6 +119,6 @@ def sample_columns(patch: Patch, threshold: float) -> Columns:
     in_cells = (index + 0.5) / n - 0.5
     xy: FloatArray = index * spacing + np.array(lower)
     ground = surface_at(patch.heights, in_cells, threshold=threshold).height
-    spans = SolidIndex(solids).intervals(xy)
-    intervals = free_intervals(ground, spans).reshape(nx, ny, -1, 2)
+    bounds = SolidIndex(solids).intervals(xy)
+    intervals = free_intervals(ground, bounds).reshape(nx, ny, -1, 2)
     return Columns(spacing=spacing, lower=lower, floor=intervals[..., 0], ceiling=intervals[..., 1])

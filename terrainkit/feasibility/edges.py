@@ -52,7 +52,7 @@ def step_edges(columns: Columns, gradient: Gradient) -> Edges:
 
     Args:
         columns: The columns.
-        gradient: Slope at each node.
+        gradient: Gradient at each node.
 
     Returns:
         The edges toward x and y, and then their opposites in the same order.

@@ -116,7 +116,7 @@ def _quantities(edges: Edges) -> list[tuple[str, FloatArray]]:
 def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
     """Return a quantity divided by the limit `name`: 0 on level open ground, 1 at the limit.
 
-    A foothold or a passage demands something if it is less than twice as wide as the limit, and a
+    A foothold or a free width demands something if it is less than twice the limit, and a
     clearance if it is less than the standing height; in between, the ratio is linear.
 
     Args:

@@ -1,4 +1,4 @@
-"""FreeWidth: the free width between walls around each node."""
+"""Free width between walls around each node."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from terrainkit.feasibility.gradient import SLOPE_LENGTH
 from terrainkit.feasibility.limits import RobotLimits
 
 NUM_DIRECTIONS = 8
-"""Number of directions in which a passage is measured."""
+"""Number of directions in which the free width is measured."""
 
 _TOLERANCE = 1e-4
 """Rounding of heights [m]: places whose heights differ by less are measured once."""
@@ -33,7 +33,7 @@ class FreeWidth:
     limits: RobotLimits
     """The limits of the robot."""
 
-    highest: FloatArray
+    max_floor: FloatArray
     """Highest floor within the body width of each column [m], shape (nx, ny)."""
 
     ceilings: tuple[tuple[FloatArray, FloatArray], ...]
@@ -45,7 +45,7 @@ class FreeWidth:
 
     @classmethod
     def build(cls, columns: Columns, limits: RobotLimits) -> Self:
-        """Return the free_width of the columns of a patch."""
+        """Return the free width around the columns of a patch."""
         import cv2
 
         reach = math.ceil(limits.body_width / columns.spacing) + 1
@@ -59,7 +59,7 @@ class FreeWidth:
         return cls(
             columns=columns,
             limits=limits,
-            highest=cv2.dilate(np.nanmax(columns.floor, axis=2), kernel),
+            max_floor=cv2.dilate(np.nanmax(columns.floor, axis=2), kernel),
             ceilings=tuple(ceilings),
             intervals=tuple(
                 (columns.floor[..., k].reshape(-1), columns.ceiling[..., k].reshape(-1))
@@ -118,9 +118,9 @@ class FreeWidth:
         self, i: IntArray, j: IntArray, z: FloatArray, min_clearance: FloatArray
     ) -> NDArray[np.bool_]:
         """Return where there may be a wall within the body width, shape (n,)."""
-        highest = self.highest[i, j]
-        near = highest > z + self.limits.step_up
-        top = np.maximum(z, highest) + min_clearance
+        max_floor = self.max_floor[i, j]
+        near = max_floor > z + self.limits.step_up
+        top = np.maximum(z, max_floor) + min_clearance
         for lowest, highest in self.ceilings:
             near |= (lowest[i, j] < top) & (highest[i, j] > z)
         return near
@@ -146,38 +146,39 @@ class FreeWidth:
             # Beyond the patch, the ground continues as at its edge.
             a = np.minimum(np.maximum(i + cell.i, 0), nx - 1)
             b = np.minimum(np.maximum(j + cell.j, 0), ny - 1)
-            above = self._pass(a * ny + b, levels[-1], levels[cell.before] + step_up, min_clearance)
+            max_floor = levels[cell.slope_start] + step_up
+            above = self._pass(a * ny + b, levels[-1], max_floor, min_clearance)
             is_open = np.isfinite(above)
             if not is_open.all():
                 free[active[~is_open]] = cell.distance
                 i, j, active = i[is_open], j[is_open], active[is_open]
                 above, min_clearance = above[is_open], min_clearance[is_open]
                 # No later cell looks further back.
-                levels[cell.before :] = [each[is_open] for each in levels[cell.before :]]
+                levels[cell.slope_start :] = [each[is_open] for each in levels[cell.slope_start :]]
             if not len(active):
                 break
             levels.append(above)
         return free
 
     def _pass(
-        self, column: IntArray, level: FloatArray, highest: FloatArray, min_clearance: FloatArray
+        self, column: IntArray, level: FloatArray, max_floor: FloatArray, min_clearance: FloatArray
     ) -> FloatArray:
         """Return the height at which the body passes each column [m], inf if it does not.
 
         Args:
             column: Number of each column, shape (n,).
             level: Height of the ray before the column [m].
-            highest: Highest floor that is not a wall [m].
+            max_floor: Highest floor that is not a wall [m].
             min_clearance: Clearance that the body needs [m].
         """
         lowest = np.full(len(column), np.inf)
-        highest, min_clearance = highest + _TOLERANCE, min_clearance - _TOLERANCE
+        max_floor, min_clearance = max_floor + _TOLERANCE, min_clearance - _TOLERANCE
         # One interval after the other: reducing a short axis of an array takes several times as
         # long.
         for floors, ceilings in self.intervals:
             floor = floors[column]
             above = np.fmax(floor, level)
-            passes = (floor <= highest) & (ceilings[column] - above >= min_clearance)
+            passes = (floor <= max_floor) & (ceilings[column] - above >= min_clearance)
             lowest = np.minimum(lowest, np.where(passes, above, np.inf))
         return lowest
 
@@ -191,7 +192,7 @@ class _Cell(NamedTuple):
     """Index along y."""
     distance: float
     """Distance at which the ray enters [m]."""
-    before: int
+    slope_start: int
     """Number of the cell, counted from the first, where a slope to this one starts."""
 
 

@@ -28,8 +28,8 @@ _MORE = 8
 def gap_edges(
     graph: FootholdGraph,
     components: IntArray,
-    starts: NDArray[np.bool_],
-    ends: NDArray[np.bool_],
+    start_mask: NDArray[np.bool_],
+    end_mask: NDArray[np.bool_],
     max_demand: float,
     *,
     one_each: bool = False,
@@ -42,14 +42,14 @@ def gap_edges(
     Args:
         graph: The graph.
         components: Component of each node, which steps join below `max_demand`, shape (nodes,).
-        starts: Nodes where an edge may start, shape (nodes,).
-        ends: Nodes where an edge may end, shape (nodes,).
+        start_mask: Nodes where an edge may start, shape (nodes,).
+        end_mask: Nodes where an edge may end, shape (nodes,).
         max_demand: Demand above which an edge is of no use.
         one_each: Whether one edge into each component is enough; then not all are searched.
     """
     parts = [graph.steps.select(slice(0))]
     is_entered = np.zeros(len(components), dtype=bool)
-    for batch in _batches(_pairs(graph, components, starts, ends, max_demand)):
+    for batch in _batches(_pairs(graph, components, start_mask, end_mask, max_demand)):
         pairs = batch.select(~is_entered[components[batch.end]]) if one_each else batch
         number = _MAX_SEARCHED_ENDS if one_each else _MAX_ENDS
         pairs = pairs.select(_best_pairs(graph, pairs, number, components[pairs.end], pairs.start))
@@ -80,8 +80,8 @@ def _batches(parts: Iterable[Edges]) -> Iterator[Edges]:
 def _pairs(
     graph: FootholdGraph,
     components: IntArray,
-    starts: NDArray[np.bool_],
-    ends: NDArray[np.bool_],
+    start_mask: NDArray[np.bool_],
+    end_mask: NDArray[np.bool_],
     max_demand: float,
 ) -> Iterator[Edges]:
     """Yield the gaps that may be useful, as if nothing was in between; see :func:`gap_edges`."""
@@ -93,10 +93,10 @@ def _pairs(
     moves, widths = _offsets(columns, max_demand * graph.limits.gap)
     n = int(moves.max(initial=0))
     is_usable = graph.node_demand < max_demand
-    is_end = (ends & is_usable).reshape(shape)
+    is_end = (end_mask & is_usable).reshape(shape)
     # Nodes without an end within the longest gap are skipped at once.
     near = cv2.dilate(is_end.any(axis=2).astype(np.uint8), np.ones((2 * n + 1,) * 2, np.uint8))
-    start = np.flatnonzero((starts & is_usable).reshape(shape) & (near[..., None] > 0))
+    start = np.flatnonzero((start_mask & is_usable).reshape(shape) & (near[..., None] > 0))
     # The nodes where an edge may end, in a frame of columns without any.
     node = np.where(is_end, np.arange(is_end.size).reshape(shape), -1)
     node = np.pad(node, ((n, n), (n, n), (0, 0)), constant_values=-1)

@@ -1,4 +1,4 @@
-"""Slopes and steps: the two parts of a height difference between neighboring columns."""
+"""Gradient and steps: the two parts of a height difference between neighboring columns."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ tread of twice this length is level ground between two steps."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gradient:
-    """The slope at each node: the change per column along x and y that continues on both sides."""
+    """The change per column along x and y that continues on both sides of each node."""
 
     x: FloatArray
     """Slope along x at each node [m per column], shape (nx, ny, m)."""
@@ -40,7 +40,7 @@ class Gradient:
 
 
 def gradient_of(floor: FloatArray, spacing: float) -> Gradient:
-    """Return the slopes of floors.
+    """Return the gradient of floors.
 
     Args:
         floor: Heights of the floors [m], shape (nx, ny, m), NaN where there are fewer than m.

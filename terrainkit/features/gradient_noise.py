@@ -47,13 +47,13 @@ def perlin_noise(grid: Grid, wavelength: float, rng: np.random.Generator) -> NDA
     gradient = _GRADIENTS[rng.integers(len(_GRADIENTS), size=(i[-1] + 2, j[-1] + 2))]
     tx, ty = (x - i)[:, None], (y - j)[None, :]
 
-    def corner(di: int, dj: int) -> NDArray[np.float64]:
-        slope = gradient[np.ix_(i + di, j + dj)]
-        return np.asarray(slope[..., 0] * (tx - di) + slope[..., 1] * (ty - dj))
+    def dot(dx: int, dy: int) -> NDArray[np.float64]:
+        slope = gradient[np.ix_(i + dx, j + dy)]
+        return np.asarray(slope[..., 0] * (tx - dx) + slope[..., 1] * (ty - dy))
 
     wx, wy = (t * t * t * (t * (6 * t - 15) + 10) for t in (tx, ty))
-    low = corner(0, 0) + wx * (corner(1, 0) - corner(0, 0))
-    high = corner(0, 1) + wx * (corner(1, 1) - corner(0, 1))
+    low = dot(0, 0) + wx * (dot(1, 0) - dot(0, 0))
+    high = dot(0, 1) + wx * (dot(1, 1) - dot(0, 1))
     return np.asarray(low + wy * (high - low))
 
 
@@ -80,26 +80,26 @@ def fractal_noise(
 
 
 def unit_heights(
-    grid: Grid, noise: NDArray[np.float64], platform: float, blend: float
+    grid: Grid, heights: NDArray[np.float64], platform: float, blend: float
 ) -> NDArray[np.float64]:
-    """Return :func:`fade_heights` with its largest absolute value scaled to 1."""
-    relief = fade_heights(grid, noise, platform, blend)
-    return np.asarray(relief / max(np.abs(relief).max(), 1e-12))
+    """Return :func:`fade_heights` with the largest absolute value scaled to 1."""
+    faded = fade_heights(grid, heights, platform, blend)
+    return np.asarray(faded / max(np.abs(faded).max(), 1e-12))
 
 
 def fade_heights(
-    grid: Grid, noise: NDArray[np.float64], platform: float, blend: float
+    grid: Grid, heights: NDArray[np.float64], platform: float, blend: float
 ) -> NDArray[np.float64]:
     """Return heights faded to 0 at the platform and at the outermost cells.
 
     Args:
         grid: Grid of the patch.
-        noise: Heights, shape `grid.shape`.
+        heights: Heights, shape `grid.shape`.
         platform: Side of the flat square at the center [m].
         blend: Distance over which the heights fade [m].
     """
     x, y = (np.minimum(np.arange(n), np.arange(n)[::-1]) for n in grid.shape)
     from_edge = np.minimum.outer(x, y) * (grid.cell / max(blend, grid.cell))
     return np.asarray(
-        noise * np.minimum(from_edge, 1.0) * grid.fade(grid.centered(platform), blend)
+        heights * np.minimum(from_edge, 1.0) * grid.fade(grid.centered(platform), blend)
     )

@@ -43,7 +43,7 @@ class RampField(FlatTerrain, Lane):
 
     @abstractmethod
     def high_corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.integer]:
-        """Return the corners of each ramp that are raised, counterclockwise, 0 or 1.
+        """Return whether each corner of each ramp is high, counterclockwise, 0 or 1.
 
         Args:
             i: Number of each ramp along x, shape (n,).

@@ -20,7 +20,7 @@ class _Rectangle(NamedTuple):
     span: Span
     shift: int
     """Number of the first cell of its first row."""
-    cells: int
+    required: int
     """The required cells within it."""
 
     @property
@@ -103,14 +103,14 @@ def _maximal_rectangles(required: list[int], allowed: list[int]) -> Iterator[tup
 
 def _select(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
     """Return rectangles in greedy order, each with the cells that it was the first to cover."""
-    queue = [(-each.cells.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
+    queue = [(-each.required.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
     heapq.heapify(queue)
     selected = []
     while missing:
         # The number of missing cells only falls, so an unchanged first entry is the largest.
         number, area, k = queue[0]
         rectangle = candidates[k]
-        first = rectangle.cells & (missing >> rectangle.shift)
+        first = rectangle.required & (missing >> rectangle.shift)
         current = -first.bit_count()
         if current == number:
             heapq.heappop(queue)
@@ -128,5 +128,5 @@ def _drop_redundant(selected: list[tuple[_Rectangle, int]]) -> list[_Rectangle]:
         # Earlier rectangles do not cover the cells that this one was the first to cover.
         if first & ~(covered >> rectangle.shift):
             kept.append(rectangle)
-            covered |= rectangle.cells << rectangle.shift
+            covered |= rectangle.required << rectangle.shift
     return kept[::-1]

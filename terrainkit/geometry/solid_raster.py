@@ -39,10 +39,10 @@ class SolidRaster:
         for (i0, j0), (i1, j1) in zip(first, last, strict=True):
             covered[i0 : i1 + 1, j0 : j1 + 1] = True
         pixels = np.argwhere(covered)
-        spans = SolidIndex(solids).intervals(self._corner + (pixels + 0.5) * PIXEL)
+        bounds = SolidIndex(solids).intervals(self._corner + (pixels + 0.5) * PIXEL)
         # Row 0 of the table has no solids; NaN compares as False.
-        self._spans = np.full((len(pixels) + 1, *spans.shape[1:]), np.nan, dtype=np.float32)
-        self._spans[1:] = spans
+        self._bounds = np.full((len(pixels) + 1, *bounds.shape[1:]), np.nan, dtype=np.float32)
+        self._bounds[1:] = bounds
         self._row = np.zeros(self._shape, dtype=np.int32)
         self._row[tuple(pixels.T)] = np.arange(1, len(pixels) + 1)
 
@@ -69,7 +69,7 @@ class SolidRaster:
         row = self._row[np.where(inside, i, 0), np.where(inside, j, 0)] * inside
         result = np.full(np.broadcast_shapes(row.shape, np.shape(z)), -np.inf, dtype=np.float32)
         hit = np.broadcast_to(row > 0, result.shape)
-        bottom, top = np.moveaxis(self._spans[np.broadcast_to(row, result.shape)[hit]], -1, 0)
+        bottom, top = np.moveaxis(self._bounds[np.broadcast_to(row, result.shape)[hit]], -1, 0)
         reached = bottom <= np.broadcast_to(z, result.shape)[hit][:, None]
         result[hit] = np.max(top, axis=1, where=reached, initial=-np.inf)
         return result

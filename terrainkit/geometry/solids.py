@@ -141,7 +141,7 @@ class Solids:
 
     @property
     def types(self) -> NDArray[np.int8]:
-        """Kind of each solid, shape (n,): 0 for a box, 1 for a cylinder, 2 for a hull."""
+        """Type of each solid, shape (n,): 0 for a box, 1 for a cylinder, 2 for a hull."""
         counts = [len(self.boxes), len(self.cylinders), len(self.hull_counts)]
         return np.repeat(np.arange(3, dtype=np.int8), counts)
 

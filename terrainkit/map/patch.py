@@ -62,13 +62,13 @@ class PatchParameters:
         names = dict.fromkeys([*self.requested, *other.requested])
         return [name for name in names if any(a.get(name) != b.get(name) for a, b in pairs)]
 
-    def deviating(self, declared: Mapping[str, Parameter], cell: float) -> list[str]:
+    def deviating(self, parameters: Mapping[str, Parameter], cell: float) -> list[str]:
         """Return the parameters that differ from the request by more than the grid requires."""
         return [
             name
             for name, requested in self.requested.items()
             if requested != self.realized[name]
-            and declared[name].deviates(requested, self.realized[name], cell)
+            and parameters[name].deviates(requested, self.realized[name], cell)
         ]
 
 
@@ -114,9 +114,9 @@ class Patch:
 
     @property
     def far_edges(self) -> NDArray[np.bool_]:
-        """Which sides are farthest from the spawn origin, up to 1.5 cells.
+        """Which edges are farthest from the spawn origin, up to 1.5 cells.
 
-        Shape (2, 2): the lower sides along x and y, then the upper ones.
+        Shape (2, 2): the lower edges along x and y, then the upper ones.
         """
         origin = self.origin[:2].astype(np.float64)
         away = np.stack([origin - self.grid.lower, self.grid.upper - origin])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from terrainkit.map.terrain_map import TerrainMap
 
 MIN_CLIFF_HEIGHT = 0.5
-"""Height difference that no leg bridges; a lower edge is never a cliff [m]."""
+"""Height difference that no leg bridges; an edge with a lower one is never a cliff [m]."""
 
 Index = tuple[int, int]
 
@@ -28,22 +28,22 @@ class PatchEdge:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PatchEdges:
-    """The edges of a map."""
+    """The patch edges of a map."""
 
     terrain_map: TerrainMap
     """The map."""
 
     def max(self) -> PatchEdge | None:
-        """Return the edge with the largest height difference; None without edges."""
+        """Return the patch edge with the largest height difference; None without edges."""
         return max(self._find_edges(-1.0), key=lambda edge: edge.height, default=None)
 
     def cliffs(self) -> list[PatchEdge]:
-        """Return the edges that are cliffs, the highest first.
+        """Return the patch edges that are cliffs, the highest first.
 
-        An edge is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and higher than the largest steps
-        within the two patches added together. The holes of stepping stones, which end at the edge
-        of their patch, are therefore not cliffs, but the side of a flight of stairs is. An edge is
-        not a cliff if walls stand along its whole length on both sides.
+        A patch edge is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and higher than the largest
+        steps within the two patches added together. The holes of stepping stones, which end at the
+        edge of their patch, are therefore not cliffs, but the side of a flight of stairs is. An
+        edge is not a cliff if walls stand along its whole length on both sides.
         """
         candidates = list(self._find_edges(MIN_CLIFF_HEIGHT))
         steps = {p: self._max_step(p) for p in {p for edge in candidates for p in edge.patches}}
@@ -54,10 +54,10 @@ class PatchEdges:
         ]
         return sorted(cliffs, key=lambda edge: -edge.height)
 
-    def _find_edges(self, limit: float) -> Iterator[PatchEdge]:
+    def _find_edges(self, min_height: float) -> Iterator[PatchEdge]:
         for axis, heights in enumerate(self._edge_heights):
             before, beside = (-1, 0) if axis == 0 else (0, -1)
-            for i, j in np.argwhere(heights > limit).tolist():
+            for i, j in np.argwhere(heights > min_height).tolist():
                 patches = self._patch(i + before, j + beside), self._patch(i, j)
                 yield PatchEdge(height=float(heights[i, j]), patches=patches)
 
@@ -89,7 +89,7 @@ class PatchEdges:
         return float(max(max(s.max(initial=0.0), -s.min(initial=0.0)) for s in steps))
 
     def _has_solids(self, edge: PatchEdge) -> bool:
-        """Return whether solids cover the samples on both sides of an edge between two patches."""
+        """Return whether solids cover the samples on both sides of the edge of two patches."""
         first, second = edge.patches
         if first is None or second is None:
             return False
@@ -112,10 +112,10 @@ def _line_heights(heights: NDArray[np.float32], lines: NDArray[np.int64]) -> NDA
 
 
 def edge_text(edge: PatchEdge, names: NDArray[np.str_]) -> str:
-    """Return an edge as text, such as "1.61 m between stairs (9, 2) and the border".
+    """Return a patch edge as text, such as "1.61 m between stairs (9, 2) and the border".
 
     Args:
-        edge: The edge.
+        edge: The patch edge.
         names: Name of the sub-terrain of each patch, shape (rows, cols).
     """
     first, second = (

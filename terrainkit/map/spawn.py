@@ -126,8 +126,8 @@ def _is_free(config: MapConfig, origins: NDArray[np.float64], solids: Solids) ->
     low, high = (f(origins[:, :2], axis=0) for f in (np.min, np.max))
     margin = config.spawn_radius + 1e-3
     solids = solids.select(((lower <= high + margin) & (upper >= low - margin)).all(axis=1))
-    spans = SolidIndex(solids, radius=config.spawn_radius).intervals(origins[:, :2])
-    bottom, top = np.moveaxis(spans, -1, 0)
+    bounds = SolidIndex(solids, radius=config.spawn_radius).intervals(origins[:, :2])
+    bottom, top = np.moveaxis(bounds, -1, 0)
     z = origins[:, 2:]
     is_blocked = (top > z + CONTACT) & (bottom < z + config.spawn_headroom)
     return np.asarray(~is_blocked.any(axis=1))

@@ -130,8 +130,8 @@ class TerrainMap:
         direction = convert("direction", direction, Direction)
         starts, shape = _points("points", points, 3)
         ground = self._surface_at(starts[:, :2]).height
-        spans = self._visible.intervals(starts[:, :2])
-        return first_surface(ground, spans, starts[:, 2], direction).reshape(shape)
+        bounds = self._visible.intervals(starts[:, :2])
+        return first_surface(ground, bounds, starts[:, 2], direction).reshape(shape)
 
     def clearance(self, xy: ArrayLike) -> NDArray[np.float64]:
         """Return the free height above the ground at `xy` [m], below the solids that collide.

@@ -62,8 +62,8 @@ class Noise(Overlay):
         weights = np.asarray(np.clip(fade, 0.0, 1.0), dtype=np.float64)
         if len(patch.solids):
             points = np.stack(np.meshgrid(grid.axis(0), grid.axis(1), indexing="ij"), axis=-1)
-            spans = SolidIndex(patch.solids, radius=grid.cell).intervals(points.reshape(-1, 2))
-            bottom, top = np.moveaxis(spans.reshape(*grid.shape, -1, 2), -1, 0)
+            bounds = SolidIndex(patch.solids, radius=grid.cell).intervals(points.reshape(-1, 2))
+            bottom, top = np.moveaxis(bounds.reshape(*grid.shape, -1, 2), -1, 0)
             z = patch.heights[..., None]
             weights[((bottom < z + CONTACT) & (top > z - CONTACT)).any(axis=-1)] = 0.0
         return weights

@@ -282,20 +282,20 @@ def convert_range(
     return easy, hard
 
 
-def check_names(owner: str, names: Iterable[str], known: Iterable[str]) -> None:
+def check_names(owner: str, names: Iterable[str], available: Iterable[str]) -> None:
     """Check the names of parameters.
 
     Args:
         owner: Name of the terrain or overlay, for the error.
         names: Names to check.
-        known: Names of the parameters that it has.
+        available: Names of the parameters that it has.
 
     Raises:
-        ConfigError: if one of `names` is not known.
+        ConfigError: if one of `names` is not available.
     """
     for name in names:
-        if name not in known:
-            expected = expected_names(name, known, "it has")
+        if name not in available:
+            expected = expected_names(name, available, "it has")
             raise ConfigError(f"{owner} has no parameter {name!r}; {expected}")
 
 

@@ -66,8 +66,8 @@ class SubTerrain(Config):
         if self.friction is not None:
             friction = convert_range(self.terrain, "friction", self.friction, _FRICTION)
             object.__setattr__(self, "friction", friction)
-        own: Any = type(self)  # mypy does not take it as hashable
-        if reserved := field_keys(own).keys() & parameters_of(self.terrain_class).keys():
+        cls: Any = type(self)  # mypy does not take it as hashable
+        if reserved := field_keys(cls).keys() & parameters_of(self.terrain_class).keys():
             raise ConfigError(
                 f"{self.terrain}: got parameters with the names {', '.join(sorted(reserved))}; "
                 "expected others, since they are keys of [[terrains]]"

@@ -1,9 +1,9 @@
 """The merged mesh, in which coplanar faces are merged.
 
 Flat quads are merged to rectangles, quads that are flat along one axis to rows, and straight
-walls of constant height to panels with a flat strip on both sides. Each polygon keeps the boundary
-vertices that its neighbors use, so large and small faces share all vertices. The surface is exactly
-the surface of the full mesh.
+walls of constant height to rectangles with a flat strip on both sides. Each polygon keeps the
+boundary vertices that its neighbors use, so large and small faces share all vertices. The surface
+is exactly the surface of the full mesh.
 """
 
 import itertools

@@ -177,10 +177,10 @@ def _fan_faces(*case: int) -> Iterator[_Face]:
             yield near, k, after
 
 
-def _saddle_faces(*ranks: int) -> Iterator[_Face]:
+def _saddle_faces(*case: int) -> Iterator[_Face]:
     """Yield the faces of a saddle, given the ranks of corners 0, 1, 3 and 2, 1, 3 on its lines."""
-    w0, w1, w3 = (_LINE + rank for rank in ranks[:3])
-    e2, e1, e3 = (_SECOND_LINE + rank for rank in ranks[3:])
+    w0, w1, w3 = (_LINE + rank for rank in case[:3])
+    e2, e1, e3 = (_SECOND_LINE + rank for rank in case[3:])
     a0, b0, a1, b1, a2, b2, a3, b3 = range(_MIDPOINTS, _LINE)
     yield from ((w0, b3, 0), (w0, 0, a0), (e2, b1, 2), (e2, 2, a2))
     yield from ((1, a1, e1), (1, e1, w1), (1, w1, b0), (3, a3, w3), (3, w3, e3), (3, e3, b2))

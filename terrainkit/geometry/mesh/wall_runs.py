@@ -24,12 +24,12 @@ class WallRuns:
     j1: Ids
 
     @classmethod
-    def from_mask(cls, node_grid: NodeGrid, straight: Mask, axis: int) -> "WallRuns":
-        """Return the walls with normals along `axis`; `straight` is cleared at single quads."""
-        straight = straight.T if axis else straight
-        i, j0, j1 = runs(straight)
+    def from_mask(cls, node_grid: NodeGrid, mask: Mask, axis: int) -> "WallRuns":
+        """Return the walls with normals along `axis`; `mask` is cleared at single quads."""
+        mask = mask.T if axis else mask
+        i, j0, j1 = runs(mask)
         alone = j1 - j0 == 1
-        straight[i[alone], j0[alone]] = False
+        mask[i[alone], j0[alone]] = False
         i, j0, j1 = i[~alone], j0[~alone], j1[~alone]
         return cls(node_grid=node_grid, axis=axis, i=i, j0=j0, j1=j1)
 
@@ -39,7 +39,7 @@ class WallRuns:
         return grid.midpoint_y(j, self.i) if self.axis else grid.midpoint_x(self.i, j)
 
     def keep_endpoints(self, kept: Mask) -> None:
-        """Mark the nodes on both sides of both ends in `kept`."""
+        """Mark the nodes on both sides of both endpoints in `kept`."""
         nodes = kept.T if self.axis else kept
         for j in (self.j0, self.j1):
             nodes[self.i, j] = nodes[self.i + 1, j] = True
