@@ -27,17 +27,12 @@ def test_check_robot_reads_contents_instead_of_file(tmp_path):
     assert [finding.code for finding in report.findings] == ["INR002"]
 
 
-def test_check_robot_compares_with_other_file():
+def test_check_robot_compares_with_other_file_and_spec():
     settings = Settings(select=("XRF",), simulate=False)
-    report = check_robot(QUADRUPED, settings, against=QUADRUPED.with_suffix(".xml"))
-    assert report.facts.against is not None
-    assert report.verdict == "pass"
-
-
-def test_check_robot_compares_with_spec():
-    spec = QUADRUPED.parent / "robot.toml"
-    report = check_robot(QUADRUPED, Settings(select=("XRF",), simulate=False), spec=spec)
-    assert report.facts.spec.name == "quadruped"
+    others = {"against": QUADRUPED.with_suffix(".xml"), "spec": QUADRUPED.parent / "robot.toml"}
+    report = check_robot(QUADRUPED, settings, **others)
+    assert report.facts.against.model.file == others["against"]
+    assert (report.facts.spec.name, report.verdict) == ("quadruped", "pass")
 
 
 def test_check_robot_rejects_other_file_without_robot(tmp_path):

@@ -48,13 +48,8 @@ def test_unknown_ignored_rule_is_rejected():
         select_rules(Settings(ignore={"NOPE1": "why"}))
 
 
-def test_only_selected_rules_run(file):
-    text = f"<robot>{LINK.format(name='a')}</robot>"
-    assert codes(check(file, text).findings) == {"INR002"}
-    assert codes(check(file, text, select=("XML003",)).findings) == {"XML003"}
-
-
 NOTE = "<!-- terrainkit: ignore INR002 a balloon -->"
+MASS = "<inertial>\n<mass value='-1'/>"
 A, B = LINK.format(name="a"), LINK.format(name="b")
 
 
@@ -68,26 +63,12 @@ A, B = LINK.format(name="a"), LINK.format(name="b")
         (f"{A}\n{NOTE} {B}", ["a"]),
         (f"{A}\n<!-- other -->{NOTE}<!-- words -->\n{B}", ["a"]),
         (
-            "<link name='a'>\n"
-            + NOTE
-            + "\n<inertial>\n<mass value='-1'/>\n</inertial></link>\n"
-            + B,
+            f"<link name='a'>\n{NOTE}\n<inertial>\n<mass value='-1'/>\n</inertial></link>\n{B}",
             ["b"],
         ),
-        (
-            "<link name='a'> "
-            + NOTE
-            + "\n<visual/><inertial>\n<mass value='-1'/></inertial></link>",
-            [],
-        ),
-        (
-            "<link name='a'>\n<inertial>\n<mass value='-1'/></inertial>\n"
-            + NOTE
-            + "\n</link>\n"
-            + B,
-            ["b"],
-        ),
-        ("<link name='a'>\n<inertial>\n<mass value='-1'/> " + NOTE + "\n</inertial></link>", []),
+        (f"<link name='a'> {NOTE}\n<visual/><inertial>\n<mass value='-1'/></inertial></link>", []),
+        (f"<link name='a'>\n{MASS}</inertial>\n{NOTE}\n</link>\n{B}", ["b"]),
+        (f"<link name='a'>\n{MASS} {NOTE}\n</inertial></link>", []),
         (f"<link name='c'/>\n{NOTE}\n<link name='d'/>\n{B}", ["b"]),
         (f"{A}\n{B}\n{NOTE}", ["a", "b"]),
         (f"{A}\n<!-- terrainkit: ignore negative-mass a balloon -->\n{B}", ["a"]),
@@ -104,17 +85,14 @@ def test_comment_suppresses_its_element(file, text, left):
     assert {each.comment.reason for each in ignored} <= {"a balloon"}
 
 
-def test_comment_suppresses_only_its_rule(file):
+def test_comment_suppresses_only_its_rule_and_has_a_reason(file):
     text = f"<robot>\n{NOTE.replace('INR002', 'XML003')}\n{A}\n</robot>"
     assert codes(check(file, text).findings) == {"INR002"}
-
-
-def test_suppressed_finding_has_reason(file):
+    assert codes(check(file, f"<robot>{A}</robot>", select=("XML003",)).findings) == {"XML003"}
     report = check(file, f'<robot name="r">\n<link name="x"/>\n{NOTE}\n{A}\n</robot>')
     (ignored,) = report.skipped
     assert ignored.reason == "suppressed for a (robot.urdf:4): a balloon"
-    assert ignored.finding.subject == "a"
-    assert report.verdict == "pass"
+    assert (ignored.finding.subject, report.verdict) == ("a", "pass")
 
 
 def test_comment_above_root_applies_to_robot_only(file):
@@ -130,31 +108,28 @@ def test_comment_above_root_applies_to_robot_only(file):
 
 def test_comment_excludes_nested_mjcf_bodies(tmp_path):
     inertial = '<inertial mass="-1" pos="0 0 0" diaginertia="1 1 1"/>'
-    text = f"""<mujoco>
-      <worldbody>
+    text = f"""<mujoco><worldbody>
         <body name="trunk"> {NOTE}
           <freejoint/>
           {inertial}
           <body name="arm"><joint axis="0 0 1"/>
             {inertial}
           </body>
-        </body>
-      </worldbody>
-    </mujoco>"""
+        </body></worldbody></mujoco>"""
     report = check(tmp_path / "robot.xml", text)
     assert [finding.subject for finding in report.findings] == ["arm"]
 
 
-def test_comment_in_malformed_file_is_read(file):
-    report = check(file, f'<robot name="r">\n{NOTE}\n{A}\n{B}\n<oops>\n</robot>')
-    assert [finding.subject for finding in report.findings] == ["b"]
-
-
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig"])
-def test_comment_in_other_encoding_is_read(file, encoding):
-    file.write_bytes(f'<robot name="r">\n{NOTE}\n{A}\n{B}\n</robot>'.encode(encoding))
-    report = lint_selected(Facts(load_robot(file)), Settings(select=("INR002",)))
-    assert [finding.subject for finding in report.findings] == ["b"]
+def test_comment_in_malformed_file_and_other_encodings_is_read(file):
+    text = f'<robot name="r">\n{NOTE}\n{A}\n{B}\n'
+    for data in (
+        f"{text}<oops>\n</robot>".encode(),
+        f"{text}</robot>".encode("utf-16"),
+        f"{text}</robot>".encode("utf-8-sig"),
+    ):
+        file.write_bytes(data)
+        report = lint_selected(Facts(load_robot(file)), Settings(select=("INR002",)))
+        assert [finding.subject for finding in report.findings] == ["b"]
 
 
 def test_replaced_contents_have_own_comments(file):
@@ -185,14 +160,10 @@ def test_invalid_comment_is_reported(file, comment, said):
     assert said in idle.reason
 
 
-def test_unused_comment_is_reported(file):
+def test_unused_comment_of_a_selected_rule_is_reported(file):
     text = f'<robot name="r">\n{NOTE}\n<link name="a"/>\n</robot>'
     (idle,) = check(file, text).skipped
     assert idle.reason == f"comment at {file}:2: unused suppression: INR002 has no finding here"
-
-
-def test_comment_of_unselected_rule_is_not_reported(file):
-    text = f'<robot name="r">\n{NOTE}\n<link name="a"/>\n</robot>'
     assert check(file, text, select=("XML003",)).skipped == ()
     ignoring = check(file, text, ignore={"INR002": "here"})
     assert [s.kind for s in ignoring.skipped] == ["ignored"]
@@ -209,9 +180,7 @@ def test_file_without_comments_is_not_parsed_again(file, monkeypatch):
 
 def test_long_words_are_cut(file):
     long = "X" * 10**6
-    report = check(
-        file, f'<robot name="r">\n<!-- terrainkit: ignore {long} {long} -->\n{A}</robot>'
-    )
+    report = check(file, f"<robot><!-- terrainkit: ignore {long} {long} -->{A}</robot>")
     assert len(report.skipped[0].reason) < 1000
 
 

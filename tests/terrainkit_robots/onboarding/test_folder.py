@@ -9,26 +9,34 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.onboarding.folder import check_folder, new_folder, write_files
 
 
-def file_names(folder):
-    return [path.name for path in folder.iterdir()]
-
-
 def make(target, **options):
     with new_folder(target, **options) as folder:
         write_files(folder, {"robot.toml": b"new", "meshes/a.stl": b"mesh"})
 
 
-def test_new_folder_writes_all_files(tmp_path):
+@pytest.fixture
+def robot(tmp_path):
+    """Return the path of a folder that was written."""
     make(tmp_path / "robot")
-    assert (tmp_path / "robot/robot.toml").read_bytes() == b"new"
-    assert (tmp_path / "robot/meshes/a.stl").read_bytes() == b"mesh"
-    assert file_names(tmp_path) == ["robot"]
+    return tmp_path / "robot"
 
 
-def test_new_folder_writes_nothing_after_error(tmp_path):
-    with pytest.raises(ExportError, match="outside"), new_folder(tmp_path / "robot") as folder:
-        write_files(folder, {"robot.toml": b"new", "../outside": b""})
-    assert file_names(tmp_path) == []
+def contents(folder):
+    """Return the content of each file below a folder."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+NEW = {"robot/robot.toml": b"new", "robot/meshes/a.stl": b"mesh"}
+
+
+@pytest.mark.parametrize("exists", [False, True])
+def test_new_or_empty_folder_gets_all_files(tmp_path, exists):
+    if exists:
+        (tmp_path / "robot").mkdir()
+    make(tmp_path / "robot")
+    assert contents(tmp_path) == NEW
+    assert [path.name for path in tmp_path.iterdir()] == ["robot"]
 
 
 def test_new_folder_removes_folders_of_killed_processes(tmp_path):
@@ -39,53 +47,38 @@ def test_new_folder_removes_folders_of_killed_processes(tmp_path):
     stale = tmp_path / name.replace(f"-{os.getpid()}-", f"-{killed.pid}-")
     (stale / "a").mkdir(parents=True)
     make(tmp_path / "b")
-    assert sorted(file_names(tmp_path)) == ["a", "b"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
 
 
-def test_new_folder_requires_overwrite(tmp_path):
-    make(tmp_path / "robot")
-    (tmp_path / "robot/robot.toml").write_text("mine")
+def test_new_folder_requires_overwrite(tmp_path, robot):
+    (robot / "robot.toml").write_text("mine")
     with pytest.raises(ExportError, match="exists; use another name, or --overwrite"):
-        make(tmp_path / "robot")
-    assert (tmp_path / "robot/robot.toml").read_text() == "mine"
-    make(tmp_path / "robot", overwrite=True)
-    assert (tmp_path / "robot/robot.toml").read_text() == "new"
-
-
-def test_new_folder_accepts_empty_folder(tmp_path):
-    (tmp_path / "robot").mkdir()
-    make(tmp_path / "robot")
-    assert (tmp_path / "robot/robot.toml").exists()
+        make(robot)
+    assert contents(tmp_path) == NEW | {"robot/robot.toml": b"mine"}
+    make(robot, overwrite=True)
+    assert contents(tmp_path) == NEW
 
 
 @pytest.mark.parametrize(
     ("files", "message"),
     [
-        ({"thesis.tex": "mine"}, "contains no robot.toml"),
-        ({"robot.toml": "", "notes.txt": "mine"}, "also contains notes.txt"),
-        ({"robot.toml": "", "robot.xml.before": "mine"}, r"also contains robot\.xml\.before"),
+        ({"thesis.tex": b"mine"}, "contains no robot.toml"),
+        ({"robot.toml": b"", "notes.txt": b"mine"}, "also contains notes.txt"),
+        ({"robot.toml": b"", "robot.xml.before": b"mine"}, r"also contains robot\.xml\.before"),
     ],
 )
 def test_new_folder_keeps_foreign_files(tmp_path, files, message):
-    folder = tmp_path / "robot"
-    folder.mkdir()
-    for name, text in files.items():
-        (folder / name).write_text(text)
+    write_files(tmp_path / "robot", files)
     with pytest.raises(ExportError, match=message):
-        make(folder, overwrite=True)
-    assert {name: (folder / name).read_text() for name in files} == files
-    assert file_names(tmp_path) == ["robot"]
+        make(tmp_path / "robot", overwrite=True)
+    assert contents(tmp_path / "robot") == files
+    assert [path.name for path in tmp_path.iterdir()] == ["robot"]
 
 
-def test_new_folder_keeps_old_folder_after_error(tmp_path):
-    make(tmp_path / "robot")
-    with pytest.raises(RuntimeError), new_folder(tmp_path / "robot", overwrite=True):
+def test_new_folder_keeps_old_folder_after_error(tmp_path, robot, monkeypatch):
+    with pytest.raises(RuntimeError), new_folder(robot, overwrite=True):
         raise RuntimeError
-    assert (tmp_path / "robot/robot.toml").read_bytes() == b"new"
-
-
-def test_new_folder_keeps_old_folder_if_rename_fails(tmp_path, monkeypatch):
-    make(tmp_path / "robot")
+    assert contents(tmp_path) == NEW
     move = Path.replace
 
     def refuse(path, target):
@@ -95,25 +88,28 @@ def test_new_folder_keeps_old_folder_if_rename_fails(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", refuse)
     with pytest.raises(ExportError, match="cannot write"):
-        make(tmp_path / "robot", overwrite=True)
-    assert (tmp_path / "robot/robot.toml").read_bytes() == b"new"
+        make(robot, overwrite=True)
+    assert contents(tmp_path) == NEW
 
 
-def test_check_folder_rejects_invalid_target(tmp_path):
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("file/robot", "file is not a folder"),
+        ("file", "is not a folder"),
+        ("link", "is not a folder"),
+    ],
+)
+def test_check_folder_rejects_invalid_target(tmp_path, target, message):
     (tmp_path / "file").write_text("")
-    with pytest.raises(ExportError, match="file is not a folder"):
-        check_folder(tmp_path / "file/robot", overwrite=False)
-    with pytest.raises(ExportError, match="is not a folder"):
-        check_folder(tmp_path / "file", overwrite=True)
     (tmp_path / "real").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "real")
-    with pytest.raises(ExportError, match="is not a folder"):
-        check_folder(tmp_path / "link", overwrite=True)
+    with pytest.raises(ExportError, match=message):
+        check_folder(tmp_path / target, overwrite="/" not in target)
 
 
 @pytest.mark.parametrize("name", ["../outside", "/etc/outside", "a/../../outside"])
-def test_write_files_rejects_path_outside_folder(tmp_path, name):
-    (tmp_path / "robot").mkdir()
-    with pytest.raises(ExportError, match="outside"):
-        write_files(tmp_path / "robot", {name: b""})
-    assert file_names(tmp_path) == ["robot"]
+def test_path_outside_of_the_folder_is_rejected(tmp_path, name):
+    with pytest.raises(ExportError, match="outside"), new_folder(tmp_path / "robot") as folder:
+        write_files(folder, {"robot.toml": b"new", name: b""})
+    assert list(tmp_path.iterdir()) == []

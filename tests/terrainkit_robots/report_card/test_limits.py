@@ -83,12 +83,13 @@ def test_limits_of_a_robot_with_long_legs(measure):
 
 def test_limits_are_printed_with_units(measure):
     results = measure([9, 9, 9, 9, 9, 9, -1, 19, 9])
-    rows = {row[0]: row[1:] for row in results.rows()}
-    assert rows["test"] == ("2 of 2 cross", "next value", "limit of the robot")
-    assert rows["step up"] == ("20.0 cm", "1 of 2 at 22.0 cm", "20.0 cm")
-    assert rows["slope up and down"][2] == "30 degrees"
-    assert rows["clearance"] == ("none", "1 of 2 at 72.0 cm", "35.0 cm")
-    assert rows["stone"][1] == "-"
+    rows = results.rows()
+    assert rows[:2] == [
+        ("test", "2 of 2 cross", "next value", "limit of the robot"),
+        ("step up", "20.0 cm", "1 of 2 at 22.0 cm", "20.0 cm"),
+    ]
+    assert ("clearance", "none", "1 of 2 at 72.0 cm", "35.0 cm") in rows
+    assert {row[0]: row[2:] for row in rows}["stone"][0] == "-"
     document = results.as_json()
     about = [document[key] for key in ("robot", "checkpoint", "repetitions", "seed")]
     assert about == ["quadruped", "model_1400.pt", 2, 3]
@@ -96,10 +97,9 @@ def test_limits_are_printed_with_units(measure):
 
 
 def test_slopes_across_are_as_steep_as_slopes_up(measure):
-    results = {each.test: each for each in measure([19] * 9).limits}
-    steepest = math.degrees(math.atan(2 * 0.577))
-    assert results["slope across"].passed == pytest.approx(steepest)
-    assert results["slope up and down"].passed == pytest.approx(steepest)
+    results = {each.test: each.passed for each in measure([19] * 9).limits}
+    steepest = pytest.approx(math.degrees(math.atan(2 * 0.577)))
+    assert (results["slope across"], results["slope up and down"]) == (steepest, steepest)
 
 
 def test_values_of_the_tests_follow_the_limits_of_the_robot():

@@ -1,3 +1,4 @@
+import mujoco
 import numpy as np
 import pytest
 
@@ -8,6 +9,7 @@ from terrainkit_robots.lint.compare.body_mass import (
     relative_difference,
 )
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 
 def gaps(one, other):
@@ -51,9 +53,9 @@ def test_trunks_are_compared_in_the_same_link(robot_of):
 
 
 def test_relative_difference():
-    assert relative_difference(1.0, 1.0) == relative_difference(0.0, 0.0) == 0.0
-    assert relative_difference(1.0, 2.0) == relative_difference(2.0, 1.0) == 0.5
-    assert np.isnan(relative_difference(np.nan, 1.0))
+    pairs = ((1.0, 1.0), (0.0, 0.0), (1.0, 2.0), (4.0, 1.0), (np.nan, 1.0))
+    found = [relative_difference(*pair) for pair in pairs]
+    np.testing.assert_array_equal(found, [0.0, 0.0, 0.5, 0.75, np.nan])
 
 
 def test_has_valid_inertial_needs_explicit_values(robot_of):
@@ -70,26 +72,25 @@ def test_has_valid_inertial_needs_explicit_values(robot_of):
 
 
 FUSED = ('<compiler discardvisual="false" fusestatic="false"/>', "")
+FLOATING = (
+    "<!-- Trunk and head.",
+    '<link name="world"/><joint name="root" type="floating"><parent link="world"/>'
+    '<child link="base"/></joint><!-- Trunk and head.',
+)
 
 
-def test_dropped_mass_matches_mujoco(robot_of):
-    import mujoco
-
-    from terrainkit_robots.quiet_mujoco import quiet_mujoco
-
-    for robot in (robot_of("quadruped.urdf"), robot_of("quadruped.urdf", FUSED)):
-        with quiet_mujoco():
-            compiled = mujoco.MjModel.from_xml_path(str(robot.model.file))
-        left = float(compiled.body_mass.sum())
-        assert dropped_mass(robot) == pytest.approx(robot.total_mass - left)
-    assert dropped_mass(robot) == pytest.approx(6.921)
-    assert dropped_mass(robot_of("quadruped.xml")) == 0.0
-
-
-def test_floating_joint_keeps_the_mass(robot_of):
-    floating = (
-        "<!-- Trunk and head.",
-        '<link name="world"/><joint name="root" type="floating"><parent link="world"/>'
-        '<child link="base"/></joint><!-- Trunk and head.',
-    )
-    assert dropped_mass(robot_of("quadruped.urdf", FUSED, floating)) == 0.0
+@pytest.mark.parametrize(
+    ("file", "edits", "mass"),
+    [
+        ("quadruped.urdf", [], 0.0),
+        ("quadruped.urdf", [FUSED], 6.921),
+        ("quadruped.urdf", [FUSED, FLOATING], 0.0),
+        ("quadruped.xml", [], 0.0),
+    ],
+)
+def test_dropped_mass_matches_mujoco(robot_of, file, edits, mass):
+    robot = robot_of(file, *edits)
+    with quiet_mujoco():
+        compiled = mujoco.MjModel.from_xml_path(str(robot.model.file))
+    left = float(compiled.body_mass.sum())
+    assert dropped_mass(robot) == pytest.approx(mass) == pytest.approx(robot.total_mass - left)

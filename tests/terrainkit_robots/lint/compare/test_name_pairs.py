@@ -1,38 +1,31 @@
+import pytest
+
 from terrainkit_robots.lint.compare.name_pairs import pair_names
 
 
-def test_equal_names_match_in_first_order():
-    pairs = pair_names(["c", "a", "b"], ["a", "c", "d"])
-    assert pairs.pairs == (("c", "c"), ("a", "a"))
-    assert pairs.only_first == ("b",)
-    assert pairs.only_second == ("d",)
-    assert pairs.renamed == ()
-
-
-def test_case_and_suffix_are_ignored():
-    pairs = pair_names(["FL_hip_joint", "FR_hip"], ["fl_hip", "FR_hip_joint"])
-    assert pairs.pairs == (("FL_hip_joint", "fl_hip"), ("FR_hip", "FR_hip_joint"))
-    assert pairs.renamed == pairs.pairs
-    assert pairs.only_first == pairs.only_second == ()
-
-
-def test_equal_name_has_priority():
-    pairs = pair_names(["hip", "hip_joint"], ["hip_joint", "hip"])
-    assert pairs.pairs == (("hip", "hip"), ("hip_joint", "hip_joint"))
-
-
-def test_ambiguous_names_do_not_match():
-    pairs = pair_names(["hip_joint", "Hip"], ["hip_link"])
-    assert pairs.pairs == ()
-    assert pairs.only_first == ("hip_joint", "Hip")
-    assert pair_names(["hip"], ["hip_joint", "HIP"]).pairs == ()
-
-
-def test_suffix_only_does_not_match():
-    assert pair_names(["_joint"], ["_link"]).pairs == ()
-
-
-def test_repeated_names_count_once():
-    pairs = pair_names(["a", "a", "b"], ["a", "b", "b"])
-    assert pairs.pairs == (("a", "a"), ("b", "b"))
-    assert pairs.only_first == pairs.only_second == ()
+@pytest.mark.parametrize(
+    ("first", "second", "pairs", "only_first", "only_second"),
+    [
+        ("c a b", "a c d", "c-c a-a", "b", "d"),
+        (
+            "FL_hip_joint FR_hip",
+            "fl_hip FR_hip_joint",
+            "FL_hip_joint-fl_hip FR_hip-FR_hip_joint",
+            "",
+            "",
+        ),
+        ("hip hip_joint", "hip_joint hip", "hip-hip hip_joint-hip_joint", "", ""),
+        ("hip_joint Hip", "hip_link", "", "hip_joint Hip", "hip_link"),
+        ("hip", "hip_joint HIP", "", "hip", "hip_joint HIP"),
+        ("_joint", "_link", "", "_joint", "_link"),
+        ("a a b", "a b b", "a-a b-b", "", ""),
+    ],
+    ids=["equal", "case and suffix", "equal first", "two here", "two there", "suffix", "repeated"],
+)
+def test_names_are_paired(first, second, pairs, only_first, only_second):
+    expected = tuple(tuple(pair.split("-")) for pair in pairs.split())
+    found = pair_names(first.split(), second.split())
+    assert found.pairs == expected
+    assert found.renamed == tuple((a, b) for a, b in expected if a != b)
+    assert found.only_first == tuple(only_first.split())
+    assert found.only_second == tuple(only_second.split())

@@ -2,16 +2,14 @@ from terrainkit_robots.lint.report.github import to_text
 
 
 def test_each_finding_is_a_command(report):
+    said = "the mass is -1 kg; expected > 0%0AWeigh it."
     assert to_text([report]).splitlines() == [
-        "::error file=robot.urdf,line=12,title=INR002 negative-mass::"
-        "the mass is -1 kg; expected > 0%0AWeigh it.",
-        "::warning file=robot.urdf,line=40,title=JNT007 degrees::"
-        "the mass is -1 kg; expected > 0%0AWeigh it.",
-        "::warning file=robot.urdf,title=JNT007 degrees::"
-        "the mass is -1 kg; expected > 0%0AWeigh it.",
-        "::notice file=robot.urdf,line=1,title=LEG001 legs::"
-        "the mass is -1 kg; expected > 0%0AWeigh it.",
+        f"::error file=robot.urdf,line=12,title=INR002 negative-mass::{said}",
+        f"::warning file=robot.urdf,line=40,title=JNT007 degrees::{said}",
+        f"::warning file=robot.urdf,title=JNT007 degrees::{said}",
+        f"::notice file=robot.urdf,line=1,title=LEG001 legs::{said}",
     ]
+    assert to_text([]) == ""
 
 
 def test_command_escapes_names(nasty):
@@ -24,7 +22,3 @@ def test_command_escapes_names(nasty):
     assert message.startswith("a,b:c%25d|e")
     assert "%0D%0A::error::x" in message
     line.encode()
-
-
-def test_no_reports_give_empty_text():
-    assert to_text([]) == ""

@@ -28,39 +28,46 @@ def on(name, message, **changes):
     return {"subject": name, "message": message.format(name), **changes}
 
 
-def test_equal_messages_are_one_group(groups):
-    (group,) = groups(*(on(name, "joint {}: no effort limit") for name in JOINTS))
-    assert group.first.subject == "FL_hip_joint"
-    assert group.text == "joint FL_hip_joint: no effort limit"
-    assert group.also == "also 2 joints: FR_hip_joint, RL_hip_joint"
+MASS = "mass of {}: got 1.2 kg; expected the mass of "
+FACES = "mesh {} of {}: got 9 faces"
 
 
-def test_different_numbers_are_listed(groups):
-    messages = ["mass of {}: got -1 kg; expected > 0", "mass of {}: got -2.5e-3 kg; expected > 0"]
-    names = ("FL_calf", "FR_calf")
-    (group,) = groups(*(on(n, m) for n, m in zip(names, messages, strict=True)))
-    assert group.also == "also 1 link: FR_calf (-2.5e-3)"
-
-
-def test_other_names_are_listed(groups):
-    text = "mass of {}: got 1.2 kg; expected the mass of "
-    (group,) = groups(on("FL_calf", text + "FR_calf"), on("RL_calf", text + "RR_calf"))
-    assert group.also == "also 1 link: RL_calf (RR_calf)"
-
-
-def test_lists_of_names_are_one_value(groups):
-    text = "mesh {} of {}: got 9 faces"
-    one = {"subject": "x.stl", "message": text.format("x.stl", "FL_calf")}
-    many = {"subject": "y.stl", "message": text.format("y.stl", "FL_calf, FR_calf, ...")}
-    (group,) = groups(one, many)
-    assert group.also == "also 1 more: y.stl (FL_calf, FR_calf, ...)"
-
-
-def test_paths_of_the_subject_are_ignored(groups):
-    text = "mesh {}: searched at /robots/{}"
-    files = ("meshes/a.stl", "meshes/b.stl")
-    (group,) = groups(*(on(file, text.replace("{}", file)) for file in files))
-    assert group.also == "also 1 more: meshes/b.stl"
+@pytest.mark.parametrize(
+    ("found", "also"),
+    [
+        (
+            [on(name, "joint {}: no effort limit") for name in JOINTS],
+            "2 joints: FR_hip_joint, RL_hip_joint",
+        ),
+        (
+            [on("FL_calf", "mass of {}: got -1 kg"), on("FR_calf", "mass of {}: got -2.5e-3 kg")],
+            "1 link: FR_calf (-2.5e-3)",
+        ),
+        (
+            [on("FL_calf", f"{MASS}FR_calf"), on("RL_calf", f"{MASS}RR_calf")],
+            "1 link: RL_calf (RR_calf)",
+        ),
+        (  # a list of names is one value
+            [
+                {"subject": "x.stl", "message": FACES.format("x.stl", "FL_calf")},
+                {"subject": "y.stl", "message": FACES.format("y.stl", "FL_calf, FR_calf, ...")},
+            ],
+            "1 more: y.stl (FL_calf, FR_calf, ...)",
+        ),
+        (  # the path of the subject is left out
+            [
+                {"subject": file, "message": f"mesh {file}: searched at /robots/{file}"}
+                for file in ("meshes/a.stl", "meshes/b.stl")
+            ],
+            "1 more: meshes/b.stl",
+        ),
+    ],
+    ids=["names", "numbers", "other names", "lists", "paths"],
+)
+def test_repeated_findings_are_one_group(groups, found, also):
+    (group,) = groups(*found)
+    assert (group.first.subject, group.text) == (found[0]["subject"], found[0]["message"])
+    assert group.also == f"also {also}"
 
 
 @pytest.mark.parametrize(

@@ -14,18 +14,68 @@ from terrainkit_robots.lint.selection import Suppressed
 SCHEMA = json.loads((Path(__file__).parent / "sarif-2.1.0.schema.json").read_text())
 
 
-def document(*reports):
+def run_of(*reports):
+    """Return the run of a valid document."""
     made = json.loads(to_text(reports), parse_constant=int)
     jsonschema.validate(made, SCHEMA)
-    return made
+    (run,) = made["runs"]
+    return run
 
 
-def test_document_is_valid(report, nasty, fixed_report):
-    document(report, nasty, fixed_report)
+def result(code, level, line, *, subject="calf", measured=None, certainty="proven", **more):
+    """Return the expected result of a finding."""
+    region = {"region": {"startLine": line}} if line else {}
+    place = {"physicalLocation": {"artifactLocation": {"uri": "robot.urdf"}} | region}
+    if subject:
+        place["logicalLocations"] = [{"name": subject, "kind": "element"}]
+    fix = more.pop("fix", None)
+    return {
+        "ruleId": code,
+        "ruleIndex": [rule.code for rule in rules()].index(code),
+        "level": level,
+        "message": {"text": "the mass is -1 kg; expected > 0\nWeigh it."},
+        "locations": [place],
+        "properties": {"certainty": certainty, "measured": measured or {"mass": -1.0}}
+        | ({"fix": fix} if fix else {}),
+        **more,
+    }
 
 
-def test_document_without_robots_is_valid():
-    assert document()["runs"][0]["results"] == []
+def test_results_of_a_report(report):
+    fix = {"safety": "safe", "description": "change the limit"}
+    suppressions = [{"kind": "inSource", "justification": "so"}]
+    assert run_of(report)["results"] == [
+        result("INR002", "error", 12),
+        result("JNT007", "warning", 40, certainty="likely", fix=fix),
+        result("JNT007", "warning", 0, subject=""),
+        result("LEG001", "note", 1, measured={"legs": 4}),
+        result("INR002", "error", 30, subject="hatch", suppressions=suppressions),
+    ]
+
+
+def test_accepted_finding_is_a_suppressed_result(report, finding):
+    accepted = Suppressed(code="INR002", kind="suppressed", reason="1 finding", finding=finding())
+    suppressions = [{"kind": "external", "justification": "1 finding"}]
+    (*_, last) = run_of(replace(report, skipped=(accepted,)))["results"]
+    assert last == result("INR002", "error", 12, suppressions=suppressions)
+
+
+def test_skipped_rule_is_a_notification(report):
+    (invocation,) = run_of(report)["invocations"]
+    listed = invocation["toolExecutionNotifications"]
+    assert [(each["level"], each["message"]["text"]) for each in listed] == [
+        ("note", "SYM001: no legs detected"),
+        ("note", "SYM002: no legs detected"),
+        ("warning", "INR999: comment at robot.urdf:3: unknown rule"),
+    ]
+    codes = [each.get("associatedRule") for each in listed]
+    assert codes == [{"id": "SYM001"}, {"id": "SYM002"}, None]
+
+
+def test_documents_of_other_reports_are_valid(report, nasty, fixed_report):
+    run = run_of(report, nasty, fixed_report)
+    assert run["properties"]["facts"]["robot.urdf"]["links"] == 0
+    assert run_of()["results"] == []
 
 
 @pytest.mark.parametrize(
@@ -33,89 +83,25 @@ def test_document_without_robots_is_valid():
     [
         lambda result: result.update(level="info"),
         lambda result: result.update(hint="no such key"),
-        lambda result: result.pop("message"),
         lambda result: result["message"].update(text="a {0}"),
-        lambda result: place(result)["region"].update(startLine=0),
-        lambda result: place(result)["artifactLocation"].update(uri="a b.urdf"),
     ],
-    ids=["level", "unknown key", "no message", "placeholder", "line", "uri"],
+    ids=["level", "unknown key", "placeholder"],
 )
 def test_schema_rejects_invalid_results(report, spoil):
-    spoiled = copy.deepcopy(document(report))
+    spoiled = copy.deepcopy(json.loads(to_text([report])))
     spoil(spoiled["runs"][0]["results"][0])
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(spoiled, SCHEMA)
 
 
-def place(result):
-    return result["locations"][0]["physicalLocation"]
-
-
 def test_every_rule_has_help(report):
-    (run,) = document(report)["runs"]
-    listed = run["tool"]["driver"]["rules"]
-    assert [rule["id"] for rule in listed] == [rule.code for rule in rules()]
+    listed = run_of(report)["tool"]["driver"]["rules"]
     for rule, theirs in zip(rules(), listed, strict=True):
+        assert (theirs["id"], theirs["shortDescription"]["text"]) == (rule.code, rule.title)
         assert rule.how_to_fix in theirs["help"]["text"]
-        assert theirs["shortDescription"]["text"] == rule.title
 
 
-def test_result_has_level_message_and_location(report):
-    (run,) = document(report)["runs"]
-    error = run["results"][0]
-    assert run["tool"]["driver"]["rules"][error["ruleIndex"]]["id"] == error["ruleId"] == "INR002"
-    assert error["level"] == "error"
-    assert error["message"]["text"] == "the mass is -1 kg; expected > 0\nWeigh it."
-    assert place(error) == {
-        "artifactLocation": {"uri": "robot.urdf"},
-        "region": {"startLine": 12},
-    }
-    assert error["locations"][0]["logicalLocations"] == [{"name": "calf", "kind": "element"}]
-    assert error["properties"]["measured"] == {"mass": -1.0}
-    levels = [result["level"] for result in run["results"]]
-    assert levels == ["error", "warning", "warning", "note", "error"]
-
-
-def test_finding_without_line_has_no_region(report):
-    assert place(document(report)["runs"][0]["results"][2]) == {
-        "artifactLocation": {"uri": "robot.urdf"}
-    }
-
-
-def test_fix_is_described(report):
-    result = document(report)["runs"][0]["results"][1]
-    assert result["properties"]["fix"] == {"safety": "safe", "description": "change the limit"}
-
-
-def test_suppressed_finding_is_a_suppressed_result(report):
-    last = document(report)["runs"][0]["results"][-1]
-    assert last["suppressions"] == [{"kind": "inSource", "justification": "so"}]
-    assert place(last)["region"]["startLine"] == 30
-
-
-def test_accepted_finding_is_a_suppressed_result(report, finding):
-    accepted = Suppressed(code="INR002", kind="suppressed", reason="1 finding", finding=finding())
-    last = document(replace(report, skipped=(accepted,)))["runs"][0]["results"][-1]
-    assert last["ruleId"] == "INR002"
-    assert last["suppressions"] == [{"kind": "external", "justification": "1 finding"}]
-
-
-def test_skipped_rule_is_a_notification(report):
-    (invocation,) = document(report)["runs"][0]["invocations"]
-    listed = invocation["toolExecutionNotifications"]
-    assert [n["level"] for n in listed] == ["note", "note", "warning"]
-    assert listed[0]["associatedRule"] == {"id": "SYM001"}
-    assert listed[0]["message"]["text"] == "SYM001: no legs detected"
-
-
-def test_facts_are_included(report):
-    facts = document(report)["runs"][0]["properties"]["facts"]
-    assert facts["robot.urdf"]["links"] == 0
-
-
-@pytest.mark.parametrize(
-    "name", ["a.urdf", "b c/ä%20#?.urdf", "x:y.urdf", "/abs/ü.xml", "\udc80.urdf"]
-)
+@pytest.mark.parametrize("name", ["a.urdf", "b c/ä%20#?.urdf", "x:y.urdf", "/abs/ü.xml", "\udc80"])
 def test_uri_decodes_to_path(name):
     text = uri(Path(name))
     assert unquote_to_bytes(text.removeprefix("file://")) == bytes(Path(name))

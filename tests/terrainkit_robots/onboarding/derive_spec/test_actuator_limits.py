@@ -15,50 +15,50 @@ HIP = 'effort="23.7" velocity="30.1"'
 FIRST = '<limit lower="-1.0472" upper="1.0472" effort="23.7" velocity="30.1"/>'
 
 
-def with_first_limit(bundled, tmp_path, *, limit):
-    """Return the quadruped with another limit element in its first joint."""
-    plain = bundled("quadruped.urdf")
-    text = plain.model.file.read_text(encoding="utf-8").replace(FIRST, limit, 1)
-    path = tmp_path / "one.urdf"
-    path.write_text(text, encoding="utf-8")
-    return Facts(load_robot(path))
+@pytest.fixture
+def with_first_limit(bundled, tmp_path):
+    """Return a function that makes the quadruped with another limit of its first joint."""
+
+    def make(limit):
+        text = bundled("quadruped.urdf").model.file.read_text(encoding="utf-8")
+        (tmp_path / "one.urdf").write_text(text.replace(FIRST, limit, 1), encoding="utf-8")
+        return Facts(load_robot(tmp_path / "one.urdf"))
+
+    return make
 
 
 def values(column):
     return {joint: value for joint, (value, _) in column.items()}
 
 
-def test_derive_effort_from_file(bundled, gains):
-    facts = bundled("quadruped.urdf")
-    column = effort_column(facts, gains(facts), facts.mirror_map)
-    assert column["FR_calf_joint"][0] == 45.43
-    assert collect_provenance({"effort": column})["effort"].reason == "in quadruped.urdf"
+def action_scales(facts, gain):
+    """Return the column of action scales of a robot with these gains."""
+    twins = facts.mirror_map
+    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
+    return action_scale_column(facts, gain, effort, velocity)
 
 
-def test_derive_effort_from_mirror_joint(bundled, gains, tmp_path):
-    facts = with_first_limit(bundled, tmp_path, limit='<limit lower="-1" upper="1"/>')
+def test_derive_effort_from_mirror_joint(with_first_limit, gains):
+    facts = with_first_limit('<limit lower="-1" upper="1"/>')
     twins = facts.mirror_map
     effort = effort_column(facts, gains(facts), twins)
-    speed = velocity_column(facts, twins)
     assert effort["FL_hip_joint"][0] == 23.7
-    assert speed["FL_hip_joint"][0] == 30.1
+    assert velocity_column(facts, twins)["FL_hip_joint"][0] == 30.1
     origins = collect_provenance({"effort": effort})
-    assert set(origins) == {"effort", "effort.FL_hip_joint"}
-    assert origins["effort"].origin == "declared"
-    assert origins["effort.FL_hip_joint"].origin == "suggested"
-    assert origins["effort.FL_hip_joint"].reason == "not in the file; copied from FR_hip_joint"
+    assert {name: (each.origin, each.reason) for name, each in origins.items()} == {
+        "effort": ("declared", "in one.urdf"),
+        "effort.FL_hip_joint": ("suggested", "not in the file; copied from FR_hip_joint"),
+    }
 
 
 def test_derive_effort_of_leg_from_mass_and_length(bundled, gains, tmp_path):
     facts = bundled("quadruped.urdf", (HIP, ""), tmp_path=tmp_path)
     twins = facts.mirror_map
-    column = effort_column(facts, gains(facts), twins)
-    # 0.5 * 15.0 kg * 9.81 m/s2 * 0.448 m
-    assert column["FL_hip_joint"][0] == 33.0
-    assert column["FL_hip_joint"][1].reason.endswith("0.5 x weight x leg length")
-    speeds = velocity_column(facts, twins)
-    assert speeds["FL_hip_joint"][0] == 20.0
-    assert speeds["FL_hip_joint"][1].origin == "suggested"
+    effort, origin = effort_column(facts, gains(facts), twins)["FL_hip_joint"]
+    assert effort == 33.0  # 0.5 * 15.0 kg * 9.81 m/s2 * 0.448 m
+    assert origin.reason.endswith("0.5 x weight x leg length")
+    speed, origin = velocity_column(facts, twins)["FL_hip_joint"]
+    assert (speed, origin.origin) == (20.0, "suggested")
 
 
 def test_derive_armature_from_file_or_gains(bundled, gains):
@@ -74,13 +74,13 @@ def test_derive_armature_from_file_or_gains(bundled, gains):
     assert set(values(more).values()) == {1.0}
 
 
-def test_derive_effort_from_stiffness(gains, tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(ARM.replace('effort="30" ', ""))
-    facts = Facts(load_robot(path))
-    column = effort_column(facts, gains(facts, stiffness=40.0), {})
-    assert column["shoulder"][0] == 40.0
-    assert "the stiffness at an error of 1 rad" in column["shoulder"][1].reason
+def test_derive_limits_of_an_arm_from_its_stiffness(robot, gains):
+    facts = robot(ARM.replace('effort="30" ', ""))
+    gain = gains(facts, stiffness=40.0)
+    effort, origin = effort_column(facts, gain, {})["shoulder"]
+    assert effort == 40.0
+    assert "the stiffness at an error of 1 rad" in origin.reason
+    assert values(action_scales(facts, gain)) == {"shoulder": 0.25}  # its only joint moves
 
 
 @pytest.mark.parametrize(
@@ -93,22 +93,14 @@ def test_derive_effort_from_stiffness(gains, tmp_path):
 )
 def test_derive_action_scale_from_effort(bundled, gains, stiffness, scale, reason):
     facts = bundled("quadruped.urdf")
-    gain, twins = gains(facts, stiffness=stiffness), facts.mirror_map
-    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
-    column = action_scale_column(facts, gain, effort, velocity)
-    assert column["FL_hip_joint"][0] == pytest.approx(scale, rel=0.01)
-    assert column["FL_hip_joint"][1].reason == reason
+    found, origin = action_scales(facts, gains(facts, stiffness=stiffness))["FL_hip_joint"]
+    assert (found, origin.reason) == (pytest.approx(scale, rel=0.01), reason)
 
 
-def test_derive_action_scale_of_short_range(bundled, gains, tmp_path):
-    facts = with_first_limit(
-        bundled, tmp_path, limit='<limit lower="-0.1" upper="0.1" effort="23.7" velocity="30.1"/>'
-    )
-    gain, twins = gains(facts, stiffness=10.0), facts.mirror_map
-    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
-    column = action_scale_column(facts, gain, effort, velocity)
-    assert column["FL_hip_joint"][0] == pytest.approx(0.05)
-    assert column["FL_hip_joint"][1].reason == "0.25 of the joint range"
+def test_derive_action_scale_of_short_range(with_first_limit, gains):
+    facts = with_first_limit('<limit lower="-0.1" upper="0.1" effort="23.7" velocity="30.1"/>')
+    scale, origin = action_scales(facts, gains(facts, stiffness=10.0))["FL_hip_joint"]
+    assert (scale, origin.reason) == (pytest.approx(0.05), "0.25 of the joint range")
 
 
 def test_joints_off_the_legs_hold_the_default_pose(bundled, gains, tmp_path):
@@ -118,19 +110,8 @@ def test_joints_off_the_legs_hold_the_default_pose(bundled, gains, tmp_path):
       <origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>
       <limit lower="-1" upper="1" effort="20" velocity="20"/></joint></robot>"""
     facts = bundled("quadruped.urdf", ("</robot>", arm), tmp_path=tmp_path)
-    gain, twins = gains(facts, stiffness=40.0), facts.mirror_map
-    effort, velocity = effort_column(facts, gain, twins), velocity_column(facts, twins)
-    column = action_scale_column(facts, gain, effort, velocity)
+    column = action_scales(facts, gains(facts, stiffness=40.0))
     scale, origin = column.pop("arm_joint")
     assert scale == 0.0
     assert "holds the default pose" in origin.reason
     assert set(values(column).values()) == {0.25}
-
-
-def test_only_joint_of_an_arm_moves(gains, tmp_path):
-    path = tmp_path / "arm.urdf"
-    path.write_text(ARM)
-    facts = Facts(load_robot(path))
-    gain = gains(facts, stiffness=40.0)
-    effort, velocity = effort_column(facts, gain, {}), velocity_column(facts, {})
-    assert values(action_scale_column(facts, gain, effort, velocity)) == {"shoulder": 0.25}

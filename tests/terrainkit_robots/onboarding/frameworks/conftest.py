@@ -1,8 +1,10 @@
 """Specs of robots, and stub modules of frameworks that reject unknown fields."""
 
+import importlib.machinery
 import importlib.util
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
@@ -11,40 +13,16 @@ import pytest
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.frameworks import config_files
 from terrainkit_robots.spec.robot_spec import Provenance, RobotSpec
+from tests.robots import QUADRUPED
 
 LEGS = ("FL", "FR", "RL", "RR")
 PARTS = ("hip", "thigh", "calf")
+QUADRUPED_SPEC = RobotSpec.load(Path(__file__).with_name("quadruped.toml"))
 
 
 def quadruped(**changes):
     """Return the spec of a quadruped, with values by pattern."""
-    leg = ".*_({})_joint".format
-    given = {
-        "name": "quad 4",
-        "urdf": "robot.urdf",
-        "mjcf": "robot.xml",
-        "floating": True,
-        "joint_order": tuple(f"{leg}_{part}_joint" for leg in LEGS for part in PARTS),
-        "base": "base",
-        "feet": tuple(f"{leg}_foot" for leg in LEGS),
-        "shanks": tuple(f"{leg}_calf" for leg in LEGS),
-        "thighs": tuple(f"{leg}_thigh" for leg in LEGS),
-        "termination_contacts": ("base",),
-        "penalized_contacts": tuple(f"{leg}_{part}" for leg in LEGS for part in PARTS[1:]),
-        "default_pose": {leg("hip"): 0.0, leg("thigh"): 0.9, leg("calf"): -1.8},
-        "stiffness": {leg("hip|thigh"): 20.0, leg("calf"): 30.0},
-        "damping": {leg("hip|thigh"): 0.5, leg("calf"): 0.75},
-        "effort": {leg("hip|thigh"): 23.7, leg("calf"): 45.43},
-        "velocity": {leg("hip|thigh"): 30.1, leg("calf"): 15.7},
-        "armature": {leg("hip|thigh"): 0.01, leg("calf"): 0.04},
-        "action_scale": {leg("hip|thigh"): 0.25, leg("calf"): 0.2},
-        "soft_limits": {leg("calf"): (-2.5, -1.0)},
-        "reset_range": (0.6, 1.4),
-        "base_height_target": 0.287,
-        "spawn_height": 0.3,
-        "provenance": {"stiffness": Provenance(origin="suggested", reason="effort at 0.5 rad")},
-    }
-    return RobotSpec(**(given | changes))
+    return replace(QUADRUPED_SPEC, **changes)
 
 
 def wheeled(**changes):
@@ -65,10 +43,27 @@ def wheels_of(spec):
     )
 
 
-def of(spec, **value):
-    """Return a value for each joint of `quadruped`: calf for calf joints, else other."""
-    calf, other = value["calf"], value["other"]
+def of(spec, *, calf, other):
+    """Return a value for each joint of `quadruped`."""
     return {joint: calf if "calf" in joint else other for joint in spec.joint_order}
+
+
+def pose_of(spec):
+    """Return the default pose of `quadruped`."""
+    return {
+        joint: -1.8 if "calf" in joint else 0.9 if "thigh" in joint else 0.0
+        for joint in spec.joint_order
+    }
+
+
+def resolved(value, names):
+    """Return values by name; each pattern must match, and each name at most one pattern."""
+    if not isinstance(value, dict):
+        return dict.fromkeys(names, value)
+    found = {name: [p for p in value if re.fullmatch(p, name)] for name in names}
+    assert {p for patterns in found.values() for p in patterns} == set(value)
+    assert all(len(patterns) <= 1 for patterns in found.values())
+    return {name: value[patterns[0]] for name, patterns in found.items() if patterns}
 
 
 def plain_robot(joints, **changes):
@@ -126,7 +121,7 @@ def hostile_robot():
         field: Provenance(origin="suggested", reason=f"{name}\nraise SystemExit(2)\r\x0cx = 1")
         for field in ("stiffness", "default_pose", "spawn_height", "armature", "action_scale")
     }
-    return RobotSpec(**(vars(spec) | {"provenance": reasons}))
+    return replace(spec, provenance=reasons)
 
 
 def in_usd(name):
@@ -153,28 +148,52 @@ class Strict:
         vars(self)[name] = value
 
 
-def refusing(title, *required, **defaults):
-    """Return a class that accepts only these fields as keyword arguments."""
+class Recorder(type):
+    """The type of classes that have nested recorders of any name."""
 
-    def init(self, **given):
-        unknown, missing = set(given) - {*required, *defaults}, set(required) - set(given)
-        if unknown or missing:
-            raise TypeError(f"{title}: unknown {unknown}, missing {missing}")
-        vars(self).update(defaults | given)
-
-    return type(title, (), {"__init__": init})
+    def __getattr__(cls, name):
+        if name.startswith("__"):
+            raise AttributeError(name)
+        setattr(cls, name, recorder(name))
+        return vars(cls)[name]
 
 
-def recording(title, **nested):
+def recorder(title):
     """Return a class that stores its keyword arguments.
 
     The real frameworks check the names of the fields (tests/frameworks, mjlab_probe.py).
     """
+    return Recorder(title, (), {"__init__": lambda self, **given: vars(self).update(given)})
 
-    def init(self, **given):
-        vars(self).update(given)
 
-    return type(title, (), {"__init__": init, **nested})
+class Stub(ModuleType):
+    """A module of a framework: content that is given, and recording classes of other names."""
+
+    def __getattr__(self, name):
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return sys.modules.get(f"{self.__name__}.{name}") or recorder(name)
+
+
+class Stubs:
+    """Importer of all modules of frameworks; those whose content is None are missing."""
+
+    def __init__(self, content):
+        self.content = content
+        self.roots = {name.partition(".")[0] for name in content}
+
+    def find_spec(self, name, *_):
+        if name.partition(".")[0] not in self.roots or self.content.get(name, {}) is None:
+            return None
+        return importlib.machinery.ModuleSpec(name, self, is_package=True)
+
+    def create_module(self, spec):
+        made = Stub(spec.name)
+        vars(made).update(self.content.get(spec.name, {}))
+        return made
+
+    def exec_module(self, module):
+        """Do nothing: the module has its content."""
 
 
 class Described:
@@ -194,28 +213,29 @@ def part(title, **fields):
     return type(title, (made, Described), {})
 
 
-def module(name, **content):
-    """Return a module with this content."""
-    made = ModuleType(name)
-    vars(made).update(content)
-    return made
-
-
 @pytest.fixture
 def load(tmp_path, monkeypatch):
-    """Return a function that executes a configuration with stub modules."""
+    """Return a function that executes a configuration with stubs of the modules of frameworks."""
+    used = []
 
-    def run(framework, spec, stand_ins, **known):
-        for name, stand_in in stand_ins.items():
-            monkeypatch.setitem(sys.modules, name, stand_in)
+    def forget(stubs):
+        for name in [each for each in sys.modules if each.partition(".")[0] in stubs.roots]:
+            del sys.modules[name]
+
+    def run(framework, spec, content, **known):
         path = tmp_path / f"{framework}_config.py"
         path.write_text(config_text(framework, ConfigRobot(spec=spec, **known)), encoding="utf-8")
+        used.append(Stubs(content))
+        forget(used[-1])
+        monkeypatch.setattr(sys, "meta_path", [used[-1], *sys.meta_path])
         located = importlib.util.spec_from_file_location("loaded_config", path)
         loaded = importlib.util.module_from_spec(located)
         located.loader.exec_module(loaded)
         return loaded
 
-    return run
+    yield run
+    for stubs in used:
+        forget(stubs)
 
 
 @pytest.fixture
@@ -228,6 +248,8 @@ def robots():
         plain=plain_robot,
         hostile=hostile_robot,
         of=of,
+        pose_of=pose_of,
+        resolved=resolved,
         HOSTILE=HOSTILE,
         in_usd=in_usd,
         bodies=("base", *(f"{leg}_{part}" for leg in LEGS for part in (*PARTS, "foot"))),
@@ -236,20 +258,11 @@ def robots():
 
 @pytest.fixture
 def stand_in():
-    """Return functions that make stub modules."""
-    return SimpleNamespace(
-        module=module,
-        refusing=refusing,
-        recording=recording,
-        part=part,
-        Strict=Strict,
-        Described=Described,
-    )
+    """Return what makes classes of frameworks."""
+    return SimpleNamespace(recorder=recorder, part=part, Strict=Strict)
 
 
 @pytest.fixture(scope="session")
 def bundled_xml():
     """Return the MJCF file of the bundled quadruped."""
-    from terrainkit_robots.description import bundled
-
-    return Path(bundled.__file__).parent / "quadruped" / "quadruped.xml"
+    return QUADRUPED.with_suffix(".xml")

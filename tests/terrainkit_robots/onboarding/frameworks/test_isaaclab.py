@@ -1,48 +1,24 @@
 """Tests of the configuration for Isaac Lab, with stub modules."""
 
-import re
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 
-@pytest.fixture
-def modules(stand_in):
-    """Return stub modules of Isaac Lab 2."""
-    recording = stand_in.recording
-    articulation = recording("ArticulationCfg", InitialStateCfg=recording("InitialStateCfg"))
+@pytest.fixture(params=["core.velocity", "manager_based.locomotion.velocity"], ids=["v3", "v2"])
+def modules(stand_in, request):
+    """Return the content of Isaac Lab 3 or 2; their modules of the velocity task differ."""
+    articulation = stand_in.recorder("ArticulationCfg")
     articulation.replace = lambda self, **more: articulation(**(vars(self) | more))
-    drive = recording("JointDriveCfg", PDGainsCfg=recording("PDGainsCfg"))
-    sim = stand_in.module(
-        "isaaclab.sim",
-        UrdfFileCfg=recording("UrdfFileCfg"),
-        UrdfConverterCfg=SimpleNamespace(JointDriveCfg=drive),
-        RigidBodyPropertiesCfg=recording("RigidBodyPropertiesCfg"),
-        ArticulationRootPropertiesCfg=recording("ArticulationRootPropertiesCfg"),
-    )
-    actuators = ("ImplicitActuatorCfg", "DCMotorCfg")
-    package = "isaaclab_tasks.manager_based.locomotion.velocity"
-    task = stand_in.module(
-        "velocity_env_cfg",
-        LocomotionVelocityRoughEnvCfg=velocity_task(stand_in),
-        mdp=SimpleNamespace(JointVelocityActionCfg=recording("JointVelocityActionCfg")),
-    )
-    made = {
-        "isaaclab": stand_in.module("isaaclab", sim=sim),
-        "isaaclab.sim": sim,
-        "isaaclab.actuators": stand_in.module(
-            "actuators", **{name: recording(name) for name in actuators}
-        ),
-        "isaaclab.assets": stand_in.module("assets", ArticulationCfg=articulation),
-        package: stand_in.module(package, velocity_env_cfg=task),
-        "isaaclab.utils": stand_in.module("utils", configclass=lambda made: made),
+    mdp = SimpleNamespace(JointVelocityActionCfg=stand_in.recorder("JointVelocityActionCfg"))
+    task = SimpleNamespace(LocomotionVelocityRoughEnvCfg=velocity_task(stand_in), mdp=mdp)
+    return {
+        "isaaclab.assets": {"ArticulationCfg": articulation},
+        "isaaclab.utils": {"configclass": lambda made: made},
+        "isaaclab_tasks.core": {} if request.param.startswith("core") else None,
+        f"isaaclab_tasks.{request.param}": {"velocity_env_cfg": task},
     }
-    parents = package.split(".")[:-1]
-    for place in range(len(parents)):
-        name = ".".join(parents[: place + 1])
-        made[name] = stand_in.module(name)
-    return made
 
 
 def velocity_task(stand_in):
@@ -77,26 +53,9 @@ def velocity_task(stand_in):
     return Task
 
 
-def driven_by(actuators, names):
-    """Return the actuator of each joint; each pattern must match, and each name only one."""
-    found = {}
-    for actuator in actuators.values():
-        for pattern in actuator.joint_names_expr:
-            matched = [name for name in names if re.fullmatch(pattern, name)]
-            assert matched
-            assert not found.keys() & set(matched)
-            found |= dict.fromkeys(matched, actuator)
-    return found
-
-
-def resolved(value, names):
-    """Return values by joint; each pattern must match, and each name at most one pattern."""
-    if not isinstance(value, dict):
-        return dict.fromkeys(names, value)
-    found = {name: [p for p in value if re.fullmatch(p, name)] for name in names}
-    assert all(len(patterns) <= 1 for patterns in found.values())
-    assert {p for patterns in found.values() for p in patterns} == set(value)
-    return {name: value[patterns[0]] for name, patterns in found.items() if patterns}
+def driven_by(robots, actuators, names):
+    """Return the actuator of each joint."""
+    return robots.resolved({p: each for each in actuators for p in each.joint_names_expr}, names)
 
 
 def test_isaaclab_config_of_quadruped(load, modules, robots, tmp_path):
@@ -107,16 +66,13 @@ def test_isaaclab_config_of_quadruped(load, modules, robots, tmp_path):
     assert config.spawn.fix_base is False
     assert config.spawn.activate_contact_sensors
     assert config.init_state.pos == (0.0, 0.0, 0.3)
-    assert resolved(config.init_state.joint_pos, names) == {
-        joint: -1.8 if "calf" in joint else 0.9 if "thigh" in joint else 0.0
-        for joint in spec.joint_order
-    }
+    assert robots.resolved(config.init_state.joint_pos, names) == robots.pose_of(spec)
     # A DC motor has one saturation effort, so the calves have their own motor.
     assert {n: type(a).__name__ for n, a in config.actuators.items()} == {
         "hip_thigh": "DCMotorCfg",
         "calf": "DCMotorCfg",
     }
-    motors = driven_by(config.actuators, names)
+    motors = driven_by(robots, config.actuators.values(), names)
     assert set(motors) == set(spec.joint_order)
     for field, calf, other in (
         ("effort_limit", 45.43, 23.7),
@@ -141,7 +97,7 @@ def test_isaaclab_actuators_of_biped(load, modules, robots):
     names = {name: each.joint_names_expr for name, each in actuators.items()}
     assert names["feet"] == [".*_ankle"]
     assert names["upper_body"] == ["torso"]
-    assert set(driven_by({"legs": actuators["legs"]}, joints)) == set(joints) - {
+    assert set(driven_by(robots, [actuators["legs"]], joints)) == set(joints) - {
         *("l_ankle", "r_ankle", "torso")
     }
 
@@ -152,7 +108,9 @@ def test_isaaclab_velocity_task(load, modules, robots):
     task = loaded.RoughEnvCfg()
     assert task.scene.robot.prim_path == "{ENV_REGEX_NS}/Robot"
     assert task.scene.height_scanner.prim_path == "{ENV_REGEX_NS}/Robot/base"
-    scale = resolved(task.actions.joint_pos.scale, spec.joint_order)
+    assert task.actions.joint_pos.joint_names == [".*"]
+    assert not hasattr(task.actions, "joint_vel")
+    scale = robots.resolved(task.actions.joint_pos.scale, spec.joint_order)
     assert scale == robots.of(spec, calf=0.2, other=0.25)
     assert task.events.reset_robot_joints.params["position_range"] == (0.6, 1.4)
     assert task.events.add_base_mass.params["asset_cfg"].body_names == "base"
@@ -162,11 +120,13 @@ def test_isaaclab_velocity_task(load, modules, robots):
     assert task.terminations.base_contact.params["sensor_cfg"].body_names == ["base"]
 
 
-def test_isaaclab_velocity_task_without_contacts(load, modules, robots):
+def test_isaaclab_velocity_task_without_contacts_and_actuators(load, modules, robots):
     spec = robots.quadruped(penalized_contacts=(), termination_contacts=())
-    task = load("isaaclab", spec, modules).RoughEnvCfg()
-    assert task.rewards.undesired_contacts is None
-    assert task.terminations.base_contact is None
+    task = load("isaaclab", spec, modules, passive_joints=["tail_joint"]).RoughEnvCfg()
+    assert task.rewards.undesired_contacts is task.terminations.base_contact is None
+    actions = SimpleNamespace(joint_names_expr=task.actions.joint_pos.joint_names)
+    names = (*spec.joint_order, "tail_joint")
+    assert set(driven_by(robots, [actions], names)) == set(spec.joint_order)
 
 
 def test_isaaclab_config_of_arm(load, modules, robots):
@@ -189,10 +149,12 @@ def test_isaaclab_config_of_wheels(load, modules, robots):
     actuators = loaded.QUAD_4_CFG.actuators
     assert set(actuators) == {"joints", "wheels"}
     for name, joints in (("joints", others), ("wheels", wheels)):
-        assert set(driven_by({name: actuators[name]}, spec.joint_order)) == set(joints)
+        assert set(driven_by(robots, [actuators[name]], spec.joint_order)) == set(joints)
     assert (actuators["joints"].stiffness, actuators["wheels"].stiffness) == (20.0, 0.0)
     assert (actuators["joints"].damping, actuators["wheels"].damping) == (0.5, 0.75)
-    assert resolved(actuators["wheels"].effort_limit_sim, wheels) == dict.fromkeys(wheels, 45.43)
+    assert robots.resolved(actuators["wheels"].effort_limit_sim, wheels) == dict.fromkeys(
+        wheels, 45.43
+    )
     assert (loaded.ACTION_SCALE, loaded.SPEED_SCALE) == (0.25, 5.0)
     actions = loaded.RoughEnvCfg().actions
     assert actions.joint_pos.joint_names == [".*_hip_joint", ".*_thigh_joint"]
@@ -200,17 +162,6 @@ def test_isaaclab_config_of_wheels(load, modules, robots):
     assert (actions.joint_vel.asset_name, actions.joint_vel.scale) == ("robot", 5.0)
     text = Path(loaded.__file__).read_text()
     assert "[rad/s or m/s]; suggested: a share\nSPEED_SCALE = 5.0\n" in text
-    task = load("isaaclab", robots.quadruped(), modules).RoughEnvCfg()
-    assert task.actions.joint_pos.joint_names == [".*"]
-    assert not hasattr(task.actions, "joint_vel")
-
-
-def test_isaaclab_actions_exclude_unactuated_joints(load, modules, robots):
-    spec = robots.quadruped()
-    task = load("isaaclab", spec, modules, passive_joints=["tail_joint"]).RoughEnvCfg()
-    names = (*spec.joint_order, "tail_joint")
-    actions = SimpleNamespace(joint_names_expr=task.actions.joint_pos.joint_names)
-    assert set(driven_by({"actions": actions}, names)) == set(spec.joint_order)
 
 
 def test_isaaclab_config_with_only_wheels(load, modules, robots):
@@ -226,5 +177,5 @@ def test_isaaclab_patterns_of_hostile_names(load, modules, robots):
     loaded = load("isaaclab", spec, modules)
     (config,) = (value for name, value in vars(loaded).items() if name.endswith("_CFG"))
     names = [robots.in_usd(joint) for joint in spec.joint_order]
-    stiffness = resolved(config.actuators["joints"].stiffness, names)
+    stiffness = robots.resolved(config.actuators["joints"].stiffness, names)
     assert list(stiffness.values()) == list(spec.stiffness.values())

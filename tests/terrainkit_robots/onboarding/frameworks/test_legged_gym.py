@@ -1,6 +1,8 @@
 """Tests of the configurations for legged_gym and LeggedGym-Ex, with stub modules."""
 
 import ast
+import tomllib
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -9,95 +11,42 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.frameworks import config_files
 
-CLASSES = {
-    "init_state": {"pos": [], "rot": [], "lin_vel": [], "ang_vel": [], "default_joint_angles": {}},
-    "env": {"num_envs": 4096, "num_observations": 235, "num_privileged_obs": None}
-    | {"num_actions": 12, "episode_length_s": 20},
-    "control": {"control_type": "P", "stiffness": {}, "damping": {}}
-    | {"action_scale": 0.5, "decimation": 4},
-    "asset": {"file": "", "name": "", "foot_name": "None", "penalize_contacts_on": []}
-    | {"terminate_after_contacts_on": [], "disable_gravity": False, "collapse_fixed_joints": True}
-    | {"fix_base_link": False, "default_dof_drive_mode": 3, "self_collisions": 0}
-    | {"replace_cylinder_with_capsule": True, "flip_visual_attachments": True, "armature": 0.0},
-    "rewards": {"soft_dof_pos_limit": 1.0, "soft_dof_vel_limit": 1.0, "base_height_target": 1.0}
-    | {"max_contact_force": 100.0},
-}
-"""Classes and fields of legged_gym's LeggedRobotCfg."""
+FIELDS = tomllib.loads(Path(__file__).with_name("legged_gym_fields.toml").read_text())
+MORE = "leggedgym_ex"
 
-MORE = {
-    "control": {"dt": 0.02},
-    "asset": {"xml_file": "", "base_link_name": "", "dof_names": [], "dof_armature": []}
-    | {"links_to_keep": [], "dof_vel_limits": []},
-    "rewards": {"only_positive_rewards": True, "foot_clearance_target": 0.04}
-    | {"foot_height_offset": 0.0, "foot_clearance_tracking_sigma": 0.01},
-    "terrain": {"mesh_type": "plane", "curriculum": False, "measure_heights": False},
-    "commands": {"curriculum": False, "max_curriculum": 1.0, "num_commands": 4}
-    | {"resampling_time": 10.0, "heading_command": True},
-    "domain_rand": {"randomize_friction": True, "friction_range": [], "randomize_base_mass": True}
-    | {"added_mass_range": [], "push_robots": True, "push_interval_s": 15, "max_push_vel_xy": 1.0}
-    | {"randomize_com_displacement": True, "com_pos_x_range": [], "com_pos_y_range": []}
-    | {"com_pos_z_range": []},
-    "normalization": {"clip_observations": 100.0, "clip_actions": 100.0},
-    "noise": {"add_noise": True, "noise_level": 1.0},
-    "sim": {"dt": 0.005, "substeps": 1},
-}
-"""Additional fields of LeggedGym-Ex."""
 
-SCALES = ("dof_pos_limits", "collision", "tracking_lin_vel", "tracking_ang_vel", "lin_vel_z")
-SCALES += ("base_height", "ang_vel_xy", "orientation", "dof_vel", "dof_acc", "action_rate")
-SCALES += ("action_smoothness", "torques", "feet_air_time", "foot_clearance")
-"""The rewards of LeggedGym-Ex's task go2."""
-
-NESTED = {
-    ("rewards", "scales"): SCALES,
-    ("commands", "ranges"): ("lin_vel_x", "lin_vel_y", "ang_vel_yaw", "heading"),
-    ("normalization", "obs_scales"): (
-        *("lin_vel", "ang_vel", "dof_pos"),
-        *("dof_vel", "height_measurements"),
-    ),
-    ("noise", "noise_scales"): (
-        *("dof_pos", "dof_vel", "lin_vel", "ang_vel"),
-        *("gravity", "height_measurements"),
-    ),
-}
-"""Fields of the classes in the classes of LeggedGym-Ex."""
-
-PPO = {
-    "policy": ("init_noise_std", "actor_hidden_dims", "critic_hidden_dims", "activation"),
-    "algorithm": ("entropy_coef", "learning_rate", "schedule", "gamma", "lam", "desired_kl"),
-    "runner": (
-        *("run_name", "experiment_name", "num_steps_per_env"),
-        *("max_iterations", "save_interval"),
-    ),
-}
-"""Classes and fields of LeggedRobotCfgPPO."""
+def fields_of(*sections):
+    """Return the fields of each class."""
+    fields = defaultdict(list)
+    for section in sections:
+        for name, words in FIELDS[section].items():
+            fields[name] += words.split()
+    return fields
 
 
 @pytest.fixture
 def frameworks(stand_in):
-    """Return stub modules of legged_gym or LeggedGym-Ex."""
+    """Return a function that returns stubs of legged_gym, or with MORE of LeggedGym-Ex."""
 
-    def make(more):
-        fields = {name: CLASSES.get(name, {}) | more.get(name, {}) for name in CLASSES | more}
-        for (name, nested), values in NESTED.items():
-            if more:
-                values = dict.fromkeys(values, 0.0)
-                fields[name] = {**fields[name], nested: stand_in.part(nested, **values)}
-        parts = {name: stand_in.part(name, **values) for name, values in fields.items()}
-        ppo = {name: stand_in.part(name, **dict.fromkeys(keys)) for name, keys in PPO.items()}
-        config = stand_in.module(
-            "legged_gym.envs.base.legged_robot_config",
-            LeggedRobotCfg=stand_in.part("LeggedRobotCfg", **parts),
-            LeggedRobotCfgPPO=stand_in.part(
-                "LeggedRobotCfgPPO", seed=1, runner_class_name="", **ppo
-            ),
-        )
-        modules = {
-            "legged_gym": stand_in.module("legged_gym", SIMULATOR="genesis"),
-            "legged_gym.envs": stand_in.module("envs"),
-            "legged_gym.envs.base": stand_in.module("base"),
+    def parts(*sections):
+        made = {}
+        for path, names in fields_of(*sections).items():
+            name, _, nested = path.partition(".")
+            values = dict.fromkeys(names, 0.0)
+            if nested:
+                values = vars(made[name].__base__) | {nested: stand_in.part(nested, **values)}
+                values = {key: each for key, each in values.items() if not key.startswith("__")}
+            made[name] = stand_in.part(name, **values)
+        return made
+
+    def make(*more):
+        config = stand_in.part("LeggedRobotCfg", **parts("legged_gym", *more))
+        ppo = stand_in.part("LeggedRobotCfgPPO", seed=1, runner_class_name="", **parts("ppo"))
+        base = "legged_gym.envs.base.legged_robot_config"
+        return {
+            "legged_gym": {"SIMULATOR": "genesis"},
+            base: {"LeggedRobotCfg": config, "LeggedRobotCfgPPO": ppo},
         }
-        return {**modules, config.__name__: config}
 
     return make
 
@@ -106,6 +55,11 @@ def gains_of(control, joint):
     """Return the gains that legged_gym assigns to a joint: the gains of the last matching key."""
     keys = [key for key in control.stiffness if key in joint]
     return control.stiffness[keys[-1]], control.damping[keys[-1]]
+
+
+def words_of(loaded):
+    """Return the text of a configuration without line ends and signs of comments."""
+    return " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
 
 
 def bodies_of(asset, attribute, bodies):
@@ -125,14 +79,9 @@ def check_contacts(asset, spec, bodies):
 
 
 def check_joints(config, robots, spec):
-    assert config.init_state.default_joint_angles == {
-        joint: -1.8 if "calf" in joint else 0.9 if "thigh" in joint else 0.0
-        for joint in spec.joint_order
-    }
-    stiffness, damping = (
-        robots.of(spec, calf=30.0, other=20.0),
-        robots.of(spec, calf=0.75, other=0.5),
-    )
+    assert config.init_state.default_joint_angles == robots.pose_of(spec)
+    stiffness = robots.of(spec, calf=30.0, other=20.0)
+    damping = robots.of(spec, calf=0.75, other=0.5)
     for joint in spec.joint_order:
         assert gains_of(config.control, joint) == (stiffness[joint], damping[joint])
     assert config.control.control_type == "P"
@@ -148,7 +97,7 @@ RANGES = {f"{leg}_calf_joint": (-2.75, -0.75) for leg in ("FL", "FR", "RL", "RR"
 
 def test_legged_gym_config_of_quadruped(load, frameworks, robots, tmp_path):
     spec = robots.quadruped()
-    loaded = load("legged_gym", spec, frameworks({}), bodies=robots.bodies, limits=RANGES)
+    loaded = load("legged_gym", spec, frameworks(), bodies=robots.bodies, limits=RANGES)
     config = loaded.Quad4RoughCfg
     check_joints(config, robots, spec)
     check_contacts(config.asset, spec, robots.bodies)
@@ -190,10 +139,11 @@ def test_leggedgym_ex_config_of_quadruped(load, frameworks, robots, tmp_path):
 def test_leggedgym_ex_has_classes_of_every_section(load, frameworks, robots):
     loaded = load("leggedgym_ex", robots.quadruped(), frameworks(MORE))
     sections = {name for name in vars(loaded.Quad4Cfg) if not name.startswith("__")}
-    assert sections == {*CLASSES, *MORE}
-    assert {*PPO, "seed", "runner_class_name"} <= vars(loaded.Quad4CfgPPO).keys()
+    expected = fields_of("legged_gym", MORE)
+    assert sections == {name for name in expected if "." not in name}
+    assert {*fields_of("ppo"), "seed", "runner_class_name"} <= vars(loaded.Quad4CfgPPO).keys()
     scales = vars(loaded.Quad4Cfg.rewards.scales)
-    assert {name for name in scales if not name.startswith("__")} == set(SCALES)
+    assert {name for name in scales if not name.startswith("__")} == set(expected["rewards.scales"])
 
 
 def test_leggedgym_ex_has_no_reward_for_missing_limits(load, frameworks, robots):
@@ -221,10 +171,12 @@ def test_leggedgym_ex_rejects_name_of_its_own_robot(robots):
 
 def test_legged_gym_config_uses_largest_armature(load, frameworks, robots):
     """With the median armature of 0, a light ankle would be unstable."""
-    spec = robots.quadruped(armature={".*_(hip|thigh)_joint": 0.0, ".*_calf_joint": 0.01})
-    loaded = load("legged_gym", spec, frameworks({}))
+    armature = {".*_(hip|thigh)_joint": 0.0, ".*_calf_joint": 0.01}
+    spec = robots.quadruped(armature=armature, urdf="{my}.urdf")
+    loaded = load("legged_gym", spec, frameworks())
     assert loaded.Quad4RoughCfg.asset.armature == 0.01
-    text = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    assert loaded.Quad4RoughCfg.asset.file.format().endswith("/{my}.urdf")
+    text = words_of(loaded)
     assert "One value for all joints, the largest of 0.0 to 0.01." in text
 
 
@@ -234,26 +186,31 @@ def test_legged_configs_ignore_wheels_in_action_scale(load, frameworks, robots, 
     loaded = load(framework, spec, frameworks(MORE))
     config = loaded.Quad4RoughCfg if framework == "legged_gym" else loaded.Quad4Cfg
     assert config.control.action_scale == 0.25
-    text = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    text = words_of(loaded)
     assert "need velocity targets instead of P: FL_calf_joint, FR_calf_joint, " in text
     plain = load(framework, robots.quadruped(), frameworks(MORE))
     assert "velocity targets" not in Path(plain.__file__).read_text()
 
 
+def test_legged_configs_hold_joints_without_action(load, frameworks, robots):
+    scales = {".*_(hip|thigh)_joint": 0.25, ".*_calf_joint": 0.0}
+    loaded = load("legged_gym", robots.quadruped(action_scale=scales), frameworks())
+    assert loaded.Quad4RoughCfg.control.action_scale == 0.25
+    assert "to 0, to hold the default pose: FL_calf_joint, FR_calf_joint, " in words_of(loaded)
+
+
 def test_stub_modules_reject_unknown_fields(frameworks, load, robots):
     """The stubs of legged_gym reject the additional fields of LeggedGym-Ex."""
     with pytest.raises(AttributeError, match="has no"):
-        load("leggedgym_ex", robots.quadruped(), frameworks({}))
+        load("leggedgym_ex", robots.quadruped(), frameworks())
 
 
 def test_legged_gym_config_warns_about_noise_vector(load, frameworks, robots):
     spec = robots.quadruped()
-    fewer = robots.quadruped(
-        joint_order=spec.joint_order[:6], feet=spec.feet[:2], default_pose={".*": 0.5}
-    )
-    changed = {"stiffness": {".*": 1.0}, "damping": {".*": 1.0}, "action_scale": {".*": 1.0}}
-    fewer = type(fewer)(**(vars(fewer) | changed | {"soft_limits": {}}))
-    loaded = load("legged_gym", fewer, frameworks({}))
+    names = ("stiffness", "damping", "action_scale", "default_pose")
+    tables = {name: {".*": 1.0} for name in names} | {"soft_limits": {}}
+    fewer = robots.quadruped(joint_order=spec.joint_order[:6], feet=spec.feet[:2], **tables)
+    loaded = load("legged_gym", fewer, frameworks())
     assert loaded.Quad4RoughCfg.env.num_observations == 12 + 18 + 187
     assert "_get_noise_scale_vec supports 12 joints" in " ".join(loaded.__doc__.split())
 
@@ -270,15 +227,9 @@ def test_legged_configs_of_ambiguous_joint_names(load, frameworks, robots, frame
     config = loaded.Quad4RoughCfg if framework == "legged_gym" else loaded.Quad4Cfg
     for joint in joints:
         assert gains_of(config.control, joint) == (gains[joint], gains[joint])
-    text = " ".join(Path(loaded.__file__).read_text().replace("#", "").split())
+    text = words_of(loaded)
     assert "joint10 contains joint1: " in text
     assert config.control.action_scale == 1.5
-
-
-def test_legged_gym_config_escapes_braces_in_path(load, frameworks, robots):
-    spec = robots.quadruped(urdf="{my}.urdf")
-    loaded = load("legged_gym", spec, frameworks({}))
-    assert loaded.Quad4RoughCfg.asset.file.format().endswith("/{my}.urdf")
 
 
 def test_leggedgym_ex_config_keeps_hostile_names(load, frameworks, robots):

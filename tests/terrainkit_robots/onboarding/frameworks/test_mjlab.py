@@ -64,61 +64,26 @@ def registered():
 
 
 @pytest.fixture
-def modules(stand_in, registered):
-    recording, module = stand_in.recording, stand_in.module
-    actuators = ("BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg")
-    entity = recording("EntityCfg", InitialStateCfg=recording("InitialStateCfg"))
-    articulation = recording("EntityArticulationInfoCfg")
-    ring = SimpleNamespace(single_ring=lambda **options: options)
+def modules(registered):
     sensor = make_dataclass("ContactSensorCfg", ["name", *((f, Any, None) for f in SENSOR_FIELDS)])
     runner = make_dataclass("RslRlOnPolicyRunnerCfg", [("experiment_name", str, "go1_velocity")])
-    velocity_mdp = SimpleNamespace(
-        self_collision_cost=0,
-        illegal_contact=0,
-        JointVelocityActionCfg=recording("JointVelocityActionCfg"),
-    )
-    made = {
-        "mjlab": module("mjlab"),
-        "actuator": module("actuator", **{name: recording(name) for name in actuators}),
-        "entity": module("entity", EntityCfg=entity, EntityArticulationInfoCfg=articulation),
-        "envs": module("envs", ManagerBasedRlEnvCfg=None),
-        "managers": module(
-            "managers",
-            RewardTermCfg=recording("RewardTermCfg"),
-            TerminationTermCfg=recording("TerminationTermCfg"),
-        ),
-        "sensor": module(
-            "sensor",
-            ContactMatch=recording("ContactMatch"),
-            ContactSensorCfg=sensor,
-            ObjRef=lambda *words: words,
-            RingPatternCfg=ring,
-        ),
-        "tasks": module("tasks"),
-        "tasks.registry": module(
-            "registry",
-            register_mjlab_task=lambda task_id, **parts: registered.update({task_id: parts}),
-        ),
-        "tasks.velocity": module("velocity", mdp=velocity_mdp),
-        "tasks.velocity.config": module("config"),
-        "tasks.velocity.config.go1": module("go1"),
-        "tasks.velocity.config.go1.rl_cfg": module("r", unitree_go1_ppo_runner_cfg=runner),
-        "tasks.velocity.rl": module("rl", VelocityOnPolicyRunner="runner"),
-        "tasks.velocity.velocity_env_cfg": module("v", make_velocity_env_cfg=velocity_env_cfg),
+    ring = SimpleNamespace(single_ring=lambda **options: options)
+    return {
+        "mjlab.sensor": {
+            "ContactSensorCfg": sensor,
+            "ObjRef": lambda *words: words,
+            "RingPatternCfg": ring,
+        },
+        "mjlab.tasks.registry": {
+            "register_mjlab_task": lambda task_id, **parts: registered.update({task_id: parts})
+        },
+        "mjlab.tasks.velocity.config.go1.rl_cfg": {"unitree_go1_ppo_runner_cfg": runner},
+        "mjlab.tasks.velocity.velocity_env_cfg": {"make_velocity_env_cfg": velocity_env_cfg},
     }
-    return {name if name == "mjlab" else f"mjlab.{name}": each for name, each in made.items()}
 
 
-def resolved(value, names):
-    """Return the value of each name; each pattern must match, and each name only one."""
-    found = {name: [p for p in value if re.fullmatch(p, name)] for name in names}
-    assert {p for patterns in found.values() for p in patterns} == set(value)
-    assert all(len(patterns) <= 1 for patterns in found.values())
-    return {name: value[patterns[0]] for name, patterns in found.items() if patterns}
-
-
-def by_target(actuators, names):
-    return resolved({p: each for each in actuators for p in each.target_names_expr}, names)
+def by_target(robots, actuators, names):
+    return robots.resolved({p: each for each in actuators for p in each.target_names_expr}, names)
 
 
 def test_mjlab_config_of_quadruped(load, modules, robots):
@@ -127,10 +92,10 @@ def test_mjlab_config_of_quadruped(load, modules, robots):
     entity = loaded.get_robot_cfg()
     assert entity is not loaded.get_robot_cfg()
     assert entity.init_state.pos == (0.0, 0.0, 0.3)
-    assert resolved(entity.init_state.joint_pos, spec.joint_order)["RR_calf_joint"] == -1.8
+    assert robots.resolved(entity.init_state.joint_pos, spec.joint_order)["RR_calf_joint"] == -1.8
     assert entity.articulation.soft_joint_pos_limit_factor == 0.9
     assert len(entity.articulation.actuators) == 2
-    found = by_target(entity.articulation.actuators, spec.joint_order)
+    found = by_target(robots, entity.articulation.actuators, spec.joint_order)
     for field, calf, other in (
         ("stiffness", 30.0, 20.0),
         ("damping", 0.75, 0.5),
@@ -139,7 +104,8 @@ def test_mjlab_config_of_quadruped(load, modules, robots):
     ):
         values = {joint: getattr(found[joint], field) for joint in spec.joint_order}
         assert values == robots.of(spec, calf=calf, other=other)
-    scales = resolved(loaded.ACTION_SCALE, spec.joint_order)
+    assert not hasattr(loaded, "SPEED_SCALE")
+    scales = robots.resolved(loaded.ACTION_SCALE, spec.joint_order)
     assert scales == robots.of(spec, calf=0.2, other=0.25)
 
 
@@ -149,6 +115,7 @@ def test_mjlab_tasks_of_quadruped(load, modules, robots, registered):
     loaded.register_tasks()
     assert list(registered) == ["Mjlab-Velocity-Flat-Quad4", "Mjlab-Velocity-Rough-Quad4"]
     flat, rough = (task["env_cfg"] for task in registered.values())
+    assert flat.actions["joint_pos"].actuator_names == (".*",)
     sensors = {sensor.name: sensor for sensor in rough.scene.sensors}
     assert sensors["terrain_scan"].frame.name == "base"
     assert sensors["foot_height_scan"].frame == tuple(("site", n, "robot") for n in spec.feet)
@@ -160,7 +127,7 @@ def test_mjlab_tasks_of_quadruped(load, modules, robots, registered):
     assert all(re.fullmatch(geoms[0], f"FL_foot_collision{end}") for end in ("", "1", "12"))
     assert not re.fullmatch(geoms[0], "FL_foot_collision_mesh")
     pose = rough.rewards["pose"].params
-    assert resolved(pose["std_walking"], spec.joint_order)["FL_hip_joint"] == 0.15
+    assert robots.resolved(pose["std_walking"], spec.joint_order)["FL_hip_joint"] == 0.15
     assert rough.rewards["foot_clearance"].params["target_height"] == 0.05
     assert rough.terminations["illegal_contact"].params == {"sensor_name": "illegal_contact"}
     assert flat.scene.terrain.terrain_type == "plane"
@@ -190,10 +157,8 @@ def test_mjlab_names_are_in_robot_xml(onboarded, load, modules, format_name):
     for patterns in (loaded.PENALIZED, loaded.TERMINATION):
         assert all(any(re.fullmatch(p, name) for name in body) for p in patterns)
     for terms in loaded.velocity_env_cfg(rough=False).observations.values():
-        names = [
-            terms.terms[name].params["sensor_name"] for name in ("base_lin_vel", "base_ang_vel")
-        ]
-        assert all(name.removeprefix("robot/") in sensors for name in names)
+        for name in ("base_lin_vel", "base_ang_vel"):
+            assert terms.terms[name].params["sensor_name"].removeprefix("robot/") in sensors
 
 
 def test_mjlab_config_of_wheels(load, modules, robots):
@@ -202,20 +167,17 @@ def test_mjlab_config_of_wheels(load, modules, robots):
     wheels, others = robots.wheels_of(spec)
     by_kind = {type(a).__name__: a for a in loaded.ARTICULATION.actuators}
     rolling = by_kind.pop("BuiltinVelocityActuatorCfg")
-    assert set(by_target([rolling], spec.joint_order)) == set(wheels)
+    assert set(by_target(robots, [rolling], spec.joint_order)) == set(wheels)
     assert (rolling.damping, rolling.effort_limit, rolling.armature) == (0.75, 45.43, 0.04)
     (held,) = by_kind.values()
-    assert set(by_target([held], spec.joint_order)) == set(others)
-    assert resolved(loaded.ACTION_SCALE, spec.joint_order) == dict.fromkeys(others, 0.25)
-    assert resolved(loaded.SPEED_SCALE, spec.joint_order) == dict.fromkeys(wheels, 5.0)
+    assert set(by_target(robots, [held], spec.joint_order)) == set(others)
+    assert robots.resolved(loaded.ACTION_SCALE, spec.joint_order) == dict.fromkeys(others, 0.25)
+    assert robots.resolved(loaded.SPEED_SCALE, spec.joint_order) == dict.fromkeys(wheels, 5.0)
     text = Path(loaded.__file__).read_text()
     assert "# For JointVelocityActionCfg.scale.\n# [rad/s or m/s]; suggested: a share\n" in text
     actions = loaded.velocity_env_cfg(rough=False).actions
     assert actions["joint_pos"].actuator_names == (".*_hip_joint", ".*_thigh_joint")
     assert actions["joint_vel"].actuator_names == (".*_calf_joint",)
-    plain = load("mjlab", robots.quadruped(), modules)
-    assert "SPEED_SCALE" not in Path(plain.__file__).read_text()
-    assert plain.velocity_env_cfg(rough=False).actions["joint_pos"].actuator_names == (".*",)
 
 
 def test_mjlab_config_with_only_wheels(load, modules, robots):
@@ -249,9 +211,6 @@ def test_mjlab_config_of_arm_without_limits(load, modules, robots):
     assert [a.target_names_expr for a in actuators] == [("joint1$",), ("joint10",), ("wrist",)]
     assert not any(vars(a).keys() & {"effort_limit", "armature"} for a in actuators)
     assert loaded.INIT_STATE.joint_pos == {"joint1$": 0.1, "joint10": 0.1, "wrist": 0.1}
-
-
-def test_mjlab_config_without_joints(load, modules, robots):
     loaded = load("mjlab", robots.plain(()), modules)
     assert loaded.get_robot_cfg().articulation.actuators == ()
 
@@ -284,11 +243,10 @@ def test_mjlab_trains_onboarded_robot(tmp_path, mjlab_python, name, terrain):
     options = OnboardOptions(frameworks=("mjlab",), render_images=False)
     onboard(bundled.urdf_path(name), tmp_path / "robot", options)
     task = f"Mjlab-Velocity-{terrain}-{name.capitalize()}"
-    command = [mjlab_python, "robot/mjlab_config.py", task, "--env.scene.num-envs", "4"]
-    command += ["--agent.max-iterations", "2", "--agent.logger", "tensorboard"]
-    command += ["--gpu-ids", "None", *["--map", "map.npz"] * is_map]
+    words = [task, "--env.scene.num-envs", "4", "--agent.max-iterations", "2", "--gpu-ids", "None"]
+    words += ["--agent.logger", "tensorboard", *["--map", "map.npz"] * is_map]
     done = subprocess.run(
-        command,
+        [mjlab_python, "robot/mjlab_config.py", *words],
         capture_output=True,
         text=True,
         cwd=tmp_path,

@@ -21,11 +21,8 @@ from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_
     ],
 )
 def test_names_are_identifiers(name, class_, constant, package):
-    assert (class_name(name), constant_name(name), package_name(name)) == (
-        class_,
-        constant,
-        package,
-    )
+    made = (class_name(name), constant_name(name), package_name(name))
+    assert made == (class_, constant, package)
     assert all(word.isidentifier() for word in (class_, constant, package))
     assert not keyword.iskeyword(package)
 

@@ -22,13 +22,18 @@ def test_usd_patterns_match_original_and_usd_names(robots):
     assert patterns["FL_hip_joint"] == "FL_hip_joint"
 
 
-def test_usd_patterns_reject_equal_names():
-    with pytest.raises(ConfigError, match=r"'a\.b' and 'a_b' have the same name in USD"):
-        usd_patterns(("a.b", "a_b"))
-    with pytest.raises(ConfigError, match="have the same name in USD"):
-        usd_patterns(("\u00e9_x", "___x"))
-    with pytest.raises(ConfigError, match="got an empty text"):
-        usd_patterns(("",))
+@pytest.mark.parametrize(
+    ("make", "names", "message"),
+    [
+        (usd_patterns, ("a.b", "a_b"), r"'a\.b' and 'a_b' have the same name in USD"),
+        (usd_patterns, ("\u00e9_x", "___x"), "have the same name in USD"),
+        (usd_patterns, ("",), "got an empty text"),
+        (mjlab_patterns, ("a/x", "b/x"), "the same name in mjlab"),
+    ],
+)
+def test_equal_and_empty_names_are_rejected(make, names, message):
+    with pytest.raises(ConfigError, match=message):
+        make(names)
 
 
 def test_usd_patterns_have_no_exponential_matching():
@@ -44,8 +49,6 @@ def test_mjlab_patterns_match_one_name_by_prefix():
     for match in (re.match, re.fullmatch):
         for name, expected in zip(names, seen, strict=True):
             assert [other for other in seen if match(patterns[name], other)] == [expected]
-    with pytest.raises(ConfigError, match="the same name in mjlab"):
-        mjlab_patterns(("a/x", "b/x"))
 
 
 @pytest.mark.parametrize(

@@ -26,17 +26,19 @@ def test_common_key_of_feet(targets, others, key):
     assert common_key(targets, [*targets, *others]) == key
 
 
-def test_keys_for_match_each_body_once():
-    targets = [f"{leg}_{part}" for leg in LEGS for part in ("thigh", "calf")]
-    assert keys_for(targets, BODIES).keys == ("thigh", "calf")
-    assert keys_for(["base"], BODIES).keys == ("base",)
-    assert keys_for([], BODIES).keys == ()
-    assert keys_for(["FL_thigh", "RR_hip"], BODIES).keys == ("FL_thigh", "RR_hip")
-
-
-def test_keys_for_reports_ambiguous_names():
-    result = keys_for(["base"], ["base", "base_imu"])
-    assert (result.keys, result.clashes) == (("base",), (("base", "base_imu"),))
+@pytest.mark.parametrize(
+    ("targets", "bodies", "keys", "clashes"),
+    [
+        ([f"{leg}_{p}" for leg in LEGS for p in ("thigh", "calf")], BODIES, ("thigh", "calf"), ()),
+        (["base"], BODIES, ("base",), ()),
+        ([], BODIES, (), ()),
+        (["FL_thigh", "RR_hip"], BODIES, ("FL_thigh", "RR_hip"), ()),
+        (["base"], ["base", "base_imu"], ("base",), (("base", "base_imu"),)),
+    ],
+)
+def test_keys_for_match_each_body_once(targets, bodies, keys, clashes):
+    result = keys_for(targets, bodies)
+    assert (result.keys, result.clashes) == (keys, clashes)
 
 
 def test_keys_for_random_bodies():
@@ -56,18 +58,20 @@ def test_keys_for_random_bodies():
             assert sorted(matches) != sorted(targets)
 
 
-def test_gain_keys_last_match_is_correct():
-    joints = ("joint10", "joint1", "joint2", "joint1_a")
-    gains = {"joint10": 1.0, "joint1": 2.0, "joint2": 3.0, "joint1_a": 2.0}
-    result = gain_keys(joints, gains)
-    assert result.keys == ("joint1", "joint2", "joint10")
-    assert result.clashes == (("joint1", "joint10"),)
-    for joint in joints:
-        assert [gains[key] for key in result.keys if key in joint][-1] == gains[joint]
-
-
-def test_gain_keys_keep_joint_order():
-    joints = ("b_long_name", "a")
-    assert gain_keys(("b_long_nme", "c"), {"b_long_nme": 1, "c": 2}).keys == ("b_long_nme", "c")
-    assert gain_keys(joints, dict.fromkeys(joints, 1)).keys == ("a",)
-    assert gain_keys(joints, dict.fromkeys(joints, 1)).clashes == ()
+@pytest.mark.parametrize(
+    ("gains", "keys", "clashes"),
+    [
+        (
+            {"joint10": 1.0, "joint1": 2.0, "joint2": 3.0, "joint1_a": 2.0},
+            ("joint1", "joint2", "joint10"),
+            (("joint1", "joint10"),),
+        ),
+        ({"b_long_nme": 1, "c": 2}, ("b_long_nme", "c"), ()),
+        ({"b_long_name": 1, "a": 1}, ("a",), ()),
+    ],
+)
+def test_last_gain_key_of_a_joint_is_correct(gains, keys, clashes):
+    result = gain_keys(tuple(gains), gains)
+    assert (result.keys, result.clashes) == (keys, clashes)
+    for joint, gain in gains.items():
+        assert gains[[key for key in keys if key in joint][-1]] == gain

@@ -1,0 +1,123 @@
+"""Run all rules on the robot of every case, and on a quadruped with changed numbers.
+
+The findings are in all_findings.json. Write them anew with `python -m
+tests.terrainkit_robots.lint.test_all_rules`, and read the difference. Rules that load the file in
+MuJoCo are left out, since its versions reject different files.
+"""
+
+import json
+import re
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from terrainkit_robots.lint.rule import FAMILIES
+from tests.terrainkit_robots.lint.test_every_rule import (
+    ALL_CASES,
+    Case,
+    bundled,
+    lint_case,
+    text_of,
+)
+
+FINDINGS = Path(__file__).with_name("all_findings.json")
+
+NUMBERS = {
+    "mass": r'<mass value="([^"]*)"',
+    "moment": r'ixx="([^"]*)"',
+    "product": r'ixy="([^"]*)"',
+    "center": r'<inertial>\s*<origin xyz="\S+ (\S+)',
+    "thigh": r'_calf_joint".*?<origin xyz="\S+ \S+ ([^"]*)"',
+    "lower limit": r'lower="([^"]*)"',
+    "upper limit": r'upper="([^"]*)"',
+    "effort": r'effort="([^"]*)"',
+    "velocity": r'velocity="([^"]*)"',
+    "radius": r'radius="([^"]*)"',
+    "length": r'length="([^"]*)"',
+    "axis": r'axis xyz="\S+ (\S+)',
+}
+"""Numbers of a URDF by name, as patterns with one group."""
+
+ONE = (-1, 0.5, 0.95, 1.05, 2)
+EVERY = (0.01, 0.1, 0.5, 2, 100)
+
+
+def scaled(pattern, factor, *, count):
+    """Return the quadruped with its first `count` numbers multiplied; 0 is all of them."""
+
+    def scale(match):
+        start, end = (place - match.start() for place in match.span(1))
+        return f"{match[0][:start]}{float(match[1]) * factor:.6g}{match[0][end:]}"
+
+    return re.sub(pattern, scale, bundled("quadruped.urdf"), count=count, flags=re.DOTALL)
+
+
+def findings(title, robot, folder, text=text_of):
+    """Return the findings of all rules, as lines."""
+    case = robot if isinstance(robot, Case) else Case(code="", fails=True, title=title, robot=robot)
+    report = lint_case(case, case.write(folder))
+    assert not report.crashed, title
+    return [f"{f.code} {text(f, folder)}" for f in report.findings if not f.code.startswith("SIM")]
+
+
+def brief(finding, _):
+    return f"{finding.severity} {finding.certainty} {finding.subject}, line {finding.line}"
+
+
+def of_cases(family, folder):
+    """Return the findings on the robots of the cases of a family, by the case.
+
+    A robot that is compared with another file or a spec is left out, since XRF tests it.
+    """
+    robots = {
+        (case.text, repr(case.files)): case
+        for case in ALL_CASES
+        if case.other_text is case.spec is None
+    }
+    cases = [case for case in robots.values() if case.code.startswith(family)]
+    found = {}
+    for number, case in enumerate(cases):
+        (folder / str(number)).mkdir()
+        found[str(case)] = findings(str(case), case, folder / str(number), brief)
+    return found
+
+
+def of_changes(name, folder):
+    """Return the findings on the quadruped with one number, or every number of a kind, scaled."""
+    changes = [("one", factor, 1) for factor in ONE] + [("every", factor, 0) for factor in EVERY]
+    return {
+        title: findings(title, scaled(NUMBERS[name], factor, count=count), folder)
+        for word, factor, count in changes
+        for title in [f"{word} {name} times {factor:g}"]
+    }
+
+
+@cache
+def expected():
+    return json.loads(FINDINGS.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_all_findings_on_the_robots_of_cases(family, tmp_path):
+    assert of_cases(family, tmp_path) == expected()[family]
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_all_findings_on_a_quadruped_with_scaled_numbers(name, tmp_path):
+    assert of_changes(name, tmp_path) == expected()[name]
+
+
+def write_findings():
+    """Write all_findings.json."""
+    found = {}
+    for make, names in ((of_cases, FAMILIES), (of_changes, NUMBERS)):
+        for name in names:
+            with tempfile.TemporaryDirectory() as folder:
+                found[name] = make(name, Path(folder))
+    FINDINGS.write_text(json.dumps(found, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_findings()

@@ -1,0 +1,66 @@
+"""Findings on robots of other projects, which their folder has to contain."""
+
+import pytest
+
+from terrainkit_robots.analysis.facts import Facts
+from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.rule import rules
+from terrainkit_robots.lint.runner import lint
+from tests.robots import REAL_ROBOTS
+
+PHYSICAL = [rule for rule in rules() if rule.family in ("INR", "JNT", "SYM")]
+COMPARED = [rule for rule in rules() if "against" in rule.needs]
+SIDES = ("front", "rear", "left", "right")
+ANYMAL_JOINTS = [
+    f"{leg}_{part}" for leg in ("LF", "RF", "LH", "RH") for part in ("HAA", "HFE", "KFE")
+]
+
+DEFECTS = {
+    # The covers of the calves have shapes but no mass, so MuJoCo adds 1.3 % of the total mass.
+    "go2/urdf/go2.urdf": [("INR011", "FL_calflower")],
+    "anymal_c/urdf/anymal_c.urdf": [
+        ("INR003", "hatch"),
+        *(("INR004", f"depth_camera_{side}_camera") for side in SIDES),
+        *(("JNT006", joint) for joint in ANYMAL_JOINTS),
+    ],
+    "cassie/urdf/cassie.urdf": [
+        ("INR001", "left_pelvis_abduction"),
+        ("INR003", "base"),
+        ("INR004", "left_toe"),
+        ("INR004", "right_toe"),
+    ],
+}
+"""Known errors and warnings of the rules on masses, joints and symmetry."""
+
+
+def found(name, selected, against=None):
+    """Return code and subject of the errors and warnings on a robot."""
+    report = lint(Facts(load_robot(name), against=against), selected)
+    assert not report.crashed
+    return sorted((f.code, f.subject) for f in report.findings if f.severity != "note")
+
+
+@pytest.mark.parametrize("name", REAL_ROBOTS)
+def test_real_robots_have_only_known_defects(robot_file, name):
+    assert found(robot_file(name), PHYSICAL) == sorted(DEFECTS.get(name, []))
+
+
+@pytest.mark.parametrize(
+    ("urdf", "mjcf", "differences"),
+    [
+        (
+            "go2/urdf/go2.urdf",
+            "go2_mjcf/go2.xml",
+            [
+                ("XRF005", "go2_description"),
+                ("XRF006", "FL_calf_joint"),
+                ("XRF007", "go2_description"),
+            ],
+        ),
+        ("h1/urdf/h1.urdf", "h1/h1.xml", [("XRF009", f"{s}_ankle_link") for s in SIDES[2:]]),
+        ("g1/g1_29dof.urdf", "g1/g1_29dof.xml", []),
+    ],
+)
+def test_real_urdf_and_mjcf_have_only_known_differences(robot_file, urdf, mjcf, differences):
+    other = Facts(load_robot(robot_file(mjcf)))
+    assert found(robot_file(urdf), COMPARED, against=other) == differences
