@@ -140,7 +140,9 @@ def onboard_robot(file: Path, target: Path) -> Outcome:
 def stands(verification: Verification | None) -> str:
     """Return the result of the standing test."""
     if verification is None or verification.standing is None:
-        return f"not simulated: {verification.error}" if verification else ""
+        return (
+            f"not simulated: {verification.error or verification.skipped}" if verification else ""
+        )
     standing = verification.standing
     locked = ", locked joints" if verification.joints_locked else ""
     contacts = (

@@ -29,9 +29,11 @@ BOX = """<robot name="{name}">
     </inertial>
     <collision><geometry><box size="0.2 0.2 0.2"/></geometry></collision>
   </link>
+  <link name="top"/>
+  <joint name="top_joint" type="fixed"><parent link="trunk"/><child link="top"/></joint>
 </robot>
 """
-"""The URDF of a robot with one link, with a name and a mass [kg] to fill in."""
+"""The URDF of a robot with one rigid body, with a name and a mass [kg] to fill in."""
 
 ARM = """<robot name="arm">
   <link name="stand"><inertial><mass value="5"/>

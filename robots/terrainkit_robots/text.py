@@ -1,5 +1,6 @@
 """Format names, counts and paths for messages."""
 
+import os
 import re
 from collections.abc import Container, Iterable, Sequence
 from pathlib import Path
@@ -66,3 +67,12 @@ def display_path(path: Path | str) -> str:
         return str(Path(path).absolute().relative_to(Path.cwd()))
     except (OSError, ValueError):
         return str(path)
+
+
+def short_path(path: Path | str) -> str:
+    """Return the shorter of the absolute path and the path relative to the working directory."""
+    full = os.path.normpath(Path(path).absolute())
+    try:
+        return min(os.path.relpath(full), full, key=len)
+    except (OSError, ValueError):  # another drive on Windows
+        return full

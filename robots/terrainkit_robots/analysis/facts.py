@@ -11,11 +11,12 @@ from terrainkit_robots.analysis.bodies.overlap import OverlapScene
 from terrainkit_robots.analysis.bodies.tree import Tree, build_tree
 from terrainkit_robots.analysis.inertia.repair import InertiaRepair
 from terrainkit_robots.analysis.legs.default_pose import default_positions
-from terrainkit_robots.analysis.legs.joint_roles import is_wheel, leg_joints, robot_joints
+from terrainkit_robots.analysis.legs.joint_roles import leg_joints, robot_joints
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg, detect_legs
 from terrainkit_robots.analysis.legs.limbs import Limb, detect_limbs
 from terrainkit_robots.analysis.legs.stance import Stance, compute_stance
+from terrainkit_robots.analysis.legs.wheels import is_balanced
 from terrainkit_robots.analysis.meshes.uses import UsedMesh, meshes_by_file, meshes_by_name
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import fixed_joints
 from terrainkit_robots.analysis.simulator_conventions.joint_order import (
@@ -163,7 +164,12 @@ class Facts:
 
     def is_wheel(self, body: Body) -> bool:
         """Return whether a body is a wheel or a propeller."""
-        return is_wheel(body, self._parents)
+        return is_balanced(body, self._parents) or body.index in self.wheels
+
+    @cached_property
+    def wheels(self) -> frozenset[int]:
+        """Indices of the bodies that are wheels at the end of legs."""
+        return frozenset(leg.limb.chain[-1] for leg in self.legs if leg.limb.has_wheel)
 
     # Files
 
@@ -272,7 +278,8 @@ class Facts:
     @cached_property
     def misalignments(self) -> tuple[list[Misalignment], set[int]]:
         """The misaligned pairs of `uncopied_pairs`, and the indices of the displaced bodies."""
-        return find_misalignments(self.mirror, self.uncopied_pairs, self.leg_bodies)
+        tips = {leg.limb.chain[-1]: leg.limb.tip for leg in self.legs}
+        return find_misalignments(self.mirror, self.uncopied_pairs, self.leg_bodies, tips)
 
     def outlier_first(
         self, pair: MirrorPair, value: Callable[[Body], Matrix | None]

@@ -9,6 +9,12 @@ from terrainkit_robots.description.xml.document import XmlDocument, parse_xml, r
 
 XACRO = "xacro"
 
+_USD_STARTS = (b"#usda", b"PXR-USDC")
+"""First bytes of text and binary USD."""
+
+_FORMATS = {"sdf": "SDF", "world": "SDF", "collada": "a Collada mesh", "launch": "a launch file"}
+"""Formats that users pass as robots, by their root element."""
+
 
 def load_robot(
     path: str | Path,
@@ -37,6 +43,9 @@ def load_robot(
     robot = RobotFile(path=Path(path)) if Path(path) in contents else find_robot(path)
     path, packages = robot.path, {**robot.packages, **(packages or {})}
     data = contents[path] if path in contents else read_bytes(path)
+    if data.startswith(_USD_STARTS) or (path.suffix == ".usdz" and data.startswith(b"PK")):
+        doc = XmlDocument(file=path, data=data, root=None, sources={})
+        return _empty_model(doc, _wrong_format(Source(file=path, line=1), "USD"))
     doc = parse_xml(path, data)
     if doc.root is None:
         return _empty_model(doc)
@@ -46,9 +55,9 @@ def load_robot(
 
         return read_mjcf(doc, contents=contents)
     if tag != "robot":
-        message = f"root element: got <{tag}>; expected <robot> (URDF) or <mujoco> (MJCF)"
-        source = doc.source(doc.root)
-        return _empty_model(doc, Problem(code="XML002", message=message, source=source))
+        name = _FORMATS.get(tag.lower(), "an XML file of another kind")
+        got = f"{name} with the root element <{tag}>"
+        return _empty_model(doc, _wrong_format(doc.source(doc.root), got))
     from terrainkit_robots.description.urdf.reader import read_urdf
 
     if path.suffix == f".{XACRO}":
@@ -57,6 +66,11 @@ def load_robot(
         arguments = {**robot.xacro_arguments, **(xacro_arguments or {})}
         return read_xacro(doc, arguments=arguments, packages=packages)
     return read_urdf(doc, packages=packages)
+
+
+def _wrong_format(source: Source, got: str) -> Problem:
+    message = f"format: got {got}; expected URDF (<robot>), xacro or MJCF (<mujoco>)"
+    return Problem(code="XML002", message=message, source=source)
 
 
 def _empty_model(doc: XmlDocument, *problems: Problem) -> RobotModel:

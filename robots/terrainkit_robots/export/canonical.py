@@ -16,6 +16,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.kinematics import joint_motion
 from terrainkit_robots.analysis.bodies.mimic_joints import mimic_joints
+from terrainkit_robots.analysis.legs.wheels import turns_without_limits
 from terrainkit_robots.description.model import (
     WORLD,
     Actuator,
@@ -132,18 +133,13 @@ def has_floating_base(facts: "Facts") -> bool:
     return not facts.joints or any(_is_wheel_or_propeller(facts, body) for body in facts.bodies)
 
 
-_MAX_LIMITED_RANGE = 4 * np.pi
-"""Joints with a wider range are wheels or propellers; exporters write 1e16 for them [rad]."""
-
-
 def _is_wheel_or_propeller(facts: "Facts", body: Body) -> bool:
     """Return whether a body is a wheel or propeller on the base or on a steering body."""
     carrier = facts.physical_parent(body)
-    if body.joint is None or body.joint.kind == "prismatic" or carrier is None:
+    if body.joint is None or carrier is None:
         return False
-    lower, upper = body.joint.range or (-np.inf, np.inf)
     near = carrier.index == 0 or carrier.parent == 0
-    return near and upper - lower > _MAX_LIMITED_RANGE and facts.is_wheel(body)
+    return near and turns_without_limits(body.joint) and facts.is_wheel(body)
 
 
 def plain_name(model: RobotModel) -> str:

@@ -126,8 +126,8 @@ def _standing(checks: "Verification | None", robot: "RobotFiles") -> Iterator[st
         return
     yield "## Standing test\n"
     if checks is None or checks.standing is None:
-        reason = f": {cell(checks.error)}" if checks is not None and checks.error else ""
-        yield f"It was not simulated{reason}.\n"
+        reason = "" if checks is None else cell(checks.error or checks.skipped)
+        yield f"It was not simulated{reason and f': {reason}'}.\n"
         return
     locked = checks.joints_locked
     how = "with locked joints" if locked else "at its default pose, with the gains below"

@@ -83,8 +83,8 @@ def _compare_files(checks: "Verification") -> str:
 
 def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
     standing = checks.standing
-    if checks.error:
-        return f"not simulated: {checks.error}"
+    if checks.error or checks.skipped:
+        return f"not simulated: {checks.error or checks.skipped}"
     if standing is None:
         return f"not simulated: the robot has {'a fixed base' if robot.facts.legs else 'no legs'}"
     locked = "with locked joints, since bipeds need a controller to balance"

@@ -54,6 +54,9 @@ class Verification:
     error: str = ""
     """The reason why a robot with legs could not be simulated."""
 
+    skipped: str = ""
+    """The reason why there is no standing test for a robot that only a controller balances."""
+
     @property
     def failures(self) -> tuple[str, ...]:
         """The reasons why the robot does not stand; empty if it stands, or has no legs."""
@@ -97,6 +100,8 @@ def verify(
     if not robot.facts.legs or not floating:
         return Verification(equivalences=equivalences)
     joints_locked = not is_statically_stable(robot.facts.legs)
+    if joints_locked and robot.facts.wheels:
+        return Verification(equivalences=equivalences, skipped="it balances on its wheels")
     stand_gains = soft_gains and not joints_locked
     test = partial(
         stand_test,

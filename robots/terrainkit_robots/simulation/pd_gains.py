@@ -13,13 +13,17 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts, cached_fact
+from terrainkit_robots.analysis.legs.wheels import turns_without_limits
 from terrainkit_robots.simulation.gain import Gain, GainSet
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel, make_sim_model
 from terrainkit_robots.simulation.stiffness import GainTarget, leg_gain_target, other_gain_target
 from terrainkit_robots.simulation.time_step import JointInertia, joint_inertia
-from terrainkit_robots.simulation.units import REVOLUTE, JointUnits
+
+if TYPE_CHECKING:
+    from terrainkit_robots.simulation.units import JointUnits
 
 _MIN_STIFFNESS_RATIO = 20.0
 """Stiffness over damping, at least [1/s]. A joint with more damping returns too slowly."""
@@ -150,7 +154,7 @@ def _sections(facts: Facts) -> dict[str, tuple[str, str]]:
             if role == "knee":
                 found[joint.name] = "knee", role
                 section = "ankle"
-            elif role != "waist":
+            elif role not in ("waist", "wheel"):
                 is_ankle = section == "ankle" and role != "slide"
                 found[joint.name] = section, "ankle" if is_ankle else role
     return found
@@ -192,16 +196,22 @@ def _merge(targets: Iterable[GainTarget]) -> list[GainTarget]:
 
 
 def _wheels(facts: Facts, sim: SimModel) -> frozenset[str]:
-    """Return the actuated joints without limits that turn a wheel and are not part of a leg."""
+    """Return the actuated joints that turn a wheel at the end of a leg, or elsewhere."""
     legs = {joint.name for leg in facts.legs for joint in leg.joints}
+    wheels = {facts.bodies[index].joint for index in facts.wheels}
     return frozenset(
         name
         for name in sim.actuated
         if name in facts.body_of_joint
-        and name not in legs
-        and not sim.model.joint(name).limited[0]
-        and sim.units(name) == REVOLUTE
-        and facts.is_wheel(facts.body_of_joint[name])
+        and (joint := facts.body_of_joint[name].joint) is not None
+        and (
+            joint in wheels
+            or (
+                name not in legs
+                and turns_without_limits(joint)
+                and facts.is_wheel(facts.body_of_joint[name])
+            )
+        )
     )
 
 

@@ -24,4 +24,7 @@ def test_kind_is_that_of_root_or_file(name, text, kind, codes):
     assert (model.links, model.file, model.sources) == ((), Path(name), (Path(name),))
     for problem in model.problems:
         if problem.code == "XML002":
-            assert problem.message.endswith("got <sdf>; expected <robot> (URDF) or <mujoco> (MJCF)")
+            assert problem.message == (
+                "format: got SDF with the root element <sdf>; expected URDF (<robot>), xacro or "
+                "MJCF (<mujoco>)"
+            )

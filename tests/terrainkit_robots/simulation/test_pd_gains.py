@@ -90,7 +90,8 @@ def test_gains_are_close_to_published_gains(name, robot_file):
     [
         ("quadruped.urdf", "FL_hip FL_thigh FL_calf", (60, 2), (20, 0.5)),
         ("quadruped.xml", "FL_hip FL_thigh FL_calf", (60, 2), (25, 0.6)),
-        ("biped.urdf", "left_hip_pitch left_hip_yaw", (80, 2), (80, 2)),
+        ("biped.urdf", "left_hip_pitch left_hip_roll", (80, 4), (60, 1.5)),
+        ("biped.urdf", "left_hip_yaw", (60, 1.5), (60, 1.5)),
         ("biped.urdf", "left_knee", (150, 4), (80, 2)),
         ("biped.urdf", "left_ankle_pitch left_ankle_roll", (50, 1.5), (50, 1.5)),
         ("biped.xml", "left_hip_pitch left_hip_yaw", (80, 2.5), (80, 2)),

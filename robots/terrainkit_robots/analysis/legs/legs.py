@@ -15,22 +15,23 @@ from terrainkit_robots.analysis.legs.limbs import Limb, is_branch
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
 
-Role = Literal["waist", "yaw", "roll", "hip", "knee", "ankle", "slide"]
+Role = Literal["waist", "yaw", "roll", "hip", "knee", "ankle", "slide", "wheel"]
 """Hip, knee and ankle bend the leg in its plane. Roll and yaw rotate that plane. A waist is shared
-with other legs."""
+with other legs. A wheel is the last body of a leg and does not bend it."""
 
 _WAIST: Role = "waist"
+_WHEEL: Role = "wheel"
 
 # Two of three criteria: near the ground, a mirror image, names of legs.
 _MIN_LEG_SCORE = 1.5
 """Score from which a limb counts as a leg."""
 
-_MIN_PARALLEL_COSINE = 0.9
-"""Cosine from which two axes count as parallel: 26 degrees, more than legs are splayed."""
+_MIN_HORIZONTAL = 0.5
+"""Horizontal part of an axis about which a leg may bend. Hips are tilted by up to 45 degrees."""
 
-_MIN_BENDING_COSINE = 0.8
-"""Cosine from which an axis bends the leg in its plane: 37 degrees. The hip pitch of some humanoids
-is tilted by 30 degrees."""
+_MIN_BENDING_COSINE = 0.5
+"""Cosine from which an axis bends the leg in its plane, if it moves the foot in that plane more
+than out of it."""
 
 _FOOT_NAME = re.compile(r"foot|feet|toe|sole", re.IGNORECASE)
 
@@ -98,40 +99,54 @@ def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg
         None if joint.kind == "prismatic" else joint_axis(bodies[i], bodies[i].zero_pose)[1]
         for joint, i in zip(limb.joints[waist:], moving[waist:], strict=True)
     ]
+    own = axes[: len(axes) - limb.has_wheel]
+    pitch = _pitch_axis([axis for axis in own if axis is not None])
     points = limb.points[waist:]
-    pitch = _pitch_axis([axis for axis in axes if axis is not None])
-    bending = [k for k, axis in enumerate(axes) if axis is not None and _bends(axis, pitch)]
-    path = [_project(points[k], pitch) for k in bending] + [_project(limb.tip, pitch)]
+    bending = [
+        k
+        for k, axis in enumerate(own)
+        if axis is not None and _bends(axis, limb.tip - points[k], pitch)
+    ]
+    # The axis of a wheel ends the last segment that the joints turn.
+    ends = [*limb.points[len(limb.points) - limb.has_wheel :], limb.tip]
+    path = [_project(point, pitch) for point in (*points[bending], *ends)]
     return Leg(
         limb=limb,
         foot=_foot_link(limb, bodies),
-        roles=(*[_WAIST] * waist, *_roles(axes, bending, path)),
+        roles=(*[_WAIST] * waist, *_roles(own, bending, path), *[_WHEEL] * limb.has_wheel),
         pitch=pitch,
         length=float(sum(np.linalg.norm(b - a) for a, b in itertools.pairwise(path))),
     )
 
 
-def _is_parallel(axis: Matrix, other: Matrix) -> bool:
-    return bool(abs(axis @ other) > _MIN_PARALLEL_COSINE)
+def _bends(axis: Matrix, lever: Matrix, pitch: Matrix) -> bool:
+    """Return whether a joint bends the leg in its plane.
 
-
-def _bends(axis: Matrix, pitch: Matrix) -> bool:
-    return bool(abs(axis @ pitch) > _MIN_BENDING_COSINE)
+    Args:
+        axis: Axis of the joint, shape (3,).
+        lever: Vector from a point of the axis to the foot, shape (3,) [m].
+        pitch: Normal of the plane of the leg, shape (3,).
+    """
+    motion = np.cross(axis, lever)  # the column of the Jacobian [m/rad]
+    sideways = abs(motion @ pitch)
+    in_plane = np.linalg.norm(_project(motion, pitch))
+    return bool(abs(axis @ pitch) > _MIN_BENDING_COSINE and in_plane >= sideways)
 
 
 def _pitch_axis(axes: Sequence[Matrix]) -> Matrix:
     """Return the horizontal axis that most joints of a leg share; in a tie the more lateral one."""
-    horizontal = []
-    for axis in axes:
-        flat = axis * [1, 1, 0]
-        length = float(np.linalg.norm(flat))
-        if length > _MIN_PARALLEL_COSINE:
-            horizontal.append(flat / length)
-    if not horizontal:
+    flat = [axis * [1, 1, 0] for axis in axes]
+    candidates = [
+        axis / length for axis in flat if (length := np.linalg.norm(axis)) > _MIN_HORIZONTAL
+    ]
+    if not candidates:
         return np.array([0.0, 1.0, 0.0])
     best = max(
-        horizontal,
-        key=lambda a: (sum(_is_parallel(a, b) for b in horizontal), round(abs(float(a[1])), 6)),
+        candidates,
+        key=lambda a: (
+            round(sum(float(a @ axis) ** 2 for axis in axes), 3),
+            abs(round(float(a[1]), 6)),
+        ),
     )
     return np.asarray(best if best[int(np.abs(best).argmax())] > 0 else -best)
 

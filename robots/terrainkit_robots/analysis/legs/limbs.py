@@ -15,6 +15,7 @@ from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import ancestors, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import bounds, min_height
 from terrainkit_robots.analysis.bodies.tree import Tree
+from terrainkit_robots.analysis.legs.wheels import is_leg_wheel
 from terrainkit_robots.description.model import WORLD, Joint
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import Matrix
@@ -46,14 +47,6 @@ _OTHER_NAME = re.compile(
 _HAND_NAME = re.compile(r"hand(?!le)|palm|gripper")
 """Name of a trunk whose limbs are fingers."""
 
-_MAX_WHEEL_OFFSET = 0.25
-"""Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel on a
-continuous joint."""
-
-_MAX_SHAPE_OFFSET = 0.5
-"""Distance of the center of its shape to the axis over half the diagonal of the shape, at most, of
-a wheel. A shank without a center of mass has 0.7 and more."""
-
 _MAX_JOINTS = 32
 """A chain of more joints is a tail, a snake or a rope."""
 
@@ -78,6 +71,9 @@ class Chain:
     tip: Matrix
     """Center of the points that touch the ground first in the frame of the trunk, all joints at 0,
     shape (3,) [m]."""
+
+    has_wheel: bool
+    """Whether its last joint turns a wheel."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -173,36 +169,21 @@ def _leaves(bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes) -
         moving = [i for i in chain if (j := bodies[i].joint) is not None and j.moves]
         joints = [j for i in moving if (j := bodies[i].joint) is not None]
         # A wheel at the end does not bend the limb.
-        has_wheel = bool(joints) and _is_continuous_wheel(bodies[moving[-1]], meshes)
+        has_wheel = bool(joints) and is_leg_wheel(bodies[moving[-1]], meshes)
         driven = sum(id(joint) in actuated_ids for joint in joints[: len(joints) - has_wheel])
         if len(joints) <= _MAX_JOINTS and driven >= 2:
             tip = contact_points(body, body.zero_pose, meshes).mean(axis=0)
             points = [joint_axis(bodies[i], bodies[i].zero_pose)[0] for i in moving]
             leaves.append(
-                Chain(chain=tuple(chain), joints=tuple(joints), points=np.array(points), tip=tip)
+                Chain(
+                    chain=tuple(chain),
+                    joints=tuple(joints),
+                    points=np.array(points),
+                    tip=tip,
+                    has_wheel=has_wheel,
+                )
             )
     return sorted(leaves, key=lambda leaf: float(leaf.tip[2]))[:_MAX_LIMBS]
-
-
-def _is_continuous_wheel(body: Body, meshes: Meshes) -> bool:
-    """Return whether a body on a continuous joint is balanced on its axis, and so is its shape."""
-    joint = body.joint
-    assert joint is not None
-    if joint.kind != "continuous":
-        return False
-    arms = [body.center - joint.anchor]
-    box = bounds(body.collisions, meshes)
-    if box is not None:
-        arms.append(box.mean(axis=0) - joint.anchor)
-        half_size = float(np.linalg.norm(np.ptp(box, axis=0))) / 2
-    center, *shape = (
-        float(np.linalg.norm(arm - (arm @ joint.direction) * joint.direction)) for arm in arms
-    )
-    if shape and shape[0] > _MAX_SHAPE_OFFSET * half_size:
-        return False
-    # Half of the trace is the polar second moment m r^2 of the body's mass about its center.
-    moment = float(np.clip(np.trace(body.inertia) / 2, 0, None))
-    return body.mass <= 0 or center <= _MAX_WHEEL_OFFSET * float(np.sqrt(moment / body.mass))
 
 
 def _robot_bounds(bodies: Sequence[Body], meshes: Meshes) -> tuple[Matrix, Matrix]:
@@ -225,7 +206,9 @@ def _make_limb(
         re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
         for name in (*links, *(joint.name for joint in leaf.joints))
     ]
-    rest = [name for name in names if not _LEG_NAME.search(name)]
+    # Legs of a robot on wheels are often named after them.
+    is_leg = [_LEG_NAME.search(name) or (leaf.has_wheel and "wheel" in name) for name in names]
+    rest = [name for name, leg in zip(names, is_leg, strict=True) if not leg]
     leg_names = len(names) - len(rest)
     other_names = sum(bool(_OTHER_NAME.search(name)) for name in rest)
     has_mirror_image = any(

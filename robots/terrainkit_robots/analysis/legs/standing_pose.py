@@ -17,7 +17,7 @@ from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint
-from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix
+from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix, invert_poses
 
 # This ratio and the next one were chosen in trials on 39 robots.
 _HEIGHT_RATIO = {2: 0.965}
@@ -43,7 +43,10 @@ _ROUNDS = 4
 _MAX_STARTS = 4
 """Number of local minima of the grid that are refined."""
 
-_BENDING_ROLES = ("hip", "knee", "ankle")
+_LEVEL_ROLES = ("ankle", "wheel")
+"""Roles of joints that keep the contact below the last segment. A wheel then returns to 0."""
+
+_BENDING_ROLES = ("hip", "knee", *_LEVEL_ROLES)
 
 _DEFAULT_RANGE = 2.4
 """A joint without limits is searched within plus and minus this [rad]."""
@@ -54,6 +57,10 @@ _LIMIT_MARGIN = 0.08
 _INSET = 0.25
 """Distance to the limits of a joint that bends a leg and cannot reach 0, over its range. The search
 does not move all of them: Cassie has two above its knee, and the second cannot reach 0."""
+
+_MAX_ANKLE_OFFSET = 0.5
+"""Offset of the center of mass of a biped from the middle of its soles toward its ankles, at most,
+over half of their length. It keeps half of the distance to the edge of the support polygon."""
 
 _MAX_FOOT_OFFSET = 0.3
 """Largest horizontal offset of all feet from their hips, over the leg length. A robot that needs
@@ -292,7 +299,8 @@ def _solve_leg(
     # The knee may bend both ways, and only the refined minima tell which way is better.
     starts = np.array([(axes[0, i], axes[1, j]) for i, j in _local_minima(cost)[:_MAX_STARTS]])
     hip, knee = _round(objective, _minimize(objective, starts, limits))
-    return {name: float(q) for name, q in objective.positions(hip, knee).items()}
+    solution = {name: float(q) for name, q in objective.positions(hip, knee).items()}
+    return solution | {wheel.name: 0.0 for wheel in filter(None, [leg.joint("wheel")])}
 
 
 def _local_minima(cost: Matrix) -> list[tuple[int, int]]:
@@ -346,7 +354,7 @@ def _make_objective(
     if hip is None or knee is None:
         return None
     chain = [robot.bodies[i] for i in leg.limb.chain]
-    ankles = [j for j, role in zip(leg.joints, leg.roles, strict=True) if role == "ankle"]
+    ankles = [j for j, role in zip(leg.joints, leg.roles, strict=True) if role in _LEVEL_ROLES]
     leaf = chain[-1]
     poses = body_poses(robot.bodies, positions)
     if ankles:
@@ -356,6 +364,8 @@ def _make_objective(
     else:
         angle, foot = 0.0, poses[leaf.index]  # the contact of a ball depends on the pose
     contact = contact_points(leaf, foot, robot.meshes).mean(axis=0)
+    if ankles and len(robot.legs) == 2:
+        contact = contact + _ankle_offset(leg, robot, foot)
     ratio = _HEIGHT_RATIO.get(len(robot.legs), _DEFAULT_HEIGHT_RATIO)
     hip_point, length = _hip_point(leg, robot, poses), max(leg.length, 1e-6)
     return _LegObjective(
@@ -373,6 +383,28 @@ def _make_objective(
         penalty_axis=_penalty_axis(leg, robot, poses, hip_point) / length,
         length=length,
     )
+
+
+def _ankle_offset(leg: Leg, robot: LegModel, foot: Matrix) -> Matrix:
+    """Return the offset from the middle of a sole toward a point below the ankle, shape (3,) [m].
+
+    The ankle carries the weight times its horizontal distance to the center of mass, which is put
+    above this point.
+
+    Args:
+        leg: The leg.
+        robot: The robot.
+        foot: Pose of the foot, flat on the ground, shape (4, 4) [m].
+    """
+    forward = np.cross(leg.pitch, [0.0, 0.0, 1.0])
+    leaf = robot.bodies[leg.limb.chain[-1]]
+    ankle = [p for p, role in zip(leg.limb.points, leg.roles, strict=True) if role == "ankle"]
+    if not ankle:
+        return np.zeros(3)
+    above = foot @ invert_poses(leaf.zero_pose) @ [*ankle[-1], 1.0]
+    sole = contact_points(leaf, foot, robot.meshes) @ forward
+    reach = _MAX_ANKLE_OFFSET * float(np.ptp(sole)) / 2
+    return np.asarray(np.clip(above[:3] @ forward - sole.mean(), -reach, reach) * forward)
 
 
 def _penalty_axis(leg: Leg, robot: LegModel, poses: Sequence[Matrix], hip_point: Matrix) -> Matrix:
@@ -396,17 +428,17 @@ def _level_coefficients(
 
     The rotations of all joints that bend the leg then add up to `angle`.
     """
-    signs = {
-        joint.name: float(np.sign(joint_axis(body, body.zero_pose)[1] @ leg.pitch))
+    cosines = {
+        joint.name: float(joint_axis(body, body.zero_pose)[1] @ leg.pitch)
         for body in (robot.bodies[i] for i in leg.limb.chain)
         if (joint := body.joint) is not None and joint.moves
     }
     roles = [(j.name, role) for j, role in zip(leg.joints, leg.roles, strict=True)]
     bending = {name for name, role in roles if role in _BENDING_ROLES}
-    ankle = [name for name, role in roles if role == "ankle"][-1]
+    ankle = [name for name, role in roles if role in _LEVEL_ROLES][-1]
     hip, knee = leg.joint("hip"), leg.joint("knee")
     assert hip is not None
     assert knee is not None
-    others = sum(signs[n] * positions[n] for n in bending - {hip.name, knee.name, ankle})
-    sign = signs[ankle]
-    return sign * (angle - others), -sign * signs[hip.name], -sign * signs[knee.name]
+    others = sum(cosines[n] * positions[n] for n in bending - {hip.name, knee.name, ankle})
+    own = cosines[ankle]
+    return (angle - others) / own, -cosines[hip.name] / own, -cosines[knee.name] / own

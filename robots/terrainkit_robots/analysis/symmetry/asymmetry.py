@@ -1,7 +1,7 @@
 """Detect joints whose origin or axis is not the mirror image of their counterpart."""
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,19 +54,39 @@ class Misalignment:
     """Angle from the mirrored direction [rad], or 0."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Slide:
+    """An offset along the axis of a hinge, which changes no motion unless the parts below move."""
+
+    pair: MirrorPair
+    """The pair of hinges that caused it."""
+
+    vector: Matrix
+    """Offset of the right joint from its mirrored position, shape (3,) [m]."""
+
+
 def find_misalignments(
-    mirror: Mirror, pairs: Sequence[MirrorPair], leg_bodies: Collection[int]
+    mirror: Mirror,
+    pairs: Sequence[MirrorPair],
+    leg_bodies: Collection[int],
+    tips: Mapping[int, Matrix],
 ) -> tuple[list[Misalignment], set[int]]:
     """Return the misaligned pairs of joints, and the indices of the bodies that they displace.
+
+    Exporters place the frame of a hinge anywhere along its axis. Such an offset only counts if the
+    joints or the feet below have it as well.
 
     Args:
         mirror: The mirror plane.
         pairs: The pairs of mirrored joints, parents first.
         leg_bodies: Indices of the bodies of legs.
+        tips: Contact of each foot in the frame of the trunk, all joints at 0, shape (3,) [m], by
+            the index of its body.
     """
     found: list[Misalignment] = []
     displaced: set[int] = set()
     pair_of: dict[int, MirrorPair] = {}
+    slides: dict[int | None, _Slide] = {}
     for pair in pairs:
         left, right = pair.left, pair.right
         pair_of[left.body.index] = pair
@@ -76,9 +96,14 @@ def find_misalignments(
         a, b = left.body.parent, right.body.parent
         has_mirror_parents = a is not None and (a == b or mirror.image_index.get(a) == b)
         if not {a, b} & displaced and has_mirror_parents:
-            misalignment = _misalignment(mirror, pair, pair_of.get(left.body.parent or 0))
+            slide = slides.get(b)
+            misalignment = _misalignment(mirror, pair, pair_of.get(left.body.parent or 0), slide)
             if misalignment is None:
-                continue
+                slide = _slide_along(mirror, pair, slide)
+                slides[right.body.index] = slide
+                misalignment = _tip_misalignment(mirror, slide, pair, tips)
+                if misalignment is None:
+                    continue
             displaced |= misalignment.pair.indices
             if misalignment.distance and _is_half_rotation(left, right):
                 continue
@@ -87,6 +112,42 @@ def find_misalignments(
                 found.append(misalignment)
         displaced |= pair.indices
     return found, displaced
+
+
+def _gap(mirror: Mirror, pair: MirrorPair, slide: _Slide | None) -> Matrix:
+    """Return the vector from the right joint to its mirrored position, shape (3,) [m]."""
+    gap = mirror.image(pair.left.offset) - pair.right.offset
+    return np.asarray(gap if slide is None else gap + slide.vector)
+
+
+def _slide_along(mirror: Mirror, pair: MirrorPair, slide: _Slide | None) -> _Slide:
+    """Return the offset along the axis of an aligned pair."""
+    gap, axis = _gap(mirror, pair, slide), pair.right.axis
+    # The hinge that the offset is from: this one, unless it only follows its parent.
+    own = mirror.image(pair.left.offset) - pair.right.offset
+    if slide is not None and float(np.linalg.norm(own)) <= MAX_POSITION_ERROR:
+        pair = slide.pair
+    return _Slide(pair=pair, vector=(gap @ axis) * axis)
+
+
+def _tip_misalignment(
+    mirror: Mirror, slide: _Slide, pair: MirrorPair, tips: Mapping[int, Matrix]
+) -> Misalignment | None:
+    """Return the misalignment of the pair that moved the feet of two legs, if their ends differ."""
+    left, right = (tips.get(side.body.index) for side in (pair.left, pair.right))
+    if left is None or right is None:
+        return None
+    arms = left - pair.left.point, right - pair.right.point
+    distance = float(np.linalg.norm(mirror.image(arms[0]) - arms[1] + slide.vector))
+    moved = float(np.linalg.norm(slide.vector))
+    if min(distance, moved) <= _tolerance(pair):
+        return None
+    return Misalignment(pair=slide.pair, is_axis=False, distance=distance, angle=0.0)
+
+
+def _tolerance(pair: MirrorPair) -> float:
+    length = min(float(np.linalg.norm(side.offset)) for side in (pair.left, pair.right))
+    return MAX_POSITION_ERROR + MAX_RELATIVE_POSITION_ERROR * length
 
 
 def _has_zero_axis(joint: Joint) -> bool:
@@ -106,13 +167,17 @@ def _is_half_rotation(left: MirrorSide, right: MirrorSide) -> bool:
 
 
 def _misalignment(
-    mirror: Mirror, pair: MirrorPair, parents: MirrorPair | None
+    mirror: Mirror, pair: MirrorPair, parents: MirrorPair | None, slide: _Slide | None
 ) -> Misalignment | None:
     left, right = pair.left, pair.right
-    distance = float(np.linalg.norm(mirror.image(left.offset) - right.offset))
+    gap, tolerance = _gap(mirror, pair, slide), _tolerance(pair)
+    if right.joint.kind != "prismatic" and left.joint.kind != "prismatic":
+        gap = gap - (gap @ right.axis) * right.axis
+    distance = float(np.linalg.norm(gap))
     lengths = [float(np.linalg.norm(joint.offset)) for joint in (left, right)]
-    tolerance = MAX_POSITION_ERROR + MAX_RELATIVE_POSITION_ERROR * min(lengths)
     if distance > tolerance:
+        if slide is not None and float(np.linalg.norm(slide.vector)) > tolerance:
+            return Misalignment(pair=slide.pair, is_axis=False, distance=distance, angle=0.0)
         # The apex angle of an isosceles triangle with the mean length as legs and the distance as
         # base.
         angle = 2 * math.asin(min(1.0, distance / (lengths[0] + lengths[1])))

@@ -212,7 +212,7 @@ def _parse_with_origins(xacro: Any, files: list[str]) -> Any:
             node: Any = self.curNode
             line = self.getParser().CurrentLineNumber
             node.setUserData(ORIGIN, (files[-1], line), origins)
-            if "xacro" not in (node.namespaceURI or node.tagName):
+            if not node.tagName.startswith("xacro:"):  # as xacro decides, whatever the namespace
                 node.setAttribute(ORIGIN, f"{len(files) - 1}:{line}")
 
     def parse(text: Any, filename: str | None = None) -> Any:

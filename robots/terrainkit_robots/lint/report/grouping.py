@@ -10,8 +10,8 @@ from terrainkit_robots.lint.rule import Finding
 _MAX_LISTED = 12
 """Maximum number of elements that the list of a group shows."""
 
-_TOKEN = re.compile(r"[\w./+%-]*[\w%]")
-_LIST = re.compile(rf"{_TOKEN.pattern}(?:, {_TOKEN.pattern})*(?:, \.\.\.)?")
+_TOKEN = re.compile(r"\d{1,3}(?:,\d{3})+(?![\w,])|[\w./+%-]*[\w%]")
+_LIST = re.compile(rf"(?:{_TOKEN.pattern})(?:, (?:{_TOKEN.pattern}))*(?:, \.\.\.)?")
 _NUMBER = re.compile(r"[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?%?")
 
 _SUBJECT, _VALUE = "\0", "\1"
@@ -108,7 +108,12 @@ def _list_others(members: Sequence[tuple[Finding, list[str]]]) -> tuple[str, ...
     others = []
     for finding, values in members[1:]:
         name = finding.subject or f"line {finding.line}"
-        shown = [value for value, differ in zip(values, differs, strict=True) if differ]
+        shown = [
+            # Without separators of thousands, which would read as several numbers.
+            value.replace(",", "") if _NUMBER.fullmatch(value) else value
+            for value, differ in zip(values, differs, strict=True)
+            if differ
+        ]
         others.append(f"{name} ({', '.join(shown)})" if shown else name)
     return tuple(others)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import BodyShape
 from terrainkit_robots.analysis.bodies.contact import contact_points
-from terrainkit_robots.analysis.bodies.kinematics import body_poses
+from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height, support
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
@@ -17,7 +17,9 @@ _MAX_AXIS_Z = 0.7
 
 
 def foot_radius(robot: Facts) -> float | None:
-    """Return the radius of spherical feet, or half the width of soles, averaged over feet [m].
+    """Return the radius of wheels or spherical feet, or half the width of soles [m].
+
+    It is the mean of all feet.
 
     Returns:
         The radius; None without feet, or if they have no collision shapes.
@@ -37,7 +39,10 @@ def _leg_radius(robot: Facts, leg: Leg, poses: Sequence[Matrix]) -> float:
     shapes = [shape for shape in body.collisions if has_bounds(shape.geometry, robot.meshes)]
     if not shapes:
         return 0.0
-    width = float(np.ptp(contact_points(body, pose, robot.meshes) @ leg.pitch))
+    contacts = contact_points(body, pose, robot.meshes)
+    if leg.limb.has_wheel:
+        return float(joint_axis(body, pose)[0][2] - contacts[:, 2].min())
+    width = float(np.ptp(contacts @ leg.pitch))
     touching = min(shapes, key=lambda shape: min_height(shape, pose, robot.meshes))
     return max(width / 2, _shape_radius(robot, touching, pose, leg.pitch))
 

@@ -129,7 +129,7 @@ def _roles(leg: "Leg") -> dict[str, str]:
     """Return the role of each joint of a leg; joints below the knee belong to the ankle."""
     roles: dict[str, str] = {}
     for joint, role in zip(leg.joints, leg.roles, strict=True):
-        is_ankle = "knee" in roles.values() and role != "slide"
+        is_ankle = "knee" in roles.values() and role not in ("slide", "wheel")
         roles[joint.name] = "ankle" if is_ankle else role
     return roles
 

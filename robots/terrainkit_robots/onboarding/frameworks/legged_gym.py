@@ -10,6 +10,30 @@ _NUM_HEIGHTS = 17 * 11
 _DEFAULT_NUM_JOINTS = 12
 """Number of joints that legged_gym's observation noise supports."""
 
+_IMPORTS = ["import torch", "from legged_gym.envs.base.legged_robot import LeggedRobot"]
+
+_WHEELS = '''
+
+class $name(LeggedRobot):
+    """LeggedRobot with velocity targets for the joints of SPEED_SCALE, such as wheels."""
+
+    def _compute_torques(self, actions):
+        torques = super()._compute_torques(actions)
+        wheels = [self.dof_names.index(name) for name in SPEED_SCALE]
+        scale = torch.tensor(list(SPEED_SCALE.values()), device=self.device)
+        error = scale * actions[:, wheels] - self.dof_vel[:, wheels]
+        limits = self.torque_limits[wheels]
+        torques[:, wheels] = torch.clip(self.d_gains[wheels] * error, -limits, limits)
+        return torques
+
+    def compute_observations(self):
+        # The angle of a wheel grows without bound, and carries no information.
+        wheels = [self.dof_names.index(name) for name in SPEED_SCALE]
+        self.dof_pos[:, wheels] = self.default_dof_pos[:, wheels]
+        super().compute_observations()
+'''
+"""The environment of robots on wheels."""
+
 LEGGED_ONLY = True
 """Whether the framework supports only robots with legs."""
 
@@ -20,11 +44,12 @@ def config_text(robot: ConfigRobot) -> str:
     Raises:
         ConfigError: if legged_gym does not support the names of the bodies.
     """
-    name = class_name(robot.spec.name)
+    name, has_wheels = class_name(robot.spec.name), bool(robot.velocity_joints)
     return source.join_lines(
         [
             source.docstring(_about(robot, name)),
             ["", *legged_robot.BEFORE_IMPORTS],
+            _IMPORTS * has_wheels,
             [
                 "from legged_gym.envs.base.legged_robot_config import (",
                 "    LeggedRobotCfg,",
@@ -33,6 +58,8 @@ def config_text(robot: ConfigRobot) -> str:
                 "",
             ],
             legged_robot.HERE,
+            legged_robot.speed_scale(robot),
+            (["", *source.fill(_WHEELS, name=name)] if has_wheels else []),
             ["", "", f"class {name}RoughCfg(LeggedRobotCfg):"],
             legged_robot.class_of("init_state", "LeggedRobotCfg", legged_robot.init_state(robot))[
                 1:
@@ -49,6 +76,8 @@ def config_text(robot: ConfigRobot) -> str:
 
 def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
+    task_class = name if robot.velocity_joints else "LeggedRobot"
+    own = [f"        {name},"] * bool(robot.velocity_joints)
     paragraphs = [
         f"{robot.title} for legged_gym: rough terrain.",
         source.GENERATED_NOTE,
@@ -57,11 +86,12 @@ def _about(robot: ConfigRobot, name: str) -> list[str]:
         "\n".join(
             [
                 f"    from .{package}.legged_gym_config import (",
+                *own,
                 f"        {name}RoughCfg,",
                 f"        {name}RoughCfgPPO,",
                 "    )",
                 "    task_registry.register(",
-                f'        "{package}", LeggedRobot, {name}RoughCfg(), {name}RoughCfgPPO()',
+                f'        "{package}", {task_class}, {name}RoughCfg(), {name}RoughCfgPPO()',
                 "    )",
             ]
         ),

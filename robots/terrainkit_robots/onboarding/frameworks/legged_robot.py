@@ -100,8 +100,7 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
         difference += source.comment(note, depth=2)
     velocity_note = ""
     if robot.velocity_joints:
-        joints = listing(robot.velocity_joints)
-        velocity_note = f"Joints without stiffness need velocity targets instead of P: {joints}."
+        velocity_note = "The joints of SPEED_SCALE, without stiffness, have velocity targets."
     warning = ""
     if result.clashes:
         key, joint = result.clashes[0]
@@ -121,6 +120,19 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
         f"action_scale = {source.float_literal(scale)}",
         "# Simulation steps per policy step: 4 steps of 0.005 s, 50 Hz.",
         "decimation = 4",
+    ]
+
+
+def speed_scale(robot: ConfigRobot) -> list[str]:
+    """Return the table of the velocity of each wheel for an action of 1; empty without wheels."""
+    if not robot.velocity_joints:
+        return []
+    entries = source.dict_entries(robot.action_scales(robot.velocity_joints))
+    return [
+        "",
+        "# Change of the velocity target for an action of 1.",
+        *robot.velocity_scale_comment(),
+        *source.format_collection("SPEED_SCALE = ", entries, "{}"),
     ]
 
 

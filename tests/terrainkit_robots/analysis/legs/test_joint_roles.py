@@ -27,12 +27,12 @@ def test_leg_joints_belong_to_one_leg(legs, expected):
     assert [each.name for each in robot.leg_joints] == [f"{name}_joint" for name in expected]
 
 
-# The radius of gyration is 0.1 m, and a wheel is balanced within a tenth of it.
+# The radius of gyration is sqrt(0.03 / 2) = 0.1225 m; a wheel is balanced within a tenth of it.
 @pytest.mark.parametrize(
     ("part", "is_wheel"),
     [
-        ({"center": "0.0099 0 0"}, True),
-        ({"center": "0.0101 0 0"}, False),
+        ({"center": "0.0122 0 0"}, True),
+        ({"center": "0.0123 0 0"}, False),
         ({"center": "0 0.5 0"}, True),  # along the axis
         ({"mass": None}, False),
         ({"inertia": "0 0 0 0 0 0"}, False),

@@ -281,10 +281,13 @@ def tilted(degrees, axis=Y, other=Z):
         (("0 1 0", "1 0 0", "0 1 0"), "hip roll knee"),
         (("0 -1 0", "0 1 0"), "hip knee"),
         (("0 0.866 0.5", "1 0 0", "0 0 1", "0 1 0", "0 1 0"), "hip roll yaw knee ankle"),
-        # An axis that is tilted by 36 degrees bends the leg, and one by 38 degrees does not.
-        (("0 0.81 0.59", "0 1 0", "0 1 0"), "hip knee ankle"),
-        (("0 0.79 0.61", "0 1 0", "0 1 0"), "roll hip knee"),
-        (("0 0.70 0.71", "0 1 0", "0 1 0"), "yaw hip knee"),
+        (("0 0.707 0.707", "1 0 0", "0 0 1", "0 1 0", "0 1 0"), "hip roll yaw knee ankle"),
+        # An axis that is tilted up by 59 degrees bends the leg, and one by 61 degrees does not.
+        (("0 0.515 0.857", "0 1 0", "0 1 0"), "hip knee ankle"),
+        (("0 0.485 0.875", "0 1 0", "0 1 0"), "yaw hip knee"),
+        # It moves the foot forward rather than sideways up to 45 degrees.
+        (("0.695 0.719 0", "0 1 0", "0 1 0"), "hip knee ankle"),
+        (("0.719 0.695 0", "0 1 0", "0 1 0"), "roll hip knee"),
     ],
 )
 def test_roles_follow_axes(axes, roles):
@@ -318,9 +321,10 @@ def test_knee_is_the_joint_closest_to_the_middle(heights, roles):
         ([-X], X),
         ([-Y], Y),
         ([Z], Y),  # no horizontal one
-        # Parallel are 25.8 degrees and less: of each other, and to the ground.
-        ([X, tilted(25), tilted(25)], Y),
-        ([X, tilted(27), tilted(27)], X),
+        # Each counts by the square of its cosine.
+        ([X, tilted(44), tilted(44)], Y),
+        ([X, tilted(46), tilted(46)], X),
+        ([X, tilted(59)], X),
         ([X, tilted(25, X, -Y), tilted(25, X, Y)], X),
     ],
 )

@@ -213,3 +213,15 @@ def test_secret_variables_are_hidden(tmp_path, monkeypatch):
     monkeypatch.setenv("CI_TOKEN", "hidden")
     file = write(tmp_path, '<link name="$(env ROBOT_MODEL)$(optenv CI_TOKEN none)"/>')
     assert [each.name for each in load_robot(file).links] == ["bignone"]
+
+
+def test_expand_decides_by_prefix_whatever_the_namespace(tmp_path):
+    file = tmp_path / "robot.xacro"
+    file.write_text(
+        """<robot name="r" xmlns:xacro="http://playerstage.sourceforge.net/#interface">
+<xacro:macro name="bar" params="name"><link name="${name}"/></xacro:macro>
+<xacro:bar name="post"/>
+</robot>"""
+    )
+    (link,) = load_robot(file).links
+    assert (link.name, link.source.line) == ("post", 2)

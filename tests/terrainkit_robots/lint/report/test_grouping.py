@@ -99,3 +99,10 @@ def test_reports_show_paths_relative_to_the_working_directory(
     assert [each["file"] for each in data["findings"]] == ["r.urdf", str(outside)]
     assert uri(inside) == "r.urdf"
     assert uri(outside) == outside.as_uri()
+
+
+def test_numbers_above_999_are_listed_as_one_number(groups):
+    counts = {"FL_hip_joint": "25,101", "FR_hip_joint": "131,499,984"}
+    (group,) = groups(*(on(name, f"faces of {{}}: got {n}") for name, n in counts.items()))
+    assert group.text == "faces of FL_hip_joint: got 25,101"
+    assert group.also == "also 1 joint: FR_hip_joint (131499984)"

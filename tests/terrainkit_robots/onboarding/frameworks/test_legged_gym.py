@@ -1,11 +1,15 @@
 """Tests of the configurations for legged_gym and LeggedGym-Ex, with stub modules."""
 
 import ast
+import sys
 import tomllib
 from collections import defaultdict
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
+import torch
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
@@ -180,16 +184,63 @@ def test_legged_gym_config_uses_largest_armature(load, frameworks, robots):
     assert "One value for all joints, the largest of 0.0 to 0.01." in text
 
 
+class LeggedRobot:
+    """The control of legged_gym for two robots with a position of 0.2 rad and 3 rad/s."""
+
+    device = "cpu"
+
+    def __init__(self, names, gains):
+        self.dof_names, self.simulator = names, self
+        self.dof_pos, self.default_dof_pos = torch.full((2, 12), 0.2), torch.zeros(1, 12)
+        self.dof_vel, self.torque_limits = torch.full((2, 12), 3.0), torch.full((12,), 4.0)
+        self.p_gains, self.d_gains = torch.tensor(gains).T
+        self._kd_scale, self._d_gains = torch.ones(2, 1), self.d_gains
+        self.cfg = SimpleNamespace(asset=SimpleNamespace(dof_names=names))
+        self.obs_scales = SimpleNamespace(dof_pos=0.5)
+
+    def _compute_torques(self, actions):
+        torques = self.p_gains * (0.25 * actions - self.dof_pos) - self.d_gains * self.dof_vel
+        return torch.clip(torques, -4.0, 4.0)
+
+    def compute_observations(self):
+        self.obs_buf = self.dof_pos - self.default_dof_pos
+
+
 @pytest.mark.parametrize("framework", ["legged_gym", "leggedgym_ex"])
-def test_legged_configs_ignore_wheels_in_action_scale(load, frameworks, robots, framework):
+def test_legged_configs_control_the_speed_of_wheels(
+    load, frameworks, robots, framework, monkeypatch
+):
     spec = robots.wheeled(joint_order=robots.quadruped().joint_order)
-    loaded = load(framework, spec, frameworks(MORE))
+    registry = SimpleNamespace(task_classes={}, register=lambda *_: None)
+    task = {
+        "legged_gym.envs.base.legged_robot": {"LeggedRobot": LeggedRobot},
+        "legged_gym.utils.task_registry": {"task_registry": registry},
+    }
+    loaded = load(framework, spec, frameworks(MORE) | task)
     config = loaded.Quad4RoughCfg if framework == "legged_gym" else loaded.Quad4Cfg
     assert config.control.action_scale == 0.25
-    text = words_of(loaded)
-    assert "need velocity targets instead of P: FL_calf_joint, FR_calf_joint, " in text
-    plain = load(framework, robots.quadruped(), frameworks(MORE))
-    assert "velocity targets" not in Path(plain.__file__).read_text()
+    gains = [gains_of(config.control, joint) for joint in spec.joint_order]
+    if framework == "leggedgym_ex":
+        monkeypatch.setitem(sys.modules, "legged_gym.envs.quad_4.quad_4_config", loaded)
+        exec(config_files(framework, ConfigRobot(spec=spec))["quad_4.py"], vars(loaded))
+    env = loaded.Quad4(list(spec.joint_order), gains)
+    torques = env.simulator._compute_torques(torch.full((2, 12), 1.0))
+    # 0.75 * (5 * 1 - 3) for a wheel; 20 * (0.25 * 1 - 0.2) - 0.5 * 3 for a joint of a leg.
+    expected = [1.5 if "calf" in joint else -0.5 for joint in spec.joint_order]
+    np.testing.assert_allclose(torques, [expected] * 2, atol=1e-6)
+    if framework == "legged_gym":
+        env.compute_observations()
+        seen = env.obs_buf
+    else:
+        seen = 2 * env.dof_pos_scale * env.dof_pos
+    expected = [0.0 if "calf" in joint else 0.2 for joint in spec.joint_order]
+    np.testing.assert_allclose(seen, [expected] * 2, atol=1e-6)
+
+
+@pytest.mark.parametrize("framework", ["legged_gym", "leggedgym_ex"])
+def test_legged_configs_without_wheels_have_no_speeds(load, frameworks, robots, framework):
+    loaded = load(framework, robots.quadruped(), frameworks(MORE))
+    assert "SPEED_SCALE" not in Path(loaded.__file__).read_text()
 
 
 def test_legged_configs_hold_joints_without_action(load, frameworks, robots):

@@ -97,7 +97,8 @@ def does_not_stand(robot: Facts) -> Violations:
     standing pose. A robot that falls within two seconds is reset before it learns anything. A robot
     that leans, stands on its shanks, lifts a foot or saturates a motor learns to do so. A tilt of 3
     to 9 degrees is only a note, and so are robots with more than six legs. Robots with one or two
-    legs need not balance: their joints are locked, so that only the feet and the pose are tested.
+    legs need not balance: their joints are locked, so that only the feet and the pose are tested. A
+    robot on two wheels balances by driving and is not checked.
 
     Fix:
         The message names the cause. Otherwise check the pose, the feet and the effort limits.
@@ -153,6 +154,8 @@ def _check_can_stand(robot: Facts, *, locked: bool) -> None:
     """Raise CannotCheckError if the robot cannot stand for a reason that other rules report."""
     if not any(body.has_contacts for body in robot.bodies):
         raise CannotCheckError("the robot has no collision shapes and falls through the floor")
+    if locked and robot.wheels:
+        raise CannotCheckError("it balances on its wheels")
     if locked and robot.stance is not None and not robot.stance.margin > _MIN_MARGIN:
         raise CannotCheckError("the center of mass of the biped is not above its feet")
     actuated = {joint.name for joint in robot.actuated}

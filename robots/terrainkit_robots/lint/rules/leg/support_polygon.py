@@ -23,8 +23,8 @@ def com_outside_support(robot: Facts) -> Violations:
 
     The search for a standing pose moves the feet below the center of mass as far as the joints
     allow. If the center of mass is still outside, the robot falls before the policy acts. Robots on
-    wheels balance by driving and are not checked. A small distance from the edge is only a note for
-    bipeds, which a policy has to balance anyway.
+    two wheels balance by driving and are not checked. A small distance from the edge is only a note
+    for bipeds, which a policy has to balance anyway.
 
     Fix:
         Check the center of mass of the heaviest links and the limits of the hips.
@@ -36,8 +36,8 @@ def com_outside_support(robot: Facts) -> Violations:
     assert stance is not None
     if math.isnan(stance.margin):
         raise CannotCheckError("MuJoCo computes a mass from a mesh")
-    if any(robot.is_wheel(robot.bodies[leg.limb.chain[-1]]) for leg in robot.legs):
-        raise CannotCheckError("the feet are wheels")
+    if robot.wheels and not is_statically_stable(robot.legs):
+        raise CannotCheckError("it balances on its wheels")
     if len(stance.support) < 3:
         raise CannotCheckError("the contacts of the feet are points or a line without area")
     max_margin = margin(stance.support.mean(axis=0), stance.support)

@@ -21,7 +21,7 @@ from terrainkit_robots.description.package_resolver import (
 )
 from terrainkit_robots.description.xml.document import read_bytes
 from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.text import display_path, names
+from terrainkit_robots.text import names, short_path
 
 _MAX_PARENT_FOLDERS = 3
 """Maximum number of `..` in a relative path, enough for another package of the same workspace."""
@@ -60,8 +60,8 @@ def _search_result(robot: Facts, used: UsedMesh) -> str:
     """Return where a missing mesh was searched."""
     mesh = used.mesh
     if is_in_other_folder(mesh):
-        folder = display_path(robot.model.file.parent)
-        return f"not found in {folder}, but {display_path(mesh.path)} exists"
+        folder = short_path(robot.model.file.parent)
+        return f"not found in {folder}, but {short_path(mesh.path)} exists"
     if re.match(r"(?i)[a-z]{2,}://", mesh.filename) and mesh.found_by == "nothing":
         package = re.match(r"(?i)(?:package|model)://([^/]+)", mesh.filename)
         if package is None:
@@ -70,7 +70,7 @@ def _search_result(robot: Facts, used: UsedMesh) -> str:
             f"package {package[1]} not found in --package, the folders above and around the robot, "
             "ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
         )
-    return f"searched at {display_path(mesh.path)}"
+    return f"searched at {short_path(mesh.path)}"
 
 
 @rule("MSH002", "absolute-path", "error", fixes="unsafe")
@@ -93,7 +93,7 @@ def absolute_path(robot: Facts) -> Violations:
         if is_missing:
             status = "which does not exist"
         elif used.mesh.found_by == "search":
-            status = f"which does not exist; found {display_path(used.mesh.path)} instead"
+            status = f"which does not exist; found {short_path(used.mesh.path)} instead"
         else:
             status = "which exists on this machine only"
         yield Violation(

@@ -218,6 +218,31 @@ def no_links(robot: Facts) -> Violations:
     )
 
 
+@rule("TRE012", "single-link", "warning", certainty="likely")
+def single_link(robot: Facts) -> Violations:
+    """A URDF has one link with a mass, and no joints.
+
+    Exporters of CAD programs lose all joints of an assembly that they do not understand, and the
+    rest of the robot with them. Every other rule then has nothing to check. A loose object, such as
+    a box, is such a file as well.
+
+    Fix:
+        Export the robot again. In Fusion 360 and Onshape, each moving part must be a component of
+        its own that a joint connects to another one.
+
+    Source:
+        Reports on fusion2urdf, whose exports keep only base_link.
+    """
+    links, kind = robot.model.links, robot.model.kind
+    if kind == "mjcf" or len(links) != 1 or robot.model.joints or not robot.total_mass > 0:
+        return
+    yield Violation(
+        element=links[0],
+        message=f"links and joints: got the link {links[0].name} and no joints; expected the links "
+        "of a robot, connected by joints",
+    )
+
+
 @rule("TRE011", "parent-of-another-leg", "warning", certainty="likely")
 def parent_of_another_leg(robot: Facts) -> Violations:
     """A link is attached to the link of another leg or side.

@@ -82,13 +82,13 @@ def mjcf_parse_error(robot: Facts) -> Violations:
 
 @rule("XML002", "unknown-root", "error")
 def unknown_root(robot: Facts) -> Violations:
-    """The root element is neither <robot> nor <mujoco>.
+    """The file is neither URDF, xacro nor MJCF.
 
-    The file is in another format, such as SDF or a launch file, or its root element is missing.
-    No robot can be read from it.
+    The file is in another format, such as SDF, USD or a launch file, or its root element is
+    missing. No robot can be read from it.
 
     Fix:
-        Pass the URDF, xacro or MJCF file of the robot. Convert SDF to one of these first.
+        Pass the URDF, xacro or MJCF file of the robot. Convert SDF or USD to one of these first.
 
     Source:
         The URDF specification (wiki.ros.org/urdf/XML) and MuJoCo's XML reference.

@@ -1,0 +1,88 @@
+"""Tell wheels from other bodies."""
+
+import math
+from collections.abc import Collection
+
+import numpy as np
+
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.shapes import has_bounds, min_height
+from terrainkit_robots.description.model import Joint
+from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.transforms import axis_angle_to_matrix
+
+MAX_LIMITED_RANGE = 4 * np.pi
+"""Range of a joint with useful limits, at most [rad]. Exporters write up to 1e16 for wheels."""
+
+_MAX_BALANCED_OFFSET = 0.1
+"""Distance of the center of mass to the axis over the radius of gyration, at most, of a wheel or a
+propeller. Parts of legs have more than 1."""
+
+_MAX_LEG_WHEEL_OFFSET = 0.25
+"""The same ratio for a round body at the end of a leg, such as a wheel with its motor. Feet have
+0.4 and more."""
+
+_MAX_RADIUS_RATIO = 1.25
+"""Largest over smallest radius of a wheel about its axis. A square has 1.41, a foot 2 and more."""
+
+_ANGLES = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+"""Angles about the axis at which the radius is measured [rad]."""
+
+
+def turns_without_limits(joint: Joint) -> bool:
+    """Return whether a joint is a hinge without limits, or with limits beyond two turns."""
+    lower, upper = joint.range or (-np.inf, np.inf)
+    return joint.kind != "prismatic" and bool(upper - lower > MAX_LIMITED_RANGE)
+
+
+def is_balanced(body: Body, parents: Collection[int | None]) -> bool:
+    """Return whether a body without children is balanced on its axis, as a wheel or a propeller is.
+
+    Args:
+        body: The body.
+        parents: Indices of all bodies with children.
+    """
+    if body.joint is None or body.index in parents:
+        return False
+    return body.mass > 0 and _mass_offset(body) < _MAX_BALANCED_OFFSET
+
+
+def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
+    """Return whether the last body of a leg is a wheel.
+
+    A wheel turns without limits, and its mass and its collision shapes are round about the axis.
+
+    Args:
+        body: A body without children, on a joint.
+        meshes: Mesh files.
+    """
+    joint = body.joint
+    assert joint is not None
+    if not turns_without_limits(joint):
+        return False
+    shapes = [shape for shape in body.collisions if has_bounds(shape.geometry, meshes)]
+    if body.mass <= 0 and not shapes:
+        return False
+    if body.mass > 0 and not _mass_offset(body) <= _MAX_LEG_WHEEL_OFFSET:
+        return False
+    # The radius at an angle is the depth of the lowest point below the axis, which is horizontal.
+    sideways = np.cross(joint.direction, np.eye(3)[np.abs(joint.direction).argmin()])
+    down = sideways / np.linalg.norm(sideways)
+    upright = np.array([joint.direction, np.cross(down, joint.direction), -down])
+    radii = []
+    for rotation in axis_angle_to_matrix(np.array([1.0, 0.0, 0.0]), _ANGLES):
+        pose = np.eye(4)
+        pose[:3, :3] = rotation @ upright
+        pose[:3, 3] = -pose[:3, :3] @ joint.anchor
+        radii.append(max((-min_height(each, pose, meshes) for each in shapes), default=1.0))
+    return min(radii) > 0 and max(radii) <= _MAX_RADIUS_RATIO * min(radii)
+
+
+def _mass_offset(body: Body) -> float:
+    """Return the distance of the center of mass to the axis over the radius of gyration."""
+    assert body.joint is not None
+    arm = body.center - body.joint.anchor
+    offset = float(np.linalg.norm(np.cross(arm, body.joint.direction)))
+    # Half of the trace is the polar second moment m r^2 of the mass about its center.
+    moment = float(np.trace(body.inertia)) / 2
+    return offset / math.sqrt(moment / body.mass) if moment > 0 else math.inf
