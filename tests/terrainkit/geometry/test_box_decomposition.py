@@ -122,7 +122,7 @@ def test_boxes_of_a_terrain_are_few(terrain, parameters, number):
 
 def test_boxes_of_a_slope_with_walls_cover_its_flat_ends():
     heights = patch("slope", grade=0.3, landing=1.5).heights.copy()
-    assert not cover_of(heights, 0.075, cell=0.1).covered.any()
+    assert not cover_of(heights, 0.075, cell=0.1).box_mask.any()
     heights[0] = -1.0
     cover = cover_of(heights, 0.075, cell=0.1)
     # Both ends are at height 0, so one box reaches under the slope from one to the other.
