@@ -20,6 +20,16 @@ def goals_of(terrain, seed=0, grid=GRID):
     return terrain.goals(grid, heights_of(terrain, seed, grid), np.random.default_rng(seed))
 
 
+def tops(terrain_map, x, y):
+    """Return the height of the highest surface at points, whose coordinates broadcast."""
+    return terrain_map.scan(np.stack(np.broadcast_arrays(x, y, 9.0), axis=-1), "down")
+
+
+def edges(profile):
+    """Return before which cells of a line the ground rises or falls."""
+    return (np.flatnonzero(np.diff(profile)) + 1).tolist()
+
+
 def ends_along_x(is_element):
     """Return the first cell of each element across a lane, and the first cell behind it."""
     change = np.diff(np.pad(is_element[:, 0], 1).astype(int))

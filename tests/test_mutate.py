@@ -21,9 +21,7 @@ def benchmarks_on_path(monkeypatch):
         ("(a) not in (b)", {"(a) in (b)"}),
         ("a and (b) and c", {"a or (b) and c", "a and (b) or c"}),
         ("x = -n", {"x = n"}),
-        ("x = not n", {"x = n"}),
         ("x = 3", {"x = 4", "x = 0", "x = 6"}),
-        ("x = 0.5", {"x = 0.0", "x = 1.0"}),
         ("x = True", {"x = False"}),
         ("x = a // b", {"x = a * b"}),
         ("x = 'a' + b", set()),
@@ -38,7 +36,6 @@ def benchmarks_on_path(monkeypatch):
         ("def f(): return a", {"def f(): return None"}),
         ("def f(a: Literal[2]) -> T[1]: '''1 < 2'''", set()),
         ("x = 'ä', a < b", {"x = 'ä', a <= b", "x = 'ä', a >= b"}),
-        ("from a import b", set()),
     ],
 )
 def test_changes_of_a_line(line, expected):

@@ -7,6 +7,7 @@ import pytest
 from terrainkit import MapConfig, TerrainMap, generate
 from terrainkit.geometry.free_space import CONTACT
 from terrainkit.terrain import presets
+from tests.rays import cast_rays
 
 POINTS = 1000
 TOLERANCE = 1e-3
@@ -47,18 +48,6 @@ def is_near_wall(terrain_map, xy):
     corners = [terrain_map.heights[i + di, j + dj] for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1))]
     steps = np.abs(np.diff([*corners, corners[0]], axis=0))
     return (steps > terrain_map.config.wall_threshold).any(axis=0)
-
-
-def cast_rays(model, starts, direction):
-    """Return the z of the first geom that MuJoCo's rays hit, NaN where there is none."""
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    z, geom, normal = np.full(len(starts), np.nan), np.zeros(1, dtype=np.int32), np.zeros(3)
-    for k, start in enumerate(starts):
-        distance = mujoco.mj_ray(model, data, start, [0, 0, direction], None, 1, -1, geom, normal)
-        if distance >= 0:
-            z[k] = start[2] + direction * distance
-    return z
 
 
 def mesh_model(mesh):
@@ -110,5 +99,5 @@ def test_every_view_is_the_same_surface(sub_terrain, patch_size, cell, tmp_path)
     exact = ~is_near_wall(terrain_map, xy) | terrain_map.boxes().box_mask.all()
     for direction, sign in (("down", -1), ("up", 1)):
         assert_close(terrain_map.scan(starts, direction), expected[direction])
-        assert_close(cast_rays(mesh, starts, sign), expected[direction])
-        assert_close(cast_rays(model, starts[exact], sign), expected[direction][exact])
+        assert_close(cast_rays(mesh, starts, sign)[0], expected[direction])
+        assert_close(cast_rays(model, starts[exact], sign)[0], expected[direction][exact])

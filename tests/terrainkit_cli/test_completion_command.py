@@ -48,10 +48,8 @@ def completed(tmp_path, monkeypatch):
         ("terrainkit check-robot ", ["biped", "quadruped"]),
         ("terrainkit train quadruped --runner.logger ", ["tensorboard", "wandb"]),
         ("terrainkit generate --terrain stairs", ["stairs", "stairs_turning"]),
-        ("terrainkit rule dyn", []),
         ("terrainkit rule DYN001", ["DYN001"]),
         ("terrainkit suite ", ["list", "show", "generate"]),
-        ("terrainkit evaluate --num-envs ", []),
         ("terrainkit --v", ["--version"]),
     ],
 )

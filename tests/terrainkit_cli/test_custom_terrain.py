@@ -78,12 +78,9 @@ def test_list_prints_choices_overlays_and_registered_terrains(run_main):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ("side=up", "banked_track.side: got 'up'; expected one of: left, right"),
-        ("color=[1,2]", "banked_track.color: got [1, 2]; expected 3 values"),
         ("color=[1,2", "--set: got '2'; expected name=value or name=easy:hard"),
         ("color=[1", "banked_track.color: got '[1'; expected 3 values"),
         ("color=1]", "banked_track.color: got '1]'; expected 3 values"),
-        ("height=1:2:3", "banked_track.height: got [1, 2, 3]; expected one value or a pair"),
         ("height", "--set: got 'height'; expected name=value"),
     ],
 )
@@ -109,8 +106,6 @@ def test_generate_adds_overlays_to_all_terrains(run_main, tmp_path):
     [
         ("nois", "with terrainkit.register_overlay; did you mean 'noise'? terrainkit list"),
         ("noise:amplitude", "--overlay: got 'amplitude'; expected name=value"),
-        ("noise:pattern=pink", "noise.pattern: got 'pink'; expected one of: uniform, perlin"),
-        ("noise:amplitudes=1", "noise has no parameter 'amplitudes'; did you mean 'amplitude'"),
     ],
 )
 def test_overlay_rejects_invalid_value(rejected, overlay, message):

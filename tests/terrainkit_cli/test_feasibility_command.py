@@ -43,10 +43,7 @@ def test_limits_on_the_command_line_replace_the_derived_ones(terrainkit, stairs)
         ("", "--robot: missing; expected a bundled robot"),
         ("--robot nosuch", "no task or robot folder 'nosuch'"),
         ("--robot .", "has no robot.toml"),
-        ("--robot quadruped --limit gap=0", "gap: got 0; expected a number > 0"),
         ("--robot quadruped --limit gap", "--limit: got 'gap'; expected NAME=VALUE"),
-        ("--robot quadruped --limit gaps=1", "'gaps'; did you mean 'gap'?"),
-        ("--robot quadruped --limit crouched_height=1", "expected less than the"),
         ("--robot quadruped --jobs 0", "jobs"),
     ],
 )
@@ -110,10 +107,8 @@ def test_generate_with_a_demand_solves_the_terrains_that_have_a_column(terrainki
         ("--robot quadruped", "--robot, --demand, --limit: expected --robot and --demand"),
         ("--limit gap=1", "--robot, --demand, --limit: expected --robot and --demand"),
         ("--robot quadruped --demand 0.2", "got '0.2'; expected LOW:HIGH, such as"),
-        ("--robot quadruped --demand a:b", "got 'a:b'; expected LOW:HIGH, such as"),
         ("--robot quadruped --demand 0.9:0.2", "demand: got 0.9:0.2; expected LOW"),
         ("--robot quadruped --demand true:2", "got 'true:2'; expected LOW:HIGH"),
-        ("--robot nobody --demand 0.2:0.9", "nobody"),
     ],
 )
 def test_invalid_demand_is_one_line(rejected, tmp_path, words, message):

@@ -1,20 +1,15 @@
 import numpy as np
 import pytest
-import trimesh
 
 import terrainkit as tk
+from tests.meshes import save_bridge
 
 pytestmark = pytest.mark.usefixtures("import_in_process")
 
 
 @pytest.fixture
 def bridge(tmp_path):
-    def box(size, center):
-        return trimesh.creation.box(size, trimesh.transformations.translation_matrix(center))
-
-    parts = [box((6, 4, 1), (3, 2, -0.5)), box((1, 4, 0.2), (3, 2, 1.1))]
-    trimesh.util.concatenate(parts).export(tmp_path / "bridge.stl")
-    return "bridge.stl"
+    return save_bridge(tmp_path).name
 
 
 def test_import_writes_map_and_report(terrainkit, tmp_path, bridge):

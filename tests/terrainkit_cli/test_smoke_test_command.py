@@ -1,6 +1,7 @@
 import json
 import shutil
 from dataclasses import asdict
+from functools import partial
 
 import pytest
 
@@ -16,10 +17,9 @@ BAD = Check("observation policy", False, "44 numbers", "45 numbers")
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch, run_main):
+def here(terrainkit):
     """Run `terrainkit smoke-test` in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-    return lambda *words: run_main("smoke-test", *words)
+    return partial(terrainkit, "smoke-test")
 
 
 @pytest.fixture

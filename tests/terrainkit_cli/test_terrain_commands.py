@@ -39,14 +39,6 @@ def test_info_counts_the_solids(terrainkit, solid_map, tmp_path):
     assert expected in terrainkit("info", path).stdout
 
 
-def test_info_patch_shows_requested_and_realized(terrainkit):
-    terrainkit("generate", "-o", "a.npz", "--rows", 2, "--cols", 1, "--terrain", "stairs")
-    lines = [
-        line.split() for line in terrainkit("info", "a.npz", "--patch", 1, 0).stdout.split("\n")
-    ]
-    assert ["step_width", "0.31", "0.3"] in lines
-
-
 def test_info_patch_shows_a_pair_of_sides_that_differ(terrainkit, tmp_path):
     pit = SubTerrain(terrain="pit", parameters={"side": 3.0})
     size = {"rows": 1, "cols": 1, "patch_size": (8.0, 5.1), "border": 1.0}

@@ -104,7 +104,6 @@ def test_demo_without_its_packages_names_the_extra(rejected, monkeypatch):
         ("map.npz --port 65536", "--port: got 65536; expected an integer from 1 to 65535"),
         ("map.npz --host no.such.host.invalid", "no.such.host.invalid"),
         ("", "MAP.npz, ROBOT or RUN: missing"),
-        ("quadruped_mop", "did you mean 'quadruped_map'"),
         ("missing.urdf", "no map, robot or run missing.urdf; bundled are"),
         ("empty", "empty: got no robot.toml or run.toml in it"),
         ("no_robot.urdf", "no_robot.urdf does not describe a robot"),

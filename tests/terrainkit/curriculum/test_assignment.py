@@ -26,19 +26,14 @@ def test_assign_levels_respects_max_init_level(highest, levels):
     ("given", "message"),
     [
         ({"num_envs": -1}, "num_envs: got -1; expected an integer >= 0"),
-        ({"num_envs": 2.5}, "num_envs: got 2.5; expected an integer >= 0"),
         ({"rows": 0}, "rows: got 0; expected an integer >= 1"),
         ({"cols": 0}, "cols: got 0; expected an integer >= 1"),
         ({"max_init_level": -1}, "max_init_level: got -1; expected an integer from 0 to 9"),
         ({"max_init_level": 10}, "max_init_level: got 10; expected an integer from 0 to 9"),
-        ({"seed": -1}, "seed: got -1; expected integers >= 0"),
         ({"seed": "a"}, "seed: got 'a'; expected integers >= 0"),
-        ({"seed": None}, "seed: got None; expected integers >= 0"),
         ({"seed": (1, -1)}, r"seed: got \[1, -1\]; expected integers >= 0"),
-        ({"seed": [[0], [1]]}, r"seed: got .*; expected integers >= 0"),
         ({"seed": [[0], [1, 2]]}, r"seed: got .*; expected integers >= 0"),
         ({"seed": []}, r"seed: got \[\]; expected integers >= 0"),
-        ({"seed": 0.5}, "seed: got 0.5; expected integers >= 0"),
     ],
 )
 def test_assign_levels_rejects_invalid_value(given, message):
@@ -101,7 +96,6 @@ def test_resample_columns_without_variants_changes_nothing(columns):
         ([0], [-1], 0, "columns: got -1 to -1; expected 0 to 4"),
         ([0], [0.5], 0, "columns: got values of float64; expected integers"),
         ([0, 0], [0], 0, r"columns: got shape \(1,\); expected \(2,\)"),
-        ([0], [0], -1, "seed: got -1; expected integers >= 0"),
     ],
 )
 def test_resample_columns_rejects_invalid_values(levels, columns, seed, message):

@@ -29,24 +29,17 @@ def test_update_levels_limits_top_levels_to_rows(rows, top_levels, levels):
     assert set(solved.tolist()) == levels
 
 
-def test_update_levels_accepts_seed_sequences():
-    one, again, other = (update(np.full(100, 9), 1.0, seed=(0, k)).tolist() for k in (1, 1, 2))
-    assert one == again != other
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
         ({"levels": [0, 10]}, "levels: got 0 to 10; expected 0 to 9"),
         ({"levels": [-1, 3]}, "levels: got -1 to 3"),
         ({"levels": [0.5, 1.0]}, "levels: got values of float64; expected integers"),
-        ({"levels": 3}, r"levels: got shape \(\); expected \(n,\)"),
         ({"levels": [[1], [2, 3]]}, "levels: got lists of different lengths; expected one list"),
         ({"progress": [1.0]}, r"progress: got shape \(1,\); expected \(2,\)"),
         ({"progress": ["a", "b"]}, "progress: got values of <U1; expected numbers"),
         ({"progress": [0.5, 1.5]}, "progress: got 1.5; expected numbers from 0 to 1, or NaN"),
         ({"progress": [-0.1, 1]}, "progress: got -0.1; expected numbers from 0 to 1, or NaN"),
-        ({"seed": -1}, "seed: got -1; expected integers >= 0"),
         ({"top_levels": 0}, "top_levels: got 0; expected an integer >= 1"),
     ],
 )

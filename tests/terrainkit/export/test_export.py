@@ -47,7 +47,6 @@ def test_export_unknown_suffix_lists_formats(level_map, tmp_path, name):
     ("name", "option", "known"),
     [
         ("map.stl", "color", "full, closed, y_up"),
-        ("map.xml", "merged", "collision"),
         ("map.npz", "merged", "mesh"),
         ("map.png", "merged", "nothing"),
     ],

@@ -11,6 +11,7 @@ from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.export import mjcf
 from terrainkit.geometry.walls import wall_edges
 from terrainkit.overlays.friction_patches import FrictionPatches
+from tests.rays import cast_rays
 from tests.terrainkit.maps import plot
 
 every_collision = pytest.mark.parametrize("collision", ["hfield", "boxes"])
@@ -31,14 +32,8 @@ def loaded(terrain_map, folder, **options):
 
 def ray_cast(model, xy):
     """Return the height of the highest geom at each point [m], and its friction."""
-    data, geom, high = mujoco.MjData(model), np.zeros(1, dtype=np.int32), 50.0
-    mujoco.mj_kinematics(model, data)
-    heights, friction = [], []
-    for x, y in xy:
-        start = np.array([x, y, high])
-        heights.append(high - mujoco.mj_ray(model, data, start, -UP, None, 1, -1, geom))
-        friction.append(model.geom_friction[geom[0], 0])
-    return np.array(heights), np.array(friction)
+    heights, geoms = cast_rays(model, np.column_stack([xy, np.full(len(xy), 50.0)]))
+    return heights, model.geom_friction[geoms, 0]
 
 
 def points_in(terrain_map, cells, count=1000):
@@ -62,9 +57,6 @@ def away_from_walls(terrain_map):
 def assert_same_ground(model, terrain_map, cells=None):
     xy = points_in(terrain_map, away_from_walls(terrain_map) if cells is None else cells)
     np.testing.assert_allclose(ray_cast(model, xy)[0], terrain_map.height(xy), atol=1e-3)
-
-
-# ---- the text ----------------------------------------------------------------------------------
 
 
 def test_mjcf_sets_every_attribute_of_its_class(terrain_map):
@@ -170,9 +162,6 @@ def test_mjcf_has_a_geom_per_solid_and_a_site_per_goal(solid_map):
     ]
 
 
-# ---- the choice of boxes and heightfields ------------------------------------------------------
-
-
 @pytest.mark.parametrize(("number", "is_boxes"), [(198, True), (199, False)])
 def test_mjcf_auto_uses_up_to_100_boxes(number, is_boxes):
     """Every other row is a box, on one box below."""
@@ -254,9 +243,6 @@ def test_mjcf_surface_has_solids_that_collide_or_are_visible(solid_map, scan, he
     assert surface.height(x, y, scan=scan) == pytest.approx(heights)
 
 
-# ---- the ground in MuJoCo ----------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("collision", ["hfield", "boxes", "auto"])
 def test_mjcf_has_the_same_ground_away_from_walls(terrain_map, tmp_path, collision):
     model = loaded(terrain_map, tmp_path, collision=collision)
@@ -271,13 +257,6 @@ def test_mjcf_has_the_same_ground_away_from_walls(terrain_map, tmp_path, collisi
         assert model.ngeom == 1 + 4  # and the border
 
 
-@pytest.mark.parametrize("collision", ["boxes", "auto"])
-def test_mjcf_boxes_match_up_to_walls(level_map, tmp_path, collision):
-    model = loaded(level_map, tmp_path, collision=collision)
-    assert model.nhfield == 0
-    assert_same_ground(model, level_map, np.ones(level_map.heights.shape, dtype=bool))
-
-
 @pytest.mark.parametrize(
     ("border", "centered"), [(0.0, False), (0.1, True), (0.2, False), (0.3, True), (2.0, True)]
 )
@@ -285,12 +264,6 @@ def test_mjcf_boxes_match_up_to_walls(level_map, tmp_path, collision):
 def test_mjcf_ground_extends_to_the_border(tmp_path, border, centered, collision):
     terrain_map = course(*"/P", rows=1, patch_size=(3.0, 2.0), border=border, centered=centered)
     assert_same_ground(loaded(terrain_map, tmp_path, collision=collision), terrain_map)
-
-
-def test_mjcf_rays_hit_the_solids(solid_map, tmp_path):
-    xy = np.array([[1, 6], [5, 6], [2, 6], [4.1, 6.1], [3, 6]])
-    heights, _ = ray_cast(loaded(solid_map, tmp_path), xy)
-    assert heights == pytest.approx([0.6, 0.6, 0.7, 0.4, 0.0], abs=1e-6)
 
 
 ROBOT = """
@@ -332,9 +305,6 @@ def test_mjcf_ignores_defaults_of_a_robot(terrain_map, tmp_path, place, collisio
         mujoco.mj_step(model, data, nstep=700)
         assert np.abs(data.qvel).max() < 0.01
         np.testing.assert_allclose(data.qpos[:3], origin + 0.1 * UP, atol=2e-3)
-
-
-# ---- friction ----------------------------------------------------------------------------------
 
 
 def friction_map(terrain, side=None, **rest):

@@ -37,9 +37,6 @@ def icy_map():
     )
 
 
-# ---- what is in it -----------------------------------------------------------------------------
-
-
 def test_npz_has_these_arrays(path, terrain_map):
     mesh = terrain_map.mesh()
     found = {key: (each.dtype.str, each.shape) for key, each in arrays_of(path).items()}
@@ -122,9 +119,6 @@ def test_has_one_friction_compares_ground_and_solids(terrain_map, solid_map):
     assert has_one_friction(terrain_map)
     friction[-1, -1] = 0.7
     assert not has_one_friction(dataclasses.replace(terrain_map, friction=friction))
-
-
-# ---- what is no map ----------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -232,16 +226,12 @@ def test_npz_missing_array_is_named(good, bad):
     [
         ("format_version", 2, "got format version 2; expected 1"),
         ("heights", np.zeros((12, 42), "f4"), "heights: got shape (12, 42); expected (42, 12)"),
-        ("heights", np.zeros((42, 12)), "heights: got dtype float64"),
         ("heights", np.array({"pickled": 1}), "heights: got dtype object"),
-        ("env_origins", np.zeros((2, 1, 3)), "env_origins: got dtype float64"),
         ("difficulty", np.zeros((2, 1), bool), "difficulty: got dtype bool"),
         ("lower", [0.0, 0.0], "lower: got [0.0, 0.0]; expected (-0.1, -0.1)"),
         ("cell", 0.2, "cell: got 0.2; expected 0.1"),
-        ("cell", NAN, "cell: got nan; expected 0.1"),
         ("border", 0.0, "border: got 0.0; expected 0.1"),
         ("patch_size", [2.0, 2.0], "patch_size: got [2.0, 2.0]; expected (2.0, 1.0)"),
-        ("friction", [1.0, 0.5], "friction: got [1.0, 0.5]; expected (1.0, 1.0) by its config"),
         ("restitution", 0.5, "restitution: got 0.5; expected 0.0 by its config"),
         ("terrain_types", np.zeros((2, 1)), "terrain_types: got dtype float64"),
         (
@@ -251,7 +241,6 @@ def test_npz_missing_array_is_named(good, bad):
         ),
         ("terrain_types", np.array([[0], [1]], "i4"), "got an index out of range; expected 0 to 0"),
         ("boxes", np.zeros((2, 10), "f4"), "solid_friction: got shape (0,); expected (2)"),
-        ("hull_counts", np.array([8], "i4"), "solid_friction: got shape (0,); expected (1)"),
         ("solid_patch", np.zeros((0, 3), "i4"), "solid_patch: got shape (0, 3); expected (0, 2)"),
         (
             "ground_friction",
@@ -260,7 +249,6 @@ def test_npz_missing_array_is_named(good, bad):
         ),
         ("ground_friction", np.full((1, 1), -1e-9, "f4"), "got values out of range; expected 0 to"),
         ("ground_friction", np.full((1, 1), 1.001e6, "f4"), "ground_friction: got values out of"),
-        ("ground_friction", np.full((1, 1), NAN, "f4"), "ground_friction: got values out of range"),
         ("spawns", np.zeros((2, 1, 0, 4), "f4"), "spawns: got none; expected one or more"),
         ("spawns", np.full((2, 1, 1, 4), 1.001e6, "f4"), "spawns: got values that are not finite"),
         ("spawns", np.full((2, 1, 1, 4), [1, 2, 3, NAN], "f4"), "spawns: got values that are not"),
@@ -335,13 +323,12 @@ def test_npz_invalid_config_is_rejected(good, bad, old, new, message):
     [
         "",
         "[]",
-        "[[{}], [{}]]",
         '[[{"requested": {"depth": "deep"}, "realized": {}}], []]',
         '[[{"requested": {"depth": 1, "side": 1}, "realized": {"side": [1, 2, 3]}}], []]',
         "[" * 30_000,
         "1" * 5000,
     ],
-    ids=["none", "empty", "bare", "text", "triple", "deep", "long"],
+    ids=["none", "empty", "text", "triple", "deep", "long"],
 )
 def test_npz_invalid_parameters_are_rejected(good, bad, text):
     repack(good, bad, {"parameters": npy(text)})
@@ -358,14 +345,10 @@ def test_npz_invalid_header_is_rejected(good, bad, header):
     assert "heights cannot be read" in refusal(bad)
 
 
-# ---- what is too large -------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("key", "dtype", "shape", "limit"),
     [
         ("config", "<U400000000", (), 64 << 20),
-        ("terrain_names", "<U400000000", (1,), 64 << 20),
         ("parameters", "<U400000000", (), (2 + 16) * 8192),  # per patch, and 16 more
         ("ground_friction", "<f4", (43, 12), 42 * 12 * 4),
         ("spawns", "<f4", (2, 1, 201, 4), 2 * 200 * 16),  # one per cell

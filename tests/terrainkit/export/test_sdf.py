@@ -76,11 +76,6 @@ def test_sdf_meshes_are_ground_and_hulls_by_friction(saved):
     assert [hull.volume for hull in hulls] == pytest.approx([9 / 6, 1 / 6])
 
 
-def test_sdf_without_solids_has_the_ground_only(tmp_path):
-    path = plot(np.zeros((4, 3))).save(tmp_path / "a.sdf")
-    assert len(ET.parse(path).getroot().find("model/link")) == 2
-
-
 @pytest.mark.parametrize("suffix", [".sdf", ".usda"])
 def test_export_rejects_ground_with_several_frictions(tmp_path, suffix):
     slippery = tk.SubTerrain(terrain="flat", friction=0.2)

@@ -13,13 +13,6 @@ def edges(pairs):
     return Edges(start=start, end=end, rise=zero, drop=zero, gap=zero, clearance=zero, width=zero)
 
 
-def test_bottleneck_takes_the_longer_easier_way():
-    graph, demand = edges([(0, 1), (1, 3), (0, 2), (2, 3)]), np.array([0.1, 0.9, 0.4, 0.3])
-    segments = [(0, np.array([3])), (3, np.array([0])), (3, np.array([3, 0]))]
-    # Edges have a direction.
-    assert [bottleneck(graph, demand, segment, 4) for segment in segments] == [0.4, np.inf, 0.0]
-
-
 @given(st.integers(0, 2**32 - 1))
 def test_bottleneck_is_that_of_floyd_and_warshall(seed):
     rng = np.random.default_rng(seed)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.features.gradient_noise import fractal_noise, perlin_noise, unit_heights
+from terrainkit.features.gradient_noise import fractal_noise, perlin_noise
 from terrainkit.geometry.grid import Grid
 
 
@@ -18,12 +18,3 @@ def test_fractal_noise_octaves_add_up():
     first, second = perlin_noise(grid, 2.0, rng), perlin_noise(grid, 1.0, rng)
     both = fractal_noise(grid, 2.0, 2, np.random.default_rng(0), gain=0.3)
     assert both == pytest.approx(first + 0.3 * second)
-
-
-def test_unit_heights_is_zero_on_platform_and_edges():
-    grid = Grid(shape=(60, 40), cell=0.1)
-    relief = unit_heights(grid, np.full((60, 40), -3.0), 1.0, 0.5)
-    assert np.abs(relief).max() == 1
-    assert (relief[25:35, 15:25] == 0).all()
-    assert (relief[[0, -1]] == 0).all()
-    assert (relief[:, [0, -1]] == 0).all()

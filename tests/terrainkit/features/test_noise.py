@@ -24,7 +24,6 @@ def test_value_noise_tiny_step_is_continuous():
     ("amplitude", "step", "largest"),
     [
         (0.3, 0.1, 0.3),  # 0.3 / 0.1 is 2.9999999999999996
-        (0.05, 0.005, 0.05),
         (0.036, 0.005, 0.035),
         (0.05, 0.02, 0.04),
         (0.05, 0.06, 0.0),
@@ -50,7 +49,6 @@ def test_value_noise_has_whole_intervals():
 @pytest.mark.parametrize(
     ("shape", "cell", "asked", "built"),
     [
-        ((80, 80), 0.1, 0.2, 0.2),
         ((80, 80), 0.1, 0.25, 0.25),  # between two cells
         ((80, 80), 0.1, 3.0, 2.666666667),  # 2.67 intervals make three
         ((80, 80), 0.1, 3.2, 2.666666667),  # 2.5 make three too
@@ -58,7 +56,6 @@ def test_value_noise_has_whole_intervals():
         ((60, 40), 0.1, 2.6, (3.0, 2.0)),  # 2.3 and 1.5
         ((80, 80), 0.1, 20.0, 8.0),
         ((80, 80), 0.1, 0.04, 0.1),  # nodes closer than the cells would never be seen
-        ((80, 80), 0.1, 5e-324, 0.1),
     ],
 )
 def test_value_noise_realized_spacing(shape, cell, asked, built):

@@ -23,12 +23,6 @@ def test_pit_between_bounds_leaves_strips_and_rim():
     assert [*low, *high] == [4.5, -0.5, 5.5, 0.5]
 
 
-def test_pit_between_leaves_rim():
-    ground = pit_between(Grid(shape=(8, 4), cell=0.5, lower=(3.0, 0.0)), 0.7, 4.1, 5.4)
-    assert (ground[2:5, 1:3] == -0.7).all()
-    assert (ground != 0).sum() == 6
-
-
 def test_pit_bounds_rejects_patch_without_pit():
     with pytest.raises(ConfigError, match="a rim of 1 m leave no pit in a patch of 2 m x 5 m"):
         pit_bounds(Grid(shape=(2, 5), cell=1.0))

@@ -104,11 +104,6 @@ def test_archive_names_the_reason_of_the_system():
         pass
 
 
-def test_archive_path_may_be_a_string(path):
-    with open_archive(str(path)) as archive:
-        assert archive.path == path
-
-
 @pytest.mark.parametrize(
     ("head", "message"),
     [

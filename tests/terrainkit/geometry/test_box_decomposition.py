@@ -6,13 +6,12 @@ from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.geometry.box_decomposition import (
     changes,
     decompose_boxes,
-    flat_cells,
     merge_boxes,
     neighborhood,
 )
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.surface import surface_at
-from tests.terrainkit.geometry.heightfields import HEIGHTFIELDS, for_any, node_grid_of, samples
+from tests.terrainkit.geometry.heightfields import HEIGHTFIELDS, for_any, samples
 
 any_walls = for_any(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
 
@@ -59,16 +58,6 @@ def test_boxes_match_covered_cells(heights, threshold):
     assert cover.box_mask.all() or threshold > 1  # else all steps are walls
 
 
-@any_walls
-def test_flat_cells_are_flat_everywhere(heights, threshold):
-    offsets = np.linspace(0.02, 0.98, 7) - 0.5
-    steps = np.stack(np.meshgrid(offsets, offsets), axis=-1).reshape(-1, 2)
-    place = (np.argwhere(np.ones(heights.shape))[:, None] + steps).reshape(-1, 2)
-    ground = surface_at(heights, place, threshold=threshold).height.reshape(*heights.shape, -1)
-    flat = flat_cells(node_grid_of(heights, threshold))
-    assert (np.ptp(ground, axis=2)[flat] < 1e-6).all()
-
-
 def test_boxes_of_a_level_map(level_map):
     cover = level_map.boxes()
     assert cover.box_mask.all()
@@ -87,15 +76,6 @@ def test_boxes_never_exceed_a_map_with_slopes(terrain_map):
     on, off = (points_in_cells(cells, cell, lower) for cells in (cover.box_mask, ~cover.box_mask))
     np.testing.assert_allclose(top_at(cover, on), terrain_map.height(on), atol=1e-3)
     assert (top_at(cover, off) < terrain_map.height(off) + 1e-3).all()
-
-
-def test_boxes_of_a_flat_map_are_one():
-    config = MapConfig(
-        rows=2, cols=3, patch_size=(8.0, 4.0), border=1.0, terrains=(SubTerrain(terrain="flat"),)
-    )
-    cover = generate(config).boxes()
-    assert cover.centers.tolist() == [pytest.approx([8.0, 6.0, -0.5])]
-    assert cover.half_sizes.tolist() == [pytest.approx([9.0, 7.0, 0.5])]
 
 
 STEPS = {"step_width": 0.5, "step_height": 0.2, "size": (5.0, 5.0)}
@@ -129,6 +109,22 @@ def test_boxes_of_a_slope_with_walls_cover_its_flat_ends():
     assert sorted(tops(cover).tolist()) == pytest.approx([-1.0, 0.0])
     # From the last of 15 flat cells, where the slope starts, to the first at the other end.
     assert np.flatnonzero(~cover.box_mask.all(axis=1)).tolist() == list(range(14, 46))
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_box_reaches_under_a_ridge_beside_a_pit(turn):
+    # The cell at the top of the ridge is three cells from the pit.
+    profile = [-1, -1, 0, 0, 0.05, 0, 0, 0]
+    cover = cover_of(np.rot90(np.tile(profile, (4, 1)), turn), 0.075)
+    assert sorted(tops(cover).tolist()) == pytest.approx([-1.0, 0.0])
+
+
+@pytest.mark.parametrize("turn", range(4))
+@pytest.mark.parametrize(("last", "has_boxes"), [(0.174, False), (0.176, True)])
+def test_patch_with_slopes_has_boxes_if_its_last_line_has_a_wall(last, has_boxes, turn):
+    heights = np.zeros((6, 4))
+    heights[3:], heights[3:, 3] = [[0.05], [0.1], [0.15]], [0.03, 0.1, last]
+    assert cover_of(np.rot90(heights, turn), 0.075).box_mask.any() == has_boxes
 
 
 def stripes(counts, axis):

@@ -21,11 +21,9 @@ def test_grid_has_the_positions_of_its_cells():
     ("length", "cell", "count"),
     [
         (0.3, 0.1, 3),  # 0.3 / 0.1 is 2.9999999999999996
-        (0.26, 0.1, 3),
         (0.24, 0.1, 2),
         (1.15, 0.1, 12),  # 1.15 / 0.1 is 11.499999999999998
         (0.25, 0.1, 3),
-        (0.31, 0.05, 6),
     ],
 )
 def test_grid_cells_round_half_up(length, cell, count):
@@ -48,12 +46,10 @@ def test_grid_length_inverts_cells(count, cell):
 @pytest.mark.parametrize(
     ("shape", "size", "counts"),
     [
-        ((80, 80), 3.0, (30, 30)),
         ((80, 40), 3.04, (30, 30)),
         ((80, 80), 3.1, (32, 32)),
         ((73, 51), 3.0, (31, 31)),
         ((80, 51), 3.0, (30, 31)),
-        ((81, 80), 3.1, (31, 32)),
         ((80, 80), 0.09, (0, 0)),
         ((81, 81), 0.09, (1, 1)),
     ],
@@ -106,7 +102,6 @@ def test_whole_cells_accepts_rounding(length, cell, count):
     ("length", "nearest"),
     [
         (0.0, "0.1 m or 0.2 m"),
-        (0.04, "0.1 m or 0.2 m"),
         (8.05, "8 m or 8.1 m"),
         (0.300002, "0.3 m or 0.4 m"),
         (0.299998, "0.2 m or 0.3 m"),

@@ -29,21 +29,16 @@ LOW_STEP = quad(0, 2.5, 2.5, 0)  # as high as the threshold
     [
         (PLANES, (0.75, 0.25), 0.5),  # 0 + (0.5 - 0) * 0.75 + (1 - 0.5) * 0.25
         (PLANES, (0.25, 0.75), 1.0),  # 0 + (1 - 1.5) * 0.25 + (1.5 - 0) * 0.75
-        (PLANES, (0.5, 0.5), 0.5),  # on the diagonal from 0 to 1
         (LOW_STEP, (0.25, 0.5), 0.625),
         (ONE_WALL, (0.25, 0.0), 0.0),
-        (ONE_WALL, (0.75, 0.0), 4.0),
         (ONE_WALL, (0.25, 0.125), 0.625),  # 0 + (2.5 - 0) * 0.125 / 0.5
         (ONE_WALL, (0.75, 0.125), 3.625),  # 4 + (2.5 - 4) * 0.125 / 0.5
         (ONE_WALL, (0.5, 0.75), 2.75),  # halfway from (4 + 2) / 2 to 2.5
-        (OPPOSITE_WALLS, (0.25, 0.125), 0.125),
         (OPPOSITE_WALLS, (0.25, 0.5), 0.5),
         (OPPOSITE_WALLS, (0.75, 0.5), 5.5),
         (OPPOSITE_WALLS, (0.75, 0.875), 5.875),
         (CORNER_WALLS, (0.375, 0.25), 0.0),
-        (CORNER_WALLS, (0.75, 0.0), 5.0),
         (CORNER_WALLS, (0.75, 0.125), 5.125),  # 5 + (5.5 - 5) * 0.125 / 0.5
-        (CORNER_WALLS, (0.0, 0.75), 6.0),
         (CORNER_WALLS, (0.875, 0.5), 5.875),  # a quarter of the way from (5 + 7) / 2 to 5.5
         (THREE_WALLS, (0.25, 0.125), 0.125),  # 0 + (0.5 - 0) * 0.125 / 0.5
         (THREE_WALLS, (0.75, 0.375), 4.0),

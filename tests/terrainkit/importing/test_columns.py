@@ -5,14 +5,11 @@ import trimesh
 from terrainkit.errors import HeightFileError
 from terrainkit.importing import columns as columns_module
 from terrainkit.importing.columns import make_columns
+from tests.meshes import box
 
 
 def columns_of(mesh, x, y):
     return make_columns(np.asarray(mesh.vertices, float), np.asarray(mesh.faces), x, y)
-
-
-def box(size, center):
-    return trimesh.creation.box(size, trimesh.transformations.translation_matrix(center))
 
 
 FLOOR = box((4, 2, 1), (2, 1, -0.5))

@@ -5,8 +5,7 @@ import pytest
 
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.importing.image import read
-from terrainkit.importing.options import ImportOptions, ReadOptions
-from terrainkit.map.import_map import import_map
+from terrainkit.importing.options import ReadOptions
 
 # Two rows of three cells of 2 m; the upper left corner is at (500000, 4649776).
 HEIGHTS = np.array([[1, 2, 3], [4, -9999, 6]], dtype=np.float32)
@@ -82,10 +81,3 @@ def test_geotiff_without_cells_in_meters_needs_file_cell(tmp_path, tags, message
 def test_geotiff_invalid_tags_are_rejected(tmp_path, tags):
     with pytest.raises(HeightFileError, match=r"a\.tif: got invalid TIFF tags: "):
         read(write(tmp_path / "a.tif", **tags), ReadOptions())
-
-
-def test_geotiff_is_imported_where_it_is(tmp_path):
-    options = ImportOptions(missing="nearest", spawn_radius=0.1, spawn_tolerance=10.0, cell=2.0)
-    terrain_map = import_map(write(tmp_path / "a.tif"), options).terrain_map
-    assert terrain_map.grid.shape == (3, 2)
-    assert terrain_map.heights[0].tolist() == [4.0, 1.0]

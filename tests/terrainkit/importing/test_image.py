@@ -51,7 +51,6 @@ def test_image_columns_are_x_and_rows_go_down(
     ("name", "heights", "options"),
     [
         ("a.tif", np.array([[1.5, np.nan, -2.25]], np.float32), {}),
-        ("a.tiff", np.array([[1.5, np.nan, -2.25]]), {}),
         ("a.tif", np.array([[150, -9999, -225]], np.int16), {"scale": 0.01, "nodata": -9999}),
     ],
 )

@@ -9,23 +9,20 @@ from terrainkit.errors import HeightFileError
 from terrainkit.importing import mesh_file
 from terrainkit.importing.mesh_file import read
 from terrainkit.importing.options import ReadOptions
+from tests.meshes import box
 
 
 def wedge():
     """Return a mesh of 4 m x 2 m whose height is x / 4 + 3 m on its left half, y < 1 m."""
-    mesh = trimesh.creation.box((4, 2, 3), trimesh.transformations.translation_matrix((2, 1, 1.5)))
+    mesh = box((4, 2, 3), (2, 1, 1.5))
     mesh.vertices[:, 2] += np.where(mesh.vertices[:, 2] > 1, mesh.vertices[:, 0] / 4, 0)
-    post = trimesh.creation.box(
-        (1, 1, 5), trimesh.transformations.translation_matrix((0.5, 1.5, 2.5))
-    )
-    return trimesh.util.concatenate([mesh, post])
+    return trimesh.util.concatenate([mesh, box((1, 1, 5), (0.5, 1.5, 2.5))])
 
 
 @pytest.mark.parametrize(
     ("suffix", "options"),
     [
         ("obj", {}),
-        ("ply", {}),
         ("glb", {}),
         ("obj", {"up": "y"}),
         ("glb", {"up": "y"}),
@@ -49,9 +46,9 @@ def test_mesh_file_heights_and_axes(tmp_path, suffix, options):
 
 def test_mesh_file_scene_is_one_mesh(tmp_path):
     scene = trimesh.Scene()
-    box = trimesh.creation.box((1, 1, 1))
+    cube = trimesh.creation.box((1, 1, 1))
     for x in (0.5, 2.5):
-        scene.add_geometry(box, transform=trimesh.transformations.translation_matrix((x, 0, x)))
+        scene.add_geometry(cube, transform=trimesh.transformations.translation_matrix((x, 0, x)))
     scene.export(tmp_path / "a.glb")
     source = read(tmp_path / "a.glb", ReadOptions())
     found = source.heights(np.array([0.5, 1.5, 2.5]), np.array([-0.2, 0.2]))

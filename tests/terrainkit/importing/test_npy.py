@@ -34,17 +34,7 @@ def test_npy_first_index_is_x(path):
         np.full((2, 2), 1e300),
         np.full((2, 2), 1.1e6, np.float32),
     ],
-    ids=[
-        "one axis",
-        "three axes",
-        "empty",
-        "complex",
-        "text",
-        "object",
-        "infinite",
-        "huge",
-        "high",
-    ],
+    ids=["1_axis", "3_axes", "empty", "complex", "text", "object", "infinite", "huge", "high"],
 )
 def test_npy_without_heights_is_rejected(path, array):
     np.save(path, array, allow_pickle=True)

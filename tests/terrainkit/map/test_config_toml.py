@@ -77,7 +77,6 @@ def test_handwritten_file_is_read():
     ("text", "message"),
     [
         ("row = 3", "config has no key 'row'; did you mean 'rows'. It has: rows, cols, patch_"),
-        ("rows = {}", "rows: got a table; expected an integer"),
         ('slope_threshold = "never"', "slope_threshold: got 'never'; expected a number .* or none"),
         ("terrains = 3", r"terrains: got 3; expected one or more \[\[terrains\]\] tables"),
         ("terrains = []", r"terrains: got \[\]; expected one or more"),
@@ -87,19 +86,9 @@ def test_handwritten_file_is_read():
             'preset = "rough"\n[[terrains]]\nterrain = "flat"',
             "preset, terrains: got both; expected",
         ),
-        ("[[terrains]]\nproportion = 1.0", r"terrains\[0\]: terrain: missing; expected a string"),
-        ('[[terrains]]\nterrain = "lava"', "no terrain 'lava' is built in, .*; terrainkit list"),
-        ('[[terrains]]\nterrain = "flat"\nproportion = "1"', "proportion: got '1'; expected a num"),
-        ("rows = " + "9" * 30, "got an integer beyond 64 bits"),
-        ("rows = " + "9" * 5000, "not a TOML file: "),
-        ("rows = " + "[" * 100_000, "not a TOML file"),
-        ("a" + ".a" * 500_000 + " = 1", "not a TOML file: line 1 has 500000 dots"),
-        ("\0", "not a TOML file: "),
         (GAP + 'width = "1"', r"terrains\[0\]: gap\.width: got '1'; expected a number"),
-        (GAP + "overlays = [3]", r"overlays: got .*; expected \[\[terrains\.overlays\]\] tables"),
         (GAP + 'overlays = [{overlay = "nois"}]', r"overlays\[0\]: no overlay 'nois' .*'noise'"),
     ],
-    ids=range(19),
 )
 def test_invalid_toml_is_rejected_on_one_line(text, message):
     with pytest.raises(ConfigError, match=message) as caught:
@@ -111,10 +100,7 @@ def test_invalid_toml_is_rejected_on_one_line(text, message):
     ("data", "message"),
     [
         (b"row = 3", "map.toml: config has no key 'row'"),
-        (b"# \xff", "map.toml: .*can't decode byte 0xff"),
-        (b"\n" * (2**20 + 1), r"map\.toml: more than 1048576 bytes; expected"),
     ],
-    ids=["key", "no text", "long"],
 )
 def test_load_error_names_the_file(tmp_path, data, message):
     path = tmp_path / "map.toml"

@@ -10,6 +10,7 @@ from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.importing import ImportOptions, import_map
 from terrainkit.map.import_map import ImportReport
 from terrainkit.map.validate import validate
+from tests.meshes import save_bridge
 
 
 def save(tmp_path, heights):
@@ -182,7 +183,7 @@ def test_import_of_other_files_is_rejected(tmp_path):
 
 
 def test_import_mesh_reports_what_a_heightfield_loses(tmp_path):
-    imported = import_map(bridge(tmp_path), ImportOptions())
+    imported = import_map(save_bridge(tmp_path), ImportOptions())
     # The top of a deck of 1 m x 4 m, from x = 2.5 m on, is 1.2 m above the ground.
     assert imported.report == ImportReport(
         num_missing=0,
@@ -196,7 +197,7 @@ def test_import_mesh_reports_what_a_heightfield_loses(tmp_path):
 
 
 def test_import_mesh_keeps_overhangs_as_solids(tmp_path):
-    imported = import_map(bridge(tmp_path), ImportOptions(solids=True, patch_size=(3.0, 4.0)))
+    imported = import_map(save_bridge(tmp_path), ImportOptions(solids=True, patch_size=(3.0, 4.0)))
     terrain_map, report = imported.terrain_map, imported.report
     assert (report.overhang_area, report.lost_area) == (pytest.approx(4.0), 0.0)
     assert report.max_error < 1e-3
@@ -210,34 +211,15 @@ def test_import_mesh_keeps_overhangs_as_solids(tmp_path):
 
 def test_import_origin_moves_a_mesh_with_its_solids(tmp_path):
     options = {"origin": (1.0, 0.5, 0.25), "rows": 1, "cols": 1, "patch_size": (4.0, 3.0)}
-    made = import_map(bridge(tmp_path), ImportOptions(solids=True, **options)).terrain_map
+    made = import_map(save_bridge(tmp_path), ImportOptions(solids=True, **options)).terrain_map
     at = [2.0, 1.5]
     found = [made.height(at), made.clearance(at), made.scan([*at, 5.0])]
     assert found == pytest.approx([-0.25, 1.0, 0.95], abs=1e-4)
 
 
 def test_import_overhang_of_open_mesh_is_rejected(tmp_path):
-    mesh = trimesh.load(bridge(tmp_path), force="mesh")
+    mesh = trimesh.load(save_bridge(tmp_path), force="mesh")
     mesh.update_faces(np.arange(len(mesh.faces)) % 12 > 5)  # three sides of each box
     mesh.export(tmp_path / "open.stl")
     with pytest.raises(HeightFileError, match="solids: got a mesh without closed bodies"):
         import_map(tmp_path / "open.stl", ImportOptions(solids=True, missing="nearest"))
-
-
-def box(size, center):
-    return trimesh.creation.box(size, trimesh.transformations.translation_matrix(center))
-
-
-def bridge(tmp_path):
-    floor = box((6, 4, 1), (3, 2, -0.5))
-    deck = box((1, 4, 0.2), (3, 2, 1.1))
-    trimesh.util.concatenate([floor, deck]).export(tmp_path / "bridge.stl")
-    return tmp_path / "bridge.stl"
-
-
-def test_import_map_rejects_infinite_extent(tmp_path):
-    path = tmp_path / "a.asc"
-    header = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1e308\n"
-    path.write_text(header + "1 2 3\n1 2 3\n")
-    with pytest.raises(ConfigError, match="the file extends from 0 m to inf m"):
-        import_map(path)

@@ -36,7 +36,6 @@ def difficulties(**config):
         ([0.1, 0.1, 0.7], 3, [1, 0, 2]),
         ([0.1, 0.4, 0.4], 6, [1, 3, 2]),
         ([1, 0, 1], 3, [2, 0, 1]),
-        ([3, 1], 1, [1, 0]),
     ],
 )
 def test_allocate_columns_uses_largest_remainder(proportions, num_columns, counts):

@@ -9,9 +9,6 @@ from terrainkit.map.patch import PatchParameters, with_heading
 from terrainkit.terrains.obstacles import Obstacles
 from terrainkit.terrains.rough import Rough
 
-PIT = SubTerrain(terrain="pit")
-OBSTACLES = SubTerrain(terrain="obstacles")
-
 
 def test_make_patch_describes_itself():
     choice = SubTerrain(terrain="pit", name="crater", parameters={"depth": (0.2, 0.6)})

@@ -9,7 +9,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate, make_patch
 from terrainkit.errors import ConfigError, PluginError
-from terrainkit.geometry.solids import Solids, make_boxes
+from terrainkit.geometry.solids import make_boxes
 from terrainkit.map.validate import validate
 from terrainkit.terrain import Terrain, parameter, registry
 from terrainkit.terrain.overlay import Overlay
@@ -134,12 +134,7 @@ SOLIDS = [
     None,
     [BOX],
     dataclasses.replace(BOX, boxes=BOX.boxes.astype(float)),
-    dataclasses.replace(BOX, boxes=BOX.boxes[:, :9]),
     dataclasses.replace(BOX, boxes=BOX.boxes * np.float32(NAN)),
-    dataclasses.replace(BOX, boxes=BOX.boxes * np.float32(2)),  # no unit quaternion
-    dataclasses.replace(BOX, friction=np.ones(5, np.float32)),
-    dataclasses.replace(BOX, friction=-np.ones(1, np.float32)),
-    dataclasses.replace(Solids.empty(), hull_counts=np.array([4], np.int32)),
 ]
 GRID = (80, 80)
 FAR = make_boxes([7.902, 1.0, 0.1], [0.2, 0.2, 0.2])  # 2 mm beyond its patch

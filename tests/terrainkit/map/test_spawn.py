@@ -99,9 +99,6 @@ def test_find_spawn_avoids_solids_within_the_radius(side, distance, is_free):
     assert (spawn(ground(), solids=post) == (2.0, 2.0, 0.0)) == is_free
 
 
-# ---- several spawns ----------------------------------------------------------------------------
-
-
 def sampled(heights, number, *, origin=(2.0, 2.0, 0.0), radius=0.5, solids=None, seed=0):
     config = MapConfig(spawn_radius=radius, spawns_per_patch=number)
     rng = partial(np.random.default_rng, seed)

@@ -39,8 +39,6 @@ def test_views_of_the_surface_keep_the_shape(solid_map, shape):
     ("view", "points", "message"),
     [
         ("height", 1.0, r"xy: got shape \(\); expected finite values of shape \(\.\.\., 2\)"),
-        ("normal", [1.0, 2.0, 3.0], r"xy: got shape \(3,\)"),
-        ("intervals", np.zeros((2, 5)), r"xy: got shape \(2, 5\)"),
         ("clearance", [np.nan, 0.0], r"xy: got shape \(2,\)"),
         ("height", [[0.0, np.inf]], r"xy: got shape \(1, 2\)"),
         ("scan", [0.0, 0.0], r"points: got shape \(2,\); .* shape \(\.\.\., 3\)"),
@@ -73,9 +71,6 @@ def test_scan_sees_visible_solids_and_clearance_solids_that_collide(solid_map):
     xy = np.array(over)[:, :2]
     assert solid_map.clearance(xy) == pytest.approx([0.4, np.inf, 0.0])
     assert solid_map.intervals(xy)[0] == pytest.approx(np.array([[0, 0.4], [0.6, np.inf]]))
-
-
-# ---- 16-bit heights ----------------------------------------------------------------------------
 
 
 def test_height_field_raw_has_the_format_of_isaac_gym(terrain_map):
@@ -116,9 +111,6 @@ def test_height_field_raw_rejects_solids(solid_map):
         solid_map.height_field_raw()
 
 
-# ---- patches -----------------------------------------------------------------------------------
-
-
 def test_map_patch_has_its_part_of_the_map(solid_map):
     empty, patch = (solid_map.patch(0, col) for col in (0, 1))
     assert (patch.terrain, patch.difficulty) == ("flat", 0.0)
@@ -135,9 +127,6 @@ def test_patch_names_follow_the_types(terrain_map):
     assert terrain_map.patch_names.tolist() == [["stairs", "obstacles", "rough_slope"]] * 2
     names = "stairs, obstacles, rough_slope"
     assert repr(terrain_map) == f"<TerrainMap 2 x 3 patches, (184, 144) samples: {names}>"
-
-
-# ---- environments ------------------------------------------------------------------------------
 
 
 def test_assign_uses_level_and_column(terrain_map):

@@ -149,9 +149,6 @@ def test_validate_finds_what_generate_warns_of(terrain, parameters, issue):
     assert (check, message[: len(issue[1])]) == issue
 
 
-# ---- spawns ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("offset", [(8.0, 0, 0), (0, 8.0, 0), (-4.1, 0, 0), (0, -4.1, 0)])
 def test_validate_finds_origin_outside_patch(sound, offset):
     origin = sound.env_origins[1, 1] + np.float32(offset)
@@ -192,9 +189,6 @@ def test_validate_finds_solid_above_the_origin():
         issues = found(replace(flat, config=config, solids=board))
         text = "patch (0, 0): the spawn origin has 0.998 m of headroom; expected 1 m"
         assert issues == [("spawn", text)] * messages
-
-
-# ---- mesh --------------------------------------------------------------------------------------
 
 
 def hole(mesh):

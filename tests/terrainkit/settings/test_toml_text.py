@@ -33,7 +33,6 @@ def test_parse_toml_returns_a_table():
         ("a = " + "9" * 5000, "not a TOML file: "),
         ("a = " + "[" * 100_000, "not a TOML file: nested too deeply"),
         ("a" + ".a" * 500_000 + " = 1", "not a TOML file: line 1 has 500000 dots"),
-        ("x = 1\n[" + "a." * 500_000 + "a]", "not a TOML file: line 2 has 500000 dots"),
         # What Python calls the end of a line is none to TOML.
         ("'\\u2028'" + ".'\\u2028'.a" * 90_000 + " = 1", "not a TOML file: line 1 has 180000 dots"),
         (("a" + ".a" * 1_000 + "\n") * 400, "not a TOML file: line 1 has 1000 dots"),

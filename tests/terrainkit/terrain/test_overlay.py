@@ -6,7 +6,6 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit.geometry.solids import make_boxes
 from terrainkit.terrain import parameter
 from terrainkit.terrain.overlay import Overlay
 
@@ -49,15 +48,3 @@ def test_own_overlay_is_applied_to_every_row():
     assert heights == pytest.approx(np.full((80, 80, 3), [1.1, 1.3, 1.5]).T)
     assert terrain_map.env_origins[:, 0, 2] == pytest.approx([1.1, 1.3, 1.5])
     assert terrain_map.parameters[1, 0].requested["overlays[0].height"] == pytest.approx(0.3)
-
-
-def test_overlay_solid_beyond_the_patch_is_rejected():
-    @dataclass(frozen=True, kw_only=True)
-    class Boom(Lift):
-        def apply(self, patch, rng):  # noqa: ARG002
-            boom = make_boxes((patch.grid.upper[0], patch.grid.center[1], 3), (1, 1, 1))
-            return dataclasses.replace(patch, solids=boom)
-
-    flat = SubTerrain(terrain="flat", overlays=(Boom(),))
-    with pytest.raises(ConfigError, match=r"flat: solids\(\): got a solid 0\.500 m beyond"):
-        generate(MapConfig(rows=1, cols=1, terrains=(flat,)))

@@ -69,15 +69,12 @@ def test_checked_geometry_keeps_valid_values_and_its_own_grid():
     ("changed", "message"),
     [
         ({"friction": -np.ones((3, 2))}, r"^friction: got shape \(3, 2\); expected \(3, 2\), fin"),
-        ({"friction": np.ones((2, 3))}, r"^friction: got shape \(2, 3\); expected \(3, 2\), fin"),
         ({"goals": np.full((1, 4), 1.1e6)}, r"^goals: got shape \(1, 4\); expected \(1, 4\), fin"),
-        ({"goals": [[0, 0, 0, np.nan]]}, r"^goals: got shape \(1, 4\)"),
         ({"goals": np.zeros((1, 3))}, r"^goals: got shape \(1, 3\); expected \(1, 4\)"),
         ({"goals": np.zeros((1001, 4))}, r"^goals: got shape \(1001, 4\); expected \(1000, 4\)"),
         ({"heading": np.inf}, r"^spawn, heading and spawn_radius: got shape \(4,\); expected \(4"),
         ({"spawn": (0, 0, 0)}, r"^spawn, heading and spawn_radius: got shape \(5,\)"),
         ({"heights": np.full((3, 2), 1e39)}, r"^got heights of shape \(3, 2\); expected \(3, 2\) "),
-        ({"heights": np.full((3, 2), np.nan)}, r"^got heights of shape \(3, 2\)"),
         ({"heights": np.zeros((2, 3))}, r"^got heights of shape \(2, 3\); expected \(3, 2\) with"),
     ],
 )

@@ -8,7 +8,6 @@ from terrainkit.terrain.terrain_docs import (
     overlay_doc,
     overlay_summaries,
     terrain_doc,
-    terrain_summaries,
 )
 
 
@@ -55,8 +54,3 @@ def test_terrain_doc_inherits_parameter_text(monkeypatch):
     words = {each.name: each.text for each in terrain_doc("hurdles").parameters}
     assert words["step_height"] == "Rise of a step [m]."
     assert words["number"] == ""
-
-
-def test_terrain_summaries_are_one_sentence():
-    assert list(terrain_summaries()) == list(registry.terrain_names())
-    assert all(text.count(". ") == 0 for text in terrain_summaries().values())

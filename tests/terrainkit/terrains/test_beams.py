@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit.features.blocks import SINK
 from terrainkit.terrains.beams import Beams
-from tests.terrains import goals_of, heights_of, solids_of
+from tests.terrains import heights_of, solids_of
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -21,11 +21,3 @@ def test_beams_straight_by_hand(seed):
     heights = heights_of(terrain)
     assert (heights[20:67, 1:-1] == -1.0).all()
     assert (heights != 0).sum() == 47 * 78
-
-
-def test_beams_have_goals_on_the_beams_and_behind_the_pit():
-    terrain = Beams.at(1.0)
-    goals = goals_of(terrain)
-    assert goals[:-1, :2] == pytest.approx(solids_of(terrain).boxes[:, :2])
-    # The pit ends at 7.075 m.
-    assert goals[-1].tolist() == pytest.approx([(7.075 + 8.0) / 2, 4.0, 0.0, 0.0])

@@ -3,7 +3,7 @@ import pytest
 
 from terrainkit.features.blocks import SINK
 from terrainkit.terrains.boxes import Boxes
-from tests.terrains import goals_of, solids_of
+from tests.terrains import solids_of
 
 
 def test_boxes_without_pyramids_by_hand():
@@ -28,12 +28,3 @@ def test_boxes_pyramid_has_equal_steps():
         assert top[k : k + 2] == pytest.approx([0.5, 1.0])
         assert side[k + 1] == pytest.approx(side[k] / 2)
         assert (solids.boxes[k, 6:] == solids.boxes[k + 1, 6:]).all()
-
-
-def test_boxes_goals_are_on_top_and_counterclockwise():
-    terrain = Boxes.at(1.0)
-    goals = goals_of(terrain, seed=3)
-    assert goals[:, 2].tolist() == [1.0] * 3
-    assert (np.diff(np.arctan2(goals[:, 1] - 4.0, goals[:, 0] - 4.0)) > 0).all()
-    centers = np.unique(solids_of(terrain, seed=3).boxes[:, :2], axis=0)
-    assert np.unique(goals[:, :2], axis=0) == pytest.approx(centers)

@@ -15,8 +15,3 @@ def test_ceiling_surrounds_the_platform(difficulty, expected):
     assert free(4.0 + 1.01 * direction) == pytest.approx(expected)
     assert free(4.0 + 2.99 * direction) == pytest.approx(expected)
     assert np.isinf(free(4.0 + 3.01 * direction)).all()
-
-
-def test_ceiling_ends_at_the_edge_of_the_patch():
-    free = map_at(1.0, "ceiling", (8.0, 4.0)).clearance
-    assert free([[4.0, 0.01], [4.0, 3.99]]) == pytest.approx(0.2)

@@ -1,12 +1,11 @@
 import numpy as np
 import pytest
 
-from tests.terrains import map_at
+from tests.terrains import map_at, tops
 
 
 def heights_at(x, y, **parameters):
-    points = np.column_stack([x, np.full(len(x), y), np.full(len(x), 5.0)])
-    return map_at(1.0, "continuous_ramps", **parameters).scan(points, "down")
+    return tops(map_at(1.0, "continuous_ramps", **parameters), x, y)
 
 
 def test_continuous_ramps_edges_meet_along_a_row():

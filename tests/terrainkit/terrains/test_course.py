@@ -9,7 +9,7 @@ from terrainkit.map.validate import validate
 from terrainkit.overlays.side_walls import SideWalls
 from terrainkit.terrain import registry
 from terrainkit.terrains.course import Course, Element
-from tests.terrains import heights_of
+from tests.terrains import edges, heights_of
 
 BLOCK = {"min_spacing": 1.0, "max_spacing": 1.0, "min_thickness": 0.4, "max_thickness": 0.4}
 """Hurdles in the middle of slots of 1 m."""
@@ -30,18 +30,13 @@ def hurdle(height, **rest):
     return {"terrain": "hurdles", "height": height, **BLOCK, **rest}
 
 
-def beginnings(heights):
-    """Return the cells along x where the ground in the middle of the lane rises or falls."""
-    return (np.flatnonzero(np.diff(heights[:, heights.shape[1] // 2])) + 1).tolist()
-
-
 def test_course_elements_share_the_length():
     """8 m: a start of 2 m at both ends, a platform of 1 m, and 1.5 m for each element.
 
     A hurdle is in the middle of the meter behind a start of 0.2 m.
     """
     patch = patch_of(hurdle(0.1), hurdle(0.2))
-    assert beginnings(patch.heights) == [25, 29, 50, 54]
+    assert edges(patch.heights[:, 20]) == [25, 29, 50, 54]
     assert patch.heights[[26, 51], 20] == pytest.approx([0.1, 0.2])
     assert patch.goals == pytest.approx(np.array([[4, 2, 0, 0], [7, 2, 0, 0]]), abs=1e-6)
     assert patch.spawns == pytest.approx(np.array([[1, 2, 0, 0]]), abs=1e-6)
@@ -55,7 +50,7 @@ def test_course_elements_have_their_own_length():
         hurdle(0.1, element_length=5.0, start=4.0),
         size=(20.0, 4.0),
     )
-    assert beginnings(patch.heights) == [43, 47, 113, 117, 173, 177]
+    assert edges(patch.heights[:, 20]) == [43, 47, 113, 117, 173, 177]
     realized = patch.parameters.realized
     assert realized["elements[2].element_length"] == 5
     assert realized["elements"] == "hurdles, hurdles, hurdles"
@@ -124,17 +119,12 @@ def test_course_takes_every_terrain(name):
         ({"elements": []}, r"course\.elements: got 0; expected 1 to 100"),
         ({"elements": [{"terrain": "pit"}] * 101}, r"course\.elements: got 101; expected 1 to 100"),
         ({"elements": "hurdles"}, r"course\.elements: got 'hurdles'; expected a list, each val"),
-        ({"elements": [3]}, r"course\.elements\[0\]: got 3; expected a table \(Element\)"),
         ({"elements": {"terrain": "gap"}}, r"got a table; expected \[\[terrains.elements\]\]"),
-        ({"elements": [{"terain": "gap"}]}, r"got the key 'terain'; did you mean 'terrain'\?"),
         ({"elements": [{}]}, r"course\.elements\[0\]: terrain: missing; expected a string"),
-        ({"elements": [{"terrain": "hurdle"}]}, r"elements\[0\]: no terrain 'hurdle'.* 'hurdles'"),
-        ({"elements": [{"terrain": "pit", "depht": 1}]}, r"elements\[0\]: pit has no parameter"),
         ({"elements": [{"terrain": "course"}]}, r"elements\[0\]: terrain: got course; expected a"),
         ({"elements": [{"terrain": "pit", "friction": 1.0}]}, r"pit: got friction of an element"),
         ({"elements": [{"terrain": "pit", "name": "hole"}]}, r"pit: got name of an element"),
         ({"elements": [{"terrain": "pit", "element_length": -1.0}]}, r"element_length: got -1\.0"),
-        ({"order": "reverse"}, r"course\.order: got 'reverse'; expected one of: given, random"),
     ],
 )
 def test_course_rejects_bad_elements(parameters, message):

@@ -2,16 +2,7 @@ import numpy as np
 
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrains.gap import Gap
-from tests.terrains import heights_of, map_at
-
-
-def moat(heights):
-    """Return which cells of each axis through the middle lie in the moat."""
-    nx, ny = heights.shape
-    return (
-        np.flatnonzero(heights[:, ny // 2] < 0).tolist(),
-        np.flatnonzero(heights[nx // 2] < 0).tolist(),
-    )
+from tests.terrains import edges, heights_of, map_at
 
 
 def test_gap_heights_by_hand():
@@ -23,6 +14,7 @@ def test_gap_heights_by_hand():
 def test_gap_ends_at_the_patch():
     grid, gap = Grid(shape=(80, 40), cell=0.1), Gap(width=1.0, platform=3.0)
     # 3 m, from cell 25 to 54 along x and from 5 to 34 along y.
-    x, y = [*range(15, 25), *range(55, 65)], [*range(5), *range(35, 40)]
-    assert moat(heights_of(gap, grid=grid)) == (x, y)
+    heights = heights_of(gap, grid=grid)
+    assert edges(heights[:, 20]) == [15, 25, 55, 65]
+    assert (edges(heights[40]), heights[40, 0]) == ([5, 35], -5.0)
     assert gap.realized(grid) == {"width": (1.0, 0.5), "depth": 5.0, "platform": 3.0}

@@ -1,8 +1,6 @@
 import numpy as np
 import pytest
 
-from terrainkit.errors import ConfigError
-from terrainkit.geometry.grid import Grid
 from terrainkit.terrains.obstacles import Obstacles
 from tests.terrains import heights_of
 
@@ -25,9 +23,3 @@ def test_obstacles_sides_are_sampled_per_axis():
     sides = np.array([extent(heights_of(terrain, seed)) for seed in range(150)])
     assert set(sides.ravel()) == set(range(10, 21))
     assert (sides[:, 0] != sides[:, 1]).any()
-
-
-def test_obstacles_wider_than_a_narrow_patch_are_rejected():
-    message = r"obstacles: .*max_width 2 m; expected .* the patch, 8 m x 1\.9 m"
-    with pytest.raises(ConfigError, match=message):
-        heights_of(Obstacles(platform=1.0), grid=Grid(shape=(80, 19), cell=0.1))

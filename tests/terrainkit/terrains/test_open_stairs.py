@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.terrains.open_stairs import OpenStairs
-from tests.terrains import map_at, solids_of
+from tests.terrains import solids_of
 
 
 def test_open_stairs_treads_have_the_exact_size():
@@ -14,10 +14,3 @@ def test_open_stairs_treads_have_the_exact_size():
     assert lower == pytest.approx(np.column_stack([x0, 0 * z, z - 0.03]))
     x1 = x0 + np.array([0.25] * 14 + [0.5])
     assert upper == pytest.approx(np.column_stack([x1, 0 * z + 8.0, z]))
-
-
-def test_open_stairs_leave_free_space_below_the_treads():
-    terrain_map = map_at(1.0, "open_stairs")
-    goals = terrain_map.patch(0, 0).goals
-    assert goals == pytest.approx(np.array([[4.0, 4.0, 1.6, 0.0], [7.0, 4.0, 0.0, 0.0]]))
-    assert terrain_map.clearance(goals[:, :2]) == pytest.approx([1.57, np.inf])

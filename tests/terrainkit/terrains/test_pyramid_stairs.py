@@ -1,22 +1,8 @@
-import numpy as np
 import pytest
 
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrains.pyramid_stairs import PyramidStairs
-from tests.terrains import GRID, heights_of
-
-
-def edges(profile):
-    """Return before which cells the ground changes."""
-    return (np.flatnonzero(np.diff(profile)) + 1).tolist()
-
-
-def test_pyramid_stairs_have_equal_steps():
-    heights = heights_of(PyramidStairs(step_height=0.1, step_width=0.5, platform=3.0))
-    # 2.5 m from the edge to the platform are five steps of five cells, and five back down.
-    up = [0] * 5 + [1] * 5 + [2] * 5 + [3] * 5 + [4] * 5 + [5] * 15
-    profile = 0.1 * np.array(up + up[::-1])
-    assert heights == pytest.approx(np.minimum.outer(profile, profile), abs=1e-6)
+from tests.terrains import GRID, edges, heights_of
 
 
 def test_pyramid_stairs_outermost_tread_takes_the_rest():

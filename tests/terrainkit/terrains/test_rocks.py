@@ -1,5 +1,3 @@
-import pytest
-
 from terrainkit.terrains.rocks import Rocks
 from tests.terrains import solids_of
 
@@ -13,8 +11,3 @@ def test_rocks_are_hulls_within_their_radius():
     assert width.min() >= 0.2  # 16 random points nearly always span half of the diameter
     assert upper[:, 2].max() <= 0.6
     assert lower[:, 2].max() < 0
-
-
-def test_rocks_become_higher_at_the_same_places():
-    low, high = (solids_of(Rocks(height=h, amplitude=0.0)).hull_vertices for h in (0.2, 0.4))
-    assert low * [1.0, 1.0, 2.0] == pytest.approx(high, abs=1e-5)

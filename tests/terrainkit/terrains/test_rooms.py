@@ -1,8 +1,7 @@
-import numpy as np
 import pytest
 
 from terrainkit.terrains.rooms import Rooms
-from tests.terrains import map_at, solids_of
+from tests.terrains import solids_of
 
 
 @pytest.mark.parametrize(("difficulty", "door"), [(0.0, 1.5), (1.0, 0.8)])
@@ -17,14 +16,3 @@ def test_rooms_doors_have_the_exact_width(difficulty, door):
     side = 3 * 2.5 + 0.2
     assert lower.min(axis=0) == pytest.approx([4 - side / 2, 4 - side / 2, -0.05])
     assert upper.max(axis=0) == pytest.approx([4 + side / 2, 4 + side / 2, 1.0])
-
-
-@pytest.mark.parametrize(("difficulty", "beside"), [(0.0, 0.76), (1.0, 0.41)])
-def test_rooms_goals_lie_in_the_doors(difficulty, beside):
-    terrain_map = map_at(difficulty, "rooms", (8.0, 5.4))
-    goals = terrain_map.patch(0, 0).goals
-    assert len(goals) == 2
-    assert np.isinf(terrain_map.clearance(goals[:, :2])).all()
-    # There is the wall beside a door of 1.5 m or 0.8 m.
-    for side in (-beside, beside):
-        assert (terrain_map.clearance(goals[:, :2] + [0.0, side]) == 0).all()

@@ -12,17 +12,3 @@ def test_slope_rises_and_falls_between_flat_ends():
     half = [*[0.0] * 20, *(0.04 * np.arange(1, 21))]
     expected = np.repeat([half + half[::-1]], 51, axis=0).T
     assert heights == pytest.approx(expected, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("shape", "top"),
-    [
-        ((80, 40), 0.8),  # 4.0 m of slope, half of it upward
-        ((73, 51), 0.68),  # 33 cells, the middle one is the 17th
-        ((41, 40), 0.04),  # one cell
-    ],
-)
-def test_slope_top_is_grade_times_half_the_run(shape, top):
-    grid, slope = Grid(shape=shape, cell=0.1), {"grade": 0.4}
-    assert heights_of(Slope(**slope), grid=grid).max() == pytest.approx(top)
-    assert heights_of(Slope(**slope, inverted=True), grid=grid).min() == pytest.approx(-top)

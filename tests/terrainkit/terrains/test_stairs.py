@@ -3,12 +3,7 @@ import pytest
 
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrains.stairs import Stairs
-from tests.terrains import GRID, heights_of
-
-
-def risers(heights):
-    """Return before which cells along x the ground rises or falls."""
-    return (np.flatnonzero(np.diff(heights[:, 0])) + 1).tolist()
+from tests.terrains import GRID, edges, heights_of
 
 
 def test_stairs_go_up_and_down_in_equal_steps():
@@ -25,7 +20,7 @@ def test_stairs_go_up_and_down_in_equal_steps():
 def test_stairs_top_takes_the_remaining_cells():
     heights = heights_of(Stairs(step_height=0.1, step_width=0.31, landing=2.0))
     # 40 cells are six treads of 3 up, six down, and a top of 4.
-    assert risers(heights) == [*range(20, 39, 3), *range(42, 61, 3)]
+    assert edges(heights[:, 0]) == [*range(20, 39, 3), *range(42, 61, 3)]
     assert heights[38:42, 0] == pytest.approx(np.full(4, 0.7))
     assert Stairs(step_width=0.31).requested()["step_width"] == 0.31
     assert Stairs(step_width=0.31).realized(GRID)["step_width"] == 0.3

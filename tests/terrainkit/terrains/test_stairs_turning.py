@@ -1,7 +1,7 @@
 import pytest
 
 from terrainkit.terrains.stairs_turning import StairsTurning
-from tests.terrains import heights_of, map_at
+from tests.terrains import heights_of
 
 
 def test_stairs_turning_climbs_and_descends_around_the_court():
@@ -13,10 +13,3 @@ def test_stairs_turning_climbs_and_descends_around_the_court():
     assert levels[::3, 33].tolist() == levels[33, ::3].tolist() == second
     assert (levels[12:27, 12:27] == 0).all()
     assert heights.sum() == pytest.approx(0.2 * levels.sum(), rel=1e-5)
-
-
-def test_stairs_turning_goals_lie_on_the_landings():
-    patch = map_at(1.0, "stairs_turning").patch(0, 0)
-    assert patch.origin == pytest.approx([1.0, 2.6, 0.0])
-    assert patch.goals[:, 2] == pytest.approx([6 * 0.2, 12 * 0.2, 6 * 0.2, 0.0])
-    assert patch.goals[0, 1] == pytest.approx(patch.origin[1])

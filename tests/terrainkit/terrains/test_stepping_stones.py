@@ -35,10 +35,3 @@ def test_stepping_stones_variation_differs_by_stone():
     assert np.ptp(first, axis=0).max() == 0.0
     # Ten rows of ten stones or eleven, and the platform.
     assert 100 <= len(np.unique(tops)) <= 111
-
-
-def test_stepping_stones_have_the_holes_of_an_endless_field():
-    free = 80 * 80 - 40 * 40
-    for seed in range(20):
-        holes = (build(seed=seed, stone=0.6, distance=0.3) < 0).sum()
-        assert abs(holes - free * (1 - (6 / 9) ** 2)) <= 6 * 3 / 2

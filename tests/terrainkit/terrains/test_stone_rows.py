@@ -15,10 +15,3 @@ def test_stone_rows_stones_have_the_exact_side_and_gap():
     assert 0.03 < np.abs(upper[:, 2]).max() <= 0.05
     expected = [[each, 4.0, 0.0, 0.0] for each in (*(x + 0.1), 7.0)]
     assert goals_of(StoneRows.at(1.0)) == pytest.approx(np.array(expected))
-
-
-def test_stone_rows_block_takes_the_rest_of_the_pit():
-    lower, upper = solids_of(StoneRows(stone=0.8, gap=0.1)).bounds()
-    # Four pairs every 0.9 m end at 5.6 m.
-    assert len(lower) == 9
-    assert [*lower[-1], *upper[-1]] == pytest.approx([5.7, 0.1, -1.05, 6.0, 7.9, 0.0], abs=1e-6)

@@ -90,7 +90,6 @@ def test_box_step_time_is_linear_in_the_logarithm(num_boxes, time):
         (0.03, 0.1, 8),  # 2 x 2 cells of 2 prisms
         (0.05, 0.1, 8),
         (0.05, 0.025, 50),  # 5 x 5
-        (0.03, 0.02, 32),
         (0.03, 0.01, 98),
     ],
 )

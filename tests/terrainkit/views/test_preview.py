@@ -112,12 +112,6 @@ def test_preview_height_scale_has_the_colors_of_heights(inverted, heights):
     assert (picture[ABOVE:-BELOW, -80:] != PAPER).any()  # tick labels
 
 
-@pytest.mark.parametrize("width", [100, 130, 400])
-def test_preview_height_scale_of_a_flat_map(width):
-    bar = color_bar(render_preview(map_of(FLAT, rows=5), width))
-    assert (bar[3:-3, 3:-3] == height_colors(np.array(0.0)).astype(np.uint8)).all()
-
-
 def test_write_preview_keeps_existing_file(pits, tmp_path):
     path = write_preview(pits, tmp_path / "a.png", width=300)
     assert (cv2.imread(str(path))[..., ::-1] == render_preview(pits, 300)).all()

@@ -37,13 +37,6 @@ def test_closed_mesh_is_a_solid_of_the_same_volume_for_each_mesh(heights, thresh
 
 
 @every_mesh
-def test_closed_mesh_of_level_ground_is_a_block(build):
-    solid = solid_of(closed_mesh(mesh_of(build, np.full((4, 2), 3.0), 0.1, cell=0.5)))
-    assert solid.bounds.tolist() == [[0.0, 0.0, 2.0], [2.0, 1.0, 3.0]]
-    assert solid.volume == pytest.approx(2.0)
-
-
-@every_mesh
 def test_closed_mesh_of_a_slope_is_a_wedge(build):
     # Level for half a cell, up by 3 over 3 cells, level for half a cell; 2 cells wide, 1 m below.
     solid = solid_of(closed_mesh(mesh_of(build, [[0, 0], [1, 1], [2, 2], [3, 3]], np.inf)))
