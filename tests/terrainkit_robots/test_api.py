@@ -25,11 +25,8 @@ def test_import_is_lazy():
     assert run.stdout == "False\n"
 
 
-def test_check_robot_accepts_string():
+def test_robots_are_checked_and_loaded_by_strings():
     report = terrainkit_robots.check_robot(str(QUADRUPED))
     assert report.verdict == "pass"
     assert report.facts.model.name == "quadruped"
-
-
-def test_load_robot_accepts_string():
     assert terrainkit_robots.load_robot(str(QUADRUPED)).name == "quadruped"

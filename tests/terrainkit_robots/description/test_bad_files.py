@@ -11,6 +11,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from tests.robots import QUADRUPED
+from tests.small_robots import box, joint, link, shape
 
 NASTY = [
     "nan", "inf", "-inf", "1e308", "1e-320", "0", "-1", "1e29", "", " ", "x", "1 2", "1,5",
@@ -70,40 +71,27 @@ def test_random_bytes(tmp_path, raw):
     assert check(tmp_path / "r.urdf") & {"XML001", "XML002", "XML009"}
 
 
-def link(name, inside=""):
-    return f'<link name="{name}">{inside}</link>'
-
-
-def joint(name, parent, child):
-    return (
-        f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
-        '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint>'
-    )
-
-
 def robot(*parts):
     return f'<robot name="r">{"".join(parts)}</robot>'
 
 
 def mesh(file):
-    shape = f'<geometry><mesh filename="{file}"/></geometry>'
-    return robot(link("a", f"<collision>{shape}</collision><visual>{shape}</visual>"))
+    mesh = f'mesh filename="{file}"'
+    return robot(link("a", shape(mesh), shape(mesh, kind="visual"), mass=None))
 
 
-def body(x):
-    """Return the contents of a link, with a number in all places."""
-    return (
-        f'<inertial><origin xyz="{x} {x} {x}" rpy="{x} {x} {x}"/><mass value="{x}"/>'
-        f'<inertia ixx="{x}" ixy="{x}" ixz="{x}" iyy="{x}" iyz="{x}" izz="{x}"/></inertial>'
-        f'<collision><geometry><box size="{x} {x} {x}"/></geometry></collision>'
-    )
+def solid(name, x):
+    """Return a link with a number in all places."""
+    three = f"{x} {x} {x}"
+    place = {"center": three, "rpy": three}
+    return link(name, box(three), mass=x, inertia=f"{three} {three}", **place)
 
 
-STAR = [link(f"l{k}", body(1)) for k in range(2000)]
-STAR += [joint(f"j{k}", "l0", f"l{k}") for k in range(1, 2000)]
+STAR = [solid(f"l{k}", 1) for k in range(2000)]
+STAR += [joint("l0", f"l{k}", limits=(-1, 1)) for k in range(1, 2000)]
 BAD = {
-    "loop": (robot(link("a"), link("b"), joint("j", "a", "b"), joint("k", "b", "a")), "TRE004"),
-    "large numbers": (robot(link("a", body("1e29"))), ""),
+    "loop": (robot(link("a"), link("b"), joint("a", "b"), joint("b", "a")), "TRE004"),
+    "large numbers": (robot(solid("a", "1e29")), ""),
     "star": (robot(*STAR), "INR003"),
     "attributes": ("<robot " + " ".join(f"a{k}='1'" for k in range(100_000)) + "/>", "XML001"),
     "name": (robot(link("a" * 1_000_000)), ""),

@@ -4,7 +4,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
@@ -51,16 +50,9 @@ def bodies(model):
 
 def shapes(model):
     """Return body, whether it collides, type, size and pose of each shape, in order."""
-    geoms = zip(
-        model.geom_bodyid,
-        model.geom_contype != 0,
-        model.geom_type,
-        *model.geom_size.T,
-        *model.geom_pos.T,
-        *model.geom_quat.T,
-        strict=True,
-    )
-    return np.array(sorted(geoms))
+    whole = [model.geom_bodyid, model.geom_contype != 0, model.geom_type]
+    geoms = np.column_stack([*whole, model.geom_size, model.geom_pos, model.geom_quat])
+    return np.array(sorted(geoms.tolist()))
 
 
 def at(model, positions):
@@ -114,7 +106,6 @@ def test_formats_have_same_joint_properties(name):
         joint = model.joint(motor.trnid[0])
         written = urdf(name).find(f"joint[@name='{joint.name}']")
         limit, dynamics = numbers(written.find("limit")), numbers(written.find("dynamics"))
-        assert motor.name + "_joint" == joint.name
         assert tuple(joint.range) == (limit["lower"], limit["upper"])
         assert tuple(motor.ctrlrange) == (-limit["effort"], limit["effort"])
         assert dynamics == {"damping": joint.damping[0], "friction": joint.frictionloss[0]}
@@ -123,18 +114,6 @@ def test_formats_have_same_joint_properties(name):
 
 def numbers(element):
     return {key: float(value) for key, value in element.items()}
-
-
-@every_robot
-@every_format
-def test_kinematics_match_mujoco(name, suffix):
-    model, robot = compiled(name, suffix), Facts(load_robot(path_of(name, suffix)))
-    for positions in random_poses(model):
-        data = at(model, positions)
-        for body, pose in zip(robot.bodies, body_poses(robot.bodies, positions), strict=True):
-            there = data.body(body.top.name)
-            np.testing.assert_allclose(pose[:3, 3], there.xpos, atol=1e-9)
-            np.testing.assert_allclose(pose[:3, :3], there.xmat.reshape(3, 3), atol=1e-9)
 
 
 @pytest.mark.parametrize(

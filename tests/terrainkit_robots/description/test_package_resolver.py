@@ -75,13 +75,8 @@ def test_file_is_found(robot, others, name, how, place):
 
 def test_absolute_names(place):
     robot, mesh = place("dog.urdf", "my foot.stl")
-    for name in (
-        f"{mesh}",
-        f"file://{mesh}",
-        f"file:{mesh}",
-        f"FILE://{mesh.parent}/my%20foot.stl",
-    ):
-        assert resolve(name, robot) == (mesh, "path")
+    for name in (mesh, f"file://{mesh}", f"file:{mesh}", f"FILE://{mesh.parent}/my%20foot.stl"):
+        assert resolve(str(name), robot) == (mesh, "path")
 
 
 @pytest.mark.parametrize(
@@ -184,9 +179,6 @@ def test_package_xml_is_pipe_or_binary(place):
     os.mkfifo(robot.parent / "package.xml")
     package.write_bytes(bytes(range(256)) * 1000)
     assert PackageResolver(robot, {}).find_package("nothing") is None
-
-
-# Functions
 
 
 def test_resolve_in_folders(place):

@@ -3,6 +3,7 @@ import pytest
 from terrainkit_robots.description import robot_folder
 from terrainkit_robots.description.robot_folder import robot_files
 from terrainkit_robots.description.xml.document import RobotFileError
+from tests.terrainkit_robots.description.made_robots import write_all
 
 XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{}</robot>'
 LEG = '<xacro:macro name="leg" params="side"><link name="${side}_leg"/></xacro:macro>'
@@ -36,9 +37,7 @@ OTHERS = {
 
 @pytest.fixture
 def folder(tmp_path):
-    for name, text in {**ROBOTS, **OTHERS}.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text)
+    write_all(tmp_path, ROBOTS | OTHERS)
     return tmp_path
 
 

@@ -15,6 +15,7 @@ from terrainkit_robots.description.model import (
     Source,
 )
 from terrainkit_robots.mesh.surface import Surface, binary_stl
+from tests import small_robots
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)
 
@@ -24,10 +25,7 @@ MJCF_MASS = '<inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
 def urdf_link(name):
     """Return the text of a URDF link of 1 kg."""
-    return (
-        f'<link name="{name}"><inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" '
-        'izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    )
+    return small_robots.link(name, inertia=".01 .01 .01 0 0 0")
 
 
 def at(x, y, z, rotation=None):

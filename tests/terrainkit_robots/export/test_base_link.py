@@ -19,49 +19,36 @@ WALKER = f"""<mujoco model="walker"><worldbody><body name="torso" pos="0 0 1">{M
   <joint name="turn" axis="0 1 0"/>
   <body name="arm" pos="0.5 0 0">{MJCF_MASS}<joint name="elbow" range="-60 60"/></body>
 </body></worldbody><actuator><motor joint="elbow" ctrlrange="-5 5"/></actuator></mujoco>"""
+LOST = "removed table, ball: not part of the kinematic tree"
+FREED = "removed z, x, turn: joints between the world and the robot"
 ADDED = "added the base link world_link for the world, with joints"
 
 
 @pytest.mark.parametrize(
-    ("text", "floating", "joints", "base", "changes"),
+    ("text", "floating", "joints", "changes"),
     [
-        (
-            CART,
-            None,
-            ["slider", "hinge"],
-            "world_link",
-            ("removed table, ball: not part of the kinematic tree", f"{ADDED} slider"),
-        ),
-        (
-            ARMS,
-            None,
-            ["left_joint", "right_joint"],
-            "world_link",
-            (f"{ADDED} left_fixed, right_fixed",),
-        ),
-        (WALKER, None, ["z", "x", "turn", "elbow"], "world_link", (f"{ADDED} z",)),
-        (
-            WALKER,
-            True,
-            ["elbow"],
-            "torso",
-            ("removed z, x, turn: joints between the world and the robot",),
-        ),
+        (CART, None, "slider hinge", (LOST, f"{ADDED} slider")),
+        (ARMS, None, "left_joint right_joint", (f"{ADDED} left_fixed, right_fixed",)),
+        (WALKER, None, "z x turn elbow", (f"{ADDED} z",)),
+        (WALKER, True, "elbow", (FREED,)),
     ],
     ids=["cart", "arms", "walker", "free walker"],
 )
-def test_world_becomes_the_base(text, floating, joints, base, changes, robot):
+def test_world_becomes_the_base(text, floating, joints, changes, robot):
     form = to_canonical(robot(text), floating=floating)
-    assert [joint.name for joint in form.model.joints if joint.moves] == joints
+    assert " ".join(joint.name for joint in form.model.joints if joint.moves) == joints
+    base = "torso" if floating else "world_link"
     assert (form.model.links[0].name, form.model.floating) == (base, bool(floating))
     assert form.changes == changes
 
 
-@pytest.mark.parametrize("base", ["<freejoint/>", "", '<joint type="ball"/>'])
-def test_robot_with_base_is_unchanged(base, robot):
-    """Of two arms, only the first has an actuator."""
-    left = '<body name="left" pos="-1 0 0">'
-    text = ARMS.replace(left, left + base).replace('<motor joint="right_joint"/>', "")
+@pytest.mark.parametrize(
+    ("base", "motors"), [("<freejoint/>", 2), ('<joint type="ball"/>', 2), ("", 1)]
+)
+def test_robot_with_base_is_unchanged(base, motors, robot):
+    """A fixed arm is a base if it alone has an actuator."""
+    left, motor = '<body name="left" pos="-1 0 0">', '<motor joint="right_joint"/>'
+    text = ARMS.replace(left, left + base).replace(motor, motor * (motors - 1))
     facts = robot(text)
     assert with_world_base(facts) is facts
 
@@ -71,4 +58,6 @@ def test_base_is_free_only_on_request(robot):
     assert with_world_base(facts).model.floating is False
     free = with_world_base(facts, floating=True)
     assert (free.model.floating, free.bodies[0].top.name) == (True, "torso")
+    parents = {joint.name: joint.parent for joint in free.model.joints}
+    assert parents == dict.fromkeys(("z", "x", "turn"), "world") | {"elbow": "torso"}
     assert with_world_base(free, floating=True) is free

@@ -49,6 +49,9 @@ def quadruped():
 
 
 TURNED = at(0.1, 0.2, 0.3, [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+TURNING = {"origin": TURNED, "axis": np.array([0.0, 2, 0]), "limit": limits(-0.5, 1.5)}
+LOSSES = Dynamics(source=SOURCE, damping=0.3, friction=0.4)
+FOLLOWS = Mimic(source=SOURCE, joint="hip", multiplier=-2.0, offset=0.1)
 LEG = model(
     link(
         "base",
@@ -58,25 +61,8 @@ LEG = model(
     link("leg", collisions=(shape("sphere", 0.1), shape("sphere", 0.2))),
     link("foot"),
     link("toe", None, collisions=(shape("sphere", 0.1, origin=at(1, 0, 0)), shape("sphere", 0.1))),
-    joint(
-        "hip",
-        "revolute",
-        "base",
-        "leg",
-        origin=TURNED,
-        axis=np.array([0.0, 2, 0]),
-        limit=limits(-0.5, 1.5),
-        armature=0.5,
-        dynamics=Dynamics(source=SOURCE, damping=0.3, friction=0.4),
-    ),
-    joint(
-        "slide",
-        "prismatic",
-        "leg",
-        "foot",
-        limit=None,
-        mimic=Mimic(source=SOURCE, joint="hip", multiplier=-2.0, offset=0.1),
-    ),
+    joint("hip", "revolute", "base", "leg", **TURNING, armature=0.5, dynamics=LOSSES),
+    joint("slide", "prismatic", "leg", "foot", limit=None, mimic=FOLLOWS),
     joint("tip", "fixed", "foot", "toe"),
     floating=True,
 )

@@ -40,12 +40,8 @@ def compiled(text):
 
 def masses(robot):
     """Return the mass of each link as written; None if it has none."""
-    return {
-        each.get("name"): None
-        if (mass := each.find("inertial/mass")) is None
-        else mass.get("value")
-        for each in parsed(robot).iter("link")
-    }
+    links = {each.get("name"): each.find("inertial/mass") for each in parsed(robot).iter("link")}
+    return {name: None if mass is None else mass.get("value") for name, mass in links.items()}
 
 
 def test_urdf_of_box():
@@ -90,25 +86,15 @@ inertiafromgeom="false"/>
     assert urdf_text(model(base)) == expected
 
 
-# Joints
-
-
 def elements(joint):
     """Return the attributes of a joint and of each element in it."""
     return {"": dict(joint.attrib), **{each.tag: dict(each.attrib) for each in joint}}
 
 
 def test_joint_values():
-    hip = joint(
-        "hip",
-        "revolute",
-        "base",
-        "leg",
-        origin=at(0, 0.1, 0),
-        axis=np.array([0.0, 2, 0]),
-        limit=limits(-0.5, 1.5, 20, 30),
-        dynamics=Dynamics(source=SOURCE, damping=0.3, friction=0.4),
-    )
+    losses = Dynamics(source=SOURCE, damping=0.3, friction=0.4)
+    fields = {"axis": np.array([0.0, 2, 0]), "limit": limits(-0.5, 1.5, 20, 30)}
+    hip = joint("hip", "revolute", "base", "leg", origin=at(0, 0.1, 0), dynamics=losses, **fields)
     mimic = Mimic(source=SOURCE, joint="hip", multiplier=-2.0, offset=0.1)
     knee = joint("knee", "prismatic", "leg", "shin", mimic=mimic)
     root = parsed(model(link("base"), link("leg"), link("shin"), hip, knee))
@@ -171,11 +157,8 @@ def test_names_cannot_end_comment(names):
 
 
 def test_feet_have_dont_collapse():
-    hip, ankle, mount = (
-        joint("hip", "revolute", "base", "leg"),
-        joint("ankle", "fixed", "leg", "foot"),
-        joint("mount", "fixed", "base", "camera"),
-    )
+    hip = joint("hip", "revolute", "base", "leg")
+    ankle, mount = joint("ankle", "fixed", "leg", "foot"), joint("mount", "fixed", "base", "camera")
     links = [link(name) for name in ("base", "leg", "foot", "camera")]
 
     def kept(*joints, **options):
@@ -189,15 +172,8 @@ def test_feet_have_dont_collapse():
 
 def test_axis_with_offset():
     """The child turns about the axis, and is where it was in between; names are kept unique."""
-    hip = joint(
-        "hip",
-        "revolute",
-        "base",
-        "leg",
-        origin=at(1, 2, 3),
-        anchor=np.array([0.1, -0.2, 0.3]),
-        axis=np.array([0.0, 0.6, 0.8]),
-    )
+    place = {"anchor": np.array([0.1, -0.2, 0.3]), "axis": np.array([0.0, 0.6, 0.8])}
+    hip = joint("hip", "revolute", "base", "leg", origin=at(1, 2, 3), **place)
     tail = joint("tail", "fixed", "base", "leg_axis")
     robot = model(link("base"), link("leg"), link("leg_axis"), hip, tail)
     made = compiled(urdf_text(robot))
@@ -222,9 +198,6 @@ def test_joint_that_is_not_canonical_is_rejected():
         urdf_text(robot)
 
 
-# Masses
-
-
 def test_links_that_need_a_mass_get_a_small_one():
     """A link moves, is virtual, or has a shape from which its mass would be computed."""
     heavy = (shape("box", 1, 1, 1),)
@@ -239,14 +212,8 @@ def test_links_that_need_a_mass_get_a_small_one():
         joint("c", "fixed", "leg", "tip"),
         joint("d", "fixed", "base", "foot"),
     )
-    small = "1e-07"
-    assert masses(robot) == {
-        "base": "3",
-        "between": small,
-        "leg": small,
-        "tip": None,
-        "foot": small,
-    }
+    small = dict.fromkeys(("between", "leg", "foot"), "1e-07")
+    assert masses(robot) == {"base": "3", "tip": None} | small
     made = compiled(urdf_text(robot))
     assert made.body_mass.sum() == pytest.approx(3, rel=1e-6)
     inertia = parsed(robot).find("link[@name='leg']/inertial/inertia")
@@ -260,13 +227,9 @@ def test_small_mass_is_a_share_of_the_robot(mass, small):
 
 
 def test_massless_link_with_a_fixed_mass_needs_none():
-    robot = model(
-        link("base", 3.0),
-        link("frame", None),
-        link("leg", 2.0),
-        joint("a", "revolute", "base", "frame"),
-        joint("b", "fixed", "frame", "leg"),
-    )
+    links = link("base", 3.0), link("frame", None), link("leg", 2.0)
+    joints = joint("a", "revolute", "base", "frame"), joint("b", "fixed", "frame", "leg")
+    robot = model(*links, *joints)
     assert masses(robot) == {"base": "3", "frame": None, "leg": "2"}
     assert compiled(urdf_text(robot)).body_mass.sum() == 5
 
@@ -291,9 +254,6 @@ def test_rounding_errors_of_inertia_are_zero():
     weight = replace(inertial(2.0), inertia=inertia)
     written = parsed(model(link("base", inertial=weight))).find("link/inertial/inertia")
     assert [written.get(name) for name in ("ixx", "ixy", "ixz")] == ["1", "0", "1.1e-12"]
-
-
-# Bundled robots
 
 
 @pytest.fixture(scope="module", params=BUNDLED)

@@ -10,8 +10,6 @@ from terrainkit_robots.mesh.surface import MeshError
 TRIANGLES = (
     '<triangles><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2 0 2 3</p></triangles>'
 )
-
-
 XYZ = '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>'
 
 
@@ -37,6 +35,7 @@ def dae(*geometries, scene="", rest="", unit=""):
 
 
 INSTANCE = '<instance_geometry url="#g"/>'
+SCENE = f"<node>{INSTANCE}</node>"
 
 
 def triangles(data):
@@ -50,15 +49,11 @@ SQUARE = [[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]]
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
-        pytest.param(dae(geometry(), scene=f"<node>{INSTANCE}</node>"), SQUARE, id="scene"),
+        pytest.param(dae(geometry(), scene=SCENE), SQUARE, id="scene"),
         pytest.param(dae(geometry(params="")), SQUARE, id="accessor without params"),
         pytest.param(dae(geometry(), rest="<library_images><image/></library_images>"), SQUARE),
         pytest.param(dae(geometry(), geometry(name="h")), SQUARE * 2, id="all without a scene"),
-        pytest.param(
-            dae(geometry(), geometry(name="h"), scene=f"<node>{INSTANCE}</node>"),
-            SQUARE,
-            id="only those of the scene",
-        ),
+        pytest.param(dae(geometry(), geometry(name="h"), scene=SCENE), SQUARE, id="of a scene"),
     ],
 )
 def test_read_dae_triangles(data, expected):
@@ -66,8 +61,6 @@ def test_read_dae_triangles(data, expected):
 
 
 VERTEX = '<input semantic="VERTEX" source="#v" offset="0"/>'
-
-
 NORMALS = '<input semantic="NORMAL" source="#pg" offset="0"/>' + VERTEX.replace("0", "1")
 
 
@@ -88,7 +81,7 @@ def test_face_elements(faces):
 
 
 def test_strips_have_consistent_winding():
-    faces = '<tristrips><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 3 2</p></tristrips>'
+    faces = f"<tristrips>{VERTEX}<p>0 1 3 2</p></tristrips>"
     corners = np.array(triangles(dae(geometry(faces))))
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert normals.tolist() == [[0, 0, 1], [0, 0, 1]]

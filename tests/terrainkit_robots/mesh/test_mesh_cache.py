@@ -11,13 +11,8 @@ from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.mesh import mesh_cache as module
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
-from terrainkit_robots.mesh.surface import Surface, binary_stl
 from tests.small_robots import joint, link, shape
-
-
-def stl_of(mesh):
-    return binary_stl(Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces)))
-
+from tests.terrainkit_robots.export.made_models import stl_of
 
 BOX = stl_of(trimesh.creation.box([1, 2, 3]))
 RING = stl_of(trimesh.creation.annulus(r_min=0.9, r_max=1.0, height=0.1))

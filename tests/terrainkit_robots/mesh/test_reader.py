@@ -106,9 +106,7 @@ def test_weights_and_colors_of_obj_are_ignored():
         pytest.param("ascii-stl", b"facet\n", "no triangles", id="none"),
         pytest.param("stl", bytes(84), "no triangles", id="no faces of an STL"),
         pytest.param("stl", bytes(84) + b"\xff" * 50, "3 vertices that are not finite", id="NaN"),
-        pytest.param(
-            "msh", msh(np.full((4, 3), np.inf)), "vertices that are not", id="infinite MSH"
-        ),
+        pytest.param("msh", msh(np.inf + TETRAHEDRON), "vertices that are not", id="infinite MSH"),
         pytest.param("msh", msh(TETRAHEDRON, [[0, 1, 4]]), "vertex index 4", id="beyond MSH"),
         pytest.param("other", b"", "unsupported format", id="another format"),
         pytest.param("ply", b"ply\n", "cannot be read", id="an empty PLY"),

@@ -92,18 +92,17 @@ def test_only_ends_are_read(tmp_path):
     assert (header.state, header.size) == ("fine", 4 * 2**30 + 11)
 
 
+def link_to_device(path):
+    path.symlink_to("/dev/zero")
+
+
 @pytest.mark.parametrize(
     ("make", "state", "problem"),
     [
         pytest.param(str, "missing", "does not exist", id="missing"),
         pytest.param(Path.mkdir, "special", "is a folder, not a file", id="folder"),
         pytest.param(os.mkfifo, "special", "is a pipe, not a file", id="pipe"),
-        pytest.param(
-            lambda path: path.symlink_to("/dev/zero"),
-            "special",
-            "is a device, not a file",
-            id="device",
-        ),
+        pytest.param(link_to_device, "special", "is a device, not a file", id="device"),
         pytest.param(lambda path: path.symlink_to(path), "missing", "does not exist", id="cycle"),
     ],
 )

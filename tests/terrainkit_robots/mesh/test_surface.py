@@ -21,11 +21,7 @@ from terrainkit_robots.mesh.surface import (
     unique_points,
     welded,
 )
-
-
-def surface_of(mesh):
-    return Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
-
+from tests.terrainkit_robots.export.made_models import surface_of
 
 BOX = surface_of(trimesh.creation.box([1, 2, 3]))
 SPHERE = surface_of(trimesh.creation.icosphere(subdivisions=3, radius=0.1))
@@ -58,11 +54,7 @@ def test_triangulate_fan():
 
 
 @settings(max_examples=50, deadline=None)
-@given(
-    arrays(
-        np.float32, (30, 3), elements=st.sampled_from([0.0, -0.0, 0.125, 0.375, -7.0, 2.0**-100])
-    )
-)
+@given(arrays(np.float32, (30, 3), elements=st.sampled_from([0.0, -0.0, 0.125, -7.0, 2.0**-100])))
 def test_unique_points(points):
     different, which = unique_points(points)
     assert len(different) == len(set(map(tuple, points.tolist())))

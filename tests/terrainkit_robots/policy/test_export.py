@@ -253,6 +253,14 @@ def test_example_has_the_joints_and_friction_of_the_training(exported, trained, 
     assert model.geom_friction[plane, 0] == pytest.approx(0.8)
 
 
+def test_example_ends_when_the_robot_has_tilted_by_60_degrees(exported, monkeypatch):
+    monkeypatch.setattr(mujoco, "mju_quat2Mat", lambda turn, _: turn.fill(0.51))
+    run_example(exported, monkeypatch, "--seconds", "0.02")
+    monkeypatch.setattr(mujoco, "mju_quat2Mat", lambda turn, _: turn.fill(0.49))
+    with pytest.raises(SystemExit, match=r"^fell after 0\.02 s$"):
+        run_example(exported, monkeypatch)
+
+
 @pytest.mark.parametrize("changed", [{"name": "camera"}, {"stop": 4}])
 def test_example_rejects_unknown_observations(exported, tmp_path, monkeypatch, changed):
     shutil.copytree(exported, tmp_path, dirs_exist_ok=True)
@@ -273,25 +281,18 @@ def test_json_describes_the_height_scan(quadruped, map_terrain):
     assert (part["offset"], part["scale"]) == ([0.5] * 187, [5.0] * 187)
 
 
-def test_example_sees_a_plane_in_the_height_scan(exported, tmp_path, monkeypatch):
-    shutil.copytree(exported, tmp_path, dirs_exist_ok=True)
-    config = json.loads((tmp_path / "policy.json").read_text())
-    config["height_scan"] = {"points": [[0, 0], [0.1, 0], [0.2, 0]]}
+def test_example_sees_a_plane_in_the_height_scan(exported, monkeypatch):
+    names = run_example(exported, monkeypatch, "--seconds", "0.02")
     scan = {"name": "height_scan", "start": 0, "stop": 3, "offset": 0.3, "scale": 5}
-    scan["clip"] = [-1, 1]
-    names = run_example(tmp_path, monkeypatch, "--seconds", "0.02")
-    names["config"].update(config)
-    names["config"]["observation"]["parts"] = [scan]
+    names["config"]["height_scan"] = {"points": [[0, 0], [0.1, 0], [0.2, 0]]}
+    names["config"]["observation"]["parts"] = [scan | {"clip": [-1, 1]}]
     names["data"].qpos[2] = 0.4
     np.testing.assert_allclose(names["observe"](np.zeros(3), 0, np.eye(3)), [0.5] * 3, atol=1e-6)
 
 
 def test_export_policy_of_a_large_task(trained, tmp_path):
-    task = replace(
-        trained.task,
-        env=replace(trained.task.env, num_envs=4096),
-        algorithm=replace(trained.task.algorithm, num_mini_batches=512),
-    )
+    algorithm = replace(trained.task.algorithm, num_mini_batches=512)
+    task = replace(trained.task, env=Env(num_envs=4096), algorithm=algorithm)
     result = export_policy(replace(trained, task=task), tmp_path / "policy")
     assert (result.num_observations, result.num_actions) == (47, 12)
 

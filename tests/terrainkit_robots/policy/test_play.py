@@ -1,5 +1,5 @@
-from contextlib import nullcontext
 from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import mujoco
 import numpy as np
@@ -122,34 +122,19 @@ def test_view_requires_a_display(make_run, monkeypatch):
 
 
 def test_view_shows_the_robot_until_closed(make_run, monkeypatch):
-    shown = []
+    shown, handle = [], MagicMock()
+    handle.__enter__.return_value = handle
+    handle.is_running.side_effect = lambda: len(shown) < 3
 
-    class Viewer:
-        cam = SimpleNamespace(type=None, trackbodyid=None)
-
-        def __init__(self, _, data):
-            self.data = data
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            return None
-
-        def lock(self):
-            return nullcontext()
-
-        def is_running(self):
-            return len(shown) < 3
-
-        def sync(self):
-            shown.append(self.data.qpos.copy())
+    def launch_passive(_, data):
+        handle.sync.side_effect = lambda: shown.append(data.qpos.copy())
+        return handle
 
     monkeypatch.setenv("DISPLAY", ":0")
-    viewer = SimpleNamespace(launch_passive=Viewer)
+    viewer = SimpleNamespace(launch_passive=launch_passive)
     monkeypatch.setitem(module.sys.modules, "mujoco.viewer", viewer)
     monkeypatch.setattr(mujoco, "viewer", viewer, raising=False)
     view(make_run(env=Env(num_threads=1)), EvaluationConfig(seconds=0.04))
     assert len(shown) == 3
     assert not np.array_equal(shown[0], shown[2])
-    assert Viewer.cam.trackbodyid == 1
+    assert handle.cam.trackbodyid == 1

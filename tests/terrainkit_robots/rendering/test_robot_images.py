@@ -98,11 +98,6 @@ def compiled(content):
     )
 
 
-def shown_names(content):
-    model = compiled(content)
-    return [model.geom(int(i)).name for i in show_robot_geoms(model)]
-
-
 def body(*geoms):
     shapes = "".join(f'<geom name="{name}" size="1" {rest}/>' for name, rest in geoms)
     return f"<body><freejoint/>{shapes}</body>"
@@ -111,37 +106,32 @@ def body(*geoms):
 HIDDEN = 'group="3"'
 
 
-def test_show_robot_geoms_prefers_visible_groups():
-    assert shown_names(body(("visual", 'group="2"'), ("collision", HIDDEN))) == ["visual"]
-    other_links = body(("visual", ""), ("a", HIDDEN)) + body(("b", HIDDEN))
-    assert shown_names(other_links) == ["visual"]
+FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
+VISUAL, CLEAR = ("visual", ""), ("clear", 'rgba="1 1 1 0"')
 
 
-def test_show_robot_geoms_falls_back_to_collision_geoms():
-    assert shown_names(body(("a", HIDDEN)) + body(("b", HIDDEN))) == ["a", "b"]
-
-
-def test_show_robot_geoms_skips_planes():
-    floor = '<geom name="floor" type="plane" size="1 1 1"/>'
-    assert shown_names(floor + body(("visual", ""))) == ["visual"]
-    assert shown_names(floor) == []
-
-
-def test_show_robot_geoms_includes_static_base():
-    base = '<geom name="base" size="1"/>'
-    assert shown_names(base + body(("visual", ""))) == ["base", "visual"]
-
-
-def test_show_robot_geoms_hides_transparent_geoms():
-    clear = ("clear", 'rgba="1 1 1 0"')
-    assert shown_names(body(clear, ("visual", ""))) == ["visual"]
-    assert shown_names(body(("glass", 'material="glass"'), ("visual", ""))) == ["visual"]
-    painted = ("painted", 'material="glass" rgba="1 0 0 1"')  # geom colors override materials
-    assert shown_names(body(painted, ("visual", ""))) == ["painted", "visual"]
+@pytest.mark.parametrize(
+    ("content", "shown"),
+    [
+        (body(("visual", 'group="2"'), ("collision", HIDDEN)), "visual"),
+        (body(VISUAL, ("a", HIDDEN)) + body(("b", HIDDEN)), "visual"),
+        (body(("a", HIDDEN)) + body(("b", HIDDEN)), "a b"),
+        (FLOOR + body(VISUAL), "visual"),
+        (FLOOR, ""),
+        ('<geom name="base" size="1"/>' + body(VISUAL), "base visual"),
+        (body(CLEAR, VISUAL), "visual"),
+        (body(("glass", 'material="glass"'), VISUAL), "visual"),
+        # The colors of geoms override materials.
+        (body(("painted", 'material="glass" rgba="1 0 0 1"'), VISUAL), "painted visual"),
+    ],
+)
+def test_geoms_of_the_robot_are_shown(content, shown):
+    model = compiled(content)
+    assert " ".join(model.geom(int(i)).name for i in show_robot_geoms(model)) == shown
 
 
 def test_show_robot_geoms_colors_transparent_robot():
-    model = compiled(body(("clear", 'rgba="1 1 1 0"'), ("glass", 'material="glass"')))
+    model = compiled(body(CLEAR, ("glass", 'material="glass"')))
     assert show_robot_geoms(model).tolist() == [1, 2]
     assert (model.geom_rgba[1:, 3] == 1).all()
     assert model.geom_group.tolist() == [0, 0, 0]

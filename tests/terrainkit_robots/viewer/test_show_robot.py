@@ -16,6 +16,7 @@ from terrainkit_robots.viewer.show_robot import (
     show_robot,
     slider_range,
 )
+from tests.small_robots import ball, joint, link
 
 
 @pytest.fixture
@@ -92,11 +93,11 @@ def test_mirrored_joints_move_together_if_checked(show, bundled):
 
 
 def test_mimic_joint_follows_without_slider(show, robot):
-    scene, shown = show(robot(GRIPPER))
-    assert "right [m]" not in shown
-    shown["left [m]"].value = 0.03
-    assert position(scene, "left_finger") == pytest.approx([0.03, 0, 0])
-    assert position(scene, "right_finger") == pytest.approx([0.06, 0, 0])
+    scene, shown = show(robot("".join(GRIPPER)))
+    assert "right_joint [m]" not in shown
+    shown["left_joint [m]"].value = 0.03
+    assert position(scene, "left") == pytest.approx([0.03, 0, 0])
+    assert position(scene, "right") == pytest.approx([0.06, 0, 0])
 
 
 def test_finding_is_listed_and_marked_at_its_link(show, bundled, tmp_path):
@@ -153,14 +154,14 @@ def test_slider_range(limits, expected, tmp_path):
     assert slider_range(joint, 0.1) == expected
 
 
-FINGER = """<link name="{0}_finger"><inertial><mass value="0.1"/>
-    <inertia ixx="1e-4" iyy="1e-4" izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision><geometry><sphere radius="0.02"/></geometry></collision></link>
-  <joint name="{0}" type="prismatic"><parent link="palm"/><child link="{0}_finger"/>
-    <axis xyz="1 0 0"/><limit lower="0" upper="0.08" effort="9" velocity="1"/>{1}</joint>"""
-MIMIC = '<mimic joint="left" multiplier="2"/>'
-GRIPPER = f"""<robot name="gripper"><link name="palm"/>
-  {FINGER.format("left", "")} {FINGER.format("right", MIMIC)}</robot>"""
+SLIDE = {"kind": "prismatic", "axis": "1 0 0", "limits": (0, 0.08)}
+GRIPPER = (
+    '<robot name="gripper">',
+    *(link(name, ball(0.02)) for name in ("palm", "left", "right")),
+    joint("palm", "left", **SLIDE),
+    joint("palm", "right", **SLIDE, more='<mimic joint="left_joint" multiplier="2"/>'),
+    "</robot>",
+)
 
 
 @pytest.mark.parametrize(

@@ -52,6 +52,7 @@ def ball(radius, *xyz):
 
 
 SOLE = ("box", (0.1, 0.05, 0.02), pose())
+SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 EGG = foot(("ellipsoid", (0.3, 0.2, 0.1), pose()))
 CAPSULE = ("capsule", (0.02, 0.1))
 
@@ -59,8 +60,7 @@ CAPSULE = ("capsule", (0.02, 0.1))
 TILTED_X = 0.1 * math.cos(0.3) - 0.02 * math.sin(0.3)
 TILTED_Z = -0.1 * math.sin(0.3) - 0.02 * math.cos(0.3)
 
-
-HERE = pose()
+HERE, TILTED, LYING = pose(), pose(rpy=(0, 0.3, 0)), pose(rpy=(0, QUARTER, 0))
 CASES = {
     "sphere": (foot(ball(0.02, 0, 0, -0.1)), pose(1, 2, 3), [[1, 2, 2.88]]),
     "box": (
@@ -68,19 +68,11 @@ CASES = {
         HERE,
         [[x, y, -0.12] for x in (-0.07, 0.13) for y in (-0.05, 0.05)],
     ),
-    "tilted box": (
-        foot(SOLE),
-        pose(rpy=(0, 0.3, 0)),
-        [[TILTED_X, -0.05, TILTED_Z], [TILTED_X, 0.05, TILTED_Z]],
-    ),
-    "lying capsule": (
-        foot((*CAPSULE, pose(rpy=(0, QUARTER, 0)))),
-        HERE,
-        [[-0.1, 0, -0.02], [0.1, 0, -0.02]],
-    ),
-    "standing capsule": (foot((*CAPSULE, pose())), HERE, [[0, 0, -0.12]]),
+    "tilted box": (foot(SOLE), TILTED, [[TILTED_X, y, TILTED_Z] for y in (-0.05, 0.05)]),
+    "lying capsule": (foot((*CAPSULE, LYING)), HERE, [[x, 0, -0.02] for x in (-0.1, 0.1)]),
+    "standing capsule": (foot((*CAPSULE, HERE)), HERE, [[0, 0, -0.12]]),
     "ellipsoid": (EGG, HERE, [[0, 0, -0.1]]),
-    "turned ellipsoid": (EGG, pose(rpy=(0, QUARTER, 0)), [[0, 0, -0.3]]),
+    "turned ellipsoid": (EGG, LYING, [[0, 0, -0.3]]),
     "lowest": (foot(ball(0.02), ball(0.02, -0.1, 0, -0.05)), HERE, [[-0.1, 0, -0.07]]),
     # The depth of a sole is 1 cm, or 5 % of the size of a foot: 0.05 * 0.1 m in the second one.
     "within 1 cm": (
@@ -93,11 +85,7 @@ CASES = {
         HERE,
         [[0, 0, -0.0151], [0.1, 0, -0.02]],
     ),
-    "no shapes": (
-        foot(frames=(pose(0.1, 0, -0.3), pose(0, 0, -0.2))),
-        pose(0, 0, 1),
-        [[0.1, 0, 0.7]],
-    ),
+    "no shapes": (foot(frames=(pose(0.1, 0, -0.3), pose(0, 0, -0.2))), HERE, [[0.1, 0, -0.3]]),
     "no bounds": (foot(("unknown", (), HERE), frames=(pose(0, 0, -1),)), HERE, [[0, 0, -1]]),
 }
 
@@ -121,23 +109,20 @@ def test_contact_points_of_cylinder():
         assert tilted[:, 2].min() == pytest.approx(lowest, abs=1e-12)
 
 
-@pytest.mark.parametrize("tilt", [-1.4, -0.5, -0.1, 0.0, 0.2, 0.7, 1.4])
-def test_flat_foot_angle_levels_a_tilted_box(tilt):
-    body = foot(("box", (0.12, 0.04, 0.015), pose()))
-    turn = flat_foot_angle(body, pose(rpy=(0, tilt, 0)), SIDEWAYS, Meshes())
-    assert turn == pytest.approx(-tilt, abs=0.03)
+HEEL_AND_TOES = foot(ball(0.005, -0.05, 0, -0.03), ball(0.005, 0.12, 0, -0.03))
 
 
-def test_flat_foot_angle_uses_given_axis():
-    body = foot(("box", (0.04, 0.12, 0.015), pose()))
-    turn = flat_foot_angle(body, pose(rpy=(0.4, 0, 0)), np.array([1.0, 0, 0]), Meshes())
-    assert turn == pytest.approx(-0.4, abs=0.03)
-
-
-def test_flat_foot_angle_levels_heel_and_toes():
-    body = foot(ball(0.005, -0.05, 0, -0.03), ball(0.005, 0.12, 0, -0.03))
-    turn = flat_foot_angle(body, pose(rpy=(0, 0.5, 0)), SIDEWAYS, Meshes())
-    assert turn == pytest.approx(-0.5, abs=0.05)
+@pytest.mark.parametrize(
+    ("body", "axis", "tilt"),
+    [
+        *((foot(SOLE), SIDEWAYS, tilt) for tilt in (-1.4, -0.5, -0.1, 0.0, 0.2, 0.7, 1.4)),
+        (foot(("box", (0.04, 0.12, 0.015), pose())), np.array([1.0, 0, 0]), 0.4),
+        (HEEL_AND_TOES, SIDEWAYS, 0.5),
+    ],
+)
+def test_flat_foot_angle_levels_a_tilted_sole(body, axis, tilt):
+    at = pose(rpy=tilt * axis)
+    assert flat_foot_angle(body, at, axis, Meshes()) == pytest.approx(-tilt, abs=0.03)
 
 
 @pytest.mark.parametrize(
@@ -156,10 +141,7 @@ def test_flat_foot_angle_of_round_foot_is_zero(body):
 @pytest.mark.parametrize(
     ("points", "expected"),
     [
-        (
-            [[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5], [0.5, 0], [0, 0]],
-            [[0, 0], [1, 0], [1, 1], [0, 1]],
-        ),
+        ([*SQUARE, [1, 1], [1, 0], [0, 0]], SQUARE),
         ([[1, 2]], [[1, 2]]),
         ([[1, 2], [1, 2], [1, 2]], [[1, 2]]),
         ([[1, 2], [1 + 4e-10, 2]], [[1, 2]]),
@@ -187,7 +169,6 @@ def test_convex_hull_contains_all_points(points):
         assert (cross(edge, np.roll(edge, -1, axis=0)) > 0).all()  # counter-clockwise
 
 
-SQUARE = [[0, 0], [2, 0], [2, 2], [0, 2]]
 # 3, 4, 5: the inscribed circle has a radius of 1 and its center at (1, 1).
 TRIANGLE = [[0, 0], [4, 0], [0, 3]]
 # Two ball feet: the mass is beside the line of balance.

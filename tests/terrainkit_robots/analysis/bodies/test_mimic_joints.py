@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -15,12 +17,10 @@ def chain(*mimics):
     """Return joints A, B, ... each of which mimics a joint (name, multiplier, offset) or none."""
     made = []
     for name, mimic in zip(NAMES, mimics, strict=False):
-        follows = mimic and Mimic(
-            source=SOURCE, joint=mimic[0], multiplier=mimic[1], offset=mimic[2]
-        )
-        made.append(
-            Joint(name=name, source=SOURCE, kind="prismatic", parent="", child="", mimic=follows)
-        )
+        fields = mimic and dict(zip(("joint", "multiplier", "offset"), mimic, strict=True))
+        follows = mimic and Mimic(source=SOURCE, **fields)
+        joint = Joint(name=name, source=SOURCE, kind="prismatic", parent="", child="")
+        made.append(replace(joint, mimic=follows))
     return made
 
 
@@ -28,25 +28,19 @@ def order(joints):
     return "".join(joint.name for joint in mimic_joints(joints))
 
 
-@pytest.mark.parametrize(
-    ("mimics", "positions", "expected"),
-    [
-        pytest.param(
-            [None, ("A", 1, 0.5), ("B", -2, 0)], {"A": 1.0}, {"B": 1.5, "C": -3.0}, id="chain"
-        ),
-        pytest.param(
-            [("B", -2, 0), ("C", 1, 0.5), None], {"C": 1.0}, {"B": 1.5, "A": -3.0}, id="backwards"
-        ),
-        pytest.param([None, ("A", 2, 1)], {}, {"B": 1.0}, id="at zero"),
-        pytest.param([None, None, ("unknown", 2, 1)], {"C": 7.0}, {}, id="unknown"),
-        pytest.param([None, ("unknown", 2, 1), ("B", 2, 1)], {"B": 7.0}, {"C": 15.0}, id="below"),
-        pytest.param([None, None, ("C", 2, 1)], {"C": 7.0}, {}, id="itself"),
-        pytest.param([("B", 1, 0), ("C", 1, 0), ("A", 2, 1)], {"C": 7.0}, {}, id="cycle"),
-        pytest.param(
-            [("B", 1, 0), ("A", 1, 0), ("B", 2, 0)], {"A": 5.0, "B": 3.0}, {"C": 6.0}, id="tail"
-        ),
-    ],
-)
+CASES = {
+    "chain": ([None, ("A", 1, 0.5), ("B", -2, 0)], {"A": 1.0}, {"B": 1.5, "C": -3.0}),
+    "backwards": ([("B", -2, 0), ("C", 1, 0.5), None], {"C": 1.0}, {"B": 1.5, "A": -3.0}),
+    "at zero": ([None, ("A", 2, 1)], {}, {"B": 1.0}),
+    "unknown": ([None, None, ("unknown", 2, 1)], {"C": 7.0}, {}),
+    "below": ([None, ("unknown", 2, 1), ("B", 2, 1)], {"B": 7.0}, {"C": 15.0}),
+    "itself": ([None, None, ("C", 2, 1)], {"C": 7.0}, {}),
+    "cycle": ([("B", 1, 0), ("C", 1, 0), ("A", 2, 1)], {"C": 7.0}, {}),
+    "tail": ([("B", 1, 0), ("A", 1, 0), ("B", 2, 0)], {"A": 5.0, "B": 3.0}, {"C": 6.0}),
+}
+
+
+@pytest.mark.parametrize(("mimics", "positions", "expected"), CASES.values(), ids=CASES)
 def test_mimic_positions(mimics, positions, expected):
     joints = chain(*mimics)
     assert order(joints) == "".join(expected)

@@ -27,10 +27,13 @@ def geometry(shape, size=None, mesh=None):
     return Geometry(source=SOURCE, shape=shape, size=tuple(size), mesh=mesh)
 
 
-def placed(geometry, xyz=(0, 0, 0), rpy=(0, 0, 0)):
+def placed(shape, xyz=(0, 0, 0), rpy=(0, 0, 0)):
+    """Place a geometry, or a shape of the size in `SIZES`."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rpy_to_matrix(np.array(rpy)), xyz
-    return BodyShape(geometry=geometry, link="l", pose=pose)
+    return BodyShape(
+        geometry=geometry(shape) if isinstance(shape, str) else shape, link="l", pose=pose
+    )
 
 
 def mesh(path, scale=(1.0, 1.0, 1.0)):
@@ -107,26 +110,17 @@ WIDE = 0.3 / math.sqrt(2)  # half a side of 0.1 and 0.2 at 45 degrees
     [
         # The box reaches from (0.9, -0.2, -0.3), the ball to (0.5, 0.5, 2.5).
         (
-            [placed(geometry("box"), (1, 0, 0)), placed(geometry("sphere"), (0, 0, 2))],
-            [[-0.5, -0.5, -0.3], [1.1, 0.5, 2.5]],
+            [placed("box", (1, 0, 0)), placed("sphere", (0, 0, 2))],
+            [-0.5, -0.5, -0.3, 1.1, 0.5, 2.5],
         ),
-        (
-            [placed(geometry("box"), rpy=(0, 0, np.pi / 4))],
-            [[-WIDE, -WIDE, -0.3], [WIDE, WIDE, 0.3]],
-        ),
-        (
-            [placed(geometry("cylinder"), rpy=(0, np.pi / 2, 0))],
-            [[-0.4, -0.1, -0.1], [0.4, 0.1, 0.1]],
-        ),
-        (
-            [placed(geometry("plane")), placed(geometry("sphere"), (1, 0, 0))],
-            [[0.5, -0.5, -0.5], [1.5, 0.5, 0.5]],
-        ),
+        ([placed("box", rpy=(0, 0, np.pi / 4))], [-WIDE, -WIDE, -0.3, WIDE, WIDE, 0.3]),
+        ([placed("cylinder", rpy=(0, np.pi / 2, 0))], [-0.4, -0.1, -0.1, 0.4, 0.1, 0.1]),
+        ([placed("plane"), placed("sphere", (1, 0, 0))], [0.5, -0.5, -0.5, 1.5, 0.5, 0.5]),
     ],
     ids=["two", "rotated", "lying", "unbounded"],
 )
 def test_bounds_by_hand(shapes, expected):
-    np.testing.assert_allclose(bounds(shapes, Meshes()), expected)
+    np.testing.assert_allclose(np.ravel(bounds(shapes, Meshes())), expected)
 
 
 def test_bounds_of_rotated_mesh(wedge):
@@ -136,21 +130,17 @@ def test_bounds_of_rotated_mesh(wedge):
 
 
 def test_bounds_without_shapes_are_none():
-    assert bounds([placed(geometry("plane"))], Meshes()) is None
+    assert bounds([placed("plane")], Meshes()) is None
     assert bounds([], Meshes()) is None
 
 
 @pytest.mark.parametrize(
     ("shape", "pose", "expected"),
     [
-        (placed(geometry("sphere"), (0, 0, 0.2)), placed(None, (5, 5, 1)).pose, 0.7),
-        (
-            placed(geometry("cylinder"), rpy=(math.asin(0.6), 0, 0)),
-            placed(None, (5, 5, 1)).pose,
-            1 - 0.06 - 0.32,
-        ),
-        (placed(geometry("box"), (0, 0, 1)), np.diag([1.0, -1.0, -1.0, 1.0]), -1.3),
-        (placed(geometry("unknown"), (0, 0, 0.2)), np.eye(4), 0.2),
+        (placed("sphere", (0, 0, 0.2)), placed(None, (5, 5, 1)).pose, 0.7),
+        (placed("cylinder", rpy=(math.asin(0.6), 0, 0)), placed(None, (5, 5, 1)).pose, 0.62),
+        (placed("box", (0, 0, 1)), np.diag([1.0, -1.0, -1.0, 1.0]), -1.3),
+        (placed("unknown", (0, 0, 0.2)), np.eye(4), 0.2),
     ],
     ids=["sphere", "tilted", "inverted", "unbounded"],
 )

@@ -9,6 +9,7 @@ from terrainkit_robots.description.model import Joint, Link, RobotModel, Source
 from tests.small_robots import URDF
 
 SOURCE = Source(file=URDF, line=1)
+LOST = "unknown-link"
 
 
 def robot(links, joints, kind="urdf"):
@@ -47,14 +48,7 @@ def rejected(tree):
         pytest.param("b a", "", "ba", "b", {}, id="first of equal roots"),
         pytest.param("a b", "abj abj", "a", "ab", {"j": "duplicate"}, id="twice"),
         pytest.param("a b c", "abj acj", "a", "abc", {}, id="equal names"),
-        pytest.param(
-            "a b",
-            "ax yb",
-            "ab",
-            "a",
-            {"a-x": "unknown-link", "y-b": "unknown-link"},
-            id="unknown links",
-        ),
+        pytest.param("a b", "ax yb", "ab", "a", {"a-x": LOST, "y-b": LOST}, id="unknown links"),
         pytest.param("a b c", "ab ac bc", "a", "abc", {"b-c": "second-parent"}, id="second parent"),
         pytest.param("a b", "ab aa", "a", "ab", {"a-a": "cycle"}, id="below itself"),
         # Every link has a parent, so the cycle is cut above its first link.
@@ -64,10 +58,8 @@ def rejected(tree):
         ),
         # The root of the robot never had a parent, although the others have more links.
         pytest.param("a b p q r", "ab pq qr rp", "aq", "ab", {"p-q": "cycle"}, id="cycle beside"),
-        pytest.param(
-            "p q r a b", "xp pq qr ab", "ap", "ab", {"x-p": "unknown-link"}, id="lost parent"
-        ),
-        pytest.param("c", "wc", "c", "c", {"w-c": "unknown-link"}, id="no world"),
+        pytest.param("p q r a b", "xp pq qr ab", "ap", "ab", {"x-p": LOST}, id="lost parent"),
+        pytest.param("c", "wc", "c", "c", {"w-c": LOST}, id="no world"),
     ],
 )
 def test_tree(links, joints, roots, order, reasons):
@@ -85,10 +77,8 @@ def test_cycles_start_at_the_rejected_joint():
 
 def test_joints_above_and_below_a_link():
     found = tree("a b c", "ab ac")
-    assert {link: joint.name for link, joint in found.parent_joint.items()} == {
-        "b": "a-b",
-        "c": "a-c",
-    }
+    above = {link: joint.name for link, joint in found.parent_joint.items()}
+    assert above == {"b": "a-b", "c": "a-c"}
     below = {link: [j.child for j in joints] for link, joints in found.child_joints.items()}
     assert below == {"a": ["b", "c"], "b": [], "c": []}
 
@@ -104,7 +94,7 @@ def test_first_link_of_a_name_is_kept():
     ("links", "kind", "order", "reasons"),
     [
         (["a", "b"], "mjcf", ("a", "b"), {}),
-        (["a", "b"], "urdf", ("a", "b"), {"world-a": "unknown-link"}),
+        (["a", "b"], "urdf", ("a", "b"), {"world-a": LOST}),
         (["world", "a", "b"], "urdf", ("world", "a", "b"), {}),
         (["world", "a", "b"], "mjcf", ("world", "a", "b"), {}),
     ],

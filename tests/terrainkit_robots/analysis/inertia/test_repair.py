@@ -32,10 +32,8 @@ def repaired(tmp_path):
         fix = robot.inertia_repair.fix(robot.tree.links[name])
         edited = EditedBytes(path.read_bytes())
         edited.apply(edited.prepare(fix.edits))
-        body, turn = (
-            mujoco.MjModel.from_xml_string(edited.result().decode()).body(name),
-            np.zeros(9),
-        )
+        body = mujoco.MjModel.from_xml_string(edited.result().decode()).body(name)
+        turn = np.zeros(9)
         mujoco.mju_quat2Mat(turn, body.iquat)
         turn = turn.reshape(3, 3)
         return turn @ np.diag(body.inertia) @ turn.T, [edit.name for edit in fix.edits]
@@ -101,23 +99,21 @@ def test_derived_and_missing_inertias_have_no_fix():
         assert robot.inertia_repair.relative_change(each) == np.inf
 
 
-def urdf_fix(left, right=(), right_mass="1.152"):
+def urdf_fix(left, right):
     """Return the fix of FL_thigh: what it takes, and the six values that it writes.
 
     Args:
-        left: Changed attributes of its inertia.
-        right: Changed attributes of FR_thigh, its mirror image.
-        right_mass: Mass of FR_thigh [kg].
+        left: Changed attributes of its inertial.
+        right: Changed attributes of FR_thigh, its mirror image; `value` is the mass.
     """
     text = QUADRUPED.read_text()
-    for name, changes in (("FL_thigh", dict(left)), ("FR_thigh", dict(right))):
+    for name, changes in (("FL_thigh", left), ("FR_thigh", right)):
         start = text.index(f'<link name="{name}">')
         end = text.index("</inertial>", start)
         block = text[start:end]
         for key, value in changes.items():
-            block = re.sub(rf'{key}="[^"]*"', f'{key}="{value}"', block)
-        if name == "FR_thigh":
-            block = block.replace('mass value="1.152"', f'mass value="{right_mass}"')
+            block, count = re.subn(rf'\b{key}="[^"]*"', f'{key}="{value}"', block)
+            assert count == 1
         text = text[:start] + block + text[end:]
     robot = facts(text)
     fix = robot.inertia_repair.fix(robot.tree.links["FL_thigh"])
@@ -131,24 +127,17 @@ MIRRORED = dict(zip(NAMES, (0.00584, 0.0058, 0.00103, 8.72e-05, -0.000289, 0.000
 BOX = dict(zip(NAMES, (0.00441305, 0.00446640, 0.00016860, 0.0, 0.0, 0.0), strict=True))
 
 
-@pytest.mark.parametrize("right_mass", ["1.152", "1.13"])
-def test_urdf_fix_mirrors_the_signs_of_products(right_mass):
-    taken, values = urdf_fix({"iyy": -0.0058}, right_mass=right_mass)
+@pytest.mark.parametrize("mass", [1.152, 1.13])
+def test_urdf_fix_mirrors_the_signs_of_products(mass):
+    taken, values = urdf_fix({"iyy": -0.0058}, {"value": mass})
     assert taken == "the inertia of its mirror image."
     assert values == pytest.approx(MIRRORED)
 
 
-@pytest.mark.parametrize(
-    ("right", "mass"),
-    [
-        ({"izz": 0.5}, "1.152"),  # violates the triangle inequality
-        ({"izz": -0.001}, "1.152"),
-        ({}, "1.129"),  # 2 % lighter
-        ({}, "0"),
-    ],
-)
-def test_urdf_fix_takes_no_invalid_mirror_image(right, mass):
-    taken, values = urdf_fix({"ixx": 0.0075}, right, mass)
+# Of which the first violates the triangle inequality, and the third is 2 % lighter.
+@pytest.mark.parametrize("right", [{"izz": 0.5}, {"izz": -0.001}, {"value": 1.129}, {"value": 0}])
+def test_urdf_fix_takes_no_invalid_mirror_image(right):
+    taken, values = urdf_fix({"ixx": 0.0075}, right)
     assert taken == "the nearest physical inertia."
     assert values["ixx"] == pytest.approx(0.0075, rel=0.1)
 

@@ -117,11 +117,6 @@ def jaw(name, y):
     return link(name, box("0.01 0.01 0.1")) + joint("arm5", name, f"0 {y} 0.05", kind="prismatic")
 
 
-def rotor(name, x, y):
-    turns = joint("base", name, f"{x} {y} 0", "0 0 1", "continuous")
-    return link(name, shape('cylinder radius="0.1" length="0.01"')) + turns
-
-
 def steered_wheel(name, x, y):
     wheel = link(name, shape('cylinder radius="0.1" length="0.05"', rpy="1.5708 0 0"))
     column = link(f"c_{name}") + joint("base", f"c_{name}", f"{x * 0.3} {y * 0.2} -0.1", "0 0 1")
@@ -137,11 +132,10 @@ def finger(name, x):
     [
         [BASE, arm("arm", "0 0 0.1"), jaw("p", 0.03), jaw("q", -0.03)],
         [COLUMN, arm("a", "0 0.2 0"), arm("b", "0 -0.2 0")],
-        [BASE, *(rotor(f"r{x}{y}", x, y) for x, y in SIGNS)],
         [BASE, *(steered_wheel(f"p{x}{y}", x, y) for x, y in SIGNS)],
         [link("palm"), *(finger(f"f{x}", x) for x in (-0.03, 0, 0.03))],
     ],
-    ids=["arm", "two arms", "drone", "car", "hand"],
+    ids=["arm", "two arms", "car", "hand"],
 )
 def test_robot_without_legs(parts):
     assert facts(*parts).legs == ()

@@ -34,17 +34,18 @@ def test_limb_of_two_joints():
     assert not found.has_leg_names
 
 
-def test_limb_includes_fixed_links():
-    tip = link("tip", ball(0.02)) + joint("a1", "tip", "0 0 -0.4", kind="fixed")
-    (found,) = robot(chain("a", "0 0 0", LENGTHS), tip).limbs
+@pytest.mark.parametrize(
+    ("ball_of_shank", "tip", "place", "end"),
+    [
+        (ball(0.02, "0 0 -0.3"), ball(0.02), "0 0 -0.4", [0, 0, -0.72]),
+        ("", "", "0.1 0 -0.3", [0.1, 0, -0.6]),  # without shapes, at the lowest frame
+    ],
+)
+def test_limb_includes_fixed_links(ball_of_shank, tip, place, end):
+    parts = chain("a", "0 0 0", LENGTHS).replace(ball(0.02, "0 0 -0.3"), ball_of_shank)
+    (found,) = robot(parts, link("tip", tip), joint("a1", "tip", place, kind="fixed")).limbs
     assert len(found.chain) == 2
-    np.testing.assert_allclose(found.tip, [0, 0, -0.72])
-
-
-def test_limb_without_shapes_ends_at_lowest_frame():
-    tip = link("tip") + joint("a1", "tip", "0.1 0 -0.3", kind="fixed")
-    (found,) = robot(chain("a", "0 0 0", LENGTHS).replace(ball(0.02, "0 0 -0.3"), ""), tip).limbs
-    np.testing.assert_allclose(found.tip, [0.1, 0, -0.6])
+    np.testing.assert_allclose(found.tip, end)
 
 
 @pytest.mark.parametrize(("joints", "count"), [(0, 0), (1, 0), (2, 1), (32, 1), (33, 0)])
@@ -161,7 +162,8 @@ def test_score_depends_on_height_of_foot(height, score):
 @pytest.mark.parametrize(("z", "score"), [(-1.219, 1.5), (-1.221, 0.5)])
 def test_arms_end_half_of_the_height_above_the_pedestal(z, score):
     # The limbs end at -0.62 m, and the pedestal 0.02 m below z.
-    found = robot(*at_corners("x", "y"), trunk=link("trunk", ball(0.02, f"0 0 {z}")))
+    head = link("head", ball(0.02)) + joint("trunk", "head", "0 0 -0.3")  # above it
+    found = robot(*at_corners("x", "y"), head, trunk=link("trunk", ball(0.02, f"0 0 {z}")))
     assert scores(found) == {"x1": score, "y1": score}
 
 
@@ -184,21 +186,13 @@ def test_score_of_fingers_is_lower():
     assert scores(robot(*at_corners("x_toe", "y_toe"), hand)) == {"x_toe1": 2.0, "y_toe1": 2.0}
 
 
-@pytest.mark.parametrize(
-    ("is_leg", "names"),
-    [
-        (
-            True,
-            "FL_thigh left_hip_yaw LF_KFE RightKnee l_foot toe_fr Leg1 lower_leg shank LLeg tibia "
-            "coxa_rf left_sole hind_leg_shoulder_leg",
-        ),
-        (
-            False,
-            "left_elbow link_3 allegro_thumb TorsoLeft chip ship console wrist finger_mcp "
-            "wheel_mount front_shoulder allegro",
-        ),
-    ],
-)
+LEG_NAMES = "FL_thigh left_hip_yaw LF_KFE RightKnee l_foot toe_fr Leg1 lower_leg shank LLeg tibia "
+LEG_NAMES += "coxa_rf left_sole hind_leg_shoulder_leg"
+OTHER_NAMES = "left_elbow link_3 allegro_thumb TorsoLeft chip ship console wrist finger_mcp "
+OTHER_NAMES += "wheel_mount front_shoulder allegro"
+
+
+@pytest.mark.parametrize(("is_leg", "names"), [(True, LEG_NAMES), (False, OTHER_NAMES)])
 def test_has_leg_names(is_leg, names):
     for name in names.split():
         (limb,) = robot(chain(name, "0 0 0", LENGTHS)).limbs

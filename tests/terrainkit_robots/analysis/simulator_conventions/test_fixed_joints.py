@@ -46,8 +46,7 @@ def test_bodies_of_mjcf_are_kept():
 
 
 @pytest.mark.parametrize(
-    ("old", "simulators"),
-    [("", ["MuJoCo", "Genesis"]), ('dont_collapse="true"', SIMULATORS)],
+    ("old", "simulators"), [("", ["MuJoCo", "Genesis"]), ('dont_collapse="true"', SIMULATORS)]
 )
 def test_merged_feet_of_bundled_quadruped(old, simulators):
     merges = merged_feet(facts(bundled.urdf_path("quadruped").read_text().replace(old, "")))

@@ -33,17 +33,8 @@ def certain(robot):
 
 # By hand. b is the parent of c, a and F; F of x3, x1 and G; G of y1.
 
-TREE = (
-    "jc: b > c",
-    "jz: a > z",
-    "jF!: b > F",
-    "jx3: F > x3",
-    "jG!: F > G",
-    "jx1: F > x1",
-    "jy1: G > y1",
-    "ja: b > a",
-    "jk: c > k",
-)
+TREE = ["jc: b > c", "jz: a > z", "jF!: b > F", "jx3: F > x3", "jG!: F > G", "jx1: F > x1"]
+TREE += ["jy1: G > y1", "ja: b > a", "jk: c > k"]
 
 
 def test_simulator_orders_by_hand():
@@ -62,9 +53,8 @@ def test_simulator_orders_by_hand():
         "Genesis": "b c k x3 x1 y1 a z",
     }
     assert certain(robot) == ["MuJoCo", "Genesis"]
-    assert [order.key for order in robot.simulator_orders] == [
-        "mujoco", "isaac_gym", "isaac_lab", "genesis",
-    ]  # fmt: skip
+    keys = [order.key for order in robot.simulator_orders]
+    assert keys == ["mujoco", "isaac_gym", "isaac_lab", "genesis"]
     reasons = {name: order.reason for name, order in orders(robot).items()}
     assert reasons["MuJoCo"] == "depth first, siblings in the order of their joints in the file"
     assert reasons["Isaac Lab"].endswith("up to Isaac Sim 5.1; compare with robot.joint_names")
@@ -80,48 +70,27 @@ def test_kept_link_is_a_body():
     }
 
 
+ALL_SIMULATORS = ["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"]
+
+
 @pytest.mark.parametrize(
     ("tree", "gym", "lab", "uncertain"),
     [
-        pytest.param(
-            ["ja: b > a", "jc: b > c", "jd: a > d", "je: c > e"],
-            "ja jd jc je",
-            "ja jc jd je",
-            [],
-            id="unique",
-        ),
+        ("ja: b > a, jc: b > c, jd: a > d, je: c > e", "ja jd jc je", "ja jc jd je", []),
         # If merged, c is a sibling of a; otherwise it is one level below, after d.
-        pytest.param(
-            ["ja: b > a", "jb!: b > bb", "jc: bb > c", "jd: a > d"],
-            "ja jd jc",
-            "ja jc jd",
-            ["Isaac Lab"],
-            id="fixed joint",
-        ),
+        ("ja: b > a, jb!: b > bb, jc: bb > c, jd: a > d", "ja jd jc", "ja jc jd", ["Isaac Lab"]),
         # In the file, - sorts before 1. In USD it becomes _ and sorts after 1.
-        pytest.param(["a1: b > p", "a-z: b > q"], "a1 a-z", "a1 a-z", [], id="names in USD"),
+        ("a1: b > p, a-z: b > q", "a1 a-z", "a1 a-z", []),
         # By the names of the links, q is after p.
-        pytest.param(
-            ["a1: b > q", "a2: b > p"], "a1 a2", "a1 a2", ["Isaac Gym"], id="names of links"
-        ),
-        pytest.param(
-            ["a2: b > p", "a1: b > q"],
-            "a1 a2",
-            "a1 a2",
-            ["Isaac Gym", "Isaac Lab"],
-            id="order of the file",
-        ),
-        pytest.param(
-            ["ja: b > a", "jc: b > c", "jd: a > c"],
-            "ja jc",
-            "ja jc",
-            ["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"],
-            id="rejected joint",
-        ),
+        ("a1: b > q, a2: b > p", "a1 a2", "a1 a2", ["Isaac Gym"]),
+        # In the order of the file, a2 is first.
+        ("a2: b > p, a1: b > q", "a1 a2", "a1 a2", ["Isaac Gym", "Isaac Lab"]),
+        # One joint is rejected.
+        ("ja: b > a, jc: b > c, jd: a > c", "ja jc", "ja jc", ALL_SIMULATORS),
     ],
 )
 def test_orders_are_certain_if_all_variants_agree(tree, gym, lab, uncertain):
-    robot = urdf(*tree)
+    robot = urdf(*tree.split(", "))
     assert (joints(robot)["Isaac Gym"], joints(robot)["Isaac Lab"]) == (gym, lab)
     assert [name for name, order in orders(robot).items() if not order.certain] == uncertain
 

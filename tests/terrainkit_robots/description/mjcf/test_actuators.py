@@ -62,6 +62,9 @@ def test_actuators_have_joint():
     ]
 
 
+AFFINE = '<general joint="j" gaintype="affine" gainprm="9" biastype="affine" biasprm="0 -9"/>'
+
+
 @pytest.mark.parametrize(
     ("drive", "stiffness"),
     [
@@ -70,10 +73,7 @@ def test_actuators_have_joint():
         ('<general joint="j" gainprm="9" biastype="affine" biasprm="0 -8 0"/>', None),
         ('<general joint="j" gainprm="-9" biastype="affine" biasprm="0 9 0"/>', None),
         ('<general joint="j" gainprm="0" biastype="affine" biasprm="0 0 0"/>', None),
-        (
-            '<general joint="j" gaintype="affine" gainprm="9" biastype="affine" biasprm="0 -9"/>',
-            None,
-        ),
+        (AFFINE, None),
         ('<motor joint="j"/>', None),
         ('<velocity joint="j" kv="9"/>', None),
     ],

@@ -1,5 +1,7 @@
 """Poses, inertias, joints and shapes are those that MuJoCo compiles."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
@@ -14,79 +16,8 @@ EXACT = 1e-9 if int(mujoco.__version__.split(".")[0]) > 3 else 1e-6
 NO_SCALE = not hasattr(mujoco.MjSpec().worldbody.add_frame(), "scale")
 needs_scale = pytest.mark.skipif(NO_SCALE, reason="frames of MuJoCo before 3.16 have no scale")
 
-EVERYTHING = """
-<mujoco model="everything">
-  <compiler angle="degree" eulerseq="ZYx" autolimits="true"/>
-  <option><flag contact="enable"/></option>
-  <default>
-    <joint damping="0.5" armature="0.01" frictionloss="0.2"/>
-    <geom density="500"/>
-    <default class="limb">
-      <joint axis="0 1 0" range="-30 60" actuatorfrcrange="-20 20"/>
-      <geom type="capsule" size="0.02"/>
-      <default class="heavy"><geom density="2000" pos="0 0 0.1"/></default>
-    </default>
-  </default>
-  <worldbody>
-    <geom type="plane" size="1 1 1"/>
-    <body name="trunk" pos="0 0 1" euler="10 20 30">
-      <freejoint name="root"/>
-      <inertial pos="0.1 0 0" quat="1 2 3 4" mass="3" diaginertia="0.1 0.2 0.25"/>
-      <geom type="box" size="0.1 0.2 0.3" euler="0 0 45"/>
-      <frame pos="0 0 0.5" axisangle="0 0 1 90" childclass="limb">
-        <geom fromto="0 0 0 0.1 0.2 0.3"/>
-        <body name="framed" pos="1 0 0">
-          <inertial pos="0 0 0.1" mass="1" fullinertia="0.1 0.2 0.25 0.01 0.02 -0.03"/>
-          <frame euler="0 90 0"><joint name="in_frame" pos="0.1 0 0"/></frame>
-          <frame pos="0 0 1"><frame zaxis="1 1 0"><geom type="sphere" size="0.1"/></frame></frame>
-        </body>
-      </frame>
-      <body name="leg" childclass="limb" pos="0 0.1 0" xyaxes="0 1 0 -1 0 0">
-        <joint name="swing"/>
-        <joint name="lift" axis="1 0 0" ref="15" pos="0 0 0.05"/>
-        <joint name="slide" type="slide" range="-0.1 0.2" ref="0.05" axis="0 0 3"/>
-        <geom fromto="0 0 0 0 0 -0.3"/>
-        <geom class="heavy" type="sphere" size="0.05"/>
-        <geom type="cylinder" fromto="0.1 0 0 0 0 0.2" size="0.03" mass="0.7"/>
-        <geom type="box" fromto="0.1 0.1 0 0 0 0.2" size="0.03"/>
-        <geom type="ellipsoid" fromto="0 0 0.3 0 0 0.5" size="0.03"/>
-        <geom type="ellipsoid" size="0.1 0.2 0.3" group="1" contype="0" conaffinity="0"/>
-        <geom type="sphere" size="0.3" mass="0"/>
-        <body name="foot" pos="0 0 -0.3"><geom type="sphere" size="0.02"/></body>
-        <body name="hand" pos="0 0 -0.1"><joint type="ball" name="wrist" class="main"/>
-          <geom size="0.1 0.2"/></body>
-      </body>
-      <replicate count="3" offset="0 0.1 0" euler="0 0 20">
-        <body name="fin"><joint name="flap" class="limb" range="0 10"/><geom size="0.01"/></body>
-      </replicate>
-    </body>
-    <body name="post" pos="2 0 0"><geom type="cylinder" size="0.1 0.2"/></body>
-  </worldbody>
-  <contact><exclude body1="trunk" body2="leg"/></contact>
-</mujoco>
-"""
-
-SCALED = """
-<mujoco>
-  <compiler angle="radian"/>
-  <worldbody>
-    <frame pos="1 0 0" scale="2 2 2" {extra}>
-      <body name="a" pos="1 0 0">
-        <joint name="h" pos="0.1 0 0" range="-1 1" actuatorfrcrange="-1 1" damping="1"
-          armature="1" frictionloss="5"/>
-        <joint name="s" type="slide" ref="0.1" range="-1 1" actuatorfrcrange="-2 2" damping="3"
-          armature="4" frictionloss="6"/>
-        <inertial pos="1 1 1" mass="1" diaginertia="1 1 1"/>
-        <geom type="box" size="1 2 3" pos="1 0 0"/>
-        <body name="b" pos="0 1 0"><geom size="0.5"/>
-          <frame pos="1 0 0" scale="0.5 0.5 0.5"><geom size="1" pos="1 1 0"/></frame></body>
-      </body>
-      <frame pos="0 0 1"><body name="c"><geom size="1"/>
-        <joint name="k" actuatorfrcrange="-1 1" armature="1"/></body></frame>
-    </frame>
-  </worldbody>
-</mujoco>
-"""
+EVERYTHING = Path(__file__).with_name("everything.xml").read_text()
+SCALED = Path(__file__).with_name("scaled.xml").read_text()
 
 
 def compiled(text):
@@ -232,10 +163,11 @@ def test_mass_from_mesh_is_nan():
     assert np.isnan(known.inertia).all()
 
 
-def test_geoms_without_mass_give_no_inertial():
+def test_geoms_without_density_give_no_inertial():
     assert link(read(body(""))).inertial is None
     assert link(read(body('<geom size="1" density="0"/>'))).inertial is None
     assert link(read(body('<geom size="1" density="0" mass="2"/>'))).inertial.mass == 2
+    assert np.isnan(link(read(body('<geom size="1" density="-1"/>'))).inertial.mass)  # unknown
 
 
 def test_invalid_geoms_keep_their_values():
@@ -251,10 +183,6 @@ def test_invalid_geoms_keep_their_values():
     assert [shape.size for shape in shapes] == [(-1,), (1,), (1,), (0.1, 0)]
     assert shapes[3].origin[:3, 3].tolist() == [1, 2, 3]
     assert link(robot).inertial.mass == pytest.approx(1)
-
-
-def test_negative_density_is_an_unknown_mass():
-    assert np.isnan(link(read(body('<geom size="1" density="-1"/>'))).inertial.mass)
 
 
 @pytest.mark.parametrize(

@@ -33,18 +33,11 @@ def test_imu_closest_to_base_is_used(sensor):
     assert robot.imu[0] == "base"
 
 
-@pytest.mark.parametrize(
-    ("sensors", "sites"),
-    [
-        (
-            '<framequat objtype="site" objname="other"/>',
-            {"base": '<site name="other"/>', "arm": '<site name="IMU"/>'},
-        ),
-        ("", {"base": '<site name="other"/>', "arm": '<site name="imu"/>'}),
-    ],
-)
-def test_imu_site_by_name(sensors, sites):
-    assert imu_robot(sensors, **sites).imu[0] == "arm"
+def test_imu_site_by_name():
+    other = '<site name="other"/>'
+    orientation = '<framequat objtype="site" objname="other"/>'
+    assert imu_robot(orientation, base=other, arm='<site name="IMU"/>').imu[0] == "arm"
+    assert imu_robot("", base=other, arm='<site name="imu"/>').imu[0] == "arm"
 
 
 @pytest.mark.parametrize("sites", [{}, {"world": '<site name="imu"/>'}, {"arm": "<site/>"}])

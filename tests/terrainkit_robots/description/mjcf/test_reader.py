@@ -2,18 +2,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.terrainkit_robots.description.made_robots import (
-    FILE,
-    body,
-    codes,
-    joint,
-    link,
-    mjcf,
-    read,
-)
+from tests.terrainkit_robots.description import made_robots
+from tests.terrainkit_robots.description.made_robots import body, codes, joint, link, mjcf, read
 from tests.terrainkit_robots.description.mjcf.test_compiled_bodies import EVERYTHING
-
-# Tree
 
 
 def test_joints_connect_links_in_document_order():
@@ -43,12 +34,8 @@ def test_unnamed_elements_get_names():
     robot = read(mjcf("<body><freejoint/><body><joint/><joint/></body><body/></body>"))
     first, second, third = (f"unnamed_body_{k}" for k in (1, 2, 3))
     assert [each.name for each in robot.links] == [first, f"{second}:{second}_joint", second, third]
-    assert [each.name for each in robot.joints] == [
-        f"{first}_joint",
-        f"{second}_joint",
-        f"{second}_joint_2",
-        f"{third}_fixed",
-    ]
+    joints = [f"{first}_joint", f"{second}_joint", f"{second}_joint_2", f"{third}_fixed"]
+    assert [each.name for each in robot.joints] == joints
 
 
 def test_generated_names_are_unused():
@@ -59,10 +46,8 @@ def test_generated_names_are_unused():
         )
     )
     assert [each.name for each in robot.links] == ["a:j", "a:j_2", "a", "b", "c"]
-    assert [each.name for each in robot.joints if each.kind == "fixed"] == [
-        "a:j_fixed",
-        "b_fixed_3",
-    ]
+    fixed = [each.name for each in robot.joints if each.kind == "fixed"]
+    assert fixed == ["a:j_fixed", "b_fixed_3"]
 
 
 def test_sources_are_start_lines():
@@ -72,7 +57,11 @@ def test_sources_are_start_lines():
     (shape,) = link(robot).collisions
     sources = [each.source for each in (link(robot), joint(robot), joint(robot).limit, shape)]
     assert [(each.line, each.element) for each in sources] == [(2, 2), (4, 3), (4, 3), (5, 4)]
-    assert (robot.file, robot.sources, robot.source.element) == (FILE, (FILE,), 0)
+    assert (robot.file, *robot.sources, robot.source.element) == (
+        made_robots.FILE,
+        made_robots.FILE,
+        0,
+    )
 
 
 def test_excluded_pairs():
@@ -94,9 +83,6 @@ def test_options():
     assert (given.disabled, given.degrees) == (frozenset(flags), False)
 
 
-# Keyframes
-
-
 def keyframe(keys, inside='<joint name="j"/>'):
     robot = read(body(inside, f"<keyframe>{keys}</keyframe>"))
     return robot.keyframe, codes(robot)
@@ -115,9 +101,6 @@ def test_keyframe_of_other_size_is_not_used():
     assert keyframe("<key/>") == ({}, [])
     # A repaired robot may have lost the joint.
     assert keyframe('<key qpos="1 2"/>', '<joint name="j"/><strange/>') == ({}, ["XML007"])
-
-
-# Inertials
 
 
 @pytest.mark.parametrize("axes", ["", "quat", "euler", "axisangle", "zaxis", "xyaxes"])
@@ -144,9 +127,6 @@ def test_inertial_without_inertia():
     assert (inertial.mass, inertial.inertia, inertial.attribute) == (1, None, "")
 
 
-# Shapes
-
-
 def test_geom_without_contacts_is_visual():
     """Both bits are zero, and no pair names it."""
     off = 'contype="0" conaffinity="0"'
@@ -160,17 +140,16 @@ def test_geom_without_contacts_is_visual():
         )
     )
     a, b = link(robot, "a"), link(robot, "b")
-    assert [(s.name, s.contype, s.conaffinity, s.contacts) for s in a.visuals + b.visuals] == [
-        ("drawn", 0, 0, False)
-    ]
-    assert [
-        (s.name, s.contype, s.conaffinity, s.contacts) for s in a.collisions + b.collisions
-    ] == [
-        ("first", 0, 1, True),
-        ("other", 1, 0, True),
-        ("paired", 1 << 30, 0, True),
-        ("both", 6, 5, True),
-    ]
+    shapes = [*a.visuals, *b.visuals, *a.collisions, *b.collisions]
+    bits = {s.name: (s.contype, s.conaffinity, s.contacts) for s in shapes}
+    assert bits == {
+        "drawn": (0, 0, False),
+        "first": (0, 1, True),
+        "other": (1, 0, True),
+        "paired": (1 << 30, 0, True),
+        "both": (6, 5, True),
+    }
+    assert [len(each) for each in (a.visuals, b.visuals)] == [1, 0]
 
 
 def test_contacts_disabled_by_option():
@@ -185,9 +164,6 @@ def test_contacts_disabled_by_option():
 def test_friction_of_geoms(written, values):
     (shape,) = link(read(body(f'<geom size="1" {written}/>'))).collisions
     assert (shape.friction, shape.priority, shape.condim) == values
-
-
-# Joints
 
 
 @pytest.mark.parametrize(

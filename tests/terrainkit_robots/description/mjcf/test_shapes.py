@@ -58,14 +58,9 @@ def test_mesh_pose_matches_mujoco(asset, tmp_path):
 
 def test_turned_mesh_with_unequal_scales_is_no_scaled_mesh():
     asset = '<asset><mesh name="m" file="m.stl" scale="1 2 1" refquat="1 {} 0 0"/></asset>'
-    shapes = [
-        collision(read(body('<geom type="mesh" mesh="m"/>', asset.format(angle))))
-        for angle in ("1e-12", "1")
-    ]
-    assert [(shape.shape, shape.mesh.scale) for shape in shapes] == [
-        ("mesh", (1, 2, 1)),
-        ("unknown", (1, 2, 1)),
-    ]
+    for angle, kind in (("1e-12", "mesh"), ("1", "unknown")):
+        shape = collision(read(body('<geom type="mesh" mesh="m"/>', asset.format(angle))))
+        assert (shape.shape, shape.mesh.scale) == (kind, (1, 2, 1))
 
 
 @pytest.mark.parametrize(
@@ -101,15 +96,10 @@ def test_meshes_that_are_not_drawn_as_they_are():
             '<mesh name="f" file="f.stl"/></asset>',
         )
     )
-    found = [
-        (shape.shape, shape.size, shape.mesh and shape.mesh.filename, shape.fit_to_mesh)
-        for shape in link(robot).collisions
-    ]
-    assert found == [
-        ("unknown", (), None, False),
-        ("mesh", (), "f.stl", True),
-        ("unknown", (), None, True),
-    ]
+    shapes = link(robot).collisions
+    found = [(s.shape, s.size, s.mesh and s.mesh.filename, s.fit_to_mesh) for s in shapes]
+    fitted = ("mesh", (), "f.stl", True)
+    assert found == [("unknown", (), None, False), fitted, ("unknown", (), None, True)]
 
 
 @pytest.mark.parametrize(

@@ -6,14 +6,8 @@ import pytest
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.mjcf import tree
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS
-from tests.terrainkit_robots.description.made_robots import (
-    codes,
-    joint,
-    link,
-    mjcf,
-    read,
-    write_all,
-)
+from tests.terrainkit_robots.description import made_robots
+from tests.terrainkit_robots.description.made_robots import codes, joint, link, mjcf, read
 
 PART = '<x><worldbody><body name="b"/></worldbody></x>'
 
@@ -22,11 +16,13 @@ def names(robot):
     return [each.name for each in robot.links]
 
 
-# Includes
+def load(folder, files):
+    """Return the robot of the first of some files."""
+    return load_robot(made_robots.write_all(folder, files))
 
 
 def test_included_elements_have_file_and_line(tmp_path):
-    file = write_all(
+    file = made_robots.write_all(
         tmp_path,
         {
             "robot.xml": '<mujoco>\n<include file="parts/defaults.xml"/>\n<worldbody>\n'
@@ -49,16 +45,13 @@ def test_included_elements_have_file_and_line(tmp_path):
         ("foot.xml", 3, 1),
     ]
     assert joint(robot).damping == 2
-    read_files = [str(path.relative_to(tmp_path)) for path in robot.sources]
-    assert read_files == [
-        "robot.xml",
-        *(f"parts/{name}.xml" for name in ("defaults", "leg", "foot")),
-    ]
+    parts = [tmp_path / f"parts/{name}.xml" for name in ("defaults", "leg", "foot")]
+    assert robot.sources == (file, *parts)
     mujoco.MjSpec.from_file(str(file))  # so does MuJoCo
 
 
 def test_include_relative_to_including_file(tmp_path):
-    file = write_all(
+    file = made_robots.write_all(
         tmp_path,
         {
             "robot.xml": '<mujoco><include file="sub/a.xml"/></mujoco>',
@@ -77,15 +70,8 @@ def test_file_may_be_included_by_several_models(tmp_path):
     part = '<include file="part.xml"/>'
     hand = '<asset><model name="h" file="hand.xml"/></asset>'
     attach = '<body name="arm"><attach model="h" body="b" prefix="p_"/></body>'
-    file = write_all(
-        tmp_path,
-        {
-            "robot.xml": mjcf(attach, part + hand),
-            "hand.xml": f"<mujoco>{part}</mujoco>",
-            "part.xml": PART,
-        },
-    )
-    robot = load_robot(file)
+    files = {"robot.xml": mjcf(attach, part + hand), "hand.xml": f"<mujoco>{part}</mujoco>"}
+    robot = load(tmp_path, files | {"part.xml": PART})
     assert (robot.problems, names(robot)) == ((), ["b", "arm", "p_b"])
 
 
@@ -105,7 +91,7 @@ def test_file_may_be_included_by_several_models(tmp_path):
     ],
 )
 def test_broken_includes_are_reported(include, says, subject, tmp_path):
-    file = write_all(
+    robot = load(
         tmp_path,
         {
             "robot.xml": f'<mujoco>\n{include}<worldbody><body name="a"/></worldbody></mujoco>',
@@ -116,7 +102,6 @@ def test_broken_includes_are_reported(include, says, subject, tmp_path):
             "large.xml": "",
         },
     )
-    robot = load_robot(file)
     problem = robot.problems[-1]
     assert {each.code for each in robot.problems} <= {"XML001", "XML012"}
     assert (problem.code, problem.subject) == ("XML012", subject)
@@ -131,8 +116,6 @@ def test_contents_replace_files(tmp_path):
     assert names(robot) == ["b"]
 
 
-# Attached models
-
 ARM = """<mujoco><compiler angle="radian"/><asset><model name="h" file="{}"/></asset><worldbody>
   <body name="arm"><frame pos="0 0 1"><attach model="h" body="hand" prefix="l_"/></frame></body>
 </worldbody></mujoco>"""
@@ -142,8 +125,7 @@ def test_attached_model_keeps_its_settings(tmp_path):
     hand = """<mujoco><compiler angle="degree" meshdir="m"/><asset><mesh name="b" file="b.stl"/>
       </asset><worldbody>\n<body name="hand">
       <joint name="j" range="-90 90"/><geom type="mesh" mesh="b"/></body></worldbody></mujoco>"""
-    file = write_all(tmp_path, {"robot.xml": ARM.format("sub/hand.xml"), "sub/hand.xml": hand})
-    robot = load_robot(file)
+    robot = load(tmp_path, {"robot.xml": ARM.format("sub/hand.xml"), "sub/hand.xml": hand})
     assert robot.problems == ()
     found, attached = link(robot, "l_hand"), joint(robot, "l_j")
     assert (found.source.file.name, found.source.line) == ("hand.xml", 3)
@@ -164,7 +146,7 @@ def test_attached_model_keeps_its_settings(tmp_path):
     ],
 )
 def test_invalid_attachments_are_reported(model, says, tmp_path):
-    file = write_all(
+    robot = load(
         tmp_path,
         {
             "robot.xml": ARM.format(model),
@@ -172,14 +154,10 @@ def test_invalid_attachments_are_reported(model, says, tmp_path):
             "robot.urdf": "<robot name='r'/>",
         },
     )
-    robot = load_robot(file)
     problem = robot.problems[0]
     assert problem.code == "XML012"
     assert says in problem.message
     assert link(robot, "arm")
-
-
-# Limits
 
 
 @pytest.mark.parametrize(
@@ -230,7 +208,7 @@ def test_number_of_files_is_bounded(tmp_path, monkeypatch):
     monkeypatch.setattr(tree, "_MAX_FILES", 3)
     includes = "".join(f'<include file="p{k}.xml"/>' for k in range(3))
     files = {f"p{k}.xml": PART.replace('"b"', f'"b{k}"') for k in range(3)}
-    robot = load_robot(write_all(tmp_path, {"robot.xml": f"<mujoco>{includes}</mujoco>", **files}))
+    robot = load(tmp_path, {"robot.xml": f"<mujoco>{includes}</mujoco>", **files})
     assert (names(robot), codes(robot)) == (["b0", "b1"], ["XML012"])
     assert "p2.xml is not read: too many" in robot.problems[0].message
 
@@ -244,7 +222,7 @@ def test_nested_attachments_are_bounded(tmp_path):
             f'<body name="b">{twice}</body>', asset
         )
     files["m30.xml"] = mjcf('<body name="b"/>')
-    assert codes(load_robot(write_all(tmp_path, files))) == ["XML011"]
+    assert codes(load(tmp_path, files)) == ["XML011"]
 
 
 @pytest.mark.parametrize(
@@ -256,7 +234,7 @@ def test_depth_is_bounded(bodies, found, tmp_path):
     for k, count in enumerate(bodies):
         inside = f'<include file="p{k + 1}.xml"/>' if k + 1 < len(bodies) else ""
         files[f"p{k}.xml"] = f"<x>{'<body>' * count}{inside}{'</body>' * count}</x>"
-    robot = load_robot(write_all(tmp_path, files))
+    robot = load(tmp_path, files)
     assert (len(robot.links), codes(robot)) == (399, found)
 
 

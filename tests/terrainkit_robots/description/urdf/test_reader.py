@@ -1,4 +1,4 @@
-import dataclasses
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from tests.terrainkit_robots.description.made_robots import codes
 
 FILE = Path("/robots/robot.urdf")
 PARENTS = '<parent link="a"/><child link="b"/>'
+PROBLEMS = tomllib.loads(Path(__file__).with_name("problems.toml").read_text())["problem"]
 TURNED = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]
 
 
@@ -45,14 +46,7 @@ def shape(inner):
 
 def values(element):
     """Return the values of an element but its source."""
-    return {
-        field.name: getattr(element, field.name)
-        for field in dataclasses.fields(element)
-        if field.name != "source"
-    }
-
-
-# What is written
+    return {name: value for name, value in vars(element).items() if name != "source"}
 
 
 def test_minimal_robot():
@@ -122,8 +116,6 @@ def test_axis_without_numbers_is_zero(axis):
     assert (found.axis.tolist(), found.direction.tolist()) == ([0, 0, 0], [1, 0, 0])
 
 
-# Inertials
-
 MOMENTS = {"ixx": 1, "iyy": 2, "izz": 3}
 PRODUCTS = {"ixy": 0.1, "ixz": 0.2, "iyz": 0.3}
 
@@ -156,9 +148,6 @@ def test_inertial_without_mass_or_inertia():
     inertial = link("<inertial/>")[0].inertial
     assert (inertial.mass, inertial.inertia, inertial.missing) == (None, None, tuple(MOMENTS))
     assert inertial.origin.tolist() == np.eye(4).tolist()
-
-
-# Shapes
 
 
 @pytest.mark.parametrize(
@@ -198,117 +187,30 @@ def test_geometry_in_document_order():
     assert len(read_link.visuals) == 3
 
 
-# What is missing or wrong
+def inside(problem):
+    """Return the elements of the robot of a problem."""
+    text = problem.get("shape")
+    text = f"<collision><geometry>{text}</geometry></collision>" if text else problem.get("link")
+    if "joint" in problem:
+        return f'<joint name="j" type="revolute">{PARENTS}{problem["joint"]}</joint>'
+    return f'<link name="l">{text}</link>' if text else problem["robot"]
 
 
-def in_joint(inner):
-    return f'<joint name="j" type="revolute">{PARENTS}{inner}</joint>'
-
-
-def in_link(inner):
-    return f'<link name="l">{inner}</link>'
-
-
-def in_shape(inner):
-    return in_link(f"<collision><geometry>{inner}</geometry></collision>")
-
-
-REPEATED = "expected one, and the first is read"
-PROBLEMS = [
-    ("<link/>", "XML013", "<link> has no name"),
-    (f'<joint type="fixed">{PARENTS}</joint>', "XML013", "<joint> has no name"),
-    (f'<joint name="j">{PARENTS}</joint>', "XML013", "<joint> has no type"),
-    ('<joint name="j" type="a"><parent link="a"/></joint>', "XML013", "<joint> has no link"),
-    (
-        '<joint name="j" type="a"><parent/><child link="a"/></joint>',
-        "XML013",
-        "<parent> has no link",
-    ),
-    (in_joint('<origin xyz="1 2"/>'), "XML006", "xyz of <origin>: got '1 2'; expected 3 numbers"),
-    (in_joint('<origin xyz=""/>'), "XML006", "xyz of <origin>: got ''; expected 3 numbers"),
-    (
-        in_joint('<origin xyz="0,5 0 1"/>'),
-        "XML006",
-        "xyz of <origin>: got '0,5 0 1'; expected 3 numbers, with decimal points and separated by "
-        "spaces",
-    ),
-    (
-        in_joint('<origin rpy="90 0 0"/>'),
-        "XML018",
-        "rpy of <origin>: got 90 0 0 rad; expected radians",
-    ),
-    (
-        in_joint('<origin quat_xyzw="0 0 0 0"/>'),
-        "XML006",
-        "quat_xyzw of <origin>: got '0 0 0 0'; expected a nonzero quaternion",
-    ),
-    (
-        in_joint('<origin quat_xyzw="0 0 1 0" rpy="0 0 0"/>'),
-        "XML006",
-        "<origin> has quat_xyzw and rpy; expected only one of them",
-    ),
-    (
-        in_joint('<origin xyz="${x} 0 0"/><axis xyz="$(arg a)"/>'),
-        "XML004",
-        "'${x} 0 0' is xacro that was not expanded",
-    ),
-    (
-        in_joint('<limit lower="0" uper="1"/>'),
-        "XML007",
-        "attribute uper of <limit> is unknown and ignored; did you mean upper?",
-    ),
-    (in_joint("<limt/>"), "XML007", "<limt> is unknown and ignored; did you mean limit?"),
-    (in_joint("<limit/><limit/>"), "XML015", f"second <limit> in a <joint>; {REPEATED}"),
-    (
-        in_link('<inertial><inertia ixx="1" iyy="1" izz="1" ixz="0"/></inertial>'),
-        "XML013",
-        "<inertia> has no ixy, iyz; MuJoCo rejects the file",
-    ),
-    (in_link("<collision/>"), "XML013", "<collision> has no shape in a <geometry>"),
-    (in_shape("<box/>"), "XML013", "<box> has no size"),
-    (in_shape("<sphere/>"), "XML013", "<sphere> has no radius"),
-    (in_shape('<cylinder radius="1"/>'), "XML013", "<cylinder> has no length"),
-    (in_shape('<cylinder length="1"/>'), "XML013", "<cylinder> has no radius"),
-    (in_shape("<capsule/>"), "XML013", "<capsule> has no length, radius"),
-    (in_shape('<box size="1 2"/>'), "XML006", "size of <box>: got '1 2'; expected 3 numbers"),
-    (in_shape('<sphere radius="x"/>'), "XML006", "radius of <sphere>: got 'x'; expected a number"),
-    (in_shape('<mesh filename=" "/>'), "XML013", "<mesh> has no filename"),
-]
-
-
-@pytest.mark.parametrize(("inner", "code", "message"), PROBLEMS)
-def test_problem_is_reported_once(inner, code, message):
-    model = robot(inner)
-    assert [(each.code, each.message) for each in model.problems] == [(code, message)]
-    assert model.problems[0].subject == next((k for k in "jl" if f'name="{k}"' in inner), "r")
+@pytest.mark.parametrize("problem", PROBLEMS, ids=[each["message"][:30] for each in PROBLEMS])
+def test_problem_is_reported_once(problem):
+    model = robot(inside(problem))
+    (found,) = model.problems
+    told = {"code": found.code, "message": found.message, "details": found.details}
+    assert told == {"details": {}} | {key: problem[key] for key in told if key in problem}
+    assert found.subject == next((k for k in "jl" if f'name="{k}"' in inside(problem)), "r")
     assert [shape.size for each in model.links for shape in each.collisions] in ([], [()])
-
-
-@pytest.mark.parametrize(
-    ("inner", "details"),
-    [
-        (in_joint('<origin xyz="1 2"/>'), [{"attribute": "xyz", "repaired": ""}]),
-        (in_joint('<origin xyz="0,5 0 1"/>'), [{"attribute": "xyz", "repaired": "0.5 0 1"}]),
-        (in_joint('<limit uper="1"/>'), [{"attribute": "uper", "known": "upper"}]),
-        (in_joint("<limt/>"), [{"attribute": "", "known": "limit"}]),
-        (in_joint('<axis xyz="0 0 1"/>' * 2), [{"copy": "1"}]),
-        (in_joint('<axis xyz="0 0 1"/><axis xyz="1 0 0"/>'), [{"copy": ""}]),
-        (in_joint('<axis xyz="0 0 1"/><axis xyz="0 0 1"><x/></axis>'), [{"copy": ""}]),
-        (
-            in_link('<inertial><inertia ixx="1" iyy="1" izz="1" ixz="0"/></inertial>'),
-            [{"attributes": "ixy iyz"}],
-        ),
-    ],
-)
-def test_details_are_for_fixes(inner, details):
-    assert [each.details for each in robot(inner).problems] == details
 
 
 def test_copies_are_compared_with_their_contents():
     """The second differs in an attribute of a child, the third in its tag."""
     geometry = '<geometry><{} radius="{}" length="1"/></geometry>'
     inside = [geometry.format(*each) for each in [("capsule", 1), ("capsule", 2), ("cylinder", 1)]]
-    model = robot(in_link(f"<collision>{''.join(inside)}{inside[0]}</collision>"))
+    model = robot(f'<link name="l"><collision>{"".join(inside)}{inside[0]}</collision></link>')
     assert [each.details for each in model.problems] == [{"copy": each} for each in ("", "", "1")]
 
 
@@ -322,7 +224,7 @@ def test_materials_are_reported():
     """The material has no color, and the visual two of them; a collision may have one."""
     shapes = '<geometry><sphere radius="1"/></geometry><material name="m"/>'
     visual = f'<visual>{shapes}<material name="m"/></visual>'
-    model = robot(in_link(f"{visual}<collision>{shapes}</collision>"))
+    model = robot(f'<link name="l">{visual}<collision>{shapes}</collision></link>')
     assert [(each.code, each.message) for each in model.problems] == [
         ("XML016", "material m: has no color or texture anywhere; expected a definition"),
         ("XML008", "<visual> has two materials; expected one"),

@@ -16,20 +16,15 @@ def told(inner, code="TRE010"):
     return [(each.message, each.subject) for each in problems]
 
 
+PLUGIN = "<gazebo><plugin><{0}> {{}} </{0}></plugin></gazebo>"
+
+
 @pytest.mark.parametrize(
     ("text", "place", "kind"),
     [
         ('<gazebo reference="{}"/>', "reference of <gazebo>", "link or joint"),
-        (
-            "<gazebo><plugin><bodyName> {} </bodyName></plugin></gazebo>",
-            "bodyName of a <plugin>",
-            "link",
-        ),
-        (
-            "<gazebo><plugin><left_joint>{}</left_joint></plugin></gazebo>",
-            "left_joint of a <plugin>",
-            "joint",
-        ),
+        (PLUGIN.format("bodyName"), "bodyName of a <plugin>", "link"),
+        (PLUGIN.format("left_joint"), "left_joint of a <plugin>", "joint"),
         ('<sensor><parent link="{}"/></sensor>', "parent of a <sensor>", "link"),
         ('<sensor><parent joint="{}"/></sensor>', "parent of a <sensor>", "joint"),
         ('<transmission><joint name="{}"/></transmission>', "joint of a <transmission>", "joint"),

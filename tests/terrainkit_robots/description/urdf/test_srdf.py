@@ -5,6 +5,7 @@ from tests.terrainkit_robots.description.made_robots import codes, write_all
 
 URDF = """<robot name="dog"><link name="base"/><link name="foot"/><joint name="ankle" type="fixed">
   <parent link="base"/><child link="foot"/></joint></robot>"""
+GROUP = '<group name="g"/>'
 WRONG = '<robot name="dog"><passive_joint name="nobody"/></robot>'
 
 
@@ -18,21 +19,13 @@ def problems(tmp_path, srdf, name="urdf/robot.srdf", **others):
     [
         ('<group name="g"><link name="{}"/></group>', "link", "<link> of a <group>"),
         ('<group name="g"><joint name="{}"/></group>', "joint", "<joint> of a <group>"),
-        (
-            '<group name="g"/><group name="h"><group name="{}"/></group>',
-            "group",
-            "<group> of a <group>",
-        ),
+        (f'{GROUP}<group name="h"><group name="{{}}"/></group>', "group", "<group> of a <group>"),
         ('<group name="g"><chain base_link="{}"/></group>', "link", "base_link of <chain>"),
         ('<group name="g"><chain tip_link="{}"/></group>', "link", "tip_link of <chain>"),
-        ('<group name="g"/><end_effector group="{}"/>', "group", "group of <end_effector>"),
-        (
-            '<group name="g"/><end_effector parent_group="{}"/>',
-            "group",
-            "parent_group of <end_effector>",
-        ),
+        (f'{GROUP}<end_effector group="{{}}"/>', "group", "group of <end_effector>"),
+        (f'{GROUP}<end_effector parent_group="{{}}"/>', "group", "parent_group of <end_effector>"),
         ('<end_effector parent_link="{}"/>', "link", "parent_link of <end_effector>"),
-        ('<group name="g"/><group_state group="{}"/>', "group", "group of <group_state>"),
+        (GROUP + '<group_state group="{}"/>', "group", "group of <group_state>"),
         ('<group_state><joint name="{}"/></group_state>', "joint", "<joint> of a <group_state>"),
         ('<virtual_joint name="v" child_link="{}"/>', "link", "child_link of <virtual_joint>"),
         ('<disable_collisions link1="{}"/>', "link", "link1 of <disable_collisions>"),

@@ -78,9 +78,6 @@ def test_several_misspellings():
     assert {("axis", "xzy", "xyz"), ("limt", "", "limit")} < set(names)
 
 
-# xacro
-
-
 @pytest.mark.parametrize("text", ["${a}", "1 ${b} 2", "$(arg x)/mesh.stl"])
 def test_has_variable(text):
     assert has_variable(text)

@@ -91,16 +91,16 @@ def test_packages_are_found(tmp_path):
     assert [each.name for each in load_robot(named).links] == ["found"]
 
 
+GONE = '<xacro:include filename="$(find gone)/x.xacro"/>'
+SIDE = '<xacro:macro name="leg" params="side"><link name="${side}"/></xacro:macro>'
+
+
 @pytest.mark.parametrize(
     ("inside", "says", "place"),
     [
         ('\n<link name="$(arg side)"/>', "--xacro-arg side:=VALUE", ("robot", 3)),
         ("\n<link name=\"${xacro.arg('side')}\"/>", "--xacro-arg side:=", ("robot", 3)),
-        (
-            '\n\n<xacro:include filename="$(find gone)/x.xacro"/>',
-            "package gone: not found; pass its folder with --package gone=FOLDER",
-            ("robot", 4),
-        ),
+        (f"\n\n{GONE}", "package gone: not found; pass its folder with --package", ("robot", 4)),
         ('\n<xacro:include filename="gone.xacro"/>', "gone.xacro: No such", ("robot", 3)),
         ('\n<xacro:include filename="bad.xacro"/>', "malformed XML", ("bad", 3)),
         ('<xacro:include filename="part.xacro"/>', "name 'q' is not", ("part", 4)),
@@ -110,12 +110,7 @@ def test_packages_are_found(tmp_path):
         ('\n<link name="${1 +}"/>', "invalid expression '1 +'", ("robot", 3)),
         ('\n<link name="${1 / 0}"/>', "division by zero", ("robot", 3)),
         ("\n<xacro:leg/>", "unknown macro name: xacro:leg", ("robot", 3)),
-        (
-            '<xacro:macro name="leg" params="side"><link name="${side}"/></xacro:macro>\n'
-            "\n<xacro:leg/>",
-            "Undefined parameters [side] of macro leg",
-            ("robot", 4),
-        ),
+        (f"{SIDE}\n\n<xacro:leg/>", "Undefined parameters [side] of macro leg", ("robot", 4)),
         ('<link name="$(env NO_SUCH_VARIABLE)"/>', "NO_SUCH_VARIABLE", ("robot", 2)),
         ('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>', "recurses", ("robot", 2)),
     ],

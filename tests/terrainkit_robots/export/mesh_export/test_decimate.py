@@ -4,11 +4,7 @@ import trimesh
 
 from terrainkit_robots.export.mesh_export.decimate import decimate
 from terrainkit_robots.mesh.surface import MeshError, Surface, signed_volume
-
-
-def surface_of(mesh):
-    return Surface(points=np.asarray(mesh.vertices), faces=np.asarray(mesh.faces))
-
+from tests.terrainkit_robots.export.made_models import surface_of
 
 BALL = surface_of(trimesh.creation.icosphere(subdivisions=5, radius=0.1))
 

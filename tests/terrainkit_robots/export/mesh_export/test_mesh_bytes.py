@@ -12,9 +12,8 @@ from terrainkit_robots.mesh.surface import Surface, binary_stl, signed_volume, w
 from tests.terrainkit_robots.export.made_models import mesh, stl_of, surface_of
 
 # a wedge: no two of its axes are alike, so that a mirror or a turn shows
-WEDGE = trimesh.convex.convex_hull(
-    [(0, 0, 0), (3, 0, 0), (0, 2, 0), (0, 0, 1), (3, 0, 0.5), (1, 1, 1)]
-)
+CORNERS = [(0, 0, 0), (3, 0, 0), (0, 2, 0), (0, 0, 1), (3, 0, 0.5), (1, 1, 1)]
+WEDGE = trimesh.convex.convex_hull(CORNERS)
 SURFACE = surface_of(WEDGE)
 STL = binary_stl(SURFACE)
 
@@ -95,13 +94,7 @@ def test_mesh_with_too_many_faces_is_decimated(monkeypatch):
 
 @pytest.mark.parametrize(
     ("scale", "flat"),
-    [
-        ((1, 1, 1), False),
-        ((1, 1, 0), True),
-        ((1, 1e-6, 1), True),
-        ((0.78e-5,) * 3, False),
-        ((0.77e-5,) * 3, True),
-    ],
+    [((1, 1, 0), True), ((0.78e-5,) * 3, False), ((0.77e-5,) * 3, True)],
 )
 def test_scale_makes_mesh_flat(scale, flat):
     """The wedge has 2.167 m3, and the smallest volume is 1e-15 m3."""

@@ -13,13 +13,8 @@ from tests.terrainkit_robots.export.made_models import at, link, mesh, model, sh
 
 BOX = stl_of(trimesh.creation.box([0.1, 0.2, 0.3]))
 BALL = stl_of(trimesh.creation.icosphere(subdivisions=2, radius=0.1))
-FILES = {
-    "box.stl": BOX,
-    "sub/box.stl": BALL,
-    "copy.stl": BOX,
-    "empty.stl": b"",
-    "cut.stl": BOX[:-1],
-}
+FILES = {"box.stl": BOX, "sub/box.stl": BALL, "copy.stl": BOX}
+FILES |= {"empty.stl": b"", "cut.stl": BOX[:-1]}
 
 
 def packed(*, visuals=(), collisions=(), **options):
@@ -48,9 +43,8 @@ def test_equal_content_is_stored_once():
     done = packed(visuals=shapes, collisions=shapes, folder="m")
     assert done.files == {"m/box.stl": BOX, "m/box_2.stl": BALL}
     names = ["m/box.stl", "m/box.stl", "m/box_2.stl", "m/box.stl"]
-    assert [[each.mesh.filename for each in of(done)] for of in (visuals, collisions)] == [
-        names
-    ] * 2
+    for of in (visuals, collisions):
+        assert [each.mesh.filename for each in of(done)] == names
 
 
 def test_mirrored_mesh_is_separate_file():
