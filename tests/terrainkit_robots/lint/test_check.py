@@ -4,10 +4,9 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.settings import Settings
 from tests.robots import QUADRUPED
+from tests.small_robots import link
 
-ROBOT = (
-    '<robot name="box"><link name="trunk"><inertial><mass value="{}"/></inertial></link></robot>'
-)
+ROBOT = f'<robot name="box">{link("trunk", mass="{}")}</robot>'
 
 
 def test_check_robot_reads_settings_above_file(tmp_path):

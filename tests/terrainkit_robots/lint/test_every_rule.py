@@ -5,16 +5,16 @@ tests.terrainkit_robots.lint.test_every_rule`, and read the difference.
 """
 
 import json
+import math
 import re
-import struct
 import tempfile
 import tomllib
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
+import trimesh
 
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
@@ -25,6 +25,7 @@ from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.spec.robot_spec import RobotSpec
 
 CASES = Path(__file__).parent / "cases"
 FINDINGS = CASES.with_name("findings.json")
@@ -105,8 +106,6 @@ class Case:
             file.write_bytes(self.other_text.encode())
             other = Facts(load_robot(file))
         if self.spec is not None:
-            from terrainkit_robots.spec.robot_spec import RobotSpec
-
             spec = RobotSpec.from_toml(self.spec)
         model = load_robot(path, contents=contents)
         return Facts(model, Meshes(contents), against=other, spec=spec)
@@ -136,32 +135,16 @@ def bytes_of(*, radius=1.0, **content):
         case "zeros":
             return bytes(value)
         case "box":
-            return stl(box(*value))
+            return trimesh.creation.box(value).export(file_type="stl")
         case "ascii_box":
-            return ascii_stl(box(*value))
+            return ascii_stl(trimesh.creation.box(value).triangles)
         case "sphere_faces":
             return sphere(value, radius)
     raise AssertionError(f"unknown kind of file content: {kind}")
 
 
-def box(x, y, z):
-    """Return the triangles of a box with these sides about the origin, shape (12, 3, 3)."""
-    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    faces = [face for a, b, c, d in quads for face in ((a, b, c), (a, c, d))]
-    return (corners * [x, y, z])[np.array(faces)]
-
-
-def stl(triangles):
-    """Return a binary STL."""
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    records = np.zeros(len(triangles), record)
-    records["corners"] = triangles
-    return bytes(80) + struct.pack("<I", len(triangles)) + records.tobytes()
-
-
 def ascii_stl(triangles):
-    """Return an ASCII STL."""
+    """Return an ASCII STL, whose size does not depend on trimesh."""
     lines = ["solid box"]
     for triangle in triangles:
         corners = [f"      vertex {x:g} {y:g} {z:g}" for x, y, z in triangle]
@@ -172,12 +155,9 @@ def ascii_stl(triangles):
 @cache
 def sphere(faces, radius):
     """Return a binary STL of a sphere with at least `faces` faces."""
-    import trimesh
-
-    subdivisions = 0
-    while 20 * 4**subdivisions < faces:
-        subdivisions += 1
-    return stl(trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius).triangles)
+    subdivisions = math.ceil(math.log(max(faces / 20, 1), 4))
+    sphere = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    return sphere.export(file_type="stl")
 
 
 # Cases.

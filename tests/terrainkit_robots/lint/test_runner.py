@@ -13,16 +13,13 @@ from terrainkit_robots.lint.rule import Rule, Violation, rules
 from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, Skipped, has_inputs, lint
 from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
+from tests.small_robots import URDF, facts, joint, link
 
-FILE = Path("/robots/robot.urdf")
-
-
-def facts(text='<robot name="r"><link name="a"/></robot>'):
-    return Facts(load_robot(FILE, contents={FILE: text.encode()}))
+LINK = link("a", mass=None)
 
 
 def violation(subject="a", line=1, **more):
-    return Violation(subject=subject, source=Source(file=FILE, line=line), message="m", **more)
+    return Violation(subject=subject, source=Source(file=URDF, line=line), message="m", **more)
 
 
 def rule(check, code="INR099", severity="error", *, needs=()):
@@ -45,7 +42,7 @@ def rule(check, code="INR099", severity="error", *, needs=()):
 
 
 def report(*selected, robot=None):
-    return lint(facts() if robot is None else robot, selected)
+    return lint(facts(LINK) if robot is None else robot, selected)
 
 
 def test_finding_combines_rule_and_violation():
@@ -127,22 +124,31 @@ def test_leg_rules_need_legs():
 )
 def test_rules_need_their_input(needs, reason):
     asked = rule([violation()], needs=needs)
-    made = lint(facts(), [asked], simulate=False)
+    made = lint(facts(LINK), [asked], simulate=False)
     assert made.skipped == (Skipped(code="INR099", kind="no-input", reason=reason),)
-    assert not has_inputs(asked, facts(), simulate=False)
-    assert has_inputs(rule([], needs=("legs",)), facts(), simulate=False)
+    assert not has_inputs(asked, facts(LINK), simulate=False)
+    assert has_inputs(rule([], needs=("legs",)), facts(LINK), simulate=False)
 
 
 @pytest.mark.parametrize("family", ["LEG", "SYM", "DYN"])
 def test_limb_rules_need_complete_tree(family):
-    text = (
-        '<robot name="r"><link name="a"/><joint name="j" type="fixed"><parent link="a"/>'
-        '<child link="lost"/></joint></robot>'
-    )
-    made = report(rule([violation()], f"{family}099"), robot=facts(text))
+    robot = facts(LINK, joint("a", "lost", kind="fixed"))
+    made = report(rule([violation()], f"{family}099"), robot=robot)
     assert made.findings == ()
     assert "missing from the kinematic tree" in made.skipped[0].reason
-    assert len(report(rule([violation()], "INR099"), robot=facts(text)).findings) == 1
+    assert len(report(rule([violation()], "INR099"), robot=robot).findings) == 1
+
+
+def test_references_are_checked_only_with_all_included_files():
+    robot = facts('<mujoco><include file="gone.xml"/><worldbody><body/></worldbody></mujoco>')
+    made = report(rule([violation()], "COL099"), rule([violation()], "INR099"), robot=robot)
+    assert [each.code for each in made.findings] == ["INR099"]
+    assert made.skipped[0].reason == "an included file cannot be read (XML012)"
+
+
+def test_only_xml_rules_run_on_an_unreadable_file():
+    made = report(rule([violation()], "XML099"), rule([violation()]), robot=facts("<robot"))
+    assert [each.code for each in made.findings] == ["XML099"]
 
 
 def test_crash_of_a_rule_is_recorded():

@@ -1,4 +1,6 @@
 import os
+import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -92,35 +94,12 @@ def test_read_settings_skips_other_pyproject_and_pipes(tmp_path):
     assert read_settings(tmp_path) == Settings()
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        (
-            "[check-robot]\nselct = []",
-            "no key 'selct'; did you mean 'select'? It has: select, ignore, package, xacro-arg",
-        ),
-        ("[check_robot]\nselect = []", "no key 'check_robot'; expected check-robot"),
-        ("check-robot = 3", "check-robot: got 3; expected a table"),
-        ("[check-robot", "not a TOML file"),
-        ("x = " + "[" * 5000, "nested too deeply"),
-        ("x" + ".x" * 500_000 + " = 1", "500000 dots"),
-        ("[check-robot]\nselect = [3]", "select: got [3]; expected a list"),
-        ("[check-robot]\nselect = ['XYZ']", "no rule 'XYZ'"),
-        ("[check-robot]\nstrict = 'yes'", "strict: got 'yes'; expected true or false"),
-        ("[check-robot]\nignore = ['INR001']", "ignore: got ['INR001']; expected a table"),
-        ("[check-robot]\nignore = { INR001 = '' }", "ignore.INR001: got ''; expected a reason"),
-        ("[check-robot]\nignore = { INR001 = true }", "ignore.INR001: got True; expected a reason"),
-        ("[check-robot]\nignore = { NOPE = 'x' }", "no rule 'NOPE'"),
-        ("[check-robot]\npackage = { p = 'none' }", "expected an existing folder"),
-        ("[check-robot]\nxacro-arg = { p = [1] }", "xacro-arg.p: got [1]; expected a string"),
-        ("[check-robot]\nxacro-arg = 'p:=1'", "xacro-arg: got 'p:=1'; expected a table"),
-        ("#" * (1 << 20) + "\n[check-robot]", "more than 1048576 bytes"),
-        ("\udcff", "codec can't decode"),
-    ],
-    ids=lambda text: ascii(text[:40]),
-)
+INVALID = tomllib.loads(Path(__file__).with_name("settings.toml").read_text())
+
+
+@pytest.mark.parametrize(("text", "said"), INVALID["rejected"])
 def test_read_settings_error_names_the_file(tmp_path, text, said):
-    (tmp_path / "terrainkit.toml").write_text(text, errors="surrogateescape")
+    (tmp_path / "terrainkit.toml").write_text(text)
     with pytest.raises(ConfigError) as error:
         read_settings(tmp_path)
     assert str(error.value).startswith(f"{tmp_path / 'terrainkit.toml'}: ")

@@ -21,6 +21,7 @@ from terrainkit_robots.onboarding.summary import summarize
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from tests.robots import ARM, BUNDLED, QUADRUPED
+from tests.small_robots import box, joint, link
 
 COMPARISON_RULES = [rule for rule in rules() if {"against", "spec"} & set(rule.needs)]
 
@@ -83,20 +84,10 @@ def check_scene(folder, facts, spec):
 
 def test_onboard_writes_expected_files(onboarded):
     result = onboarded(QUADRUPED)
-    assert sorted(path.name for path in result.folder.iterdir()) == [
-        "__init__.py",
-        "genesis_config.py",
-        "isaaclab_config.py",
-        "legged_gym_config.py",
-        "mjlab_config.py",
-        "quadruped.py",
-        "quadruped_config.py",
-        "report.md",
-        "robot.toml",
-        "robot.urdf",
-        "robot.xml",
-        "scene.xml",
-    ]
+    configs = "genesis_config.py isaaclab_config.py legged_gym_config.py mjlab_config.py"
+    robot = "__init__.py quadruped.py quadruped_config.py robot.toml robot.urdf robot.xml scene.xml"
+    names = {path.name for path in result.folder.iterdir()}
+    assert names == {*configs.split(), *robot.split(), "report.md"}
     assert dict(summarize(result))["pictures"] == "none: disabled"
 
 
@@ -138,30 +129,23 @@ def edit_spec(result, tmp_path, *replacements):
 
 def test_onboard_applies_edited_spec(onboarded, tmp_path):
     first = onboarded(QUADRUPED)
-    old, new = ('".*_thigh_joint" = 0.75', '"F.*_thigh_joint" = 0.85\n"R.*_thigh_joint" = 0.75')
-    edited = edit_spec(first, tmp_path, (old, new))
-    expected = RobotSpec.load(edited)
-    result = onboard(QUADRUPED, tmp_path / "robot", replace(options(), spec=edited))
+    feet = tuple(foot.replace("foot", "calf") for foot in first.robot.spec.feet)
+    edited = edit_spec(
+        first,
+        tmp_path,
+        ('".*_thigh_joint" = 0.75', '"F.*_thigh_joint" = 0.85\n"R.*_thigh_joint" = 0.75'),
+        *zip(first.robot.spec.feet, feet, strict=True),
+    )
+    changed = options(spec=edited, frameworks=framework_names())
+    result = onboard(QUADRUPED, tmp_path / "robot", changed)
     spec = result.robot.spec
-    assert replace(spec, provenance={}) == replace(expected, provenance={})
+    assert spec.feet == feet
+    assert replace(spec, provenance={}) == replace(RobotSpec.load(edited), provenance={})
     assert spec.provenance["default_pose.F.*_thigh_joint"].origin == "given"
     assert "default_pose.R.*_thigh_joint" not in spec.provenance
     assert spec.provenance["default_pose"].origin == "solved"
     model = read_mujoco(result)
-    joint = model.joint("FL_thigh_joint")
-    assert model.key("home").qpos[joint.qposadr[0]] == 0.85
-
-
-def test_onboard_accepts_any_link_as_foot(onboarded, tmp_path):
-    first = onboarded(QUADRUPED)
-    feet = tuple(foot.replace("foot", "calf") for foot in first.robot.spec.feet)
-    old, new = (f"feet = {list(each)}".replace("'", '"') for each in (first.robot.spec.feet, feet))
-    edited = edit_spec(first, tmp_path, (old, new))
-    result = onboard(
-        QUADRUPED, tmp_path / "robot", options(spec=edited, frameworks=framework_names())
-    )
-    assert result.robot.spec.feet == feet
-    model = read_mujoco(result)
+    assert model.key("home").qpos[model.joint("FL_thigh_joint").qposadr[0]] == 0.85
     for foot in feet:
         assert model.site(foot).bodyid[0] == model.body(foot).id
 
@@ -212,35 +196,32 @@ def test_onboard_arm_without_legs(tmp_path):
     assert (model.nq, model.nu) == (1, 1)
 
 
-IMU = """<link name="imu"><inertial><mass value="{mass}"/>
-    <inertia ixx="{i}" iyy="{i}" izz="{i}" ixy="{i}" ixz="{i}" iyz="{i}"/></inertial></link>
-  <joint name="imu_joint" type="fixed"><parent link="upper"/><child link="imu"/></joint></robot>"""
-"""A sensor whose inertia has three equal products: two principal moments are 0."""
+def with_imu(tmp_path, inertia, **changes):
+    """Onboard an arm with a sensor of 1 g."""
+    imu = link("imu", mass=1e-3, inertia=inertia)
+    imu += joint("upper", "imu", "0 0 0.3", kind="fixed") + "</robot>"
+    return onboard_arm(tmp_path, ("</robot>", imu), **changes)
 
 
 def test_onboard_repairs_only_negligible_inertia(tmp_path):
-    imu = IMU.format(mass="1e-3", i="1e-3")
-    assert onboard_arm(tmp_path, ("</robot>", imu), unsafe_fixes=False).folder is None
-    imu = IMU.format(mass="1e-3", i="1e-6")
-    result = onboard_arm(tmp_path, ("</robot>", imu), unsafe_fixes=False)
+    """Three equal products: two principal moments are 0."""
+    large, small = (" ".join([value] * 6) for value in ("1e-3", "1e-6"))
+    assert with_imu(tmp_path, large, unsafe_fixes=False).folder is None
+    result = with_imu(tmp_path, small, unsafe_fixes=False)
     assert [(f.code, f.subject) for f in result.fixed] == [("INR003", "imu")]
     assert "the inertia of body upper changes by" in (result.folder / "report.md").read_text()
 
 
 def test_onboard_keeps_frame_named_imu(tmp_path):
-    imu = IMU.replace('type="fixed">', 'type="fixed"><origin xyz="0 0 0.3"/>')
-    imu = imu.replace('ixy="{i}" ixz="{i}" iyz="{i}"', 'ixy="0" ixz="0" iyz="0"')
-    result = onboard_arm(tmp_path, ("</robot>", imu.format(mass="1e-3", i="1e-6")))
-    model = read_mujoco(result)
+    model = read_mujoco(with_imu(tmp_path, "1e-6 1e-6 1e-6 0 0 0"))
     np.testing.assert_allclose(model.site("imu").pos, [0, 0, 0.3], atol=1e-9)
     assert model.site("imu").bodyid[0] == model.body("upper").id
 
 
 def test_onboard_accepts_links_without_inertial(tmp_path):
-    cover = """<link name="cover"><collision><geometry><box size="0.1 0.1 0.1"/></geometry>
-      </collision></link><joint name="cover_joint" type="fixed"><parent link="stand"/>
-      <child link="cover"/><origin xyz="0.15 0 0"/></joint></robot>"""
-    result = onboard_arm(tmp_path, ("</robot>", cover))
+    cover = link("cover", box("0.1 0.1 0.1"), mass=None)
+    cover += joint("stand", "cover", "0.15 0 0", kind="fixed")
+    result = onboard_arm(tmp_path, ("</robot>", cover + "</robot>"))
     assert codes(result.fixed) == ["INR011"]
     model = read_mujoco(result, "robot.urdf")
     assert model.body_mass.sum() == pytest.approx(6, rel=1e-3)

@@ -29,16 +29,9 @@ ARM = """<robot name="arm"><link name="base"/><link name="tip"/>
 
 
 def equivalence(file="robot.urdf", link="FL_foot"):
-    return Equivalence(
-        file=file,
-        mass=-0.0004,
-        inertia=2e-5,
-        joint="FL_calf_joint",
-        distance=2.5e-5,
-        link=link,
-        angle=1e-5,
-        angle_link="RR_foot",
-    )
+    differences = {"mass": -0.0004, "inertia": 2e-5, "distance": 2.5e-5, "angle": 1e-5}
+    names = {"joint": "FL_calf_joint", "link": link, "angle_link": "RR_foot"}
+    return Equivalence(file=file, **differences, **names)
 
 
 def make_result(text=None):
@@ -153,6 +146,7 @@ def test_report_escapes_names(quadruped, stood):
     held = NASTY.replace("\udc80", "")  # which a spec refuses
     named = with_spec(quadruped, name=held, base=held, feet=(held,))
     standing = replace(stood, other_contacts=(NASTY,), saturated_joint=NASTY)
+    compared = equivalence(NASTY, link=NASTY)
     text = report_markdown(
         replace(
             named,
@@ -162,9 +156,7 @@ def test_report_escapes_names(quadruped, stood):
                 findings=(finding(NASTY, subject=NASTY, message=NASTY, hint=NASTY),),
                 skipped=(Skipped(code="SYM001", kind="cannot-check", reason=NASTY),),
             ),
-            verification=Verification(
-                equivalences=(equivalence(NASTY, link=NASTY),), standing=standing
-            ),
+            verification=Verification(equivalences=(compared,), standing=standing),
             fixed=(finding(subject=NASTY, message=NASTY),),
             configs={"isaaclab": (NASTY,)},
             images_error=NASTY,

@@ -4,7 +4,6 @@
 modify are made for each test; the others are shared in the session.
 """
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,110 +28,25 @@ from terrainkit_robots.rl.config import (
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
-from terrainkit_robots.spec.robot_spec import RobotSpec
-
-# Test files are not in packages, so shared modules are found by path.
-sys.path.append(str(Path(__file__).parent))
 
 torch.set_num_threads(1)
 
-CART = """
-<mujoco model="cart">
-  <compiler angle="radian"/>
-  <option gravity="0 0 -9.81"/>
-  <default>
-    <joint frictionloss="0.3" armature="0.5"/>
-    <motor ctrllimited="true" ctrlrange="-0.1 0.1" gear="7"/>
-    <geom friction="0.7"/>
-  </default>
-  <worldbody>
-    <light pos="0 0 3"/>
-    <body name="trunk" pos="0 0 1">
-      <freejoint/>
-      <geom name="hull" type="box" size="0.2 0.1 0.05" mass="4" friction="0.3"/>
-      <geom name="paint" type="box" size="0.2 0.1 0.06" mass="0" contype="0" conaffinity="0"/>
-      <site name="imu" pos="0 0 0"/>
-      <body name="front" pos="0.2 0 0">
-        <joint name="front_hinge" axis="0 1 0" range="-1 1" actuatorfrcrange="-1 1"/>
-        <geom name="front_leg" type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.5"/>
-        <geom name="front_ball" type="sphere" pos="0 0 -0.2" size="0.03" mass="0.1"/>
-      </body>
-      <body name="rear" pos="-0.2 0 0">
-        <joint name="rear_hinge" axis="0 1 0" range="-1 1"/>
-        <geom name="rear_leg" type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" mass="0.5"/>
-        <body name="wheel" pos="0 0 -0.2">
-          <joint name="wheel_axle" axis="0 1 0"/>
-          <geom name="tire" type="sphere" size="0.03" mass="0.1"/>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-  <actuator>
-    <motor name="old" joint="front_hinge"/>
-  </actuator>
-  <sensor>
-    <gyro name="old" site="imu"/>
-  </sensor>
-  <keyframe>
-    <key name="old" qpos="0 0 1 1 0 0 0 0 0 0"/>
-  </keyframe>
-</mujoco>
-"""
-"""A robot whose own defaults, motors and sensors training must ignore."""
-
 
 @pytest.fixture(scope="session")
-def cart_spec() -> RobotSpec:
-    """Return the spec of a cart; the MJCF has another order of joints."""
-    return RobotSpec(
-        name="cart",
-        urdf="cart.urdf",
-        mjcf="cart.xml",
-        floating=True,
-        joint_order=("wheel_axle", "rear_hinge", "front_hinge"),
-        base="trunk",
-        feet=("wheel", "front"),
-        termination_contacts=("trunk",),
-        penalized_contacts=("rear",),
-        default_pose={"wheel_axle": 0.0, "rear_hinge": -0.2, "front_hinge": 0.3},
-        stiffness={"wheel_axle": 0.0, ".*_hinge": 20.0},
-        damping={"wheel_axle": 0.4, ".*_hinge": 1.5},
-        effort={"wheel_axle": 3.0, "rear_hinge": 5.0, "front_hinge": 6.0},
-        velocity={"wheel_axle": 30.0, ".*_hinge": 10.0},
-        armature={"wheel_axle": 0.001, "rear_hinge": 0.01, "front_hinge": 0.02},
-        action_scale={"wheel_axle": 12.0, "rear_hinge": 0.25, "front_hinge": 0.5},
-        soft_limits={".*_hinge": (-0.9, 0.9)},
-        base_height_target=0.22,
-        spawn_height=0.24,
-        leg_length=0.2,
-        stance_width=0.2,
-        foot_radius=0.03,
-    )
-
-
-@pytest.fixture(scope="session")
-def cart(cart_spec: RobotSpec, tmp_path_factory: pytest.TempPathFactory) -> Robot:
-    folder = tmp_path_factory.mktemp("cart")
-    (folder / "cart.xml").write_text(CART)
-    return Robot.from_spec(cart_spec, folder)
+def cart() -> Robot:
+    """Return a robot on a foot and a wheel."""
+    return Robot.load(Path(__file__).with_name("cart"))
 
 
 @pytest.fixture(scope="session")
 def mixed_map() -> TerrainMap:
     """Return a map of stairs and slopes that is not symmetric in x and y."""
-    return generate(
-        MapConfig(
-            rows=3,
-            cols=2,
-            patch_size=(6.0, 4.0),
-            border=1.2,
-            seed=7,
-            terrains=(
-                SubTerrain(terrain="stairs", parameters={"step_height": (0.05, 0.2)}),
-                SubTerrain(terrain="rough_slope", parameters={"platform": 1.5}),
-            ),
-        )
+    terrains = (
+        SubTerrain(terrain="stairs", parameters={"step_height": (0.05, 0.2)}),
+        SubTerrain(terrain="rough_slope", parameters={"platform": 1.5}),
     )
+    size = {"rows": 3, "cols": 2, "patch_size": (6.0, 4.0), "border": 1.2}
+    return generate(MapConfig(**size, seed=7, terrains=terrains))
 
 
 @pytest.fixture(scope="session")
@@ -153,15 +67,8 @@ def course_ground() -> Ground:
 
 @pytest.fixture(scope="session")
 def no_randomization() -> DomainRand:
-    return DomainRand(
-        friction=None,
-        added_mass=None,
-        com_shift=0.0,
-        gains=None,
-        motor_strength=None,
-        joint_offset=0.0,
-        push_interval_s=0.0,
-    )
+    nominal = dict.fromkeys(("friction", "added_mass", "gains", "motor_strength"))
+    return DomainRand(**nominal, com_shift=0.0, joint_offset=0.0, push_interval_s=0.0)
 
 
 @pytest.fixture(scope="session")

@@ -13,29 +13,14 @@ Shape = tuple[int, ...]
 
 def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, Shape]:
     """Return the shapes of the arrays of a state, for one robot."""
-    others = {
-        "base_pos": (3,),
-        "base_quat": (4,),
-        "base_lin_vel": (3,),
-        "base_ang_vel": (3,),
-        "projected_gravity": (3,),
-        "base_height": (),
-        "commands": (3,),
-        "gait_phase": (2,),
-        "swing_phase": (feet,),
-        "mean_vel": (3,),
-        "foot_height": (feet,),
-        "foot_vel": (feet, 3),
-        "foot_force": (feet, 3),
-        "penalized_force": (penalized,),
-        "height_scan": (points,),
-        "push_vel": (3,),
-        "friction": (1,),
-        "added_mass": (1,),
-        "com_shift": (3,),
-        "fallen": (),
-        "history": (0,),
-    }
+    vectors = "base_pos base_lin_vel base_ang_vel projected_gravity commands mean_vel push_vel"
+    others = dict.fromkeys([*vectors.split(), "com_shift"], (3,))
+    others |= dict.fromkeys(["base_height", "fallen"], ())
+    others |= dict.fromkeys(["friction", "added_mass"], (1,))
+    others |= dict.fromkeys(["swing_phase", "foot_height"], (feet,))
+    others |= dict.fromkeys(["foot_vel", "foot_force"], (feet, 3))
+    others |= {"base_quat": (4,), "gait_phase": (2,), "history": (0,)}
+    others |= {"penalized_force": (penalized,), "height_scan": (points,)}
     return {each.name: others.get(each.name, (joints,)) for each in fields(State)}
 
 

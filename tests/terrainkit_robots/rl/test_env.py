@@ -58,10 +58,9 @@ class TestVecEnv:
             assert isinstance(observed, TensorDict)
             assert observed.batch_size == (5,)
             assert {name: group.shape for name, group in observed.items()} == shapes
-            assert (
-                {group.dtype for group in observed.values()} == {rewards.dtype} == {torch.float32}
-            )
-            assert all(torch.isfinite(part).all() for part in (rewards, *observed.values()))
+            for part in (rewards, *observed.values()):
+                assert part.dtype == torch.float32
+                assert torch.isfinite(part).all()
             assert rewards.shape == dones.shape == extras["time_outs"].shape == (5,)
             assert dones.dtype == extras["time_outs"].dtype == torch.bool
             for name, group in env.get_observations().items():
@@ -88,12 +87,6 @@ class TestVecEnv:
                 assert np.isfinite(value), name
         assert seen > 0
 
-    def test_episode_lengths_can_be_replaced(self, env):
-        env.episode_length_buf = torch.tensor([19, 1, 2, 3, 4])
-        _, _, dones, extras = stand(env)
-        assert dones.tolist() == extras["time_outs"].tolist() == [True, *[False] * 4]
-        assert env.episode_length_buf.tolist() == [0, 2, 3, 4, 5]
-
     def test_large_actions_stay_finite_and_unchanged(self, env):
         for sign in (1, -1, 1):
             actions = torch.full((5, env.num_actions), sign * 1e30).requires_grad_()
@@ -103,21 +96,18 @@ class TestVecEnv:
                 assert torch.isfinite(part).all()
                 assert not part.requires_grad
 
-    @pytest.mark.parametrize("strange", [np.nan, np.inf, -np.inf])
-    def test_nonfinite_actions_are_rejected(self, env, strange):
-        actions = torch.zeros(5, env.num_actions)
-        actions[-1, 1] = strange
-        with pytest.raises(ConfigError, match="actions of environment 4 are not finite"):
-            env.step(actions)
-        assert env.episode_length_buf.tolist() == [0] * 5
-        stand(env)
 
-    def test_actions_of_another_shape_are_rejected(self, env):
-        for more_envs, more_actions in ((1, 0), (0, 1), (0, -1)):
-            wrong = torch.zeros(5 + more_envs, env.num_actions + more_actions)
-            for actions in (wrong, wrong[0]):
-                with pytest.raises(ConfigError, match="shape of the actions"):
-                    env.step(actions)
+def test_invalid_actions_are_rejected(nominal_env):
+    env = nominal_env()
+    for strange in (np.nan, np.inf, -np.inf):
+        actions = torch.zeros(4, 12)
+        actions[2:, 1] = strange
+        with pytest.raises(ConfigError, match="actions of environment 2 are not finite"):
+            env.step(actions)
+    for shape in ((5, 12), (4, 13), (4, 11), (12,)):
+        with pytest.raises(ConfigError, match=r"shape of the actions: got \(.*expected \(4, 12"):
+            env.step(torch.zeros(shape))
+    assert env.episode_length_buf.tolist() == [0] * 4
 
 
 def stand(env):
@@ -181,8 +171,6 @@ class TestHistory:
 
 
 class TestActionDelay:
-    TORQUE = Control(control_type="T", decimation=1)
-
     @pytest.fixture
     def make(self, nominal_env, no_randomization):
         """Return a function that makes environments with an action delay."""
@@ -192,16 +180,6 @@ class TestActionDelay:
             return nominal_env(num_envs, domain_rand=delayed, **sections)
 
         return make
-
-    @pytest.mark.parametrize("steps", [1, 4, 7])
-    def test_step_input_arrives_late(self, make, quadruped, steps):
-        delay = 0.005 * steps
-        env = make((delay, delay), control=self.TORQUE)
-        effort = 0.1 * quadruped.effort
-        for step in range(12):
-            env.step(torch.full((3, 12), 0.1))
-            expected = effort if step >= steps else 0 * effort
-            np.testing.assert_allclose(env.sim.torque, [expected] * 3, atol=1e-6)
 
     def test_delay_ends_within_a_policy_step(self, make, quadruped):
         # After 2 of 4 simulation steps; the motors are at rest until then.
@@ -213,14 +191,17 @@ class TestActionDelay:
             seen.append(env.sim.torque[0, 0] / quadruped.effort[0])
         np.testing.assert_allclose(seen, [0, 0, 0.1, 0.1], atol=1e-6)
 
-    def test_delay_stays_exact_in_long_episodes(self, make, quadruped):
-        env = make((0.015, 0.015), 1, control=self.TORQUE)
+    @pytest.mark.parametrize("steps", [1, 3, 7])
+    def test_delay_stays_exact_in_long_episodes(self, make, quadruped, steps):
+        control = Control(control_type="T", decimation=1)
+        env = make((0.005 * steps, 0.005 * steps), 1, control=control)
         applied = []
         for step in range(1500):  # the time accumulates rounding errors
             env._apply_actions(torch.full((1, 12), 1e-4 * step))
             env.sim.step(1)
             applied.append(env.sim.torque[0, 0] / quadruped.effort[0] * 1e4)
-        np.testing.assert_allclose(applied[3:], np.arange(1497), rtol=1e-4, atol=1e-3)
+        expected = np.maximum(np.arange(1500) - steps, 0)
+        np.testing.assert_allclose(applied, expected, rtol=1e-4, atol=1e-3)
 
     def test_motors_hold_the_default_pose_first(self, nominal_env, make):
         still = nominal_env(3)
@@ -336,19 +317,18 @@ class TestWaypoints:
         np.testing.assert_array_equal(success[0], [1.0, np.nan])
         assert env.waypoints.index.tolist() == [0, 0, 0, 0]
 
-    @pytest.mark.parametrize(("goals", "progress"), [(0, 0.0), (1, 0.625), (2, 1.0)])
+    @pytest.mark.parametrize(("goals", "progress"), [(0, 0.0), (1, 0.625)])
     def test_progress_is_the_share_of_goals_over_the_promotion(
         self, env, monkeypatch, goals, progress
     ):
         updates = []
         monkeypatch.setattr(env.curriculum.sampler, "update", lambda *args: updates.append(args))
-        for x in (4.0, 7.0)[:goals]:
-            self.move(env, 0, x, 2.0)
-        if goals < 2:
-            env.sim.qpos[0, 3:7] = 0, 1, 0, 0  # upside down
-            self.move(env, 0, 1.0, 2.0)
-        assert updates[-1][0].tolist() == [0]
-        assert updates[-1][1].tolist() == pytest.approx([progress])
+        for _ in range(goals):
+            self.move(env, 0, 4.0, 2.0)
+        env.sim.qpos[0, 3:7] = 0, 1, 0, 0  # upside down
+        self.move(env, 0, 1.0, 2.0)
+        robots, made, *_ = updates[-1]
+        assert (robots.tolist(), made.tolist()) == ([0], [pytest.approx(progress)])
 
     def test_terrain_without_goals_is_rejected(self, nominal_env):
         with pytest.raises(ConfigError, match="without goals; expected a map with terrains such"):
@@ -470,7 +450,7 @@ class TestControl:
         ("action", "settings", "expected"),
         [
             # Hinges: kp (default + scale a - q) - kd dq. Wheel, without stiffness: kd (12 a - dq).
-            # The second torque would be 5.5, but the effort is 5.
+            # The second torque would be 5.5, but the effort is 5; with V, it would be 7.5.
             ((0.2, 0.4, 0.1), {}, [0.4 * (2.4 - 2.0), 5.0, 20 * (0.35 - 0.5) - 1.5 * 0.5]),
             (
                 (0.5, 0.2, 0.1),
@@ -480,19 +460,14 @@ class TestControl:
             # Without stiffness, every joint is controlled like a wheel: by its velocity.
             ((0.5, 0.2, 0.1), {"stiffness": 0.0}, [0.4 * (6 - 2.0), 1.5 * 1.05, 1.5 * -0.45]),
             # An action of 1 is the joint's velocity limit.
-            ((0.1, 0.1, -0.1), {"control_type": "V"}, [0.4 * (3 - 2), 1.5 * 2, 1.5 * -1.5]),
+            ((0.1, 0.4, -0.1), {"control_type": "V"}, [0.4 * (3 - 2), 5.0, 1.5 * -1.5]),
             # An action of 1 is the effort, or the task's scale.
-            ((0.5, -0.2, 1.0), {"control_type": "T"}, [1.5, -1.0, 6.0]),
+            ((0.5, -0.2, -9.0), {"control_type": "T"}, [1.5, -1.0, -6.0]),
             ((0.5, -0.2, 0.1), {"control_type": "T", "action_scale": 2.0}, [1.0, -0.4, 0.2]),
         ],
     )
     def test_torques_by_hand(self, torques, action, settings, expected):
         np.testing.assert_allclose(torques(action, **settings), expected, rtol=1e-6)
-
-    @pytest.mark.parametrize("kind", ["P", "V", "T"])
-    def test_torques_are_clipped_at_effort(self, torques, kind):
-        np.testing.assert_allclose(torques((9, 9, 9), control_type=kind), [3, 5, 6])
-        np.testing.assert_allclose(torques((-9, -9, -9), control_type=kind), [-3, -5, -6])
 
     # A motor that measures 0.05 rad too much moves 0.05 rad too little.
     @pytest.mark.parametrize(("kind", "less"), [("P", [0, 20 * 0.05, 20 * 0.05]), ("V", [0, 0, 0])])

@@ -1,16 +1,18 @@
+import tomllib
 from dataclasses import fields, replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import torch
-from made_states import FLAGS, made_state, shapes
 
 from terrainkit.errors import PluginError
 from terrainkit_robots.rl import rewards
 from terrainkit_robots.rl.config import Env, Rewards
 from terrainkit_robots.rl.rewards import REWARDS, active_rewards
 from terrainkit_robots.rl.state import State
+from tests.terrainkit_robots.rl.made_states import FLAGS, made_state, shapes
 
 _SHAPES = shapes(joints=2, feet=2, penalized=3, points=0)
 """Shapes of the state of a robot with two joints and two feet."""
@@ -55,88 +57,24 @@ def paid(name, robot, given, **settings):
     return REWARDS[name](given, robot, Rewards(**settings)).tolist()
 
 
-_MOVED = [[0.75, -1.0]] * 4
-"""Joint positions off the default pose."""
+_BY_HAND = tomllib.loads(Path(__file__).with_name("rewards.toml").read_text())
 
 
-def case(name, expected, **arrays):
-    return name, arrays, expected
-
-
-_BY_HAND = [
-    # 0.25^(error^2 / command^2): 0.25^0, 0.25^1, 0.25^(1 / 4); exp(-0.25 / 0.25) for standing.
-    case(
-        "tracking_lin_vel",
-        [1, 0.25, 0.70711, 0.36788],
-        commands=[[1, 0, 9], [1, 0, 0], [0, 0.5, 0], [0, 0, 0]],
-        mean_vel=[[1, 0, 7], [0, 0, 0], [0, 0.25, 9], [0.3, 0.4, 0]],
-    ),
-    # 0.25^0 and 0.25^1. Where no yaw rate is commanded, standing earns only 0.25 as well.
-    case(
-        "tracking_ang_vel",
-        [1, 0.25, 0.25],
-        commands=[[9, 9, -1], [0, 0, 1], [1, 0, 0]],
-        mean_vel=[[8, 8, -1], [0, 0, 0], [0, 0, 0]],
-    ),
-    # Half of the command; against it; (1 + 0.5) / 2; half of the yaw rate; standing.
-    case(
-        "progress",
-        [0.5, -1, 0.75, 0.5, 0, 0],
-        commands=[[0.5, 0, 0], [0, -0.5, 0], [1, 0, 1], [0, 0, 0.5], [0, 0, 0], [1, 0, 1]],
-        mean_vel=[[0.25, 9, 9], [0, 3, 9], [2, 0, 0.5], [9, 9, 0.25], [9, 9, 9], [0, 0, 0]],
-    ),
-    # A squared sine of 0.01 is worth exp(-1).
-    case("upright", [1, 0.36788], projected_gravity=[[0, 0, -1], [0.06, 0.08, -0.995]]),
-    case("lin_vel_z", [0.25], base_lin_vel=[[5, 6, -0.5]]),
-    case("ang_vel_xy", [25], base_ang_vel=[[3, -4, 7]]),
-    # Over a hole of 10 m, the error is limited to the target: 0.3^2.
-    case("base_height", [0, 0.04, 0.09], base_height=[0.3, 0.5, 10.0]),
-    case("torques", [25], torques=[[3, -4]]),
-    case("dof_acc", [250], dof_acc=[[10, -20]]),
-    case("action_rate", [5], actions=[[1, 2]], last_actions=[[0, -1]]),
-    case("collision", [0, 2], penalized_force=[[0, 0.099, 0], [0.101, 0, 300]]),
-    case("termination", [0, 1], fallen=[False, True]),
-    # Soft limits of -1 and 1; the second joint has none.
-    case("dof_pos_limits", [0, 0.25, 0.5], dof_pos=[[0.9, 100], [1.25, -100], [-1.5, 0]]),
-    # The second foot should swing: right, one foot right, both wrong.
-    case(
-        "feet_gait",
-        [1, 0.5, 0],
-        swing_phase=[[0, 0.5]] * 3,
-        foot_force=[[[0, 0, 50], [0, 0, 0]], [[0, 0, 50]] * 2, [[0, 0, 0], [0, 0, 50]]],
-    ),
-    # The arc is 0.18 * 0.5 m high. Errors of half of it and all of it; feet in stance count 0.
-    case(
-        "foot_swing_height",
-        [0, 0.25 / 2, (1 + 1) / 2, 0],
-        swing_phase=[[0.5, 0], [0.5, 0.5], [0.5, 0.5], [0, 0]],
-        foot_height=[[0.09, 9], [0.045, 0.09], [0, 9], [9, 9]],
-    ),
-    case("foot_slip", [12.5], foot_vel=[[[3, 4, 9]] * 2], foot_force=[[[0, 0, 50], [0, 0, 0.5]]]),
-    # A small yaw rate counts as standing.
-    case(
-        "stand_still",
-        [0, 0.375, 0, 0, 0],
-        commands=[[0, 0, 0], [0, 0, 0.099], [0, 0, -0.101], [0.05, 0, 0], [0, -0.05, 0.01]],
-        dof_pos=[[0.5, -0.5], *_MOVED],
-    ),
-]
-
-
-@pytest.mark.parametrize(("name", "arrays", "expected"), _BY_HAND)
-def test_reward_by_hand(robot, name, arrays, expected):
-    given = state(len(expected), **arrays)
-    found = paid(name, robot, given, tracking_sigma=0.25)
+@pytest.mark.parametrize("name", _BY_HAND)
+def test_reward_by_hand(robot, name):
+    expected = _BY_HAND[name]["pays"]
+    arrays = {key: array for key, array in _BY_HAND[name].items() if key != "pays"}
+    found = paid(name, robot, state(len(expected), **arrays), tracking_sigma=0.25)
     assert found == pytest.approx(expected, abs=1e-5)
 
 
 def test_stand_still_ignores_wheels(robot):
     wheeled = replace(robot, wheels=np.array([False, True]))
-    assert paid("stand_still", wheeled, state(dof_pos=_MOVED[:1])) == [0.125]
+    assert paid("stand_still", wheeled, state(dof_pos=[[0.75, -1.0]])) == [0.125]
 
 
 def test_every_reward_is_tested_by_hand():
-    assert {*REWARDS} == {name for name, *_ in _BY_HAND}
+    assert {*REWARDS} == {*_BY_HAND}
 
 
 _BOUNDED = {"tracking_lin_vel", "tracking_ang_vel", "progress", "feet_gait", "upright"}

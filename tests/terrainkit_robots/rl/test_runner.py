@@ -10,7 +10,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.config import Algorithm, Policy, Rewards, Task
+from terrainkit_robots.rl.config import Algorithm, Policy, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, runner_config
@@ -129,30 +129,21 @@ OF_ENV = "processes 0 env"
     [
         ("actor_state_dict mlp.0.weight", DELETED, "mlp.0.weight: got nothing; expected float32"),
         ("critic_state_dict mlp.0.bias", torch.zeros(16).double(), "got float64 (16,); expected"),
-        ("actor_state_dict mlp.0.bias", torch.full((16,), torch.nan), "got nan; expected finite"),
         ("optimizer_state_dict", {}, "optimizer_state_dict.state: got nothing"),
         ("optimizer_state_dict state", {}, "state.0: got nothing; expected dict"),
         ("optimizer_state_dict state 2 exp_avg", torch.zeros(3), "exp_avg: got float32 (3,); exp"),
-        ("optimizer_state_dict state 2 exp_avg_sq", -torch.ones(16), "got -1; expected finite"),
-        ("optimizer_state_dict param_groups 0 lr", "fast", "param_groups.0.lr: got str; exp"),
-        (
-            "optimizer_state_dict param_groups 0 lr",
-            -1.0,
-            "lr: got -1; expected finite numbers >= 0",
-        ),
+        ("optimizer_state_dict param_groups 0 lr", -1.0, "lr: got -1; expected finite numbers"),
         ("processes", [], "processes: got none; expected one or more"),
         ("processes", DELETED, "state.processes: got nothing"),
         (OF_ENV, 3, "env: got int; expected dict"),
         (f"{OF_ENV} arrays commands", torch.zeros(3), "env.arrays.commands: got float32 (3,); exp"),
         (f"{OF_ENV} arrays episode_length", torch.zeros(2).long(), "episode_length: got int64 (2"),
-        (f"{OF_ENV} curriculum updates", "x", "curriculum.updates: got str; expected int"),
         (f"{OF_ENV} curriculum levels", torch.full((3,), 99), "levels: got 99 to 99; expected 0"),
         (f"{OF_ENV} observations policy", torch.zeros(3), "env.observations.policy: got float32"),
         (f"{OF_ENV} rng state state", 2**200, ""),
         (f"{OF_ENV} rng bit_generator", "MT19937", "PCG64"),
         ("processes 0 random cpu", torch.zeros(3).byte(), "random.cpu: got uint8 (3,); expected"),
         ("logger", DELETED, "state.logger: got nothing"),
-        ("logger rewbuffer", ["much"], "logger.rewbuffer.0: got str; expected float"),
         ("logger rewbuffer", [0.5] * 7, "logger.rewbuffer: got 7 numbers; expected"),
         ("logger cur_reward_sum", torch.zeros(2), "logger.cur_reward_sum: got float32 (2,)"),
     ],
@@ -196,12 +187,9 @@ def test_symmetry_setting_reaches_rsl_rl(make, task, symmetry):
 
 
 def test_runner_config_has_the_tasks_values():
-    task = Task(
-        policy=Policy(actor_hidden_dims=(7,), critic_hidden_dims=(5, 6), activation="relu"),
-        algorithm=Algorithm(gamma=0.5, entropy_coef=0.125, num_mini_batches=2),
-        rewards=Rewards(),
-    )
-    config = runner_config(task)
+    policy = Policy(actor_hidden_dims=(7,), critic_hidden_dims=(5, 6), activation="relu")
+    algorithm = Algorithm(gamma=0.5, entropy_coef=0.125, num_mini_batches=2)
+    config = runner_config(Task(policy=policy, algorithm=algorithm))
     assert (config["actor"]["hidden_dims"], config["critic"]["hidden_dims"]) == ([7], [5, 6])
     assert config["critic"]["activation"] == "relu"
     algorithm = {"gamma": 0.5, "entropy_coef": 0.125, "num_mini_batches": 2}

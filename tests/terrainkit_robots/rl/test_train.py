@@ -66,19 +66,17 @@ def after(iteration, act):
     return lambda progress: act() if progress.iteration == iteration else None
 
 
-def test_train_writes_a_run(task, tmp_path):
-    trained = train("quadruped", "plane", task, folder=tmp_path / "run")
-    assert (trained.folder, trained.current_learning_iteration) == (tmp_path / "run", 4)
-    run = open_run(tmp_path / "run")
-    assert (run.task, run.checkpoint) == (task, tmp_path / "run" / "model_4.pt")
-
-
-def test_train_names_the_default_folder(task, tmp_path, monkeypatch):
+def test_train_writes_a_run_in_the_default_folder(task, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("OMP_WAIT_POLICY", raising=False)
-    folder = train("quadruped", "plane", with_iterations(task, 1)).folder
-    assert folder.parent == Path("logs/quadruped")
-    assert (folder / "model_1.pt").exists()
+    task = with_iterations(task, 1)
+    trained = train("quadruped", "plane", task)
+    run = open_run(trained.folder)
+    assert (run.task, run.checkpoint) == (task, trained.folder / "model_1.pt")
+    assert (trained.folder.parent, trained.current_learning_iteration) == (
+        Path("logs/quadruped"),
+        1,
+    )
     assert os.environ["OMP_WAIT_POLICY"] == "PASSIVE"
 
 
@@ -236,22 +234,17 @@ def test_divergence_names_the_last_checkpoint(task, tmp_path):
         train("quadruped", "plane", diverging, folder=tmp_path / "run")
 
 
+ONE_SAMPLE = {"env": Env(num_envs=1), "runner": Runner(num_steps_per_env=1)}
+ONE_SAMPLE["algorithm"] = Algorithm(num_mini_batches=1)
+
+
 @pytest.mark.parametrize(
     ("sections", "options", "error", "told"),
     [
         ({"env": Env(num_envs=10**8)}, {}, MemoryLimitError, r"num_envs 100000000, .* MB each, n"),
         ({"commands": Commands(waypoints=True)}, {}, ConfigError, "a terrain without goals"),
         ({}, {"device": "gpu"}, ConfigError, "device: got 'gpu'; expected one of: cpu"),
-        (
-            {
-                "env": Env(num_envs=1),
-                "runner": Runner(num_steps_per_env=1),
-                "algorithm": Algorithm(num_mini_batches=1),
-            },
-            {},
-            ConfigError,
-            r"num_steps_per_env: got 1 with one env.*; expected 2",
-        ),
+        (ONE_SAMPLE, {}, ConfigError, r"num_steps_per_env: got 1 with one env.*; expected 2"),
     ],
     ids=["memory", "waypoints", "device", "one sample"],
 )

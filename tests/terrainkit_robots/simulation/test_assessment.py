@@ -11,8 +11,7 @@ from terrainkit_robots.simulation.standing import contact_areas, stand_test
 
 def test_assess_accepts_standing_robot(stood):
     assessment = assess(stood)
-    assert assessment.stands
-    assert (assessment.failures, assessment.degree) == ((), 0)
+    assert (assessment.stands, assessment.failures, assessment.degree) == (True, (), 0)
 
 
 @pytest.mark.parametrize(
@@ -25,11 +24,7 @@ def test_assess_accepts_standing_robot(stood):
         ({"height_loss": 9.0}, "its base sinks by 9.000 m (expected at most 0.100 m)", 2),
         ({"drift": 0.2}, "it drifts by 0.200 m (expected at most 0.100 m)", 1),
         ({"other_contacts": ("calf",)}, "calf touches the ground (expected only feet)", 1),
-        (
-            {"other_contacts": tuple("abcdef")},
-            "a, b, c, d and 2 more touch the ground (expected only",
-            1,
-        ),
+        ({"other_contacts": tuple("abcdef")}, "a, b, c, d and 2 more touch the ground (expec", 1),
         ({"lifted_feet": ("toe",)}, "toe does not touch the ground (expected all feet)", 1),
         ({"lifted_feet": ("a", "b")}, "a, b do not touch the ground (expected all feet)", 1),
         ({"saturation": 0.98}, "knee needs 98% of its effort limit (expected at most 95%)", 1),
@@ -38,10 +33,8 @@ def test_assess_accepts_standing_robot(stood):
 )
 def test_assess_reports_value_and_limit(stood, changes, fault, degree):
     assessment = assess(replace(stood, **changes))
-    assert not assessment.stands
-    assert len(assessment.failures) == 1
-    assert assessment.failures[0].startswith(fault)
-    assert assessment.degree == degree
+    (failure,) = assessment.failures
+    assert (assessment.stands, failure[: len(fault)], assessment.degree) == (False, fault, degree)
 
 
 def test_assess_reports_shank_on_ground_once(stood):

@@ -4,56 +4,33 @@ import pytest
 
 from terrainkit_robots.simulation.joint_sweep import joint_sweep
 from terrainkit_robots.simulation.sim_model import make_sim_model
+from tests.small_robots import ball, box, facts, joint, link
 
-CRANE = """
-<robot name="crane">
-  <link name="mast">
-    <collision><origin xyz="0 0.5 0"/><geometry><box size="1 0.02 0.2"/></geometry></collision>
-  </link>
-  <link name="turntable">
-    <inertial><mass value="1"/>
-      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <joint name="lift" type="revolute">
-    <parent link="mast"/><child link="turntable"/><axis xyz="1 0 0"/>
-    <limit lower="-0.1" upper="0.1" effort="10" velocity="10"/>
-  </joint>
-  <link name="boom">
-    <inertial><origin xyz="0.6 0 0"/><mass value="3"/>
-      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision>
-      <origin xyz="0.6 0 0"/><geometry><sphere radius="0.01"/></geometry>
-    </collision>
-  </link>
-  <joint name="swing" type="revolute">
-    <parent link="turntable"/><child link="boom"/><axis xyz="0 0 1"/>
-    <limit lower="-1.5" upper="1.5" effort="10" velocity="10"/>
-  </joint>
-  <link name="hook">
-    <inertial><origin xyz="0.2 0 0"/><mass value="0.5"/>
-      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <joint name="hook_joint" type="revolute">
-    <parent link="boom"/><child link="hook"/><origin xyz="0.6 0 0"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="2" effort="10" velocity="10"/>
-  </joint>
-</robot>
-"""
+LINK = {"inertia": "0.1 0.1 0.1 0 0 0"}
+CRANE = (
+    link("mast", box("1 0.02 0.2", "0 0.5 0"), mass=None)
+    + link("turntable", **LINK)
+    + joint("mast", "turntable", axis="1 0 0", limits=(-0.1, 0.1))
+    + link("boom", ball(0.01, "0.6 0 0"), mass=3, center="0.6 0 0", **LINK)
+    + joint("turntable", "boom", axis="0 0 1", limits=(-1.5, 1.5))
+    + link("hook", mass=0.5, center="0.2 0 0", **LINK)
+    + joint("boom", "hook", "0.6 0 0", limits=(-1, 2))
+)
 
 
-@pytest.fixture
-def sweep(robot):
-    """Return a function that sweeps the joints of a robot in a text, by name."""
-    return lambda text: {each.joint: each for each in joint_sweep(make_sim_model(robot(text)))}
+def sweep(text):
+    """Return the sweeps of the joints of a robot, by the link that each moves."""
+    found = joint_sweep(make_sim_model(facts(text)))
+    return {each.joint.removesuffix("_joint"): each for each in found}
 
 
-@pytest.fixture
-def crane(sweep):
+@pytest.fixture(scope="module")
+def crane():
     return sweep(CRANE)
 
 
 def test_joint_sweep_stops_at_collision(crane):
-    swing = crane["swing"]
+    swing = crane["boom"]
     # The tip has a radius of 0.6 m, and the wall is at y = 0.49: contact from asin(0.48 / 0.6) on.
     assert swing.reached[1] == pytest.approx(math.asin(0.48 / 0.6), abs=3 / 40)
     assert swing.reached[0] == pytest.approx(-1.5)
@@ -63,10 +40,10 @@ def test_joint_sweep_stops_at_collision(crane):
 
 
 def test_joint_sweep_measures_gravity_load(crane):
-    hook = crane["hook_joint"]
+    hook = crane["hook"]
     load = pytest.approx(0.5 * 9.81 * 0.2)
-    assert (hook.load, hook.max_load, hook.effort, hook.share) == (load, load, 10, 1)
-    assert crane["swing"].max_load == pytest.approx(0, abs=1e-9)
+    assert (hook.load, hook.max_load, hook.effort, hook.share) == (load, load, 50, 1)
+    assert crane["boom"].max_load == pytest.approx(0, abs=1e-9)
 
 
 def test_joint_sweep_follows_actuator_order(bundled):
@@ -87,11 +64,8 @@ def test_joint_sweep_is_symmetric(bundled):
     assert set(left.blocked[0]) == {"FL_foot", "FR_foot"}
 
 
-def test_joint_sweep_moves_mimic_joints(sweep):
-    text = CRANE.replace(
-        '<parent link="boom"/><child link="hook"/>',
-        '<mimic joint="swing" multiplier="0.5"/><parent link="boom"/><child link="hook"/>',
-    )
-    results = sweep(text)
-    assert set(results) == {"lift", "swing"}
-    assert results["swing"].share < 1
+def test_joint_sweep_moves_mimic_joints():
+    mimic = '<mimic joint="boom_joint" multiplier="0.5"/><parent link="boom"/>'
+    results = sweep(CRANE.replace('<parent link="boom"/>', mimic))
+    assert set(results) == {"turntable", "boom"}
+    assert results["boom"].share < 1

@@ -3,86 +3,31 @@ import re
 
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.pd_gains import suggest_gains, suggest_training_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import max_stable_time_step
 from tests.robots import BUNDLED, PENDULUM
+from tests.small_robots import facts, joint, link, shape
 
-# Published gains by joint, stiffness and damping: a1 of walk-these-ways, go2, h1 and g1 of
-# unitree_rl_gym and Isaac Lab.
-PUBLISHED = {
-    "a1/urdf/a1.urdf": {".*": ((20, 40), (0.5, 1))},
-    "go2/urdf/go2.urdf": {".*": ((20, 40), (0.5, 1))},
-    "go2_mjcf/go2.xml": {".*": ((20, 40), (0.5, 1))},
-    "h1/urdf/h1.urdf": {
-        ".*hip.*": ((150, 200), (2, 5)),
-        ".*knee.*": ((200, 300), (4, 6)),
-        ".*ankle.*": ((20, 40), (2, 4)),
-    },
-    "g1/g1_29dof.urdf": {
-        ".*hip.*": ((100, 100), (2, 2)),
-        ".*knee.*": ((150, 150), (4, 4)),
-        ".*(ankle|shoulder|elbow).*": ((40, 40), (1, 2)),
-    },
-}
-
-WHEELED = """
-<robot name="car">
-  <link name="body">
-    <inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <link name="wheel">
-    <inertial><mass value="1"/>
-      <inertia ixx="0.01" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-    <collision>
-      <origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.2" length="0.05"/></geometry>
-    </collision>
-  </link>
-  <joint name="axle" type="continuous">
-    <parent link="body"/><child link="wheel"/><axis xyz="0 1 0"/>
-    {limit}
-  </joint>
-</robot>
-"""
-
+CAR = (
+    link("body", mass=5)
+    + link(
+        "wheel",
+        shape('cylinder radius="0.2" length="0.05"', rpy="1.5708 0 0"),
+        inertia="0.01 0.02 0.01 0 0 0",
+    )
+    + joint("body", "wheel", kind="continuous", more="{limit}")
+)
 ARM = PENDULUM.replace('"revolute"', '"{kind}"').replace('effort="10"', 'effort="{effort}"')
 
-GANTRY = """
-<robot name="gantry">
-  <link name="frame"/>
-  <link name="slider">
-    <inertial><mass value="2"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <joint name="rail" type="prismatic">
-    <parent link="frame"/><child link="slider"/><axis xyz="1 0 0"/>
-    <limit lower="-1" upper="1" effort="10" velocity="10"/>
-  </joint>
-  <!-- and -->
-  <link name="arm">
-    <inertial><origin xyz="0.1 0 0"/><mass value="4"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-  </link>
-  <joint name="swing" type="revolute">
-    <parent link="frame"/><child link="arm"/><origin xyz="0 1 0"/><axis xyz="0 1 0"/>
-    <limit lower="-1" upper="1" effort="100" velocity="10"/>
-  </joint>
-</robot>
-"""
-
-
-@pytest.mark.parametrize("name", PUBLISHED)
-def test_gains_are_close_to_published_gains(name, robot_file):
-    found = suggest_gains(Facts(load_robot(robot_file(name))))
-    for pattern, ((softest, stiffest), (least, most)) in PUBLISHED[name].items():
-        joints = [joint for joint in found if re.fullmatch(pattern, joint)]
-        assert joints
-        for joint in joints:
-            gain = found[joint]
-            assert softest / 2 <= gain.stiffness <= 2 * stiffest, (joint, gain)
-            assert least / 2.1 <= gain.damping <= 2.1 * most, (joint, gain)
+SLIDER = (
+    link("frame", mass=None)
+    + link("slider", mass=2, inertia="0.01 0.01 0.01 0 0 0")
+    + joint("frame", "slider", axis="1 0 0", kind="prismatic", limits=(-1, 1))
+)
+ARM_BESIDE = link("arm", mass=4, center="0.1 0 0", inertia="0.01 0.01 0.01 0 0 0") + joint(
+    "frame", "arm", "0 1 0", limits=(-1, 1)
+)
 
 
 @pytest.mark.parametrize(
@@ -100,31 +45,31 @@ def test_gains_are_close_to_published_gains(name, robot_file):
     ],
 )
 def test_gains_of_bundled_robots(bundled, name, joints, stand, train):
-    facts = bundled(name)
-    for gains, expected in ((suggest_gains(facts), stand), (suggest_training_gains(facts), train)):
-        for joint in joints.split():
-            gain = gains[f"{joint}_joint"]
-            assert (gain.stiffness, gain.damping) == expected, joint
+    robot = bundled(name)
+    for gains, expected in ((suggest_gains(robot), stand), (suggest_training_gains(robot), train)):
+        for name in joints.split():
+            gain = gains[f"{name}_joint"]
+            assert (gain.stiffness, gain.damping) == expected, name
 
 
 @pytest.mark.parametrize("name", BUNDLED)
 def test_gains_of_every_robot(bundled, name):
-    facts = bundled(name)
-    sim, stand, train = make_sim_model(facts), suggest_gains(facts), suggest_training_gains(facts)
+    robot = bundled(name)
+    sim, stand, train = make_sim_model(robot), suggest_gains(robot), suggest_training_gains(robot)
     assert tuple(stand) == sim.actuated
-    for pair in facts.mirror.pairs:
-        left, right = (facts.bodies[index].joint for index in (pair.left, pair.right))
+    for pair in robot.mirror.pairs:
+        left, right = (robot.bodies[index].joint for index in (pair.left, pair.right))
         assert stand[left.name] == stand[right.name]
-    legs = {joint.name for joint in facts.leg_joints}
-    for joint in facts.actuated:
-        gain, softer = stand[joint.name], train[joint.name]
-        assert gain.armature >= joint.armature
+    legs = {each.name for each in robot.leg_joints}
+    for each in robot.actuated:
+        gain, softer = stand[each.name], train[each.name]
+        assert gain.armature >= each.armature
         assert gain.reason.startswith("kp ")
         assert "; kd " in gain.reason
         for value in (gain.stiffness, gain.damping):  # rounded
             digits = f"{value:.6e}".split("e")[0].rstrip("0").rstrip(".")
             assert digits in {"1", "1.5", "2", "2.5", "3", "4", "5", "6", "8"}, gain
-        assert softer.stiffness <= gain.stiffness if joint.name in legs else softer == gain
+        assert softer.stiffness <= gain.stiffness if each.name in legs else softer == gain
     for gains in (stand, train):
         assert max_stable_time_step(sim, gains).seconds > 1.1 * TIME_STEP
 
@@ -159,28 +104,40 @@ def test_gains_of_prismatic_joint_have_linear_units(robot, effort, why):
     assert not re.search(r"N m|rad|kg m2", gain.reason)
 
 
-def test_gains_of_slides_and_hinges_are_damped_separately(robot):
+def test_gains_of_slides_and_hinges_are_damped_separately():
     """Both have the same stiffness, for 2 kg and for 0.05 kg m2."""
-    found = suggest_gains(robot(GANTRY))
-    assert found["rail"].stiffness == found["swing"].stiffness == 200
-    alone = robot(GANTRY.split("<!-- and -->")[0] + "</robot>")
-    assert found["rail"].damping == suggest_gains(alone)["rail"].damping
-    assert found["rail"].damping > found["swing"].damping
+    found = suggest_gains(facts(SLIDER, ARM_BESIDE))
+    slide, hinge = found["slider_joint"], found["arm_joint"]
+    assert (slide.stiffness, hinge.stiffness) == (1000, 100)
+    assert slide.damping == suggest_gains(facts(SLIDER))["slider_joint"].damping > hinge.damping
 
 
 @pytest.mark.parametrize(
     ("limit", "damping"), [('<limit effort="5" velocity="10"/>', 0.5), ("", 0.02 / 0.05)]
 )
-def test_gains_of_wheel_control_velocity(limit, damping, robot):
-    gain = suggest_gains(robot(WHEELED.format(limit=limit)))["axle"]
+def test_gains_of_wheel_control_velocity(limit, damping):
+    gain = suggest_gains(facts(CAR.format(limit=limit)))["wheel_joint"]
     assert (gain.stiffness, gain.damping) == (0, pytest.approx(damping, rel=0.12))
 
 
-def test_gains_of_wheel_respect_time_step(robot):
-    text = WHEELED.format(limit='<limit effort="500" velocity="1"/>')
-    gain = suggest_gains(robot(text))["axle"]
+def test_gains_of_wheel_respect_time_step():
+    text = CAR.format(limit='<limit effort="500" velocity="1"/>')
+    gain = suggest_gains(facts(text))["wheel_joint"]
     assert gain.damping == pytest.approx(0.5 * 0.02 / TIME_STEP, rel=0.12)
 
 
 def test_gains_without_joints_are_empty(robot):
     assert suggest_gains(robot('<robot name="r"><link name="a"/></robot>')) == {}
+
+
+def test_mirrored_arms_have_equal_gains(bundled, tmp_path):
+    """The weaker motor of the right arm limits both."""
+    arms = ""
+    for name, y, effort in (("left", 0.2, 5), ("right", -0.2, 1)):
+        limit = f'<limit lower="-1" upper="1" effort="{effort}" velocity="9"/>'
+        arms += link(name, center="0.2 0 0", inertia="0.01 0.01 0.01 0 0 0")
+        arms += joint("base", name, f"0 {y} 0.1", more=limit)
+    robot = bundled("quadruped.urdf", ("</robot>", arms + "</robot>"), tmp_path=tmp_path)
+    gains = suggest_gains(robot)
+    assert gains["left_joint"] == gains["right_joint"]
+    assert gains["right_joint"].stiffness == pytest.approx(1 / 0.5)

@@ -6,9 +6,8 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.rollout import Rollout
 from terrainkit_robots.simulation.sim_model import make_sim_model
-
-INERTIAL = """<inertial><mass value="1"/>
-  <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>"""
+from tests import small_robots
+from tests.small_robots import ball, joint, link
 
 
 @pytest.fixture
@@ -21,15 +20,11 @@ def sim(facts):
     return make_sim_model(facts)
 
 
-def chain(count, shape=""):
-    """Return the URDF of a chain of hinges, all at the same point."""
-    links = [f'<link name="l{k}">{INERTIAL}{shape}</link>' for k in range(count + 1)]
-    joints = [
-        f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/>'
-        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-        for k in range(count)
-    ]
-    return f'<robot name="r">{"".join(links + joints)}</robot>'
+def chain(count, *shapes):
+    """Return the facts of a chain of hinges, all at the same point."""
+    links = [link(f"l{k}", *shapes) for k in range(count + 1)]
+    joints = [joint(f"l{k}", f"l{k + 1}", limits=(-1, 1)) for k in range(count)]
+    return small_robots.facts(*links, *joints)
 
 
 def test_reset_places_robot_above_floor(sim):
@@ -81,15 +76,14 @@ def test_rollout_detects_divergence(sim):
         assert rollout.diverged
 
 
-def test_rollout_rejects_many_joints(robot):
-    Rollout(make_sim_model(robot(chain(100))))
+def test_rollout_rejects_many_joints():
+    Rollout(make_sim_model(chain(100)))
     with pytest.raises(CannotCheckError, match="degrees of freedom: got 101"):
-        Rollout(make_sim_model(robot(chain(101))))
+        Rollout(make_sim_model(chain(101)))
 
 
-def test_rollout_rejects_many_contacts(robot):
-    ball = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
-    sim = make_sim_model(robot(chain(40, ball)))
+def test_rollout_rejects_many_contacts():
+    sim = make_sim_model(chain(40, ball(0.1)))
     with quiet_mujoco(), pytest.raises(CannotCheckError, match="contacts: got"):
         Rollout(sim).reset(sim.standing_qpos)
 

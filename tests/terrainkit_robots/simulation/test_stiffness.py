@@ -9,6 +9,7 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.stiffness import _max_gravity_load, leg_gain_target
+from tests.small_robots import facts, joint, link
 
 LEGS = ("FL", "FR", "RL", "RR")
 
@@ -45,31 +46,20 @@ def test_stiffness_of_slides_limits_sag(sliding):
     assert not re.search(r"N m|rad|kg m2", gain.reason)
 
 
-INERTIAL = """<inertial><origin xyz="{com} 0 0"/><mass value="{mass}"/>
-<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>"""
-JOINT = """<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
-<origin xyz="{x} 0 0"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="50" velocity="5"/>
-</joint>"""
-
-
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
-def test_gravity_load_is_that_of_all_bodies_below_a_joint(robot, kind):
+def test_gravity_load_is_that_of_all_bodies_below_a_joint(kind):
     """An arm of 2 kg and 1 kg beside one of 4 kg, which does not count."""
     links = {"base": (0, 9), "other": (0.1, 4), "upper": (0.3, 2), "fore": (0.2, 1)}
-    text = "".join(
-        f'<link name="{name}">{INERTIAL.format(com=com, mass=mass)}</link>'
+    inertia = "0.01 0.01 0.01 0 0 0"
+    parts = [
+        link(name, mass=mass, center=f"{com} 0 0", inertia=inertia)
         for name, (com, mass) in links.items()
-    )
-    for name, parent, child, x in (
-        ("shoulder", "base", "upper", 0.1),
-        ("elbow", "upper", "fore", 0.5),
-        ("side", "base", "other", -0.1),
-    ):
-        text += JOINT.format(name=name, kind=kind, parent=parent, child=child, x=x)
-    sim = make_sim_model(robot(f'<robot name="r">{text}</robot>'))
-    loads = {name: _max_gravity_load(sim, name) / 9.81 for name in ("shoulder", "elbow", "side")}
-    turning = {"shoulder": 2 * 0.3 + 1 * (0.5 + 0.2), "elbow": 0.2, "side": 0.4}
-    expected = turning if kind == "revolute" else {"shoulder": 3, "elbow": 1, "side": 4}
+    ]
+    for parent, child, x in (("base", "upper", 0.1), ("upper", "fore", 0.5), ("base", "other", -1)):
+        parts.append(joint(parent, child, f"{x} 0 0", kind=kind, limits=(-1, 1)))
+    sim = make_sim_model(facts(*parts))
+    loads = [_max_gravity_load(sim, f"{name}_joint") / 9.81 for name in ("upper", "fore", "other")]
+    expected = [2 * 0.3 + 1 * (0.5 + 0.2), 0.2, 0.4] if kind == "revolute" else [3, 1, 4]
     assert loads == pytest.approx(expected, rel=1e-3)
 
 

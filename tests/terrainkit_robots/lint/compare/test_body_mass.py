@@ -10,6 +10,7 @@ from terrainkit_robots.lint.compare.body_mass import (
 )
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
+from tests.small_robots import facts, joint, link, mjcf
 
 
 def gaps(one, other):
@@ -38,16 +39,10 @@ def test_difference_of_one_body_is_measured(robot_of):
     assert found["FL_calf"].mass == pytest.approx(0.0)
 
 
-def test_trunks_are_compared_in_the_same_link(robot_of):
-    moments = 'ixx="1" iyy="2" izz="2.5" ixy="0" ixz="0" iyz="0"'
-    inertial = f'<inertial><mass value="2"/><inertia {moments}/></inertial>'
-    plain = f'<robot name="r"><link name="base">{inertial}</link></robot>'
-    footed = plain.replace(
-        '<link name="base">',
-        '<link name="footprint"/><joint name="up" type="fixed"><parent link="footprint"/>'
-        '<child link="base"/><origin xyz="0 0 0.3" rpy="0 0 1"/></joint><link name="base">',
-    )
-    (gap,) = gaps(robot_of(plain), robot_of(footed)).values()
+def test_trunks_are_compared_in_the_same_link():
+    base, footprint = link("base", inertia="1 2 2.5 0 0 0"), link("footprint", mass=None)
+    up = joint("footprint", "base", "0 0 0.3", rpy="0 0 1", kind="fixed")
+    (gap,) = gaps(facts(base), facts(footprint, up, base)).values()
     assert gap.center < 1e-12
     assert gap.inertia < 1e-12
 
@@ -60,14 +55,10 @@ def test_relative_difference():
 
 def test_has_valid_inertial_needs_explicit_values(robot_of):
     assert all(has_valid_inertial(body) for body in robot_of("quadruped.urdf").bodies)
-    bare = robot_of(
-        '<robot name="r"><link name="a"><inertial><mass value="1"/></inertial></link></robot>'
-    )
+    bare = facts('<link name="a"><inertial><mass value="1"/></inertial></link>')
     assert not has_valid_inertial(bare.bodies[0])
-    meshed = robot_of(
-        '<mujoco><asset><mesh name="m" file="m.stl"/></asset><worldbody>'
-        '<body name="a"><geom type="mesh" mesh="m"/></body></worldbody></mujoco>'
-    )
+    mesh = '<asset><mesh name="m" file="m.stl"/></asset>'
+    meshed = mjcf('<body name="a"><geom type="mesh" mesh="m"/></body>', mesh)
     assert not has_valid_inertial(meshed.bodies[0])
 
 

@@ -7,6 +7,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.runner import lint
+from tests.small_robots import facts, mjcf, tree_text
 
 XRF = [rule for rule in rules() if "against" in rule.needs]
 
@@ -19,27 +20,17 @@ def test_bundled_robots_agree(robot_of, name, suffixes):
     assert (report.findings, report.skipped) == ((), ())
 
 
-def test_permutation_in_message_is_correct(robot_of):
+def test_permutation_in_message_is_correct():
     """The list in the message reorders values from joint order to actuator order."""
     names = ["c", "a", "d", "b"]
-    joints = "".join(
-        f'<body name="{name}"><joint name="{name}" axis="0 0 1" range="-1 1"/><geom size="0.1"/>'
-        "</body>"
-        for name in "abcd"
-    )
+    joint = '<body name="{0}"><joint name="{0}" range="-1 1"/><geom size="0.1"/></body>'
+    bodies = "".join(joint.format(name) for name in "abcd")
     motors = "".join(f'<motor name="{name}" joint="{name}"/>' for name in names)
-    text = (
-        f'<mujoco><worldbody><body name="base"><geom size="0.1"/>{joints}</body></worldbody>'
-        f"<actuator>{motors}</actuator></mujoco>"
+    one = mjcf(
+        f'<body name="base"><geom size="0.1"/>{bodies}</body>', f"<actuator>{motors}</actuator>"
     )
-    urdf = '<robot name="r"><link name="base"/>{}</robot>'.format(
-        "".join(
-            f'<link name="{name}"/><joint name="{name}" type="revolute"><parent link="base"/>'
-            f'<child link="{name}"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-            for name in "abcd"
-        )
-    )
-    report = lint(Facts(robot_of(text).model, against=robot_of(urdf)), XRF)
+    other = facts(tree_text(*(f"{name}: base > {name}" for name in "abcd")))
+    report = lint(Facts(one.model, against=other), XRF)
     (finding,) = [each for each in report.findings if each.code == "XRF005"]
     order = re.search(r"ctrl = joints\[\[([\d, ]+)\]\]", finding.message)[1]
     assert ["abcd"[int(place)] for place in order.split(",")] == names

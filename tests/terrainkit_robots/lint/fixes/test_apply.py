@@ -235,13 +235,8 @@ class TestNewFiles:
         assert path.read_bytes() == b"mesh"
         assert b'mesh="new"' in robot.read_bytes()
         again = fixed(robot, with_mesh(path))
-        assert (again.after, again.before, again.new, again.fixed, again.unfixed) == (
-            {},
-            {},
-            {},
-            (),
-            (),
-        )
+        assert again.after == again.before == again.new == {}
+        assert again.fixed == again.unfixed == ()
         assert unified_diff(again) == ""
 
     @pytest.mark.parametrize(

@@ -7,21 +7,8 @@ from terrainkit_robots.analysis.inertia.physical import triangle_ratio
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from tests.small_robots import ball, box, joint, link, shape
 
-ARM = """<robot name="arm">
-  <link name="base"/>
-  <joint name="turn" type="revolute">
-    <parent link="base"/><child link="tip"/>
-    <axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="10" velocity="5"/>
-  </joint>
-  <link name="tip">
-    <inertial><origin xyz="0 0 0.2"/><mass value="{mass}"/>
-      <inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}"/></inertial>
-    <collision><origin xyz="0 0 0.2"/><geometry><box size="0.06 0.08 0.4"/></geometry></collision>
-    {visual}
-  </link>
-  {more}
-</robot>"""
 MOMENTS = {"ixx": 0.014, "iyy": 0.0136, "izz": 0.0008}
 
 
@@ -30,8 +17,14 @@ def arm(tmp_path):
     """Return a function that writes an arm of 1 kg with changed values."""
 
     def write(**changed):
+        values = {"mass": 1, "more": "", "visual": ""} | MOMENTS | changed
+        six = "{ixx} {iyy} {izz} 0 0 0".format(**values)
+        shapes = box("0.06 0.08 0.4", "0 0 0.2"), values["visual"]
+        tip = link("tip", *shapes, mass=values["mass"], center="0 0 0.2", inertia=six)
+        turn = joint("base", "tip", axis="0 0 1", limits=(-1, 1))
         path = tmp_path / "arm.urdf"
-        path.write_text(ARM.format(**{"mass": 1, "more": "", "visual": ""} | MOMENTS | changed))
+        arm = link("base", mass=None) + turn + tip + values["more"]
+        path.write_text(f'<robot name="arm">{arm}</robot>')
         return path
 
     return write
@@ -51,8 +44,8 @@ def check(path):
 
 def test_inr_reads_no_visual_mesh(arm, monkeypatch):
     monkeypatch.setattr(Meshes, "vertices", lambda *_: pytest.fail("read"))
-    path = arm(visual='<visual><geometry><mesh filename="shell.stl"/></geometry></visual>')
-    assert check(path) == []
+    visual = shape('mesh filename="shell.stl"', kind="visual")
+    assert check(arm(visual=visual)) == []
 
 
 def test_triangle_inequality_tolerates_rounding_to_four_digits(arm):
@@ -83,11 +76,8 @@ def test_inertia_rules_agree_with_mujoco(arm):
 
 
 def test_inferred_mass_agrees_with_mujoco(arm):
-    hood = """<joint name="mount" type="fixed"><parent link="tip"/><child link="hood"/></joint>
-      <link name="hood">
-        <collision><geometry><cylinder radius="0.03" length="0.1"/></geometry></collision>
-        <collision><geometry><sphere radius="0.02"/></geometry></collision>
-      </link>"""
+    cylinder = shape('cylinder radius="0.03" length="0.1"')
+    hood = link("hood", cylinder, ball(0.02), mass=None) + joint("tip", "hood", kind="fixed")
     path = arm(more=hood)
     (violation,) = get_rule("INR011").findings(Facts(load_robot(path)))
     compiled = mujoco.MjModel.from_xml_path(str(path))

@@ -4,16 +4,14 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule
-
-JOINT = """<joint name="{name}" type="{kind}">
-    <parent link="base"/><child link="{name}_link"/><axis xyz="0 0 1"/>
-    <limit {limit} effort="1" velocity="1"/>{more}
-  </joint><link name="{name}_link"><inertial><mass value="1"/>
-    <inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>"""
+from tests import small_robots
+from tests.small_robots import link
 
 
 def joint(name, more="", *, kind="revolute", limit='lower="-1" upper="1"'):
-    return JOINT.format(name=name, more=more, kind=kind, limit=limit)
+    more += f'<limit {limit} effort="1" velocity="1"/>'
+    moved = link(f"{name}_link") + small_robots.joint("base", f"{name}_link", kind=kind, more=more)
+    return moved.replace(f"{name}_link_joint", name)
 
 
 @pytest.fixture

@@ -1,39 +1,28 @@
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import get_rule
 from terrainkit_robots.lint.rules.tre import connections
 from terrainkit_robots.lint.runner import MAX_FINDINGS, lint
+from tests.small_robots import facts, link
+from tests.small_robots import joint as movable
 
-MANY = range(6000)
+MANY = range(MAX_FINDINGS + 2)
 
 
-@pytest.fixture
-def report(tmp_path):
-    """Return a function that runs a rule on a robot with these elements."""
-
-    def check(code, *parts):
-        path = tmp_path / "robot.urdf"
-        path.write_text(f'<robot name="r">{"".join(parts)}</robot>')
-        return lint(Facts(load_robot(path)), [get_rule(code)])
-
-    return check
+def report(code, *parts):
+    return lint(facts(*parts), [get_rule(code)])
 
 
 def joint(name, parent, child):
-    return (
-        f'<joint name="{name}" type="fixed"><parent link="{parent}"/><child link="{child}"/>'
-        "</joint>"
-    )
+    return movable(parent, child, kind="fixed").replace(f"{child}_joint", name)
 
 
 def links(*names):
-    return "".join(f'<link name="{name}"/>' for name in names)
+    return "".join(link(name, mass=None) for name in names)
 
 
 @pytest.mark.parametrize(("most", "is_compared"), [(3, True), (2, False)])
-def test_unknown_link_suggests_nearest_name_of_small_robots(report, monkeypatch, most, is_compared):
+def test_unknown_link_suggests_nearest_name_of_small_robots(monkeypatch, most, is_compared):
     monkeypatch.setattr(connections, "_MAX_COMPARED", most)
     parts = links("base", "FL_foot", "FL_calf", "FR_calf"), joint("j", "base", "fl_foot")
     (finding,) = report("TRE002", *parts).findings
@@ -41,7 +30,7 @@ def test_unknown_link_suggests_nearest_name_of_small_robots(report, monkeypatch,
     assert finding.hint.startswith("Did you mean FL_foot?") == is_compared
 
 
-def test_long_cycle_is_cut(report):
+def test_long_cycle_is_cut():
     names = [f"l{k}" for k in range(12)]
     around = [joint(f"j{k}", names[k], names[k - 11]) for k in range(12)]
     (finding,) = report("TRE004", links("a", *names), *around).findings
@@ -70,13 +59,10 @@ def test_long_cycle_is_cut(report):
         ),
         ("TRE005", [links(*(f"l{k}" for k in MANY))]),
         ("NAM002", [links(*(f"l{sep}{k}" for k in MANY for sep in " -"))]),
-        (
-            "XML006",
-            [f'<link name="l{k}"><inertial><mass value="x"/></inertial></link>' for k in MANY],
-        ),
+        ("XML006", [link(f"l{k}", mass="x") for k in MANY]),
     ],
 )
-def test_number_of_findings_is_limited(report, code, parts):
+def test_number_of_findings_is_limited(code, parts):
     checked = report(code, *parts)
     assert len(checked.findings) == MAX_FINDINGS
     assert [each.code for each in checked.skipped] == [code]

@@ -10,6 +10,7 @@ from terrainkit_robots.onboarding.derive_spec.actuator_limits import (
 )
 from terrainkit_robots.spec.column import collect_provenance
 from tests.robots import ARM
+from tests.small_robots import joint, link
 
 HIP = 'effort="23.7" velocity="30.1"'
 FIRST = '<limit lower="-1.0472" upper="1.0472" effort="23.7" velocity="30.1"/>'
@@ -104,12 +105,8 @@ def test_derive_action_scale_of_short_range(with_first_limit, gains):
 
 
 def test_joints_off_the_legs_hold_the_default_pose(bundled, gains, tmp_path):
-    arm = """<link name="arm"><inertial><mass value="0.5"/>
-      <inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
-    <joint name="arm_joint" type="revolute"><parent link="base"/><child link="arm"/>
-      <origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>
-      <limit lower="-1" upper="1" effort="20" velocity="20"/></joint></robot>"""
-    facts = bundled("quadruped.urdf", ("</robot>", arm), tmp_path=tmp_path)
+    arm = link("arm", inertia="0.1 0.1 0.1 0 0 0") + joint("base", "arm", limits=(-1, 1))
+    facts = bundled("quadruped.urdf", ("</robot>", arm + "</robot>"), tmp_path=tmp_path)
     column = action_scales(facts, gains(facts, stiffness=40.0))
     scale, origin = column.pop("arm_joint")
     assert scale == 0.0

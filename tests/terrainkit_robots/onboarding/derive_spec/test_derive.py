@@ -7,20 +7,17 @@ from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec, unit_of
+from tests.small_robots import facts, joint, link
 
-ARM = """
-<robot name="arm">
-  <link name="base"><inertial><mass value="1"/>
-    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="lower"/><link name="upper"/><link name="follower"/>
-  <joint name="turn" type="revolute"><parent link="base"/><child link="lower"/>
-    <axis xyz="0 0 1"/><limit lower="0.5" upper="2.5" effort="10" velocity="3"/></joint>
-  <joint name="spin" type="continuous"><parent link="lower"/><child link="upper"/>
-    <axis xyz="0 1 0"/></joint>
-  <joint name="mimic" type="revolute"><parent link="upper"/><child link="follower"/>
-    <axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/>
-    <mimic joint="turn"/></joint>
-</robot>"""
+ARM = "".join(
+    (
+        link("base"),
+        *(link(name, mass=None) for name in ("lower", "upper", "follower")),
+        joint("base", "lower", axis="0 0 1", limits=(0.5, 2.5)),
+        joint("lower", "upper", kind="continuous"),
+        joint("upper", "follower", limits=(-1, 1), more='<mimic joint="lower_joint"/>'),
+    )
+)
 
 
 def derived(facts, gains, **changed):
@@ -28,8 +25,8 @@ def derived(facts, gains, **changed):
 
 
 def test_derive_spec_of_quadruped(bundled, gains):
-    facts = bundled("quadruped.urdf")
-    spec = derived(facts, gains)
+    quadruped = bundled("quadruped.urdf")
+    spec = derived(quadruped, gains)
     legs = ("FL", "FR", "RL", "RR")
     hip, thigh, calf = (f".*_{part}_joint" for part in ("hip", "thigh", "calf"))
     expected = {
@@ -39,8 +36,8 @@ def test_derive_spec_of_quadruped(bundled, gains):
         "default_pose": {hip: 0.0, thigh: 0.75, calf: -1.5},
         "effort": {hip: 23.7, thigh: 23.7, calf: 45.43},
         "velocity": {hip: 30.1, thigh: 30.1, calf: 15.7},
-        "base_height_target": round(facts.stance.height, 3),
-        "spawn_height": round(facts.stance.height + 0.01, 3),
+        "base_height_target": round(quadruped.stance.height, 3),
+        "spawn_height": round(quadruped.stance.height + 0.01, 3),
         "foot_radius": pytest.approx(0.022),
         "stance_width": pytest.approx(0.284, abs=1e-3),
         "urdf": "robot.urdf",
@@ -49,7 +46,7 @@ def test_derive_spec_of_quadruped(bundled, gains):
     }
     assert {name: getattr(spec, name) for name in expected} == expected
     assert spec.soft_limits[hip] == (-0.942, 0.942)
-    assert spec.per_joint("default_pose") == dict(facts.stance.positions)
+    assert spec.per_joint("default_pose") == dict(quadruped.stance.positions)
     assert set(spec.mirror) == set(spec.joint_order)
     assert all(spec.mirror[twin.joint].joint == name for name, twin in spec.mirror.items())
     about = {name: spec.provenance[name].origin for name in ("effort", "default_pose", "mirror")}
@@ -66,14 +63,14 @@ def test_derive_spec_of_biped(bundled, gains):
     assert spec.penalized_contacts == (*spec.thighs, *spec.shanks)
 
 
-def test_derive_spec_without_legs(robot, gains):
-    spec = derived(robot(ARM), gains)
-    assert spec.joint_order == ("turn", "spin")
+def test_derive_spec_without_legs(gains):
+    spec = derived(facts(ARM), gains)
+    assert spec.joint_order == ("lower_joint", "upper_joint")
     assert spec.feet == spec.shanks == spec.thighs == spec.penalized_contacts == ()
     assert spec.base_height_target is spec.spawn_height is spec.leg_length is None
     assert spec.stance_width is spec.foot_radius is None
-    assert spec.default_pose == {"turn": 0.5, "spin": 0.0}
-    assert spec.soft_limits == {"turn": (0.5, 2.4)}  # the default pose is at the limit
+    assert spec.default_pose == {"lower_joint": 0.5, "upper_joint": 0.0}
+    assert spec.soft_limits == {"lower_joint": (0.5, 2.4)}  # the default pose is at the limit
     assert spec.reset_range == (1.0, 1.5)
     assert spec.provenance["default_pose"].origin == "suggested"
     assert RobotSpec.from_toml(spec.to_toml()) == spec
@@ -103,9 +100,9 @@ def test_derive_spec_uses_keyframe(robot, gains):
 
 
 def test_derive_spec_reset_range_is_within_limits(bundled, gains):
-    facts = bundled("quadruped.urdf")
-    spec = derived(facts, gains)
-    limits = {joint.name: joint.range for joint in facts.actuated}
+    quadruped = bundled("quadruped.urdf")
+    spec = derived(quadruped, gains)
+    limits = {each.name: each.range for each in quadruped.actuated}
     assert spec.reset_range != (0.5, 1.5)
     for name, position in spec.per_joint("default_pose").items():
         for factor in spec.reset_range:
@@ -139,20 +136,20 @@ def test_derive_spec_resets_two_legs_near_the_default_pose(robot, gains, feet, i
     assert ("0.25 rad" in spec.provenance["reset_range"].reason) == is_biped
 
 
-def test_derive_spec_rejects_missing_gains_and_bodies(robot, gains):
-    facts = robot(ARM)
-    with pytest.raises(ConfigError, match="gains of spin are missing; expected all actuated"):
-        derive_spec(facts, gains={"turn": gains(facts)["turn"]}, floating=False)
-    nothing = robot('<robot name="r"/>')
+def test_derive_spec_rejects_missing_gains_and_bodies(gains):
+    arm = facts(ARM)
+    known = {"lower_joint": gains(arm)["lower_joint"]}
+    with pytest.raises(ConfigError, match="gains of upper_joint are missing; expected all actuat"):
+        derive_spec(arm, gains=known, floating=False)
     with pytest.raises(ConfigError, match="r has no bodies"):
-        derive_spec(nothing, gains={}, floating=False)
+        derive_spec(facts('<robot name="r"/>'), gains={}, floating=False)
 
 
 @pytest.mark.parametrize("value", ["1e29", "1e-300", "-1"])
 @pytest.mark.parametrize("old", ['effort="23.7"', 'radius="0.022"', 'lower="-2.7227"'])
 def test_derive_spec_with_extreme_numbers(bundled, gains, tmp_path, old, value):
     new = f'{old.split("=")[0]}="{value}"'
-    facts = bundled("quadruped.urdf", (old, new), tmp_path=tmp_path)
-    spec = derived(facts, gains)
+    quadruped = bundled("quadruped.urdf", (old, new), tmp_path=tmp_path)
+    spec = derived(quadruped, gains)
     assert RobotSpec.from_toml(spec.to_toml()) == spec
     assert all(math.isfinite(v) for table in JOINT_TABLES for v in getattr(spec, table).values())

@@ -1,8 +1,6 @@
 import pytest
 
-from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
-from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.derive_spec.named_bodies import (
     feet,
     penalized_contacts,
@@ -10,22 +8,19 @@ from terrainkit_robots.onboarding.derive_spec.named_bodies import (
     termination_contacts,
     thighs,
 )
+from tests.robots import QUADRUPED
+from tests.small_robots import ball, facts, joint, link
 
-BODY = """<link name="{name}"><inertial><mass value="1"/>
-<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>{shape}</link>
-<joint name="{name}_joint" type="continuous"><parent link="{parent}"/><child link="{name}"/>
-<origin xyz="{xyz}"/><axis xyz="0 0 1"/></joint>"""
-SHAPE = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+SHAPE = ball(0.1)
 
 
 def biped(*bodies, shape=SHAPE):
     """Return the bundled biped with more bodies: name, parent and position."""
-    file = bundled.urdf_path("biped")
     more = "".join(
-        BODY.format(name=name, parent=parent, xyz=xyz, shape=shape) for name, parent, xyz in bodies
+        link(name, shape) + joint(parent, name, xyz, kind="continuous")
+        for name, parent, xyz in bodies
     )
-    text = file.read_text().replace("</robot>", f"{more}</robot>")
-    return Facts(load_robot(file, contents={file: text.encode()}))
+    return facts(bundled.urdf_path("biped").read_text().replace("</robot>", f"{more}</robot>"))
 
 
 ARMS = (("left_arm", "upper", "0 0.2 0"), ("right_arm", "upper", "0 -0.2 0"))
@@ -52,8 +47,7 @@ def test_bodies_without_collision_shapes_do_not_end_episodes():
 
 
 def test_bodies_of_the_quadruped_are_named():
-    file = bundled.urdf_path("quadruped")
-    robot = Facts(load_robot(file))
+    robot = facts(QUADRUPED.read_text())
     legs = ("FL", "FR", "RL", "RR")
     assert feet(robot) == tuple(f"{leg}_foot" for leg in legs)
     assert thighs(robot) == tuple(f"{leg}_thigh" for leg in legs)

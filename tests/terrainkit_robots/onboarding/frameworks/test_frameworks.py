@@ -56,10 +56,7 @@ def test_framework_names_are_sorted(robots):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (
-            {"feet": ()},
-            "but .* requires a legged robot; other frameworks: genesis, isaaclab, mjlab$",
-        ),
+        ({"feet": ()}, "requires a legged robot; other frameworks: genesis, isaaclab, mjlab$"),
         ({"joint_order": ()}, "has no legs"),
         ({"floating": False}, "the base of quad 4 is fixed"),
         ({"spawn_height": None}, "has no spawn_height or base_height_target"),

@@ -45,17 +45,13 @@ def test_keys_for_random_bodies():
     rng = random.Random(0)
     for _ in range(300):
         words = ["arm", "hip", "l", "r", "link", "1", "2", "12"]
-        bodies = list(
-            dict.fromkeys("_".join(rng.choices(words, k=rng.randint(1, 3))) for _ in range(9))
-        )
+        names = ("_".join(rng.choices(words, k=rng.randint(1, 3))) for _ in range(9))
+        bodies = list(dict.fromkeys(names))
         targets = rng.sample(bodies, rng.randint(1, len(bodies)))
         result = keys_for(targets, bodies)
         matches = [name for key in result.keys for name in bodies if key in name]
         assert set(targets) <= set(matches)
-        if not result.clashes:
-            assert sorted(matches) == sorted(targets)
-        else:
-            assert sorted(matches) != sorted(targets)
+        assert (sorted(matches) == sorted(targets)) == (not result.clashes)
 
 
 @pytest.mark.parametrize(
