@@ -1,6 +1,6 @@
-"""Onboard the robots that ship inside Python packages, and write docs/field_robots.md.
+"""Onboard robots of Python packages and public repositories, and write docs/field_robots.md.
 
-python docs/field_robots.py FOLDER...    each folder holds unpacked wheels
+python docs/field_robots.py FOLDER...    each folder holds unpacked wheels and checkouts
 
 The robots are listed in field_robots.toml. None of their files is kept.
 """
@@ -33,8 +33,8 @@ ABOUT = """\
 
 <!-- Written by docs/field_robots.py: change that or docs/field_robots.toml, not this file. -->
 
-Results of `terrainkit onboard FILE -o OUT --unsafe-fixes --no-pictures` for unmodified robots that
-ship inside Python packages. Of {count} files {summary}
+Results of `terrainkit onboard FILE -o OUT --unsafe-fixes --no-pictures` for unmodified robots of
+Python packages and of public repositories. Of {count} files {summary}
 
 - **onboarded**: the folder was written; `robot.urdf` and `robot.xml` load in MuJoCo and match the
   source (link positions within 0.1 mm at 100 poses, mass within 0.1 %).
@@ -50,6 +50,12 @@ To reproduce the table:
 ```sh
 pip download --no-deps -d wheels {pinned}
 for wheel in wheels/*.whl; do unzip -q -o "$wheel" -d field; done
+while read -r name commit; do
+  git clone -q "https://github.com/$name" "field/$name"
+  git -C "field/$name" checkout -q "$commit"
+done <<'END'
+{commits}
+END
 python docs/field_robots.py field
 ```
 """
@@ -78,19 +84,22 @@ class Outcome:
     errors: str = ""
 
 
-def robots() -> list[Robot]:
-    """Return the robots of field_robots.toml in the same order."""
+def robots() -> tuple[list[Robot], dict[str, str]]:
+    """Return the robots of field_robots.toml in the same order, and the commits by repository."""
     with (DOCS / "field_robots.toml").open("rb") as file:
         packages = tomllib.load(file)
-    return [
-        Robot(package=package, under=table.get("under", ""), **row)
+    listed = [
+        Robot(package=package, under=table.get("under", package if "/" in package else ""), **row)
         for package, table in packages.items()
         for row in table["robots"]
     ]
+    return listed, {name: table["commit"] for name, table in packages.items() if "commit" in table}
 
 
-def version(package: str, folders: Sequence[Path]) -> str:
-    """Return the version of a package in the folders."""
+def version(package: str, folders: Sequence[Path], commit: str | None) -> str:
+    """Return the commit of a repository, or the version of a package in the folders."""
+    if commit is not None:
+        return commit
     name = package.replace("-", "_")
     for folder in folders:
         for found in folder.glob(f"{name}-*.dist-info"):
@@ -166,9 +175,11 @@ def page(found: Sequence[tuple[Robot, Outcome]], versions: dict[str, str]) -> It
     legged = [outcome for _, outcome in found if outcome.stands]
     stood = sum(outcome.stands.startswith("yes") for outcome in legged)
     told = ", ".join(f"{count} were {result}" for result, count in results.most_common())
+    repositories = [f"{name} {commit}" for name, commit in versions.items() if "/" in name]
     yield ABOUT.format(
         count=len(found),
-        pinned=" ".join(f"{name}=={number}" for name, number in versions.items()),
+        pinned=" ".join(f"{name}=={each}" for name, each in versions.items() if "/" not in name),
+        commits="\n".join(repositories),
         summary=f"{told}.\n{stood} of {len(legged)} robots with legs and a floating base stand.",
     )
     for package, number in versions.items():
@@ -189,8 +200,9 @@ def main() -> int:
         sys.stdout.write(json.dumps(asdict(onboard_robot(options.folders[0], options.into))))
         return 0
     folders = options.folders
-    listed = robots()
-    versions = {robot.package: version(robot.package, folders) for robot in listed}
+    listed, commits = robots()
+    packages = {robot.package: commits.get(robot.package) for robot in listed}
+    versions = {name: version(name, folders, commit) for name, commit in packages.items()}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         outcomes = pool.map(partial(onboard_in_subprocess, folders=folders), listed)
         found = list(zip(listed, outcomes, strict=True))
