@@ -7,9 +7,8 @@ removed and listed in `changes`.
 
 import re
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,7 +31,6 @@ from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.base_link import with_world_base
 from terrainkit_robots.export.valid_inertia import with_valid_inertia
 from terrainkit_robots.text import free_name, names
-from terrainkit_robots.transforms import quat_to_matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -158,9 +156,12 @@ def _links(facts: "Facts", changes: list[str]) -> list[Link]:
     world_joints = [j.name for j in facts.model.joints if j.moves and j.parent not in facts.body_of]
     if world_joints:
         changes.append(f"removed {names(world_joints)}: joints between the world and the robot")
-    unknown = [link for link in links if has_unknown_inertia(link.inertial)]
-    known = _with_mesh_inertia(facts, links) if unknown else links
-    return with_valid_inertia(facts.bodies, known, changes)
+    unknown = [link.name for link in links if has_unknown_inertia(link.inertial)]
+    if unknown:
+        raise RobotFileError(
+            f"{facts.model.file}: mass of {names(unknown)}: MuJoCo cannot compute it from its mesh"
+        )
+    return with_valid_inertia(facts.bodies, links, changes)
 
 
 def has_unknown_inertia(inertial: Inertial | None) -> bool:
@@ -169,65 +170,6 @@ def has_unknown_inertia(inertial: Inertial | None) -> bool:
         (inertial.mass is not None and np.isnan(inertial.mass))
         or (inertial.inertia is not None and bool(np.isnan(inertial.inertia).any()))
     )
-
-
-_MAX_BODIES = 600
-"""Maximum number of bodies for which MuJoCo computes masses."""
-
-
-def _with_mesh_inertia(facts: "Facts", links: Sequence[Link]) -> list[Link]:
-    """Return links with the inertia that MuJoCo computes from meshes."""
-    import mujoco
-
-    model = _compile(facts)
-    result = []
-    for link in links:
-        if has_unknown_inertia(link.inertial):
-            assert link.inertial is not None
-            if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link.name) < 0:
-                raise RobotFileError(
-                    f"{facts.model.file}: a body with its mass from a mesh has no name"
-                )
-            body = model.body(link.name)
-            origin = np.eye(4)
-            origin[:3, 3] = body.ipos
-            origin[:3, :3] = quat_to_matrix(body.iquat)
-            inertial = replace(
-                link.inertial,
-                mass=float(body.mass[0]),
-                origin=origin,
-                inertia=np.diag(body.inertia),
-            )
-            link = replace(link, inertial=inertial)
-        result.append(link)
-    return result
-
-
-def _compile(facts: "Facts") -> Any:
-    """Compile the file with MuJoCo, without textures, whose size is not limited.
-
-    Raises:
-        RobotFileError: If MuJoCo rejects the file.
-    """
-    import mujoco
-
-    from terrainkit_robots.quiet_mujoco import quiet_mujoco
-
-    file = facts.model.file
-    prefix = f"{file}: cannot compute masses from meshes"
-    if len(facts.model.links) > _MAX_BODIES:
-        raise RobotFileError(f"{prefix}: more than {_MAX_BODIES} bodies")
-    try:
-        with quiet_mujoco():
-            spec = mujoco.MjSpec.from_file(str(file))
-            for material in spec.materials:
-                material.textures = [""] * len(material.textures)
-            for texture in list(spec.textures):
-                spec.delete(texture)
-            return spec.compile()
-    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
-        reason = " ".join(str(error).split())
-        raise RobotFileError(f"{prefix}: MuJoCo rejects the file: {reason}") from None
 
 
 def _joints(facts: "Facts", changes: list[str]) -> list[tuple[Joint, str]]:

@@ -43,9 +43,9 @@ SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 Certainty = Literal["proven", "likely"]
 Measured = Mapping[str, float | int | str]
 
-Need = Literal["legs", "simulation", "against", "spec"]
-"""Input that a rule requires: detected legs, permission to simulate, a second description of the
-robot, or its robot.toml."""
+Need = Literal["mjcf", "legs", "simulation", "against", "spec"]
+"""Input that a rule requires: an MJCF file, detected legs, permission to simulate, a second
+description of the robot, or its robot.toml."""
 
 FAMILIES = {
     "XML": "XML syntax and schema",

@@ -19,7 +19,8 @@ SkipKind = Literal[
 
 - `cannot-check`: the rule cannot be evaluated for this robot.
 - `no-legs`: the rule only applies to legged robots.
-- `no-input`: the user did not provide a second file, a spec, or permission to simulate.
+- `no-input`: the file is not MJCF, or the user did not provide a second file, a spec, or permission
+  to simulate.
 - `truncated`: only the first findings of the rule are reported.
 - `crashed`: the rule raised an unexpected exception.
 - `ignored`: the settings ignore the rule.
@@ -155,6 +156,7 @@ def has_inputs(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
 
 
 _MISSING: dict[Need, str] = {
+    "mjcf": "only MJCF has physics settings",
     "simulation": "simulation is disabled",
     "against": "no second file to compare with; use --against FILE",
     "spec": "no robot.toml to compare with; use --spec FILE",
@@ -166,6 +168,7 @@ _MISSING: dict[Need, str] = {
 def _missing_need(rule: Rule, facts: Facts, *, simulate: bool) -> Need | None:
     """Return the first input that a rule lacks, or None if it can run."""
     lacks: dict[Need, Callable[[], bool]] = {
+        "mjcf": lambda: facts.model.kind != "mjcf",
         "simulation": lambda: not simulate,
         "against": lambda: facts.against is None,
         "spec": lambda: facts.spec is None,

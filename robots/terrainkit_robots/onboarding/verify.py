@@ -10,7 +10,6 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.base_link import with_world_base
-from terrainkit_robots.export.canonical import has_unknown_inertia, to_canonical
 from terrainkit_robots.onboarding.equivalence import (
     Equivalence,
     compare_models,
@@ -92,7 +91,7 @@ def verify(
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
     with quiet_mujoco(), ThreadPoolExecutor(2) as executor:
         urdf, scene = (executor.submit(_load_model, folder / name) for name in (URDF, SCENE))
-        reference = reference_kinematics(_source_with_base(source, floating), robot.facts)
+        reference = reference_kinematics(with_world_base(source, floating=floating), robot.facts)
     equivalences = compare_models(reference, {URDF: urdf.result(), MJCF: scene.result()})
     for each in equivalences:
         if each.failures:
@@ -124,15 +123,6 @@ def verify(
         stand_gains=stand_gains,
         free_standing=free_standing,
     )
-
-
-def _source_with_base(source: "Facts", floating: bool) -> "Facts":
-    """Return the source with a base link, and with the masses that are computed from meshes."""
-    from terrainkit_robots.analysis.facts import Facts
-
-    if not any(has_unknown_inertia(link.inertial) for link in source.links):
-        return with_world_base(source, floating=floating)
-    return Facts(to_canonical(source, floating=floating).model, source.meshes)
 
 
 def _load_model(path: Path) -> Any:

@@ -46,10 +46,7 @@ class Rollout:
         self.sim = sim
         self.model = copy.copy(sim.model)
         model = self.model
-        if model.nv > _MAX_DOFS:
-            raise CannotCheckError(
-                f"degrees of freedom: got {model.nv}; expected at most {_MAX_DOFS} to simulate it"
-            )
+        check_dofs(model)
         if not self_collision:
             can_collide, floor = collides(model), model.geom_bodyid == 0
             # Only the floor offers a contact bit, and only the robot accepts it.
@@ -99,10 +96,7 @@ class Rollout:
             mujoco.mj_kinematics(model, data)
             data.qpos[2] += clearance - self._clearance()
         mujoco.mj_forward(model, data)
-        if data.ncon > _MAX_CONTACTS:
-            raise CannotCheckError(
-                f"contacts: got {data.ncon}; expected at most {_MAX_CONTACTS} to simulate it"
-            )
+        check_contacts(data)
 
     def _clearance(self) -> float:
         """Return the height of the lowest shape above the floor [m]."""
@@ -129,12 +123,33 @@ class Rollout:
 
     @property
     def diverged(self) -> bool:
-        """Whether a position, velocity or acceleration was not finite, or huge.
+        """Whether a position, velocity or acceleration was not finite, or huge."""
+        return has_diverged(self.data)
 
-        MuJoCo then resets the state and continues, with only a warning.
-        """
-        import mujoco
 
-        kinds = mujoco.mjtWarning
-        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
-        return any(self.data.warning[int(kind)].number for kind in bad)
+def check_dofs(model: Any) -> None:
+    """Raise CannotCheckError if a model has so many joints that a simulation takes too long."""
+    if model.nv > _MAX_DOFS:
+        raise CannotCheckError(
+            f"degrees of freedom: got {model.nv}; expected at most {_MAX_DOFS} to simulate it"
+        )
+
+
+def check_contacts(data: Any) -> None:
+    """Raise CannotCheckError if a state has so many contacts that a simulation takes too long."""
+    if data.ncon > _MAX_CONTACTS:
+        raise CannotCheckError(
+            f"contacts: got {data.ncon}; expected at most {_MAX_CONTACTS} to simulate it"
+        )
+
+
+def has_diverged(data: Any) -> bool:
+    """Return whether a position, velocity or acceleration was not finite, or huge.
+
+    MuJoCo then resets the state and continues, with only a warning.
+    """
+    import mujoco
+
+    kinds = mujoco.mjtWarning
+    bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+    return any(data.warning[int(kind)].number for kind in bad)

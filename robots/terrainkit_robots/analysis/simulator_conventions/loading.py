@@ -95,17 +95,9 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
     Raises:
         NotAttemptedError: if the file is not passed to MuJoCo.
     """
-    if model.kind == "xacro":
-        raise NotAttemptedError("MuJoCo does not read xacro, and the expanded text has no file")
-    if len(model.links) > _MAX_BODIES:
-        raise NotAttemptedError(
-            f"number of bodies: got {len(model.links)}; expected at most {_MAX_BODIES} for MuJoCo"
-        )
-    if not is_utf8(model.file):
-        raise NotAttemptedError("MuJoCo opens only paths that are UTF-8")
     if not with_meshes and model.kind != "urdf":
         raise NotAttemptedError("only URDF is compiled without its mesh files")
-    _check_cost(model.sources, with_files=with_meshes)
+    check_mujoco_cost(model, with_files=with_meshes)
     import mujoco
 
     replaced = _without_repeated_names(model) if with_meshes else {}
@@ -129,6 +121,27 @@ def mujoco_load_error(model: RobotModel, *, with_meshes: bool = True) -> LoadErr
             line=int(line[1]) if line and is_unchanged else 0,
         )
     return None
+
+
+def check_mujoco_cost(model: RobotModel, *, with_files: bool = True) -> None:
+    """Raise an error if MuJoCo must not read the file, or would take too long.
+
+    Args:
+        model: The robot.
+        with_files: Whether MuJoCo opens the files that it refers to.
+
+    Raises:
+        NotAttemptedError: if the file is not passed to MuJoCo.
+    """
+    if model.kind == "xacro":
+        raise NotAttemptedError("MuJoCo does not read xacro, and the expanded text has no file")
+    if len(model.links) > _MAX_BODIES:
+        raise NotAttemptedError(
+            f"number of bodies: got {len(model.links)}; expected at most {_MAX_BODIES} for MuJoCo"
+        )
+    if not is_utf8(model.file):
+        raise NotAttemptedError("MuJoCo opens only paths that are UTF-8")
+    _check_cost(model.sources, with_files=with_files)
 
 
 def _without_repeated_names(model: RobotModel) -> dict[str, bytes]:

@@ -4,7 +4,8 @@ The compiler resolves orientations, frames and their scales, and computes the in
 it also opens all files, and rejects models with invalid values, which the reader keeps for the lint
 rules. It therefore gets a copy of the bodies with placeholders for everything that it cannot use:
 
-- A shape that needs a file or has an invalid size is a unit sphere without mass.
+- A shape that needs a mesh or has an invalid size is a unit sphere without mass. A mesh that gives
+  a body its mass is added as another shape, if MuJoCo compiles it.
 - An explicit inertial has a mass of 1 kg and moments of 1 kg m2.
 - A joint is a fixed body at its anchor, because the time to compile joints grows with the third
   power of their number in a chain. In a scaled frame, a joint with limits and an armature of 1, on
@@ -14,12 +15,14 @@ The compiled value of a placeholder is the scale of the value that it replaces.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit_robots.description.mjcf.mesh_masses import MeshMasses
 from terrainkit_robots.description.mjcf.shapes import SIZES, shape_kind
 from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.description.model import ShapeKind
@@ -53,6 +56,7 @@ class CompiledBodies:
         imu: The site of the IMU, or None. Other sites are not compiled.
         node_of: Function that returns the node of a MuJoCo element.
         report: Function that reports what MuJoCo rejects at a node.
+        contents: File contents by path, which are used instead of files on disk.
 
     Raises:
         ValueError: If MuJoCo rejects the bodies.
@@ -64,11 +68,13 @@ class CompiledBodies:
         imu: Any,
         node_of: Callable[[Any], Node],
         report: Callable[[Node, str], None],
+        contents: Mapping[Path, bytes],
     ) -> None:
         import mujoco
 
         self._parsed, self._node_of, self._report = spec, node_of, report
         self._spec = mujoco.MjSpec()
+        self._meshes = MeshMasses(spec, self._spec, node_of, contents)
         self._copies: dict[Any, Any] = {spec.worldbody: self._spec.worldbody}
         self._placeholders: set[Any] = set()
         self._scaled: set[Any] = set()
@@ -168,7 +174,7 @@ class CompiledBodies:
         low, high = body.compiler.inertiagrouprange
         for geom in body.geoms:
             self._copy_shape(geom)
-            if low <= geom.group <= high:
+            if low <= geom.group <= high and not is_explicit(body):
                 self._set_mass(geom, body)
         for joint in body.joints:
             self._copy_joint(joint)
@@ -212,6 +218,10 @@ class CompiledBodies:
         if not is_placeholder and not mass < 0 and density >= 0:
             copy.mass, copy.density, copy.typeinertia = mass, density, geom.typeinertia
             return
+        if needs_mesh and not mass < 0 and density >= 0:
+            place, quat = self._place(geom), self._quat(geom, geom.quat, geom.alt)
+            if self._meshes.add(place, geom, quat):
+                return
         if mass > 0:
             copy.mass = mass
         self._missing.setdefault(body, []).append(0.0 if mass > 0 else mass)

@@ -2,7 +2,7 @@
 
 MuJoCo's parser resolves defaults and replicas, and its compiler frames, units and the inertia of
 geoms. Written values that the compiler does not need, or rejects, are read from the parsed spec.
-Masses that depend on a mesh file are NaN.
+Masses that depend on a mesh that MuJoCo does not compile are NaN.
 """
 
 import math
@@ -79,15 +79,21 @@ def read_mjcf(doc: XmlDocument, *, contents: Mapping[Path, bytes] | None = None)
         sources=mjcf.sources,
     )
     if spec is not None:
-        model = _SpecReader(mjcf, spec, lines).fill(model)
+        model = _SpecReader(mjcf, spec, lines, contents or {}).fill(model)
     return replace(model, problems=tuple(mjcf.problems))
 
 
 class _SpecReader:
     """Convert a parsed MuJoCo spec to links and joints, and collect problems."""
 
-    def __init__(self, mjcf: MjcfTree, spec: "mujoco.MjSpec", lines: Sequence[Node]) -> None:
-        self._mjcf = mjcf
+    def __init__(
+        self,
+        mjcf: MjcfTree,
+        spec: "mujoco.MjSpec",
+        lines: Sequence[Node],
+        contents: Mapping[Path, bytes],
+    ) -> None:
+        self._mjcf, self._contents = mjcf, contents
         self._spec = spec
         self._lines = lines
         self._meshes = {mesh_name(mesh): mesh for mesh in spec.meshes}
@@ -110,7 +116,9 @@ class _SpecReader:
 
         imu = find_imu(self._spec)
         try:
-            self._compiled = CompiledBodies(self._spec, imu, self._node, self._report)
+            self._compiled = CompiledBodies(
+                self._spec, imu, self._node, self._report, self._contents
+            )
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
             reason, _, location = str(error).removeprefix("Error: ").partition("\n")
             message = f"MuJoCo rejects the file: {reason}; the robot is not checked"

@@ -37,7 +37,7 @@ _CHARS_PER_ELEMENT = 1000
 _EXCLUDED_ATTRIBUTES = {
     "*": {"user"},
     "hfield": {"nrow", "ncol", "elevation"},
-    "mesh": {"builtin", "params", "vertex", "normal", "texcoord", "face"},
+    "mesh": {"builtin", "params"},
     "numeric": {"size"},
 }
 """Attributes that make MuJoCo's parser allocate memory, and do not describe the robot."""

@@ -31,7 +31,7 @@ def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
 
 def _size(data: Mapping[str, Any]) -> Iterator[str]:
     mass = data["total_mass"]
-    yield f"{mass:.4g} kg" if mass is not None else "infinite mass"
+    yield f"{mass:.4g} kg" if mass is not None else "unknown mass"
     bodies = "body" if data["bodies"] == 1 else "bodies"
     yield f"{count(data['links'], 'link')} in {data['bodies']:,} rigid {bodies}"
     yield count(data["joints"], "joint")

@@ -1,0 +1,122 @@
+"""Weigh meshes: give a MuJoCo spec the meshes of another one, as far as MuJoCo can compile them."""
+
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from terrainkit_robots.description.mjcf.shapes import mesh_file, mesh_name
+from terrainkit_robots.description.mjcf.tree import Node
+from terrainkit_robots.files import open_regular
+from terrainkit_robots.quiet_mujoco import quiet_mujoco
+
+_MAX_BYTES = 32 * 2**20
+"""Size of all files that are weighed; MuJoCo needs about a second for them."""
+
+_FORMATS = frozenset({".stl", ".obj", ".msh"})
+"""Formats that MuJoCo reads without plugins."""
+
+
+class MeshMasses:
+    """The meshes of a parsed spec that a copy of it can be compiled with.
+
+    Args:
+        parsed: The parsed spec.
+        copy: The spec that gets the meshes.
+        node_of: Function that returns the node of a MuJoCo element.
+        contents: File contents by path, which are used instead of files on disk.
+    """
+
+    def __init__(
+        self, parsed: Any, copy: Any, node_of: Callable[[Any], Node], contents: Mapping[Path, bytes]
+    ) -> None:
+        self._parsed, self._copy, self._node_of = parsed, copy, node_of
+        self._meshes = {mesh_name(mesh): mesh for mesh in parsed.meshes}
+        self._contents, self._bytes = contents, 0
+        self._added: dict[tuple[str, int], bool] = {}
+        self._files: dict[str, tuple[str, bytes]] = {}
+        """File name and content of each mesh with a file."""
+
+    def add(self, place: Any, geom: Any, quat: Any) -> bool:
+        """Add a geom that has the mass of a geom with a mesh; return whether MuJoCo weighs it.
+
+        Args:
+            place: The body or frame that it is added to.
+            geom: The geom of the parsed spec.
+            quat: Its orientation.
+        """
+        key = geom.meshname, int(geom.typeinertia)
+        if key not in self._added:
+            self._added[key] = self._add_mesh(geom)
+        if self._added[key]:
+            _add_geom(place, geom, geom.meshname, pos=geom.pos, quat=quat)
+        return self._added[key]
+
+    def _add_mesh(self, geom: Any) -> bool:
+        """Add the mesh of a geom to the copy, unless MuJoCo rejects it."""
+        import mujoco
+
+        mesh = self._meshes.get(geom.meshname)
+        if mesh is None or not self._read(mesh, geom.meshname):
+            return False
+        trial = mujoco.MjSpec()
+        self._write(trial, mesh, geom.meshname)
+        body = trial.worldbody.add_body()
+        _add_geom(body, geom, geom.meshname)
+        body.add_freejoint()
+        try:
+            with quiet_mujoco():
+                mass = float(trial.compile().body_mass[1])
+        except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError):
+            return False
+        if geom.meshname not in {each.name for each in self._copy.meshes}:
+            self._write(self._copy, mesh, geom.meshname)
+        return 0 < mass < math.inf
+
+    def _read(self, mesh: Any, name: str) -> bool:
+        """Read the file of a mesh, if it has one; return whether it can be used."""
+        file = mesh_file(mesh, self._node_of(mesh), bool(self._parsed.strippath))
+        if file is None:
+            return len(mesh.uservert) > 0
+        if file.path.suffix.lower() not in _FORMATS:
+            return False
+        data = self._contents.get(file.path)
+        if data is None:
+            try:
+                with open_regular(file.path) as stream:
+                    data = stream.read(_MAX_BYTES - self._bytes + 1)
+            except (OSError, ValueError):
+                return False
+        self._bytes += len(data)
+        self._files[name] = f"{len(self._files)}{file.path.suffix.lower()}", data
+        return self._bytes <= _MAX_BYTES
+
+    def _write(self, spec: Any, mesh: Any, name: str) -> None:
+        """Add a mesh to a spec, with the data that was read."""
+        file, data = self._files.get(name, ("", b""))
+        spec.add_mesh(
+            name=name,
+            file=file,
+            uservert=[] if file else mesh.uservert,
+            userface=[] if file else mesh.userface,
+            scale=mesh.scale,
+            refpos=mesh.refpos,
+            refquat=mesh.refquat,
+            inertia=mesh.inertia,
+        )
+        if file:
+            spec.assets = {**spec.assets, file: data}
+
+
+def _add_geom(place: Any, geom: Any, mesh: str, **pose: Any) -> None:
+    place.add_geom(
+        type=geom.type,
+        meshname=mesh,
+        mass=geom.mass,
+        density=geom.density,
+        typeinertia=geom.typeinertia,
+        fitscale=geom.fitscale,
+        contype=0,
+        conaffinity=0,
+        **pose,
+    )
