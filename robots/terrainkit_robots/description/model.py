@@ -291,6 +291,9 @@ class Joint:
     limit: Limit | None = None
     mimic: Mimic | None = None
 
+    coupled: bool = False
+    """Whether other joints move it through a closed loop or a tendon; MJCF only."""
+
     dynamics: Dynamics | None = None
     """Damping and friction; None if the file declares neither."""
 

@@ -39,7 +39,11 @@ def compiled(form):
         ]
 
 
-@pytest.mark.parametrize("sensor", [ZERO.format(0.5), NONE.format(0.5)])
+TINY = INERTIA.format(0.5, *["5e-15"] * 3)
+"""MuJoCo rejects moments below 1e-14 kg m2."""
+
+
+@pytest.mark.parametrize("sensor", [ZERO.format(0.5), NONE.format(0.5), TINY])
 @pytest.mark.parametrize("order", [("trunk", "imu"), ("imu", "trunk")])
 def test_mass_without_inertia_moves_to_heaviest_link(sensor, order, robot):
     facts = robot(urdf({name: {"trunk": TRUNK, "imu": sensor}[name] for name in order}))

@@ -9,8 +9,9 @@ import numpy as np
 
 from terrainkit_robots.transforms import Matrix
 
-MIN_INERTIA = 1e-15
-"""MuJoCo's mjMINVAL: masses [kg] and moments [kg m2] up to this count as zero."""
+MIN_INERTIA = 1e-14
+"""Masses [kg] and moments [kg m2] up to this count as zero. MuJoCo rejects smaller moments of a
+fullinertia, as in URDF, and masses up to 1e-15 kg."""
 
 MAX_INERTIA = 1e12
 """Masses [kg] and moments [kg m2] from this on are invalid, and are not used in computations."""

@@ -29,9 +29,15 @@ _MIN_LEG_SCORE = 1.5
 _MIN_HORIZONTAL = 0.5
 """Horizontal part of an axis about which a leg may bend. Hips are tilted by up to 45 degrees."""
 
-_MIN_BENDING_COSINE = 0.5
+_MIN_BENDING_COSINE = 0.6
 """Cosine from which an axis bends the leg in its plane, if it moves the foot in that plane more
-than out of it."""
+than out of it. A yaw joint that is tilted sideways by 30 degrees has 0.5, a tilted hip 0.7."""
+
+_MAX_IMBALANCE = 0.1
+"""Gap of the two segments' difference in length to the smallest one, over the length of the leg, up
+to which a name decides which joint is the knee: the ankle of a small biped may halve its leg."""
+
+_KNEE_NAME = re.compile(r"knee|calf|kfe|shank|tibia|shin", re.IGNORECASE)
 
 _FOOT_NAME = re.compile(r"foot|feet|toe|sole", re.IGNORECASE)
 
@@ -110,10 +116,11 @@ def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg
     # The axis of a wheel ends the last segment that the joints turn.
     ends = [*limb.points[len(limb.points) - limb.has_wheel :], limb.tip]
     path = [_project(point, pitch) for point in (*points[bending], *ends)]
+    names = [joint.name for joint in limb.joints[waist:]]
     return Leg(
         limb=limb,
         foot=_foot_link(limb, bodies),
-        roles=(*[_WAIST] * waist, *_roles(own, bending, path), *[_WHEEL] * limb.has_wheel),
+        roles=(*[_WAIST] * waist, *_roles(own, bending, path, names), *[_WHEEL] * limb.has_wheel),
         pitch=pitch,
         length=float(sum(np.linalg.norm(b - a) for a, b in itertools.pairwise(path))),
     )
@@ -156,7 +163,10 @@ def _project(point: Matrix, normal: Matrix) -> Matrix:
 
 
 def _roles(
-    axes: Sequence[Matrix | None], bending: Sequence[int], path: Sequence[Matrix]
+    axes: Sequence[Matrix | None],
+    bending: Sequence[int],
+    path: Sequence[Matrix],
+    names: Sequence[str],
 ) -> tuple[Role, ...]:
     """Return the role of each joint.
 
@@ -164,9 +174,12 @@ def _roles(
         axes: Axis of each joint, shape (3,); None for a prismatic joint.
         bending: Indices of the joints that bend the leg in its plane.
         path: Positions of these joints and of the contact in that plane, each of shape (3,) [m].
+        names: Name of each joint.
     """
+    bonus = _MAX_IMBALANCE * np.linalg.norm(path[-1] - path[0])
     imbalances = [
         abs(np.linalg.norm(path[k] - path[0]) - np.linalg.norm(path[-1] - path[k]))
+        - bonus * bool(_KNEE_NAME.search(names[bending[k]]))
         for k in range(1, len(bending))
     ]
     knee = bending[1 + int(np.argmin(imbalances))] if imbalances else None

@@ -29,6 +29,10 @@ _MIN_ARM_HEIGHT = 0.5
 """A limb that ends this high above the rest of the robot, such as wheels or a pedestal, is an arm.
 Over the height of the robot. A leg that is folded at zero ends lower above the belly."""
 
+_MIN_ARM_RISE = 0.25
+"""The same height over the length of the limb, for robots that are flat at zero: the legs of a
+spider that are stretched sideways have 0.1, arms of published robots more than 0.5."""
+
 _MAX_MIRROR_ERROR = 0.05
 """Distance of a leaf to the mirror image of another one, at most, over the size of the robot."""
 
@@ -117,13 +121,13 @@ def detect_limbs(
     )
     is_fixed_base = bool(tree.order) and tree.order[0] == bodies[0].top.name == WORLD
 
-    def height_score(foot: float) -> float:
-        ratio, is_arm = (foot - ground) / height, foot - rest > _MIN_ARM_HEIGHT * height
+    def height_score(leaf: Chain) -> float:
+        foot = float(leaf.tip[2])
+        min_rise = max(_MIN_ARM_HEIGHT * height, _MIN_ARM_RISE * _length(leaf, 0))
+        ratio, is_arm = (foot - ground) / height, foot - rest > min_rise
         return (ratio <= _LOW) / 2 + (ratio <= _NEAR_GROUND) / 2 - is_arm - is_fixed_base / 2
 
-    return tuple(
-        _make_limb(leaf, leaves, bodies, size, height_score(float(leaf.tip[2]))) for leaf in leaves
-    )
+    return tuple(_make_limb(leaf, leaves, bodies, size, height_score(leaf)) for leaf in leaves)
 
 
 def is_branch(one: Chain, other: Chain, size: float) -> bool:
@@ -183,7 +187,10 @@ def _leaves(bodies: Sequence[Body], actuated: Sequence[Joint], meshes: Meshes) -
                     has_wheel=has_wheel,
                 )
             )
-    return sorted(leaves, key=lambda leaf: float(leaf.tip[2]))[:_MAX_LIMBS]
+    # A body without mass and collision is a picture of a linkage beside the leg that it follows.
+    ends = [bodies[leaf.chain[-1]] for leaf in leaves]
+    solid = [leaf for leaf, end in zip(leaves, ends, strict=True) if end.mass > 0 or end.collisions]
+    return sorted(solid or leaves, key=lambda leaf: float(leaf.tip[2]))[:_MAX_LIMBS]
 
 
 def _robot_bounds(bodies: Sequence[Body], meshes: Meshes) -> tuple[Matrix, Matrix]:

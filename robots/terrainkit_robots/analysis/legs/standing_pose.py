@@ -441,4 +441,6 @@ def _level_coefficients(
     assert knee is not None
     others = sum(cosines[n] * positions[n] for n in bending - {hip.name, knee.name, ankle})
     own = cosines[ankle]
+    if abs(own) < 1e-6:  # the axle of a wheel may point ahead
+        return 0.0, 0.0, 0.0
     return (angle - others) / own, -cosines[hip.name] / own, -cosines[knee.name] / own

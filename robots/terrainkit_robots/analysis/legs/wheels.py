@@ -51,6 +51,7 @@ def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
     """Return whether the last body of a leg is a wheel.
 
     A wheel turns without limits, and its mass and its collision shapes are round about the axis.
+    The mass alone does not tell: the center of mass of a foot may be on the axis of an ankle.
 
     Args:
         body: A body without children, on a joint.
@@ -61,7 +62,7 @@ def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
     if not turns_without_limits(joint):
         return False
     shapes = [shape for shape in body.collisions if has_bounds(shape.geometry, meshes)]
-    if body.mass <= 0 and not shapes:
+    if not shapes:
         return False
     if body.mass > 0 and not _mass_offset(body) <= _MAX_LEG_WHEEL_OFFSET:
         return False
@@ -74,7 +75,7 @@ def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
         pose = np.eye(4)
         pose[:3, :3] = rotation @ upright
         pose[:3, 3] = -pose[:3, :3] @ joint.anchor
-        radii.append(max((-min_height(each, pose, meshes) for each in shapes), default=1.0))
+        radii.append(max(-min_height(each, pose, meshes) for each in shapes))
     return min(radii) > 0 and max(radii) <= _MAX_RADIUS_RATIO * min(radii)
 
 

@@ -10,6 +10,10 @@ from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
 MAX_MASS_DIFFERENCE = 0.02
 """Allowed relative difference of masses: cables and screws that CAD adds on one side only."""
 
+_MIN_MASS_SHARE = 0.001
+"""Share of the robot's mass. At the end of a leg, the whole mass of such a body shifts the robot's
+center of mass by a thousandth of the leg's distance."""
+
 MAX_COM_ERROR, _COM_ERROR_SHARE = 0.002, 0.1
 """Allowed distance of a center of mass from the mirrored one: a constant [m] plus a share of the
 radius of gyration."""
@@ -22,6 +26,16 @@ def has_valid_masses(pair: MirrorPair) -> bool:
     masses = [inertial.mass for inertial in inertials if inertial is not None]
     valid = all(mass is not None and mass >= 0 for mass in masses)
     return valid and min(body.mass for body in bodies) > 0
+
+
+def is_negligible(pair: MirrorPair, total: float) -> bool:
+    """Return whether both bodies are too light for a difference to matter, such as gears.
+
+    Args:
+        pair: The mirrored joints.
+        total: Mass of the robot [kg].
+    """
+    return max(pair.left.body.mass, pair.right.body.mass) < _MIN_MASS_SHARE * total
 
 
 def com_error(mirror: Mirror, pair: MirrorPair) -> float:

@@ -23,6 +23,10 @@ robot."""
 _MIN_ALIGNED_COSINE = 0.7
 """Cosine from which two axes count as aligned."""
 
+_MIN_REACH = 0.25
+"""Horizontal distance from the yaw axis to the foot over the length of the leg, at least, of a leg
+that reaches sideways. Feet below the hip have less than 0.1."""
+
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Za-z][a-z]*|\d+")
 
 _LEFT_TO_RIGHT = {
@@ -151,10 +155,20 @@ def detect_mirror(legs: Sequence[Leg], bodies: Sequence[Body]) -> Mirror:
 
 def _plane_normal(legs: Sequence[Leg]) -> Matrix:
     """Return y, or x if most legs bend about x, as in a robot that walks along y."""
-    lateral = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) for leg in legs)
+    lateral = sum(abs(leg.pitch[0]) > abs(leg.pitch[1]) and not _sprawls(leg) for leg in legs)
     radial = any(0.5 < abs(leg.pitch[0]) < 0.87 for leg in legs)  # legs all around, as a spider's
     is_x = 2 * lateral > len(legs) and not radial
     return np.array([1.0, 0, 0] if is_x else [0, 1.0, 0])
+
+
+def _sprawls(leg: Leg) -> bool:
+    """Return whether a leg reaches sideways, so that its yaw joint swings it, as an insect's."""
+    levers = [
+        leg.limb.tip - point
+        for point, role in zip(leg.limb.points, leg.roles, strict=True)
+        if role == "yaw"
+    ]
+    return bool(levers) and bool(np.hypot(*levers[0][:2]) > _MIN_REACH * leg.length)
 
 
 def _plane_offset(legs: Sequence[Leg], bodies: Sequence[Body], normal: Matrix) -> float:

@@ -27,6 +27,7 @@ from terrainkit_robots.description.mjcf.inertia import (
     geom_inertial,
     scale_to_total_mass,
 )
+from terrainkit_robots.description.mjcf.loops import coupled_joints
 from terrainkit_robots.description.mjcf.parser import parse_mjcf
 from terrainkit_robots.description.mjcf.references import dangling_references
 from terrainkit_robots.description.mjcf.shapes import (
@@ -106,6 +107,7 @@ class _SpecReader:
         for actuator in self._actuators:
             self._joint_actuators.setdefault(actuator.joint, []).append(actuator)
         self._mimics = read_mimics(spec, self._node)
+        self._coupled = coupled_joints(spec)
         self._force_scales: dict[str, float] = {}
         self._links = {spec.worldbody: WORLD}
         self._reported: set[str] = set()
@@ -356,6 +358,7 @@ class _SpecReader:
             reference=float(joint.ref) * unit,
             limit=_limit(node.source, limits, unit, force_limit(joint, actuators, scale.force)),
             mimic=self._mimics.get(joint.name),
+            coupled=joint.name in self._coupled,
             dynamics=Dynamics(
                 source=node.source,
                 damping=float(np.ravel(joint.damping)[0]) * scale.armature,

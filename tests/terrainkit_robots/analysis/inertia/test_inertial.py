@@ -18,8 +18,8 @@ from tests.small_robots import URDF, facts, link
     [
         (1, True, True),
         (0, True, False),
-        (1e-15, True, False),
-        (1.1e-15, True, True),
+        (1e-14, True, False),
+        (1.1e-14, True, True),
         (-1, False, False),
         ("x", False, False),
         (0.99e12, True, True),

@@ -68,7 +68,7 @@ def test_nearest_physical(inertia, nearest):
 
 @pytest.mark.parametrize(
     ("element", "zero", "in_range"),
-    [(1e-15, True, True), (-1.1e-15, False, True), (-0.9e12, False, True), (-1e12, False, False)],
+    [(1e-14, True, True), (-1.1e-14, False, True), (-0.9e12, False, True), (-1e12, False, False)],
 )
 def test_elements_of_an_inertia_have_a_range(element, zero, in_range):
     inertia = np.zeros((3, 3))

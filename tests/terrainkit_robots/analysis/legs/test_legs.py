@@ -258,6 +258,20 @@ def test_legs_of_eight_legged_spider():
     assert robot.stance.margin > 0.09
 
 
+# Legs of 0.2 m, stretched sideways at zero; a quarter of them is 0.05 m.
+@pytest.mark.parametrize(("belly", "count"), [(0.049, 4), (0.051, 0)])
+def test_legs_that_are_stretched_sideways_at_zero(belly, count):
+    parts = [link("trunk", box("0.4 0.2 0.02", f"0 0 {0.01 - belly}"), mass=5)]
+    for name, x, y in (("a", 0.2, 1), ("b", 0.2, -1), ("c", -0.2, 1), ("d", -0.2, -1)):
+        parts += [link(f"{name}_coxa"), joint("trunk", f"{name}_coxa", f"{x} {0.1 * y} 0", "0 0 1")]
+        parts += [link(f"{name}_femur")]
+        parts += [joint(f"{name}_coxa", f"{name}_femur", "0 0 0", "1 0 0")]
+        parts += [link(f"{name}_tibia", ball(1e-6, f"0 {0.1 * y} 0"))]
+        parts += [joint(f"{name}_femur", f"{name}_tibia", f"0 {0.1 * y} 0", "1 0 0")]
+    legs = facts(*parts).legs
+    assert [leg.roles for leg in legs] == [("yaw", "hip", "knee")] * count
+
+
 X, Y, Z = np.eye(3)
 
 
@@ -276,9 +290,9 @@ def tilted(degrees, axis=Y, other=Z):
         (("0 -1 0", "0 1 0"), "hip knee"),
         (("0 0.866 0.5", "1 0 0", "0 0 1", "0 1 0", "0 1 0"), "hip roll yaw knee ankle"),
         (("0 0.707 0.707", "1 0 0", "0 0 1", "0 1 0", "0 1 0"), "hip roll yaw knee ankle"),
-        # An axis that is tilted up by 59 degrees bends the leg, and one by 61 degrees does not.
-        (("0 0.515 0.857", "0 1 0", "0 1 0"), "hip knee ankle"),
-        (("0 0.485 0.875", "0 1 0", "0 1 0"), "yaw hip knee"),
+        # An axis that is tilted up by 52 degrees bends the leg, and one by 54 degrees does not.
+        (("0 0.616 0.788", "0 1 0", "0 1 0"), "hip knee ankle"),
+        (("0 0.588 0.809", "0 1 0", "0 1 0"), "yaw hip knee"),
         # It moves the foot forward rather than sideways up to 45 degrees.
         (("0.695 0.719 0", "0 1 0", "0 1 0"), "hip knee ankle"),
         (("0.719 0.695 0", "0 1 0", "0 1 0"), "roll hip knee"),
@@ -303,7 +317,22 @@ def test_roles_follow_axes(axes, roles):
 def test_knee_is_the_joint_closest_to_the_middle(heights, roles):
     path = [np.array([0, 0, -height]) for height in heights]
     bending = range(len(path) - 1)
-    assert " ".join(_roles([Y] * len(bending), bending, path)) == roles
+    assert " ".join(_roles([Y] * len(bending), bending, path, [""] * len(bending))) == roles
+
+
+# The third joint halves the leg of 0.5 m: 0.26 and 0.24 m, and the second one 0.22 and 0.28 m, so
+# that the gap is 0.04 m; with 0.205 and 0.295 m it is 0.07 m.
+@pytest.mark.parametrize(("height", "roles"), [(0.22, "hip knee ankle"), (0.205, "hip hip knee")])
+def test_name_decides_between_knees_up_to_a_tenth_of_the_leg(height, roles):
+    path = [np.array([0, 0, -height]) for height in (0, height, 0.26, 0.5)]
+    assert " ".join(_roles([Y] * 3, range(3), path, ["a", "left_knee", "b"])) == roles
+
+
+def test_picture_of_a_linkage_is_no_leg():
+    # Rods beside each leg, with visuals only.
+    rods = chain("c", "0 0.12 0", (0.2, 0.2)) + chain("d", "0 -0.12 0", (0.2, 0.2))
+    rods = re.sub(r"<(inertial|collision)>.*?</\1>", "", rods, flags=re.S)
+    assert [leg.foot for leg in facts(TRUNK, pair((0.2, 0.2)), rods).legs] == ["a1", "b1"]
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import mujoco
@@ -76,6 +77,18 @@ def test_wheel_is_round_and_turns_without_limits():
 )
 def test_ankle_is_not_a_wheel(end):
     assert last_role(**end) == "ankle"
+
+
+def test_foot_without_shapes_is_not_a_wheel():
+    text = re.sub(r"<collision>.*?</collision>", "", wheel_legs(TWO), flags=re.S)
+    assert [leg.roles[-1] for leg in facts(text).legs] == ["ankle"] * 2
+
+
+def test_pose_of_legs_with_wheels_about_x():
+    text = wheel_legs(FOUR, rpy="0 1.5708 0")
+    robot = facts(re.sub(r'(name="end\d_joint.*?xyz=)"0 1 0"', r'\1"1 0 0"', text, flags=re.S))
+    assert {leg.roles[-1] for leg in robot.legs} == {"wheel"}
+    assert abs(robot.default_pose["shank0_joint"]) > 0.1
 
 
 def test_leg_ends_at_the_rim_of_the_wheel():

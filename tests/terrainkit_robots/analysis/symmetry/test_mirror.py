@@ -196,6 +196,10 @@ def test_mirror_of_robot_along_y_is_x():
     assert pairs(found) == "b0 a0 1; b1 a1 1; d0 c0 1; d1 c1 1"
 
 
+X = np.array([1.0, 0, 0])
+STRAIGHT = SimpleNamespace(points=np.zeros((0, 3)), tip=np.zeros(3))
+
+
 @pytest.mark.parametrize(
     ("pitches", "normal"),
     [
@@ -210,8 +214,16 @@ def test_mirror_of_robot_along_y_is_x():
     ],
 )
 def test_plane_is_across_most_legs(pitches, normal):
-    legs = [SimpleNamespace(pitch=np.array([*pitch, 0])) for pitch in pitches]
+    legs = [SimpleNamespace(pitch=np.array([*p, 0]), roles=(), limb=STRAIGHT) for p in pitches]
     assert _plane_normal(legs).tolist() == normal
+
+
+# The legs have 0.4 m; those of an insect reach more than a quarter of it to the side.
+@pytest.mark.parametrize(("reach", "normal"), [(0.11, [0, 1, 0]), (0.09, [1, 0, 0])])
+def test_legs_that_a_yaw_joint_swings_step_along_their_pitch_axis(reach, normal):
+    limb = SimpleNamespace(points=np.array([[0, 0.2, 0]] * 3), tip=np.array([0, 0.2 + reach, -0.3]))
+    leg = SimpleNamespace(pitch=X, roles=("yaw", "hip", "knee"), limb=limb, length=0.4)
+    assert _plane_normal([leg] * 6).tolist() == normal
 
 
 @pytest.mark.parametrize(

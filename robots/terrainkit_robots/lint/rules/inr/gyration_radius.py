@@ -117,6 +117,15 @@ def inertia_too_small(robot: Facts) -> Violations:
             yield _report_radius(body, radius, box, limit, "warning")
 
 
+def is_far_too_large(robot: Facts, body: Body) -> bool:
+    """Return whether the inertia of a body is an error, for rules on why it is too large."""
+    radius = gyration_radius(body.principal, body.mass)
+    invalid = robot.body_bounds.box_if(
+        body, lambda box: radius > _MAX_GYRATION_ERROR * half_diagonal(box)
+    )
+    return invalid is not None and (body.index > 0 or has_floating_base(robot))
+
+
 def _report_radius(
     body: Body, radius: float, box: Matrix, limit: str, severity: Severity
 ) -> Violation:

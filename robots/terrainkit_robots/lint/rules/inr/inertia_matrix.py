@@ -17,6 +17,7 @@ from terrainkit_robots.analysis.inertia.physical import (
 from terrainkit_robots.analysis.inertia.placeholder import is_identity, placeholder_inertias
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rules.inr.gyration_radius import is_far_too_large
 from terrainkit_robots.text import names, numbers
 from terrainkit_robots.transforms import Matrix
 
@@ -155,7 +156,8 @@ def placeholder_inertia(robot: Facts) -> Violations:
 
     A mass of 1 kg with an inertia of 1 kg m2 has a radius of gyration of 1 m. Such a link resists
     rotation like a flywheel, and gains tuned on it fail on the real robot. Identical parts, such as
-    four wheels, may have the same inertia; a thigh and a shank do not.
+    four wheels, may have the same inertia; a thigh and a shank do not. It is an error if
+    INR006 would be one, which it replaces.
 
     Fix:
         Take the inertia from CAD, or compute it from the mesh at a uniform density.
@@ -172,9 +174,11 @@ def placeholder_inertia(robot: Facts) -> Violations:
             expected = "an inertia for each of these different parts"
         listed = names(link.name for link in links)
         bodies = f"{len(links)} of {massive} bodies ({listed})"
+        parts = [body for body in robot.bodies if any(body.main_link is link for link in links)]
         yield Violation(
             subject=first.name,
             source=inertia_source(first),
+            severity="error" if any(is_far_too_large(robot, part) for part in parts) else "warning",
             message=f"inertia of {bodies if len(links) > 1 else f'body {listed}'}: got {got}; "
             f"expected {expected}",
             measured={"links": len(links)},

@@ -14,9 +14,10 @@ def missing_actuator(robot: Facts) -> Violations:
     """A joint of an MJCF file has no actuator.
 
     The joint is passive, and an environment made from the file has one action less. Joints that
-    mimic others, joints that carry the trunk of a planar model, and files with tendons or other
-    transmissions are not checked. A robot without legs may be passive by design, and mjlab and
-    Genesis add actuators to a file without any: both are only notes.
+    mimic others or move with a closed loop or a tendon, joints that carry the trunk of a planar
+    model, and files whose actuators pull tendons or other transmissions are not checked. A robot
+    without legs may be passive by design, and mjlab and Genesis add actuators to a file without
+    any: both are only notes.
 
     Fix:
         Add a <motor> or <position> actuator for the joint.
@@ -39,7 +40,7 @@ def missing_actuator(robot: Facts) -> Violations:
     if "" in actuated:
         return
     for joint in robot.robot_joints:
-        if joint.name not in actuated and joint.mimic is None:
+        if joint.name not in actuated and joint.mimic is None and not joint.coupled:
             yield Violation(
                 element=joint,
                 severity="warning" if robot.legs else "note",

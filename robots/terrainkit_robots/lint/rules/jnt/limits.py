@@ -201,9 +201,9 @@ def unlimited_joint(robot: Facts) -> Violations:
     """A hinge of an MJCF file has no range.
 
     The joint turns without end, so that a leg can rotate through the trunk. MuJoCo needs a range,
-    and either limited="true" or autolimits, which is the default. Wheels and propellers are not
-    checked. On a robot without legs, this is only a note, since joints of arms may turn without
-    end.
+    and either limited="true" or autolimits, which is the default. Wheels, propellers and joints of
+    closed loops, which the loop limits, are not checked. On a robot without legs, this is only a
+    note, since joints of arms may turn without end.
 
     Fix:
         Give the joint a range, in the unit of <compiler angle>, which is degrees by default.
@@ -215,7 +215,8 @@ def unlimited_joint(robot: Facts) -> Violations:
         return
     bodies = robot.body_of_joint
     for joint in robot.robot_joints:
-        if joint.kind == "continuous" and not robot.is_wheel(bodies[joint.name]):
+        free = joint.kind == "continuous" and not joint.coupled
+        if free and not robot.is_wheel(bodies[joint.name]):
             yield Violation(
                 element=joint,
                 severity="warning" if robot.legs else "note",

@@ -7,6 +7,7 @@ from terrainkit_robots.analysis.meshes.replacement import binary_copy, has_hull,
 from terrainkit_robots.analysis.meshes.uses import UsedMesh, replace_edits
 from terrainkit_robots.description.fix import make_fix
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
+from terrainkit_robots.lint.rules.msh.path import not_loaded
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
 
@@ -74,9 +75,7 @@ def _file_problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
     if used.header.state in ("lfs", "missing"):
         return "", "note"
     if used.header.problem:
-        # All readers except MuJoCo read the faces and ignore the rest.
-        is_harmless = not used.strict and used.header.faces is not None
-        return used.header.problem, "warning" if is_harmless else "error"
+        return used.header.problem, not_loaded(used)
     if used.header.format != "other":
         for use in used.collisions:
             try:
@@ -132,5 +131,6 @@ def lfs_pointer(robot: Facts) -> Violations:
             yield Violation(
                 element=used,
                 message=f"{used.label} {used.header.problem}",
+                severity=not_loaded(used),
                 measured={"bytes": used.header.size},
             )

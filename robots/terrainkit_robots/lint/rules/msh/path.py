@@ -20,8 +20,17 @@ from terrainkit_robots.description.package_resolver import (
     is_package_uri,
 )
 from terrainkit_robots.description.xml.document import read_bytes
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.text import names, short_path
+
+
+def not_loaded(used: UsedMesh) -> Severity:
+    """Return how severe it is that a file cannot be loaded, whatever the cause.
+
+    Training does not need the visual meshes of a URDF; MuJoCo needs all meshes of an MJCF file.
+    """
+    return "error" if used.strict else "warning"
+
 
 _MAX_PARENT_FOLDERS = 3
 """Maximum number of `..` in a relative path, enough for another package of the same workspace."""
@@ -50,7 +59,7 @@ def missing_mesh(robot: Facts) -> Violations:
                 element=used,
                 message=f"{used.label}: does not exist; {_search_result(robot, used)}"
                 + ("; MuJoCo cannot load the robot without it" if is_mjcf else ""),
-                severity="error" if used.collisions or is_mjcf else "warning",
+                severity=not_loaded(used),
                 measured={"collisions": len(used.collisions)},
                 fix=_relative_fix(robot, used, "unsafe") if is_in_other_folder(used.mesh) else None,
             )
@@ -77,7 +86,8 @@ def _search_result(robot: Facts, used: UsedMesh) -> str:
 def absolute_path(robot: Facts) -> Violations:
     """A mesh has an absolute path.
 
-    The robot loads on one machine only: not in a container, on a cluster, or for other users.
+    The robot loads on one machine only: not in a container, on a cluster, or for other users. As
+    with a missing file, the path of a visual mesh of a URDF is a warning.
 
     Fix:
         Use a path relative to the robot's file. --unsafe-fixes does this if the file, or one with
@@ -100,6 +110,7 @@ def absolute_path(robot: Facts) -> Violations:
             element=used,
             message=f"path of the {used.role}: got the absolute path {used.name}, {status}; "
             "expected a relative path",
+            severity=not_loaded(used),
             fix=None if is_missing else _relative_fix(robot, used, "unsafe"),
         )
 
@@ -130,8 +141,8 @@ def package_uri(robot: Facts) -> Violations:
 
     `package://`, `model://` and `$(find ...)` work only where ROS or Gazebo is installed and the
     package is on its path. MuJoCo looks for a folder called `package:`, and other readers guess.
-    A package path of a file that was found is a note. A relative path after `file://` is a warning:
-    its first part is read as a host name, so that no tool finds the file.
+    A package path of a file that was found is a note. A relative path after `file://` counts as a
+    missing file: its first part is read as a host name, so that no tool finds the file.
 
     Fix:
         Use a path relative to the robot's file. --fix does this for every mesh that was found.
@@ -150,6 +161,7 @@ def package_uri(robot: Facts) -> Violations:
         groups.setdefault((scheme, fix.safety if fix else ""), []).append((used, fix))
     for (scheme, _), members in groups.items():
         first, fix = members[0]
+        severity = not_loaded(next((used for used, _ in members if used.strict), first))
         edits = [edit for _, each in members if each is not None for edit in each.edits]
         description = fix.description if fix and len(members) == 1 else "Use relative paths."
         yield Violation(
@@ -157,7 +169,7 @@ def package_uri(robot: Facts) -> Violations:
             message=f"path of {len(members)} mesh{'es' * (len(members) > 1)} "
             f"({names((each.name for each, _ in members), 2)}): refers to {scheme}; expected a "
             "relative path, which MuJoCo can load",
-            severity="warning" if scheme == "a host" else None,
+            severity=severity if scheme == "a host" else None,
             measured={"meshes": len(members)},
             fix=None if fix is None else make_fix(fix.safety, description, edits),
         )
@@ -180,7 +192,8 @@ def filename_case(robot: Facts) -> Violations:
     """A mesh path differs from the file name in case, or contains backslashes.
 
     The file is found on Windows and on most Macs, but not on Linux, where `Foot.STL` and `foot.stl`
-    are different files and a backslash is not a separator.
+    are different files and a backslash is not a separator. As with a missing file, the path of a
+    visual mesh of a URDF is a warning.
 
     Fix:
         Use the case of the file name, and forward slashes. --fix does this.
@@ -199,6 +212,7 @@ def filename_case(robot: Facts) -> Violations:
         yield Violation(
             element=used,
             message=f"path of the {used.role}: got {used.name}; expected {expected}",
+            severity=not_loaded(used),
             fix=make_fix("safe", f"Change the path to {expected}.", edits),
         )
 

@@ -91,6 +91,8 @@ def mujoco_load_failure(robot: Facts) -> Violations:
     for refusal in refusals:
         if refusal is not None:
             code, severity = _explaining_rule(robot, refusal.message)
+            if "package:" in refusal.message and any(findings_of(robot, "MSH003")):
+                code = "MSH003"  # a missing visual mesh is only a warning, and not the cause
             is_explained = severity == "error" or code == "MSH003"
             if "not found in" in refusal.message and _is_included(robot.model.file):
                 is_explained = True

@@ -12,6 +12,7 @@ from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     com_error,
     has_valid_masses,
     is_merged,
+    is_negligible,
     max_com_error,
 )
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
@@ -59,7 +60,8 @@ def inertia_asymmetry(robot: Facts) -> Violations:
         a, b = left.body.principal, right.body.principal
         scaled = b * (left.body.mass / right.body.mass)  # SYM001 reports the difference of masses
         difference = min(_moment_difference(a, b), _moment_difference(a, scaled))
-        if difference <= _MAX_MOMENT_DIFFERENCE or other_rules.report(pair):
+        harmless = difference <= _MAX_MOMENT_DIFFERENCE or is_negligible(pair, robot.total_mass)
+        if harmless or other_rules.report(pair):
             continue
         digit = max(_precision(left.body), _precision(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):

@@ -5,6 +5,7 @@ from collections import Counter
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.inertial import mass_source
 from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
@@ -13,8 +14,10 @@ from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
     com_error,
     has_valid_masses,
     is_merged,
+    is_negligible,
     max_com_error,
 )
+from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair
 from terrainkit_robots.lint.compare.body_mass import relative_difference
 from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
 from terrainkit_robots.lint.rules.sym.other_rules import OtherRules, check_joint_types
@@ -47,7 +50,7 @@ def mass_asymmetry(robot: Facts) -> Violations:
         difference = relative_difference(left.body.mass, right.body.mass)
         if not has_valid_masses(pair) or difference <= MAX_MASS_DIFFERENCE:
             continue
-        if other_rules.report(pair):
+        if is_negligible(pair, robot.total_mass) or other_rules.report(pair):
             continue
         odd, other = robot.outlier_first(pair, lambda body: np.array([body.mass]))
         yield Violation(
@@ -73,6 +76,9 @@ def com_asymmetry(robot: Facts) -> Violations:
     rotated. As with a wrong mass, the weight shifts to one side. The center of mass of the trunk
     has to be close to the mirror plane.
 
+    A part such as a motor that is mounted on both sides in the same way is not reported: its shape
+    is not mirrored either.
+
     Fix:
         Mirror the origin of the <inertial>, in the frame of its own link.
 
@@ -93,7 +99,7 @@ def com_asymmetry(robot: Facts) -> Violations:
         error, limit = com_error(robot.mirror, pair), max_com_error(pair)
         if error <= limit or other_rules.report(pair):
             continue
-        if _is_same_part(robot, left.body, right.body):
+        if _is_same_part(robot, left.body, right.body) or _moves_with_shape(robot, pair, limit):
             continue
         odd, other = robot.outlier_first(pair, lambda body: body.center)
         centers = [numbers(1000 * side.body.center, ".1f", ", ") for side in (odd, other)]
@@ -138,6 +144,24 @@ def _is_same_part(robot: Facts, a: Body, b: Body) -> bool:
         and bool(a.collisions or a.visuals)
         and _signature(robot, a) == _signature(robot, b)
     )
+
+
+def _moves_with_shape(robot: Facts, pair: MirrorPair, limit: float) -> bool:
+    """Return whether the shapes are as far from mirrored as the centers of mass, as with motors.
+
+    Args:
+        robot: The facts about the robot.
+        pair: Two bodies.
+        limit: Allowed difference of the two distances [m].
+    """
+    offsets = []
+    for side in (pair.left, pair.right):
+        body = side.body
+        box = bounds(body.collisions or body.visuals, robot.meshes)
+        if box is None:
+            return False
+        offsets.append(body.zero_pose[:3, :3] @ (body.center - box.mean(axis=0)))
+    return float(np.linalg.norm(robot.mirror.image(offsets[0]) - offsets[1])) <= limit
 
 
 def _signature(robot: Facts, body: Body) -> Counter[tuple[object, ...]]:

@@ -1,0 +1,36 @@
+"""Find the joints that other joints move through constraints or tendons."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+def coupled_joints(spec: "mujoco.MjSpec") -> set[str]:
+    """Return the joints in loops that connect and weld constraints close, and of fixed tendons."""
+    import mujoco
+
+    kinds = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD
+    bodies = {body.name: body for body in spec.bodies}
+    bodies |= {site.name: site.parent for site in spec.sites if site.name not in bodies}
+    found: list[Any] = []
+    for each in spec.equalities:
+        chains = [_ancestors(bodies.get(name)) for name in (each.name1, each.name2)]
+        # A body that is held by the world or by a mocap body closes no loop.
+        if each.type in kinds and each.active and chains[0][-1:] == chains[1][-1:] != []:
+            for chain, other in (chains, chains[::-1]):
+                found += [joint for body in chain if body not in other for joint in body.joints]
+    names = {joint.name for joint in found}
+    for tendon in spec.tendons:
+        wraps = [each for each in tendon.path if each.type == mujoco.mjtWrap.mjWRAP_JOINT]
+        names |= {each.target.name for each in wraps if each.target is not None}
+    return names - {""}
+
+
+def _ancestors(body: Any) -> list[Any]:
+    """Return a body and the bodies that carry it, without the world."""
+    found = []
+    while body is not None and body.parent is not None:
+        found.append(body)
+        body = body.parent
+    return found
