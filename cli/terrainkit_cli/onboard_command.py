@@ -64,8 +64,9 @@ class Onboard(Command):
     """A robot.toml, such as an edited one, whose values override the derived values."""
 
     gains: Literal["stand", "train"] = "stand"
-    """PD gains to suggest: stand holds the default pose without a policy; train has softer gains,
-    as in published configurations, with action scales of about 0.25 rad."""
+    """PD gains: stand uses the gains of position controllers in the file, or suggested ones that
+    hold the default pose without a policy; train has softer gains, as in published configurations,
+    with action scales of about 0.25 rad."""
 
     unsafe_fixes: bool = False
     """Also apply fixes that change a number, a shape or a mesh. The input file is not changed."""

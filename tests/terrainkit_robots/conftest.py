@@ -126,6 +126,7 @@ class Gain:
     damping: float = 1.0
     armature: float = 0.0
     reason: str = "for a test"
+    declared: bool = False
 
 
 @pytest.fixture

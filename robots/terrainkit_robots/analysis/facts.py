@@ -29,7 +29,7 @@ from terrainkit_robots.analysis.symmetry.mirror import Mirror, detect_mirror
 from terrainkit_robots.analysis.symmetry.mirror_map import mirror_map
 from terrainkit_robots.analysis.symmetry.mirror_pairs import (
     MirrorPair,
-    MirrorSide,
+    Outlier,
     mirror_pairs,
     outlier_first,
 )
@@ -282,15 +282,19 @@ class Facts:
         return find_misalignments(self.mirror, self.uncopied_pairs, self.leg_bodies, tips)
 
     def outlier_first(
-        self, pair: MirrorPair, value: Callable[[Body], Matrix | None]
-    ) -> tuple[MirrorSide, MirrorSide]:
+        self,
+        pair: MirrorPair,
+        value: Callable[[Body], Matrix | None],
+        misfit: Callable[[Body], float | None] = lambda _: None,
+    ) -> Outlier:
         """Return the joints of a pair; first the joint that deviates more from the other legs.
 
         Args:
             pair: The mirrored joints.
             value: Function of a body that returns the quantity to compare, or None if it has none.
+            misfit: Function of a body that returns how much it contradicts its shapes, or None.
         """
-        return outlier_first(pair, value, self.bodies, self.legs, self.mirror)
+        return outlier_first(pair, value, self.bodies, self.legs, self.mirror, misfit)
 
     # Simulators
 

@@ -255,6 +255,19 @@ class SafetyController:
     """Upper soft limit [rad] or [m]."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class PositionGains:
+    """Gains of the position controllers of a joint, as declared."""
+
+    source: Source
+
+    stiffness: float
+    """Proportional gain [N m/rad] or [N/m]."""
+
+    damping: float | None = None
+    """Derivative gain [N m s/rad] or [N s/m]; None if the file declares none or a damping ratio."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Joint:
     """Connection of a link to its parent."""
@@ -304,6 +317,9 @@ class Joint:
     """Whether the URDF tells Isaac Gym not to merge the child of this fixed joint."""
 
     safety_controller: SafetyController | None = None
+
+    position_gains: PositionGains | None = None
+    """Gains of its position actuators in MJCF, or of its ros2_control in URDF."""
 
     @property
     def damping(self) -> float:

@@ -4,10 +4,13 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from terrainkit_robots.simulation.declared_gains import declared_gains
+from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.spec.per_joint import match_joints
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.simulation.gain import Gain
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
 _COLUMNS: Mapping[str, tuple[str, str, str]] = {
@@ -42,7 +45,8 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
         for joint, role in zip(leg.joints, leg.roles, strict=True)
     }
     torques = {} if facts.stance is None else facts.stance.torques
-    rows = [_header(joint_types, has_legs=bool(facts.legs))]
+    gain_sets = _gain_sets(facts)
+    rows = [_header(joint_types, has_legs=bool(facts.legs), has_gain_sets=bool(gain_sets))]
     for index, name in enumerate(order):
         joint = joints.get(name)
         cells = [str(index), name]
@@ -50,13 +54,25 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
             cells.append(roles.get(name, ""))
         cells.append("" if joint is None else _format_limits(joint.range))
         cells += [format_number(values[column].get(name)) for column in _COLUMNS]
+        cells += [_format_gain(gains.get(name)) for gains in gain_sets]
         if facts.legs:
             cells.append(_format_torque(torques.get(name), values["effort"].get(name)))
         rows.append(tuple(cells))
     return rows
 
 
-def _header(joint_types: set[str], *, has_legs: bool) -> tuple[str, ...]:
+def _gain_sets(facts: "Facts") -> list[Mapping[str, "Gain"]]:
+    """Return the declared and the suggested gains, or nothing if the file declares none."""
+    if all(joint.position_gains is None for joint in facts.actuated):
+        return []
+    return [declared_gains(facts).gains, suggest_gains(facts)]
+
+
+def _format_gain(gain: "Gain | None") -> str:
+    return "" if gain is None else f"{format_number(gain.stiffness)}, {format_number(gain.damping)}"
+
+
+def _header(joint_types: set[str], *, has_legs: bool, has_gain_sets: bool) -> tuple[str, ...]:
     def with_unit(title: str, revolute_unit: str, prismatic_unit: str) -> str:
         units = [revolute_unit] * bool(joint_types - {"prismatic"})
         units += [prismatic_unit] * ("prismatic" in joint_types)
@@ -64,6 +80,7 @@ def _header(joint_types: set[str], *, has_legs: bool) -> tuple[str, ...]:
 
     titles = ["#", "joint", *["role"] * has_legs, with_unit("limits", "rad", "m")]
     titles += [with_unit(*column) for column in _COLUMNS.values()]
+    titles += ["declared kp, kd", "suggested kp, kd"] * has_gain_sets
     titles += [with_unit("holding torque", "N m", "N")] * has_legs
     return tuple(titles)
 

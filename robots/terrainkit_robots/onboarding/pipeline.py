@@ -222,7 +222,11 @@ def _write_folder(
         # The pictures are rendered by another process at the same time.
         with ThreadPoolExecutor(1) as executor:
             images_job = executor.submit(_render_images, folder, options.render_images)
-            is_soft = options.gains == "train" and options.spec is None
+            stiffness = result.robot.spec.provenance.items()
+            is_soft = options.spec is None and (
+                options.gains == "train"
+                or any(k.startswith("stiffness") and p.origin == "declared" for k, p in stiffness)
+            )
             verification = verify(result.report.facts, result.robot, folder, soft_gains=is_soft)
             options.on_step("rendering pictures")
         images, images_error = images_job.result()

@@ -132,7 +132,7 @@ def _standing(checks: "Verification | None", robot: "RobotFiles") -> Iterator[st
     locked = checks.joints_locked
     how = "with locked joints" if locked else "at its default pose, with the gains below"
     if checks.stand_gains:
-        how = "at its default pose, with the gain set `stand`"
+        how = "at its default pose, with suggested gains"
     outcome = "It stands" if checks.is_stable else "It does not stand"
     yield f"**{outcome}**, {how}, in MuJoCo:\n"
     has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)

@@ -88,7 +88,7 @@ def make_robot_files(
         floating: Whether the base is floating; by default as in the overriding spec or the file,
             or as the legs suggest.
         user_spec: Values that replace the derived values.
-        gain_set: The PD gains to suggest.
+        gain_set: The PD gains: to hold the pose, as declared or suggested, or to train.
         unknown_effort: Joints whose effort limit in the file is a placeholder.
         cache_dir: Folder that caches convex decompositions between runs.
         progress: Wraps an iterable of collision meshes to display a progress bar.
@@ -152,11 +152,12 @@ def _make_spec(facts: Facts, user_spec: SpecOverride | None, gain_set: "GainSet"
         ExportError: if the robot cannot be simulated, so that no gains can be derived.
     """
     from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
-    from terrainkit_robots.simulation.pd_gains import suggest_gains, suggest_training_gains
+    from terrainkit_robots.simulation.declared_gains import standing_gains
+    from terrainkit_robots.simulation.pd_gains import suggest_training_gains
     from terrainkit_robots.spec.provenance import with_provenance
 
     try:
-        gains = suggest_gains(facts) if gain_set == "stand" else suggest_training_gains(facts)
+        gains = standing_gains(facts) if gain_set == "stand" else suggest_training_gains(facts)
     except CannotCheckError as error:
         raise ExportError(f"{facts.model.file}: cannot derive PD gains: {error}") from None
     floating = bool(facts.model.floating)
@@ -191,11 +192,21 @@ def _check_user_spec(facts: Facts, user_spec: SpecOverride) -> tuple[str, ...]:
 
 
 def _set_motor_limits(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
-    """Return a model whose joints have the effort and velocity limits of the spec."""
+    """Return a model whose joints have the effort and velocity limits of the spec.
+
+    Damping of a joint that is its derivative gain in the spec is removed from the joint.
+    """
     effort, velocity = spec.per_joint("effort"), spec.per_joint("velocity")
+    damping = spec.per_joint("damping")
     joints = tuple(
         replace(
             joint,
+            dynamics=replace(joint.dynamics, damping=None)
+            if joint.dynamics is not None
+            and joint.position_gains is not None
+            and joint.position_gains.damping is None
+            and joint.damping == damping[joint.name]
+            else joint.dynamics,
             limit=replace(joint.limit, effort=effort[joint.name], velocity=velocity[joint.name]),
         )
         if joint.limit is not None and joint.name in effort

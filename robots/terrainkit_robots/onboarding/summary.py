@@ -90,7 +90,7 @@ def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
     locked = "with locked joints, since bipeds need a controller to balance"
     how = locked if checks.joints_locked else "with the gains of robot.toml"
     if checks.stand_gains:
-        how = "with the gains of --gains stand, which hold the pose without a policy"
+        how = "with suggested gains, which hold the pose without a policy"
     if checks.failures:
         return f"NO: {standing.seconds:g} s {how}; {'; '.join(checks.failures)}"
     tilt = f"tilt {math.degrees(standing.tilt):.1f} degrees"

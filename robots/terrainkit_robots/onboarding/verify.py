@@ -44,7 +44,7 @@ class Verification:
     """Whether the joints were locked in the standing test, as for bipeds, which need balance."""
 
     stand_gains: bool = False
-    """Whether the standing test used the gain set `stand` instead of the spec's softer gains."""
+    """Whether the standing test used suggested gains instead of the spec's, which may be softer."""
 
     free_standing: "StandResult | None" = None
     """Result with the gains of the spec and without locked joints, if the standing test used other
@@ -78,21 +78,22 @@ def verify(
         source: Facts of the source file.
         robot: The robot that was written.
         folder: The folder with its files.
-        soft_gains: Whether the gains of the spec do not hold the pose without a policy.
+        soft_gains: Whether the gains of the spec need not hold the pose without a policy.
 
     Raises:
         ExportError: if MuJoCo cannot load the files, or they differ from the source.
     """
     from terrainkit_robots.simulation.pd_gains import suggest_gains
     from terrainkit_robots.simulation.sim_model import SimModel
-    from terrainkit_robots.simulation.standing import contact_areas, stand_test
+    from terrainkit_robots.simulation.standing import contact_areas, ground_normal, stand_test
 
     floating = bool(robot.facts.model.floating)
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
     with quiet_mujoco(), ThreadPoolExecutor(2) as executor:
         urdf, scene = (executor.submit(_load_model, folder / name) for name in (URDF, SCENE))
         reference = reference_kinematics(with_world_base(source, floating=floating), robot.facts)
-    equivalences = compare_models(reference, {URDF: urdf.result(), MJCF: scene.result()})
+    (_, urdf_model), (scene_spec, scene_model) = urdf.result(), scene.result()
+    equivalences = compare_models(reference, {URDF: urdf_model, MJCF: scene_model})
     for each in equivalences:
         if each.failures:
             raise ExportError(f"{each.file} differs from the source: {'; '.join(each.failures)}")
@@ -104,10 +105,11 @@ def verify(
     stand_gains = soft_gains and not joints_locked
     test = partial(
         stand_test,
-        SimModel.from_mujoco(scene.result(), base=robot.facts.bodies[0].top.name),
+        SimModel.from_mujoco(scene_model, spec=scene_spec, base=robot.facts.bodies[0].top.name),
         positions=robot.facts.default_pose,
         areas=contact_areas(robot.facts),
         seconds=_DURATION,
+        ground_normal=ground_normal(robot.facts),
     )
     spec_gains = _gains(robot.spec)
     try:
@@ -125,11 +127,13 @@ def verify(
     )
 
 
-def _load_model(path: Path) -> Any:
+def _load_model(path: Path) -> tuple[Any, Any]:
+    """Return the specification and the model of a file."""
     import mujoco
 
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        spec = mujoco.MjSpec.from_file(str(path))
+        return spec, spec.compile()
     except ValueError as error:
         reason = " ".join(str(error).split())
         raise ExportError(f"MuJoCo cannot load the written {path.name}: {reason}") from None

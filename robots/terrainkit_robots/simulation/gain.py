@@ -23,4 +23,7 @@ class Gain:
     light for its gains."""
 
     reason: str
-    """How the gains were computed."""
+    """How the gains were computed, or where they are declared."""
+
+    declared: bool = False
+    """Whether the file of the robot declares them."""

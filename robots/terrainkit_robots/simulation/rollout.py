@@ -20,10 +20,6 @@ _MAX_DOFS = 100
 _MAX_DISTANCE = 100.0
 """Distance within which the floor is searched [m]."""
 
-_LOCKED_ARMATURE = 1e8
-"""Armature of locked joints [kg m2] or [kg]. The torques of a robot turn it by less than 1e-4 rad
-in minutes, and in the limit the robot moves like a rigid body."""
-
 
 class Rollout:
     """A simulation of a robot. Use it within `quiet_mujoco`."""
@@ -60,15 +56,6 @@ class Rollout:
             model.dof_armature[model.joint(name).dofadr[0]] = gain.armature
         self.data = mujoco.MjData(model)
         mujoco.mj_setConst(model, self.data)  # the contact solver scales by these masses
-
-    def lock_joints(self) -> None:
-        """Make the joints immovable by a huge armature."""
-        import mujoco
-
-        self.model.dof_armature[self.sim.base_dofs :] = _LOCKED_ARMATURE
-        self.model.eq_active0[:] = 0  # mimic joints are locked themselves
-        self.data = mujoco.MjData(self.model)
-        mujoco.mj_setConst(self.model, self.data)
 
     def disable_floor(self) -> None:
         """Disable the contacts of the floor."""

@@ -52,6 +52,9 @@ class SimModel:
     model: Any
     """The `mujoco.MjModel`."""
 
+    spec: Any
+    """The `mujoco.MjSpec` that it was compiled from; None if it is unknown."""
+
     floating: bool
     """Whether the base has a free joint: the first 7 elements of qpos, and the first 6 of qvel."""
 
@@ -68,13 +71,14 @@ class SimModel:
     """qpos of the standing pose with the lowest shape on the floor, shape (nq,)."""
 
     @classmethod
-    def from_mujoco(cls, model: Any, *, base: str) -> "SimModel":
+    def from_mujoco(cls, model: Any, *, base: str, spec: Any = None) -> "SimModel":
         """Return the simulation model of a MuJoCo model.
 
         Args:
             model: The `mujoco.MjModel` of a robot and a floor, with an actuator for each actuated
                 joint.
             base: Name of the body that the limbs are attached to.
+            spec: The `mujoco.MjSpec` that it was compiled from; its joints can then be welded.
         """
         import mujoco
 
@@ -82,6 +86,7 @@ class SimModel:
         joints = [model.joint(k).name for k in range(model.njnt) if model.jnt_type[k] != free]
         return cls(
             model=model,
+            spec=spec,
             floating=len(joints) < model.njnt,
             joints=tuple(joints),
             actuated=tuple(model.actuator(k).name for k in range(model.nu)),
@@ -148,14 +153,13 @@ def make_sim_model(facts: Facts) -> SimModel:
         time_step=TIME_STEP,
     )
     try:
-        compiled = _compile(model, extras, assets)
+        return _compile(model, extras, assets)
     except ValueError as error:
         try:
-            compiled = _compile(_merge_inertia(model), extras, assets)
+            return _compile(_merge_inertia(model), extras, assets)
         except ValueError:
             reason = _compiler_message(str(error))
             raise CannotCheckError(f"MuJoCo cannot simulate it: {reason}") from None
-    return SimModel.from_mujoco(compiled, base=model.links[0].name)
 
 
 def _compiler_message(error: str) -> str:
@@ -166,14 +170,15 @@ def _compiler_message(error: str) -> str:
     return subject + " ".join(message.removeprefix("Error: ").split())
 
 
-def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> Any:
+def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> SimModel:
     import mujoco
 
     text = mjcf_text(model, extras)
     if model.floating:
         text = text.replace("<worldbody>", f"<worldbody>{floor_text()}", 1)
     with quiet_mujoco():
-        return mujoco.MjModel.from_xml_string(text, assets)
+        spec = mujoco.MjSpec.from_string(text, assets=dict(assets))
+        return SimModel.from_mujoco(spec.compile(), spec=spec, base=model.links[0].name)
 
 
 def _merge_inertia(model: RobotModel) -> RobotModel:

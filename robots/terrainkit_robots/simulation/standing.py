@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.rollout import Rollout
 from terrainkit_robots.simulation.sim_model import SimModel
-from terrainkit_robots.transforms import invert_poses, quat_to_matrix
+from terrainkit_robots.simulation.welding import weld_joints
+from terrainkit_robots.transforms import Matrix, invert_poses, quat_to_matrix
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
@@ -23,6 +25,8 @@ _DECIMATION = 4
 
 _FINAL_SECONDS = 0.1
 """A foot that touches the ground within the last tenth of a second touches it at the end [s]."""
+
+_UP = np.array([0.0, 0.0, 1.0])
 
 _FOOT_RADIUS_RATIO = 0.3
 """Radius around the tip that counts as foot if the foot is a part of the shank, over leg length."""
@@ -121,6 +125,21 @@ def contact_areas(facts: "Facts") -> tuple[ContactArea, ...]:
     return tuple(found)
 
 
+def ground_normal(facts: "Facts") -> Matrix:
+    """Return the mean normal of the soles at the default pose, shape (3,).
+
+    It is in the frame of the trunk. A robot with locked joints and a level trunk tilts until its
+    soles are level. Points are level, and so are edges across their length.
+    """
+    poses = body_poses(facts.bodies, facts.default_pose)
+    feet = [leg.limb.chain[-1] for leg in facts.legs]
+    soles = [contact_points(facts.bodies[i], poses[i], facts.meshes) for i in feet]
+    offsets = np.concatenate([sole - sole.mean(axis=0) for sole in soles] or [np.zeros((1, 3))])
+    slope, *_ = np.linalg.lstsq(offsets[:, :2], offsets[:, 2], rcond=1e-3)
+    normal = np.array([*-slope, 1.0])
+    return np.asarray(normal / np.linalg.norm(normal))
+
+
 def stand_test(
     sim: SimModel,
     gains: Mapping[str, Gain],
@@ -130,6 +149,7 @@ def stand_test(
     seconds: float = 2.0,
     self_collision: bool = True,
     joints_locked: bool = False,
+    ground_normal: Matrix = _UP,
 ) -> StandResult:
     """Simulate a robot that holds its pose.
 
@@ -140,7 +160,9 @@ def stand_test(
         areas: Where the robot may touch the ground; nowhere by default.
         seconds: Time to simulate [s].
         self_collision: Whether the shapes of the robot collide with each other.
-        joints_locked: Whether the joints are immovable.
+        joints_locked: Whether the joints are welded at their positions.
+        ground_normal: Normal of the ground in the frame of the base at the start if the joints are
+            locked, shape (3,).
 
     Raises:
         CannotCheckError: if the base is fixed, or the simulation would take too long.
@@ -148,15 +170,23 @@ def stand_test(
     if not sim.floating:
         raise CannotCheckError("it does not stand: its base is fixed to the world")
     with quiet_mujoco():
-        rollout = Rollout(sim, {} if joints_locked else gains, self_collision=self_collision)
+        qpos = sim.qpos_at(positions)
         if joints_locked:
-            rollout.lock_joints()
+            sim, gains, positions = weld_joints(sim, positions), {}, {}
+            qpos = np.concatenate([qpos[:3], _level(ground_normal)])
+        rollout = Rollout(sim, gains, self_collision=self_collision)
         # Without a drop, a failure is a failure to stand and not to land.
-        rollout.reset(sim.qpos_at(positions), clearance=0.0)
+        rollout.reset(qpos, clearance=0.0)
         recorder = _Recorder(rollout, positions, areas, seconds)
         for step in rollout.steps(seconds):
             recorder.update(step)
         return recorder.result()
+
+
+def _level(normal: Matrix) -> Matrix:
+    """Return the quaternion of the shortest rotation that makes a normal vertical, shape (4,)."""
+    quat = np.array([1.0 + normal[2], *np.cross(normal, _UP)])
+    return np.asarray(quat / np.linalg.norm(quat))
 
 
 @dataclass(eq=False)

@@ -1,5 +1,6 @@
 """Tests of onboarding: the bundled robots always, real robots where they are available."""
 
+import re
 import shutil
 from dataclasses import replace
 
@@ -254,7 +255,9 @@ def cannot_check(reason):
 
 
 def test_onboard_reports_failed_gain_derivation(tmp_path, monkeypatch):
-    monkeypatch.setattr("terrainkit_robots.simulation.pd_gains.suggest_gains", cannot_check("why"))
+    monkeypatch.setattr(
+        "terrainkit_robots.simulation.declared_gains.suggest_gains", cannot_check("why")
+    )
     with pytest.raises(ExportError, match="cannot derive PD gains: why"):
         onboard(QUADRUPED, tmp_path / "robot", options())
 
@@ -328,8 +331,21 @@ def test_onboard_training_gains(onboarded, tmp_path):
     assert checks.stand_gains
     assert checks.standing == stiff.verification.standing
     assert checks.free_standing != checks.standing
-    assert "--gains stand" in dict(summarize(result))["standing"]
-    assert "gain set `stand`" in (result.folder / "report.md").read_text()
+    assert "with suggested gains" in dict(summarize(result))["standing"]
+    assert "with suggested gains" in (result.folder / "report.md").read_text()
+
+
+def test_onboard_uses_declared_gains(tmp_path):
+    servo = r'<position \1 kp="35" kv="0.9" forcerange="-23.7 23.7"/>'
+    text = QUADRUPED.with_suffix(".xml").read_text()
+    file = tmp_path / "quadruped.xml"
+    file.write_text(re.sub(r'<motor (name="\w+" joint="\w+") class="\w+"/>', servo, text))
+    result = onboard(file, tmp_path / "robot", options())
+    spec = result.robot.spec
+    assert (spec.stiffness, spec.damping) == ({".*": 35.0}, {".*": 0.9})
+    assert spec.provenance["stiffness"].origin == "declared"
+    assert result.verification.stand_gains
+    assert "| 35, 0.9 | 60, 2 |" in (result.folder / "report.md").read_text()
 
 
 def test_onboard_biped_reports_free_standing(onboarded):

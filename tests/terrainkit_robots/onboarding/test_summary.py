@@ -93,7 +93,7 @@ def test_summary_lists_what_else_happened(lines):
             {"verified": {"joints_locked": True}},
             "yes: 5 s with locked joints, since bipeds need a controller to balance, tilt",
         ),
-        ({"verified": {"stand_gains": True}}, "yes: 5 s with the gains of --gains stand, which"),
+        ({"verified": {"stand_gains": True}}, "yes: 5 s with suggested gains, which"),
     ],
 )
 def test_summary_says_how_the_robot_stood(lines, options, text):

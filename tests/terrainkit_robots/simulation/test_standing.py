@@ -1,12 +1,13 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
-from terrainkit_robots.simulation.standing import contact_areas, stand_test
+from terrainkit_robots.simulation.standing import contact_areas, ground_normal, stand_test
 from tests.robots import PENDULUM
 
 
@@ -83,3 +84,40 @@ def test_contact_areas_of_foot_and_shank(bundled):
 def test_stand_test_rejects_fixed_base(robot):
     with pytest.raises(CannotCheckError, match="does not stand"):
         stand(robot(PENDULUM))
+
+
+@pytest.mark.parametrize("name", ["biped.urdf", "quadruped.urdf"])
+def test_soles_of_bundled_robots_are_level(bundled, name):
+    assert ground_normal(bundled(name)) == pytest.approx([0, 0, 1], abs=1e-6)
+
+
+def test_locked_robot_settles_on_its_soles(bundled):
+    # With the ground 1 degree off its soles, the robot tilts by this degree.
+    tilt = math.radians(1)
+    normal = np.array([math.sin(tilt), 0, math.cos(tilt)])
+    standing = stand(bundled("biped.urdf"), joints_locked=True, ground_normal=normal)
+    assert standing.tilt == pytest.approx(tilt, abs=math.radians(0.2))
+    assert standing.other_contacts == standing.lifted_feet == ()
+
+
+def test_ground_normal_of_inclined_soles(robot):
+    # Two boxes that are turned by 0.05 rad about y, without joints to level them.
+    leg = """<link name="{s}_thigh"><inertial><mass value="1"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+    <joint name="{s}_hip" type="revolute"><parent link="base"/><child link="{s}_thigh"/>
+      <origin xyz="0 {y} 0"/><axis xyz="1 0 0"/>
+      <limit lower="-0.5" upper="0.5" effort="50" velocity="9"/></joint>
+    <link name="{s}_foot"><inertial><mass value="1"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+      <collision><origin rpy="0 0.05 0"/>
+        <geometry><box size="0.15 0.08 0.02"/></geometry></collision>
+    </link>
+    <joint name="{s}_yaw" type="revolute"><parent link="{s}_thigh"/><child link="{s}_foot"/>
+      <origin xyz="0 0 -0.5"/><axis xyz="0 0 1"/>
+      <limit lower="-0.5" upper="0.5" effort="50" velocity="9"/></joint>"""
+    legs = leg.format(s="left", y=0.1) + leg.format(s="right", y=-0.1)
+    base = """<link name="base"><inertial><mass value="5"/>
+      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+    facts = robot(f'<robot name="r">{base}{legs}</robot>')
+    assert len(facts.legs) == 2
+    assert ground_normal(facts) == pytest.approx([math.sin(0.05), 0, math.cos(0.05)], abs=1e-3)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.linalg import norm
@@ -12,6 +13,9 @@ from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.analysis.symmetry.mirror import Mirror, Sign, swap_sides
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix
+
+_MIN_CLEAR_RATIO = 3.0
+"""Ratio from which a difference of one side is clearly larger than that of the other side."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,6 +38,16 @@ class MirrorSide:
 
     arm: Matrix
     """Vector from the joint to the center of mass, shape (3,) [m]."""
+
+
+class Outlier(NamedTuple):
+    """Two mirrored joints, of which the first one is probably wrong."""
+
+    odd: MirrorSide
+    other: MirrorSide
+
+    reason: str
+    """What else in the file says so, or that nothing does."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,10 +118,12 @@ def outlier_first(
     bodies: Sequence[Body],
     legs: Sequence[Leg],
     mirror: Mirror,
-) -> tuple[MirrorSide, MirrorSide]:
+    misfit: Callable[[Body], float | None],
+) -> Outlier:
     """Return two mirrored joints, first the joint that deviates more from the legs on its side.
 
-    The right joint is first if there are no other legs to compare with.
+    If there are no other legs to compare with, or they do not decide, the misfit decides. If it
+    does not either, the right joint is first.
 
     Args:
         pair: The joints.
@@ -116,6 +132,7 @@ def outlier_first(
         bodies: The bodies, the trunk first.
         legs: The legs of the robot.
         mirror: The mirror plane.
+        misfit: How much the property of a body contradicts its shapes; None if it is unknown.
     """
     left, right = pair.left, pair.right
     siblings = _sibling_bodies(legs, pair.indices)
@@ -136,7 +153,19 @@ def outlier_first(
             default=0.0,
         )
 
-    return (left, right) if distance(left) > distance(right) else (right, left)
+    distances = distance(left), distance(right)
+    order = (left, right) if distances[0] > distances[1] else (right, left)
+    if _is_clear(distances):
+        return Outlier(*order, f"{order[0].body.name} differs from the other legs as well")
+    misfits = misfit(left.body), misfit(right.body)
+    if misfits[0] is not None and misfits[1] is not None and _is_clear((misfits[0], misfits[1])):
+        order = (left, right) if misfits[0] > misfits[1] else (right, left)
+        return Outlier(*order, f"the shapes of {order[0].body.name} contradict it")
+    return Outlier(*order, "either side may be wrong")
+
+
+def _is_clear(values: tuple[float, float]) -> bool:
+    return max(values) > _MIN_CLEAR_RATIO * min(values)
 
 
 def _sibling_bodies(legs: Sequence[Leg], exclude: set[int]) -> list[int]:

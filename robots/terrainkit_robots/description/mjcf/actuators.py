@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.description.mjcf.tree import Node
-from terrainkit_robots.description.model import Actuator, Mimic, Source
+from terrainkit_robots.description.model import Actuator, Mimic, PositionGains, Source
 
 if TYPE_CHECKING:
     import mujoco
@@ -35,6 +35,9 @@ class ActuatorData:
 
     stiffness: float | None
     """Position gain on the joint [N m/rad] or [N/m]; None if it is not a position actuator."""
+
+    damping: float | None
+    """Derivative gain on the joint [N m s/rad] or [N s/m]; None if it is 0 or a ratio."""
 
     commands: tuple[float, float] | None
     """Range of the commanded force; None if it is unlimited or commands something else."""
@@ -80,6 +83,8 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
             armature=float(getattr(each, "armature", 0.0)) * gear**2,
             gear=gear,
             stiffness=_stiffness(each, gear),
+            # A positive value is a damping ratio.
+            damping=-float(each.biasprm[2]) * gear**2 if each.biasprm[2] < 0 else None,
             commands=None
             if commanded is None
             else (float(each.ctrlrange[0]), float(each.ctrlrange[1])),
@@ -147,6 +152,24 @@ def force_limit(joint: Any, actuators: Sequence[ActuatorData], factor: float) ->
     ]
     known = [limit for limit in limits if limit is not None]
     return min(known) * factor if known else None
+
+
+def position_gains(actuators: Sequence[ActuatorData], factor: float) -> PositionGains | None:
+    """Return the sum of the gains of the position actuators of a joint; None if it has none.
+
+    Args:
+        actuators: The actuators of the joint.
+        factor: Factor of the frames around the joint on gains.
+    """
+    servos = [actuator for actuator in actuators if actuator.stiffness]
+    damping = factor * sum(actuator.damping or 0.0 for actuator in actuators)
+    if not servos:
+        return None
+    return PositionGains(
+        source=servos[0].source,
+        stiffness=factor * sum(actuator.stiffness or 0.0 for actuator in servos),
+        damping=damping or None,
+    )
 
 
 def read_mimics(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> dict[str, Mimic]:

@@ -17,6 +17,7 @@ import numpy as np
 from terrainkit_robots.description.mjcf.actuators import (
     ActuatorData,
     force_limit,
+    position_gains,
     read_actuators,
     read_mimics,
 )
@@ -365,6 +366,7 @@ class _SpecReader:
                 friction=float(joint.frictionloss) * scale.force,
             ),
             armature=armature * scale.armature,
+            position_gains=position_gains(actuators, scale.armature),
         )
 
     def _range(self, joint: Any, node: Node) -> tuple[float, float] | None:

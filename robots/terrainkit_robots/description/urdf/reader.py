@@ -5,7 +5,7 @@ rest is read.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
@@ -23,6 +23,7 @@ from terrainkit_robots.description.model import (
     Link,
     MeshFile,
     Mimic,
+    PositionGains,
     Problem,
     RobotModel,
     SafetyController,
@@ -68,6 +69,7 @@ class _Reader:
         self._packages = PackageResolver(doc.file, packages)
         self._problems = list(doc.problems)
         self._colors: Mapping[str, Color] = {}
+        self._controlled: Mapping[str, etree._Element] = {}
 
     def robot(self) -> RobotModel:
         """Return the robot."""
@@ -78,6 +80,9 @@ class _Reader:
             self._report("XML003", root, "the robot has no name; expected <robot name=...>")
         self._check_names(root)
         self._colors = named_colors(root)
+        self._controlled = {
+            joint.get("name", ""): joint for joint in root.iterfind("ros2_control/joint")
+        }
         links = tuple(self._link(element) for element in root.iterchildren("link"))
         joints = tuple(self._joint(element) for element in root.iterchildren("joint"))
         return RobotModel(
@@ -327,7 +332,18 @@ class _Reader:
             dynamics=self._numbers(Dynamics, element.find("dynamics")),
             dont_collapse=element.get("dont_collapse", "").lower() == "true",
             safety_controller=self._numbers(SafetyController, element.find("safety_controller")),
+            position_gains=self._position_gains(self._controlled.get(name)),
         )
+
+    def _position_gains(self, control: "etree._Element | None") -> PositionGains | None:
+        """Return the gains of a position controller in the <joint> of a <ros2_control>."""
+        if control is None:
+            return None
+        texts = {param.get("name"): param.text or "" for param in control.iterchildren("param")}
+        stiffness, damping = (_first_number(texts, names) for names in _GAIN_PARAMETERS)
+        if stiffness is None:
+            return None
+        return PositionGains(source=self._doc.source(control), stiffness=stiffness, damping=damping)
 
     def _numbers(self, kind: type[_Numbers], element: "etree._Element | None") -> _Numbers | None:
         """Return an element whose attributes are numbers, named like the fields of `kind`."""
@@ -350,6 +366,9 @@ class _Reader:
         )
 
 
+_GAIN_PARAMETERS = (("position_kp", "pos_kp"), ("position_kd", "pos_kd"))
+"""Parameters for stiffness and damping, in mujoco_ros2_control and in gazebo_ros2_control."""
+
 _NAMED_TAGS = ("link", "joint", "robot")
 _DIAGONAL = ("ixx", "iyy", "izz")
 _PRODUCTS = ("ixy", "ixz", "iyz")
@@ -368,6 +387,13 @@ def _symmetric(values: list[float | None]) -> Matrix | None:
         return None
     xx, yy, zz, xy, xz, yz = (float(value) for value in values if value is not None)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _first_number(texts: Mapping[str | None, str], names: Sequence[str]) -> float | None:
+    """Return the first of the named numbers that is positive, or None."""
+    found = (parse_numbers(texts[name], 1) for name in names if name in texts)
+    values = (float(each[0]) for each in found if each is not None)
+    return next((value for value in values if 0 < value < math.inf), None)
 
 
 def _complete(*values: float | None) -> tuple[float, ...] | None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -113,13 +114,16 @@ def _pose_and_gain_columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[st
     stiffness: Column = {}
     damping: Column = {}
     origin = _pose_provenance(facts)
-    see_stiffness = Provenance(origin="suggested", reason="see stiffness")
+    see = Provenance(origin="suggested", reason="see stiffness")
     for joint in facts.actuated:
         name, gain = joint.name, gains[joint.name]
-        suggested = Provenance(origin="suggested", reason=gain.reason)
+        origin_of_gain = Provenance(
+            origin="declared" if gain.declared else "suggested", reason=gain.reason
+        )
         pose[name] = rounded(facts.default_pose[name]), origin
-        stiffness[name] = rounded(gain.stiffness, 2), suggested
-        damping[name] = rounded(gain.damping, 2), see_stiffness
+        digits = 6 if gain.declared else 2
+        stiffness[name] = rounded(gain.stiffness, digits), origin_of_gain
+        damping[name] = rounded(gain.damping, digits), replace(see, origin=origin_of_gain.origin)
     return {"default_pose": pose, "stiffness": stiffness, "damping": damping}
 
 

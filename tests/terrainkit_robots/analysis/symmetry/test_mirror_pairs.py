@@ -56,23 +56,25 @@ def test_body_of_two_links_with_mass_is_merged(mass, merged):
     assert is_merged(arms(more=part)[1]) == merged
 
 
-# Of the left, right, rear left and rear right thigh.
+# Of the left, right, rear left and rear right thigh. The other legs decide from a factor of 3 on.
 @pytest.mark.parametrize(
-    ("values", "first"),
+    ("values", "first", "decided"),
     [
-        ((2, 1, 1, 1), "FL"),
-        ((1, 2, 1, 1), "FR"),
-        ((1, 1, 1, 1), "FR"),
-        ((-1, 1, 1, 1), "FL"),  # a sign costs 0.01 times the difference
-        ((-1, 1.019, 1, 1), "FL"),
-        ((-1, 1.021, 1, 1), "FR"),
-        ((None, 2, 1, 1), "FL"),
-        ((1, None, 1, 1), "FR"),
-        ((1, 2, None, 2), "FR"),
-        ((2, 1, 1, None), "FL"),
+        ((2, 1, 1, 1), "FL", True),
+        ((1, 2, 1, 1), "FR", True),
+        ((1, 1, 1, 1), "FR", False),
+        ((-1, 1, 1, 1), "FL", True),  # a sign costs 0.01 times the difference
+        ((-1, 1.019, 1, 1), "FL", False),
+        ((-1, 1.021, 1, 1), "FR", False),
+        ((2, 1.3, 1, 1), "FL", True),
+        ((2, 1.4, 1, 1), "FL", False),
+        ((None, 2, 1, 1), "FL", True),
+        ((1, None, 1, 1), "FR", True),
+        ((1, 2, None, 2), "FR", False),
+        ((2, 1, 1, None), "FL", True),
     ],
 )
-def test_outlier_differs_from_the_other_leg_of_its_side(bundled, values, first):
+def test_outlier_differs_from_the_other_leg_of_its_side(bundled, values, first, decided):
     robot = bundled("quadruped.urdf")
     table = dict(zip(("FL_thigh", "FR_thigh", "RL_thigh", "RR_thigh"), values, strict=True))
     pair = next(p for p in robot.mirror_pairs if p.left.body.name == "FL_thigh")
@@ -80,5 +82,25 @@ def test_outlier_differs_from_the_other_leg_of_its_side(bundled, values, first):
     def value(body):
         return None if table[body.name] is None else np.array([table[body.name]])
 
-    sides = [side.body.name for side in robot.outlier_first(pair, value)]
-    assert sides == [f"{first}_thigh", "FR_thigh" if first == "FL" else "FL_thigh"]
+    odd, other, reason = robot.outlier_first(pair, value)
+    others = "FR_thigh" if first == "FL" else "FL_thigh"
+    assert (odd.body.name, other.body.name) == (f"{first}_thigh", others)
+    assert ("either side" in reason, odd.body.name in reason) == (not decided, decided)
+
+
+@pytest.mark.parametrize(
+    ("misfits", "first", "reason"),
+    [
+        ((3.1, 1), "left", "the shapes of left_knee_link contradict it"),
+        ((2.9, 1), "right", "either side may be wrong"),
+        ((0, 0.1), "right", "the shapes of right_knee_link contradict it"),
+        ((None, 1), "right", "either side may be wrong"),
+    ],
+)
+def test_shapes_decide_without_other_legs(bundled, misfits, first, reason):
+    robot = bundled("biped.urdf")
+    names = "left_knee_link", "right_knee_link"
+    pair = next(p for p in robot.mirror_pairs if p.left.body.name == names[0])
+    table = dict(zip(names, misfits, strict=True))
+    found = robot.outlier_first(pair, lambda body: body.inertia, lambda body: table[body.name])
+    assert (found.odd.body.name, found.reason) == (f"{first}_knee_link", reason)

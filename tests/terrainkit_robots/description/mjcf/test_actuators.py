@@ -135,3 +135,24 @@ def test_source_of_mimic_is_the_equality():
     rest = '\n<equality>\n<joint joint1="k" joint2="j"/></equality>'
     robot = read(mjcf(BODIES.format(0, 0), rest))
     assert joint(robot, "k").mimic.source.line == 3
+
+
+@pytest.mark.parametrize(
+    ("drives", "stiffness", "damping"),
+    [
+        ('<position joint="j" kp="9" kv="2"/>', 9, 2),
+        ('<position joint="j" kp="9" kv="2" gear="-3"/>', 81, 18),
+        ('<position joint="j" kp="9"/>', 9, None),
+        ('<position joint="j" kp="9" dampratio="1"/>', 9, None),
+        ('<position joint="j" kp="9"/><velocity joint="j" kv="2"/>', 9, 2),
+        ('<general joint="j" gainprm="9" biastype="affine" biasprm="0 -9 -2"/>', 9, 2),
+    ],
+)
+def test_position_gains(drives, stiffness, damping):
+    gains = joint(driven("", drives)).position_gains
+    assert (gains.stiffness, gains.damping) == (stiffness, damping)
+
+
+@pytest.mark.parametrize("drives", ["", '<motor joint="j"/>', '<velocity joint="j" kv="2"/>'])
+def test_joint_without_position_gains(drives):
+    assert joint(driven("", f"{drives}")).position_gains is None

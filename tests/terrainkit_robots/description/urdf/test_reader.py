@@ -262,3 +262,24 @@ def test_elements_have_lines():
         each.source for each in (moved.limit, moved.mimic, moved.dynamics, moved.safety_controller)
     ]
     assert [each.line for each in sources] == [1, 2, 4, 6, 8, 10, 12, 15, 16, 17, 18, 19]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "gains"),
+    [
+        ({"position_kp": "40", "position_kd": "1.5"}, (40, 1.5)),
+        ({"pos_kp": "40"}, (40, None)),
+        ({"position_kp": "0", "pos_kp": "7", "pos_kd": "x"}, (7, None)),
+        ({"position_kd": "1"}, None),
+        ({}, None),
+    ],
+)
+def test_position_gains_of_ros2_control(parameters, gains):
+    params = "".join(f'<param name="{name}">{text}</param>' for name, text in parameters.items())
+    control = f'<ros2_control><joint name="j">{params}</joint></ros2_control>'
+    model = read(
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="continuous">'
+        f'<parent link="a"/><child link="b"/></joint>{control}</robot>'
+    )
+    found = model.joints[0].position_gains
+    assert (found and (found.stiffness, found.damping)) == gains

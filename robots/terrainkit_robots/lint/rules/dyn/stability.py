@@ -8,7 +8,12 @@ from terrainkit_robots.simulation.assessment import assess
 from terrainkit_robots.simulation.drop import DropResult, drop_test
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
-from terrainkit_robots.simulation.standing import StandResult, contact_areas, stand_test
+from terrainkit_robots.simulation.standing import (
+    StandResult,
+    contact_areas,
+    ground_normal,
+    stand_test,
+)
 
 # 7 of 536 published files exceed the first limit, with overlapping hulls or tiny inertias.
 _MAX_SPEED, _MAX_SPEED_ERROR = 100.0, 500.0
@@ -97,8 +102,8 @@ def does_not_stand(robot: Facts) -> Violations:
     standing pose. A robot that falls within two seconds is reset before it learns anything. A robot
     that leans, stands on its shanks, lifts a foot or saturates a motor learns to do so. A tilt of 3
     to 9 degrees is only a note, and so are robots with more than six legs. Robots with one or two
-    legs need not balance: their joints are locked, so that only the feet and the pose are tested. A
-    robot on two wheels balances by driving and is not checked.
+    legs need not balance: their joints are locked and their soles start level, so that only their
+    feet and their pose are tested. A robot on two wheels balances by driving and is not checked.
 
     Fix:
         The message names the cause. Otherwise check the pose, the feet and the effort limits.
@@ -147,6 +152,7 @@ def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> StandR
         areas=contact_areas(robot),
         self_collision=self_collision,
         joints_locked=locked,
+        ground_normal=ground_normal(robot),
     )
 
 

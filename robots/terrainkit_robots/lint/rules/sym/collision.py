@@ -1,14 +1,18 @@
 """Rule on the symmetry of collision shapes."""
 
+from collections.abc import Iterator
+from functools import partial
+
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body, BodyShape
-from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds
+from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.gaps import box_at_zero
+from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.mirror_pairs import MirrorPair, MirrorSide
-from terrainkit_robots.description.model import Geometry
-from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.text import numbers
+from terrainkit_robots.description.model import Geometry, Link
+from terrainkit_robots.lint.rule import Violation, Violations, findings_of, rule
+from terrainkit_robots.text import names, numbers
 from terrainkit_robots.transforms import Matrix
 
 _MAX_SIZE_RATIO = 1.5
@@ -21,11 +25,13 @@ _MAX_SHAPE_ERROR, _SHAPE_MARGIN = 0.3, 0.01
 
 @rule("SYM013", "collision-asymmetry", "warning", certainty="likely")
 def collision_asymmetry(robot: Facts) -> Violations:
-    """The collision shapes of a body differ from its mirror image in position or size.
+    """The collision shapes of a body differ from its mirror image, or are missing.
 
     A shape is turned, shifted or scaled on one side only, or has the mesh of another part. The legs
     collide at different positions, and one foot may reach deeper than the other. The sizes of
-    primitives are compared on all pairs, arms included.
+    primitives are compared on all pairs, arms included. A link of a leg without collision shapes
+    passes through the ground; it is reported if the link of the other leg, or of most legs, has
+    some.
 
     Fix:
         Mirror the <origin> and the size of the collision shapes.
@@ -35,8 +41,12 @@ def collision_asymmetry(robot: Facts) -> Violations:
     """
     # Bodies behind a misaligned joint are elsewhere; SYM006 reports the joint.
     _, displaced = robot.misalignments
+    missing = dict(_missing(robot))
+    yield from missing.values()
     for pair in robot.uncopied_pairs:
         left, right = pair.left, pair.right
+        if not missing.keys().isdisjoint(pair.indices):
+            continue
         resized = _resized(robot, pair)
         if resized is not None:
             yield resized
@@ -60,15 +70,46 @@ def collision_asymmetry(robot: Facts) -> Violations:
             box = bounds(body.collisions, robot.meshes)
             return None if box is None else box.ravel()
 
-        odd, other = robot.outlier_first(pair, extent)
+        odd, other, reason = robot.outlier_first(pair, extent, partial(_visual_offset, robot))
         yield Violation(
             subject=odd.body.name,
             source=odd.body.collisions[0].geometry.source,
             message=f"bounding box of the collision shapes of {odd.body.name}: got a face "
             f"{1000 * error:.3g} mm from its mirror image {other.body.name}; expected at most "
-            f"{1000 * limit:.3g} mm",
+            f"{1000 * limit:.3g} mm; {reason}",
             measured={"difference": error, "mirror_image": other.body.name},
         )
+
+
+def _missing(robot: Facts) -> Iterator[tuple[int, Violation]]:
+    """Yield the violations of links without collision shapes where other legs have some.
+
+    Links are compared with the links at the same place of other legs. Each comes with the index of
+    its body. COL001 reports feet, whose shapes may be on another link.
+    """
+    bodies = [[robot.bodies[i] for i in leg.limb.chain] for leg in robot.legs]
+    lengths = {tuple(len(body.links) for body in chain) for chain in bodies}
+    if len(lengths) != 1 or next(findings_of(robot, "COL001"), None):
+        return
+    for column in zip(*bodies, strict=True):
+        counts = [sum(map(_collides, body.links)) for body in column]
+        for links in zip(*(body.links for body in column), strict=True):
+            without = [
+                (body, link)
+                for body, link, count in zip(column, links, counts, strict=True)
+                # With as many links in another order, nothing is missing.
+                if not _collides(link) and count < max(counts)
+            ]
+            others = [link.name for link in links if _collides(link)]
+            if 2 * len(without) > max(len(links) - 1, 2):
+                continue  # a choice for all front legs, for example
+            for body, link in without:
+                message = f"collision shapes of {link.name}: got none; expected some, as in "
+                yield body.index, Violation(element=link, message=message + names(others))
+
+
+def _collides(link: Link) -> bool:
+    return any(shape.contacts for shape in link.collisions)
 
 
 def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
@@ -86,7 +127,7 @@ def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
             siblings = _primitives(body)
             return np.array(siblings[index].size) if len(siblings) == len(shapes[0]) else None
 
-        odd, other = robot.outlier_first(pair, size)
+        odd, other, reason = robot.outlier_first(pair, size)
         own, mirrored = (left, right) if odd is pair.left else (right, left)
         return Violation(
             subject=odd.body.name,
@@ -94,7 +135,7 @@ def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
             message=f"size of the collision {own.shape} of {odd.body.name}: got "
             f"{numbers(own.size)} m, and {numbers(mirrored.size)} m for its mirror image "
             f"{other.body.name} (radii and half lengths); expected at most a factor of "
-            f"{_MAX_SIZE_RATIO:g}",
+            f"{_MAX_SIZE_RATIO:g}; {reason}",
             measured={"ratio": ratio, "mirror_image": other.body.name},
         )
     return None
@@ -108,11 +149,12 @@ def _primitives(body: Body) -> list[Geometry]:
 
 def _box(robot: Facts, side: MirrorSide) -> Matrix | None:
     """Return the bounding box of collision shapes from the joint, in the axes of the trunk [m]."""
-    shapes = [
-        BodyShape(geometry=s.geometry, link=s.link, pose=side.body.zero_pose @ s.pose)
-        for s in side.body.collisions
-    ]
-    if not shapes or not all(has_bounds(s.geometry, robot.meshes) for s in shapes):
-        return None
-    box = bounds(shapes, robot.meshes)
+    box = box_at_zero(side.body, side.body.collisions, robot.meshes)
     return None if box is None else box - side.point
+
+
+def _visual_offset(robot: Facts, body: Body) -> float | None:
+    """Return the distance between the middles of the collision and the visual shapes [m]."""
+    boxes = [box_at_zero(body, each, robot.meshes) for each in (body.collisions, body.visuals)]
+    a, b = boxes
+    return None if a is None or b is None else float(np.linalg.norm((a - b).mean(axis=0)))

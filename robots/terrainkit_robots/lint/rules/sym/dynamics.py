@@ -47,13 +47,14 @@ def loss_asymmetry(robot: Facts) -> Violations:
             def value(body: Body, name: str = name) -> Matrix | None:
                 return None if body.joint is None else np.array([getattr(body.joint, name)])
 
-            odd, other = robot.outlier_first(pair, value)
+            odd, other, reason = robot.outlier_first(pair, value)
             own, mirrored = getattr(odd.joint, name), getattr(other.joint, name)
             yield Violation(
                 subject=odd.joint.name,
                 source=(odd.joint.dynamics or odd.joint).source,
                 message=f"{name} of joint {odd.joint.name}: got {own:g}, and {mirrored:g} for its "
-                f"mirror image {other.joint.name}; expected at most a factor of {_MAX_RATIO:g}",
+                f"mirror image {other.joint.name}; expected at most a factor of {_MAX_RATIO:g}; "
+                f"{reason}",
                 measured={name: own, "other": mirrored, "mirror_image": other.joint.name},
             )
 
@@ -90,7 +91,7 @@ def gear_asymmetry(robot: Facts) -> Violations:
             actuator = gears.get(body.joint.name) if body.joint else None
             return None if actuator is None else np.array([float(actuator.gear < 0)])
 
-        odd, other = robot.outlier_first(pair, is_negative)
+        odd, other, _ = robot.outlier_first(pair, is_negative)
         if gears[odd.joint.name].gear > 0:
             odd, other = other, odd
         yield Violation(

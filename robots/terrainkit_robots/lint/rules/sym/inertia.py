@@ -66,7 +66,7 @@ def inertia_asymmetry(robot: Facts) -> Violations:
         digit = max(_precision(left.body), _precision(right.body))
         if digit >= (difference - _MAX_MOMENT_DIFFERENCE) * float(max(a[2], b[2])):
             continue  # rounding explains the difference
-        odd, other = robot.outlier_first(pair, lambda body: body.principal)
+        odd, other, reason = robot.outlier_first(pair, lambda body: body.principal)
         moments = [numbers(side.body.principal, ".4g", ", ") for side in (odd, other)]
         yield Violation(
             subject=odd.body.name,
@@ -74,7 +74,7 @@ def inertia_asymmetry(robot: Facts) -> Violations:
             message=f"principal moments of body {odd.body.name}: got {moments[0]} kg m2, and "
             f"{moments[1]} kg m2 for its mirror image {other.body.name}: "
             f"{contrast(difference, _MAX_MOMENT_DIFFERENCE, '.1%')[0]} of the largest apart; "
-            f"expected at most {_MAX_MOMENT_DIFFERENCE:.0%}",
+            f"expected at most {_MAX_MOMENT_DIFFERENCE:.0%}; {reason}",
             measured={"gap": difference, "mirror_image": other.body.name},
         )
 
@@ -140,13 +140,13 @@ def product_asymmetry(robot: Facts) -> Violations:
         error = float(np.abs(reflection @ a @ reflection - b).max()) / largest
         if error <= _MAX_PRODUCT_ERROR or moments > _MAX_MOMENT_ERROR:
             continue
-        odd, other = robot.outlier_first(pair, lambda body: body.inertia.ravel())
+        odd, other, reason = robot.outlier_first(pair, lambda body: body.inertia.ravel())
         yield Violation(
             subject=odd.body.name,
             source=inertia_source(odd.body.main_link),
             message=f"inertia of body {odd.body.name} in the axes of the trunk: got {error:.0%} "
             f"of its largest moment between it and the mirrored one of {other.body.name}; "
-            f"expected at most {_MAX_PRODUCT_ERROR:.0%}",
+            f"expected at most {_MAX_PRODUCT_ERROR:.0%}; {reason}",
             measured={"difference": error, "mirror_image": other.body.name},
         )
     if len(robot.legs) > 1 and robot.uncopied_pairs:

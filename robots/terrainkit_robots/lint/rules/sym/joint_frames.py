@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.gaps import gap_between
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.symmetry.asymmetry import (
     MAX_AXIS_ERROR,
@@ -142,7 +143,12 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
         return body.origin[:3, :3].ravel()
 
     value = axis if error.is_axis else position if error.distance else rotation
-    odd, other = robot.outlier_first(error.pair, value)
+
+    def gap(body: Body) -> float | None:
+        parent = robot.physical_parent(body) if error.distance else None
+        return None if parent is None else gap_between((parent, body), robot.meshes)
+
+    odd, other, reason = robot.outlier_first(error.pair, value, gap)
     name, mirror = odd.joint.name, other.joint.name
     if error.distance:
         offsets = [numbers(1000 * side.offset, ".1f", ", ") for side in (odd, other)]
@@ -164,6 +170,6 @@ def _report_pair(robot: Facts, error: Misalignment) -> Violation:
     return Violation(
         subject=name,
         source=source,
-        message=message,
+        message=f"{message}; {reason}",
         measured={"gap": error.distance, "angle": error.angle, "mirror_image": mirror},
     )

@@ -46,7 +46,7 @@ def limit_asymmetry(robot: Facts) -> Violations:
             continue
         if has_flipped_axes(left, right) and limits_match(a, b, -pair.sign):
             continue  # SYM007 reports the axis
-        odd, other = robot.outlier_first(pair, _limit_sizes)
+        odd, other, reason = robot.outlier_first(pair, _limit_sizes)
         own, mirror = (a, b) if odd is left else (b, a)
         expected = mirror if pair.sign > 0 else (-mirror[1], -mirror[0])
         unit, name = odd.joint.unit, other.joint.name
@@ -55,7 +55,8 @@ def limit_asymmetry(robot: Facts) -> Violations:
             source=(odd.joint.limit or odd.joint).source,
             message=f"limits of joint {odd.joint.name}: got {numbers(own, '.5g', ' to ')} {unit}; "
             f"expected {numbers(expected, '.5g', ' to ')} {unit}, mirrored from {name}, "
-            f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range",
+            f"within {MAX_LIMIT_ERROR:g} {unit} plus {MAX_RELATIVE_LIMIT_ERROR:.0%} of the range; "
+            f"{reason}",
             measured={
                 "lower": own[0],
                 "upper": own[1],
@@ -102,7 +103,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
             limit = _motor_limit(body.joint, name) if body.joint else None
             return None if limit is None else np.array([limit])
 
-        odd, other = robot.outlier_first(pair, value)
+        odd, other, reason = robot.outlier_first(pair, value)
         joint, parts = odd.joint, list[str]()
         measured: dict[str, float | int | str] = {}
         for name, (a, b, difference) in differences.items():
@@ -115,7 +116,7 @@ def effort_asymmetry(robot: Facts) -> Violations:
             source=(joint.limit or joint).source,
             message=f"{' and '.join(differences)} limit of joint {joint.name}: got "
             f"{' and '.join(parts)} of its mirror image {other.joint.name}; expected at "
-            f"most {_MAX_LIMIT_DIFFERENCE:.0%}",
+            f"most {_MAX_LIMIT_DIFFERENCE:.0%}; {reason}",
             measured={**measured, "mirror_image": other.joint.name},
         )
 

@@ -1,10 +1,12 @@
 """Rules on the symmetry of masses and centers of mass."""
 
 from collections import Counter
+from functools import partial
 
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.gaps import box_at_zero, shapes_of
 from terrainkit_robots.analysis.bodies.shapes import bounds
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.inertial import mass_source
@@ -52,14 +54,14 @@ def mass_asymmetry(robot: Facts) -> Violations:
             continue
         if is_negligible(pair, robot.total_mass) or other_rules.report(pair):
             continue
-        odd, other = robot.outlier_first(pair, lambda body: np.array([body.mass]))
+        odd, other, reason = robot.outlier_first(pair, lambda body: np.array([body.mass]))
         yield Violation(
             subject=odd.body.name,
             source=mass_source(odd.body.main_link),
             message=f"mass of body {odd.body.name}: got {odd.body.mass:.4g} kg, "
             f"{contrast(difference, MAX_MASS_DIFFERENCE, '.1%')[0]} from the "
             f"{other.body.mass:.4g} kg of its mirror image {other.body.name}; expected at most "
-            f"{MAX_MASS_DIFFERENCE:.0%}",
+            f"{MAX_MASS_DIFFERENCE:.0%}; {reason}",
             measured={
                 "mass": odd.body.mass,
                 "other": other.body.mass,
@@ -101,7 +103,9 @@ def com_asymmetry(robot: Facts) -> Violations:
             continue
         if _is_same_part(robot, left.body, right.body) or _moves_with_shape(robot, pair, limit):
             continue
-        odd, other = robot.outlier_first(pair, lambda body: body.center)
+        odd, other, reason = robot.outlier_first(
+            pair, lambda body: body.center, partial(_shape_offset, robot)
+        )
         centers = [numbers(1000 * side.body.center, ".1f", ", ") for side in (odd, other)]
         got, expected = contrast(1000 * error, 1000 * limit, ".3g")
         yield Violation(
@@ -109,11 +113,18 @@ def com_asymmetry(robot: Facts) -> Violations:
             source=mass_source(odd.body.main_link),
             message=f"center of mass of body {odd.body.name}: got ({centers[0]}) mm, and "
             f"({centers[1]}) mm for its mirror image {other.body.name}, each in its own "
-            f"frame: {got} mm from mirrored; expected at most {expected} mm",
+            f"frame: {got} mm from mirrored; expected at most {expected} mm; {reason}",
             measured={"gap": error, "allowed": limit, "mirror_image": other.body.name},
         )
     if len(robot.legs) > 1 and robot.uncopied_pairs:
         yield from _trunk_offset(robot)
+
+
+def _shape_offset(robot: Facts, body: Body) -> float | None:
+    """Return the distance of the center of mass from the middle of the shapes [m]."""
+    box = box_at_zero(body, shapes_of(body), robot.meshes)
+    center = body.zero_pose[:3, :3] @ body.center + body.zero_pose[:3, 3]
+    return None if box is None else float(np.linalg.norm(box.mean(axis=0) - center))
 
 
 def _trunk_offset(robot: Facts) -> Violations:
