@@ -457,6 +457,9 @@ class RobotModel:
     floating: bool | None = None
     """Whether the base is free; None if the file does not say."""
 
+    keeps_fixed_links: bool = False
+    """Whether the file tells MuJoCo to keep links on fixed joints as bodies; URDF only."""
+
     excluded: frozenset[frozenset[str]] = frozenset()
     """Pairs of links whose contacts are disabled; MJCF only."""
 

@@ -49,6 +49,7 @@ description of the robot, or its robot.toml."""
 
 FAMILIES = {
     "XML": "XML syntax and schema",
+    "UNI": "units",
     "MSH": "mesh files",
     "TRE": "kinematic tree",
     "JNT": "joints",
@@ -65,6 +66,7 @@ FAMILIES = {
 
 
 IMPORTANCE = (
+    "UNI",  # one cause of many findings
     *("XML", "TRE", "SIM", "MSH"),  # the robot cannot be loaded
     *("OPT", "INR", "JNT", "COL", "DYN"),  # its physics are wrong
     *("LEG", "XRF", "SYM", "NAM"),  # it is not what was meant

@@ -1,6 +1,6 @@
 """Run rules on a robot and collect their findings in a report."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Literal
@@ -92,6 +92,18 @@ _NEEDS_COMPLETE_TREE = ("LEG", "SYM", "DYN")
 """Families that compare limbs or simulate. On an incomplete tree they would report consequences of
 the tree's own errors."""
 
+_UNIT_CONSEQUENCES: Mapping[str, tuple[str, ...]] = {
+    "UNI001": ("INR006", "INR007", "INR009", "INR010", "INR011", "JNT011", "JNT015", "JNT026"),
+    "UNI002": (
+        *("INR006", "INR007", "INR008", "INR010", "INR011", "MSH011", "JNT011", "JNT015", "JNT026"),
+        *("COL", "SYM", "LEG005", "LEG006", "LEG007"),
+    ),
+    "UNI003": ("INR006", "INR007", "JNT023"),
+    "UNI004": ("JNT008", "JNT012", "JNT015", "JNT018", "JNT019", "LEG005", "LEG006", "LEG007"),
+    "UNI005": ("JNT011", "JNT015", "JNT021", "JNT022", "JNT026"),
+}
+"""Families and rules that would report consequences of a wrong unit, besides DYN and SIM003."""
+
 
 def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Report:
     """Return the report of the selected rules on a robot.
@@ -110,6 +122,7 @@ def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Re
     for rule in selected:
         try:
             _require_complete(rule, facts)
+            _require_units(rule, findings)
             missing = _missing_need(rule, facts, simulate=simulate)
             if missing is not None:
                 kind: SkipKind = "no-legs" if missing == "legs" else "no-input"
@@ -141,6 +154,13 @@ def _require_complete(rule: Rule, facts: Facts) -> None:
         raise CannotCheckError("an included file cannot be read (XML012)")
     if rule.family in _NEEDS_COMPLETE_TREE and facts.tree.rejected:
         raise CannotCheckError("links or joints are missing from the kinematic tree")
+
+
+def _require_units(rule: Rule, findings: Sequence[Finding]) -> None:
+    """Raise CannotCheckError if a rule would report consequences of a wrong unit."""
+    for code in {finding.code for finding in findings} & _UNIT_CONSEQUENCES.keys():
+        if rule.code.startswith((*_UNIT_CONSEQUENCES[code], "DYN", "SIM003")):
+            raise CannotCheckError(f"a quantity has another unit ({code})")
 
 
 def _importance(finding: Finding) -> tuple[int, int, str, str, int]:

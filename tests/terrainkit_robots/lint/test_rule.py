@@ -121,7 +121,7 @@ def test_get_rule_by_code_or_name():
     ("word", "message"),
     [
         ("inr999", r"no rule .*[Tt]here are: INR001, INR002, .*INR\d+$"),
-        ("no-such-rule", r"xpected a code or a name of the families: XML, MSH, "),
+        ("no-such-rule", r"xpected a code or a name of the families: XML, UNI, MSH, "),
     ],
 )
 def test_get_rule_lists_what_exists(word, message):

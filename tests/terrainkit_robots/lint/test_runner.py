@@ -1,3 +1,4 @@
+import re
 from itertools import count
 from pathlib import Path
 
@@ -189,3 +190,14 @@ def test_bundled_robots_pass_all_rules(name, suffix):
     made = lint_selected(Facts(load_robot(bundled.urdf_path(name).with_suffix(suffix))), Settings())
     assert made.crashed == ()
     assert made.verdict == "pass"
+
+
+def test_wrong_unit_is_first_and_hides_its_consequences():
+    text = re.sub(
+        r'mass value="([^"]*)"', r'mass value="\g<1>e3"', bundled.urdf_path("quadruped").read_text()
+    )
+    report = lint(facts(text), rules(), simulate=False)
+    assert report.findings[0].code == "UNI001"
+    assert {finding.code for finding in report.findings if finding.severity != "note"} == {"UNI001"}
+    reasons = {each.code: each.reason for each in report.skipped}
+    assert reasons["INR010"] == reasons["JNT015"] == "a quantity has another unit (UNI001)"

@@ -27,7 +27,7 @@ def test_matching_suggests_nearest_name():
 
 @pytest.mark.parametrize("word", ["", "INR2", "XYZ", "mass", "*"])
 def test_matching_rejects_other_words(word):
-    with pytest.raises(ConfigError, match=r"no rule .* families XML, MSH, TRE"):
+    with pytest.raises(ConfigError, match=r"no rule .* families XML, UNI, MSH, TRE"):
         matching(word)
 
 

@@ -76,7 +76,7 @@ class Body(BodyFrame):
         """Center of mass in the frame of the body, shape (3,) [m]. Zero for a massless body."""
         if self.mass <= 0:
             return np.zeros(3)
-        weighted = [mass * pose[:3, 3] for mass, pose, _ in self._parts()]
+        weighted = [mass * pose[:3, 3] for _, mass, pose, _ in self.parts()]
         center: Matrix = np.sum(weighted, axis=0) / self.mass
         return center
 
@@ -84,7 +84,7 @@ class Body(BodyFrame):
     def inertia(self) -> Matrix:
         """Inertia about the center of mass, in the axes of the body, shape (3, 3) [kg m2]."""
         total = np.zeros((3, 3))
-        for mass, pose, inertia in self._parts():
+        for _, mass, pose, inertia in self.parts():
             total += pose[:3, :3] @ inertia @ pose[:3, :3].T
             total += parallel_axis(mass, pose[:3, 3] - self.center)
         return total
@@ -110,15 +110,15 @@ class Body(BodyFrame):
         """Whether one of its collision shapes can collide with anything."""
         return any(shape.geometry.contacts for shape in self.collisions)
 
-    def _parts(self) -> Iterator[tuple[float, Matrix, Matrix]]:
-        """Yield mass, inertial frame and inertia of each link with mass."""
+    def parts(self) -> Iterator[tuple[Link, float, Matrix, Matrix]]:
+        """Yield each link with mass: mass [kg], inertial frame [m] and inertia [kg m2]."""
         for link, pose in zip(self.links, self.poses, strict=True):
             if _mass(link):
                 assert link.inertial is not None
                 inertia = link.inertial.inertia
                 if inertia is None or not (np.abs(inertia) < MAX_INERTIA).all():
                     inertia = np.zeros((3, 3))
-                yield _mass(link), pose @ link.inertial.origin, inertia
+                yield link, _mass(link), pose @ link.inertial.origin, inertia
 
     def _shapes(self, kind: str) -> Iterator[BodyShape]:
         for link, pose in zip(self.links, self.poses, strict=True):

@@ -5,7 +5,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.bounds import BodyBounds
 from terrainkit_robots.analysis.bodies.shapes import has_bounds, volume
-from terrainkit_robots.description.model import Geometry
+from terrainkit_robots.description.model import Geometry, Link
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.transforms import Matrix
 
@@ -16,6 +16,9 @@ are mostly air, have 20."""
 
 _PLAUSIBLE_DENSITY = 200.0
 """If the bounding box of a body has at least this density, its volume is not computed [kg/m3]."""
+
+_DEFAULT_DENSITY = 1000.0
+"""Density that MuJoCo assigns to the collision shapes of links without <inertial> [kg/m3]."""
 
 _SLENDERNESS = 20.0
 """Cubed length over volume of a rather slender limb."""
@@ -50,6 +53,11 @@ def check_min_density(
     shapes = (*body.collisions, *body.visuals)
     largest = max(shape_volume(shape.geometry, meshes) for shape in shapes)
     return (largest, MIN_DENSITY) if body.mass < MIN_DENSITY * largest else None
+
+
+def default_mass(link: Link, meshes: Meshes) -> float:
+    """Return the mass that MuJoCo infers for a link without <inertial> [kg]."""
+    return _DEFAULT_DENSITY * sum(shape_volume(shape, meshes) for shape in link.collisions)
 
 
 def _box_volume(box: Matrix) -> float:

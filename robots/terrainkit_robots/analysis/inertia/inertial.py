@@ -5,8 +5,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.inertia.merged_inertia import parallel_axis
 from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA, MIN_INERTIA
 from terrainkit_robots.description.model import Link, Source
+from terrainkit_robots.transforms import Matrix
 
 
 def mass_source(link: Link) -> Source:
@@ -17,6 +19,21 @@ def mass_source(link: Link) -> Source:
 def inertia_source(link: Link) -> Source:
     """Return where the inertia of a link is written, or the link itself without one."""
     return (link.inertial and link.inertial.inertia_source) or mass_source(link)
+
+
+def main_cause(body: Body) -> Link:
+    """Return the link that contributes the most to the inertia of a body with mass."""
+
+    def trace(part: tuple[Link, float, Matrix, Matrix]) -> float:
+        _, mass, pose, inertia = part
+        return float(np.trace(inertia + parallel_axis(mass, pose[:3, 3] - body.center)))
+
+    return max(body.parts(), key=trace)[0]
+
+
+def because_of(cause: Link, body: Body) -> str:
+    """Return which merged link causes a finding on a body; empty if it is its main link."""
+    return "" if cause is body.main_link else f"; mostly due to its link {cause.name}"
 
 
 def max_inertia(link: Link) -> float:

@@ -7,16 +7,15 @@ merged link, such as a foot, does not exist.
 
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal, get_args
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.tree import Tree
-from terrainkit_robots.analysis.legs.legs import Leg
 from terrainkit_robots.description.model import Joint, Kind
 
-Simulator = Literal["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"]
+Simulator = Literal["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis", "PyBullet"]
 
 SIMULATORS: tuple[Simulator, ...] = get_args(Simulator)
 
@@ -29,7 +28,7 @@ KEEP_LINK_OPTIONS: Mapping[Simulator, str] = MappingProxyType(
     }
 )
 """How to keep a link on a fixed joint as a separate body. MuJoCo, Isaac Lab and Genesis merge by
-default; Isaac Gym merges as configured by legged_gym and its forks."""
+default; Isaac Gym merges as configured by legged_gym and its forks; PyBullet does not merge."""
 
 _READS_DONT_COLLAPSE = frozenset({"Isaac Gym", "Isaac Lab"})
 
@@ -46,20 +45,6 @@ class MergedTree:
 
     child_joints: Mapping[str, tuple[Joint, ...]]
     """The joints below each body. The joints of a merged link replace the joint above it."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MergedFoot:
-    """A foot that some simulators merge into its parent."""
-
-    foot: str
-    """Name of the link."""
-
-    joint: Joint
-    """The fixed joint above it."""
-
-    merged_body: Mapping[Simulator, str]
-    """Name of the merged body, by simulator that merges it."""
 
 
 def merge_joints(tree: Tree, bodies: Sequence[Body], merged: AbstractSet[Joint]) -> MergedTree:
@@ -102,32 +87,32 @@ def fixed_joints(kind: Kind, tree: Tree, bodies: Sequence[Body]) -> tuple[Joint,
     return tuple(tree.parent_joint[link.name] for body in bodies for link in body.links[1:])
 
 
-def merged_joints(fixed: Iterable[Joint], simulator: Simulator) -> frozenset[Joint]:
-    """Return the fixed joints that a simulator merges by default."""
+def merged_joints(
+    fixed: Iterable[Joint], simulator: Simulator, *, keeps_fixed_links: bool = False
+) -> frozenset[Joint]:
+    """Return the fixed joints that a simulator merges by default.
+
+    Args:
+        fixed: The fixed joints of a robot.
+        simulator: The simulator.
+        keeps_fixed_links: Whether the file tells MuJoCo to merge none.
+    """
+    if simulator == "PyBullet" or (simulator == "MuJoCo" and keeps_fixed_links):
+        return frozenset()
     reads_attribute = simulator in _READS_DONT_COLLAPSE
     return frozenset(joint for joint in fixed if not (joint.dont_collapse and reads_attribute))
 
 
-def find_merged_feet(
-    tree: Tree, bodies: Sequence[Body], legs: Sequence[Leg], fixed: Sequence[Joint]
-) -> tuple[MergedFoot, ...]:
-    """Return the feet with collision shapes that at least one simulator merges."""
-    if not fixed or not legs:
-        return ()
-    trees = {
-        simulator: merge_joints(tree, bodies, merged_joints(fixed, simulator))
-        for simulator in SIMULATORS
-    }
-    found = []
-    for leg in legs:
-        joint = tree.parent_joint.get(leg.foot)
-        if joint is None or joint not in fixed or not tree.links[leg.foot].collisions:
-            continue
-        merged_body = {
-            simulator: merged.body_of[leg.foot]
-            for simulator, merged in trees.items()
-            if merged.body_of[leg.foot] != leg.foot
-        }
-        if merged_body:
-            found.append(MergedFoot(foot=leg.foot, joint=joint, merged_body=merged_body))
-    return tuple(found)
+def kept_bodies(tree: Tree, body: Body) -> tuple[Body, ...]:
+    """Return the parts of a body that `dont_collapse` keeps as bodies of their own."""
+    top_of: dict[str, str] = {}
+    for link in body.links:  # each after its parent
+        joint = tree.parent_joint.get(link.name)
+        inner = joint is not None and joint.parent in top_of and not joint.dont_collapse
+        top_of[link.name] = top_of[joint.parent] if joint and inner else link.name
+    parts = []
+    for top in list(dict.fromkeys(top_of.values()))[1:]:
+        chosen = [k for k, link in enumerate(body.links) if top_of[link.name] == top]
+        links = tuple(body.links[k] for k in chosen)
+        parts.append(replace(body, links=links, poses=tuple(body.poses[k] for k in chosen)))
+    return tuple(parts)

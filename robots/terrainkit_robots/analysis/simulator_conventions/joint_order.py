@@ -15,6 +15,8 @@ The orders and their sources:
   the USD file. The URDF importers up to Isaac Sim 5.1 keep joints in a map by name, so siblings are
   sorted by name; the later importer keeps the order of the URDF. The joint lists that Isaac Lab
   publishes for G1, H1 and ANYmal D agree.
+- **PyBullet** traverses a URDF depth first, with siblings in the order of their joints in the file,
+  and merges nothing. This was compared with pybullet 3.2.7.
 - **Isaac Gym** is closed source. The joint lists published for A1, Go1 and Open Duck Mini are depth
   first with siblings sorted by name, although their URDFs have another order.
 
@@ -73,7 +75,7 @@ class SimulatorOrder:
 def simulator_orders(
     model: RobotModel, tree: Tree, bodies: Sequence[Body], fixed: Sequence[Joint]
 ) -> tuple[SimulatorOrder, ...]:
-    """Return the order in MuJoCo, Isaac Gym, Isaac Lab and Genesis.
+    """Return the order in MuJoCo, Isaac Gym, Isaac Lab, Genesis and, for a URDF, PyBullet.
 
     Args:
         model: The description.
@@ -82,7 +84,7 @@ def simulator_orders(
         fixed: The fixed joints of the main tree.
     """
     robot = _Robot(model=model, tree=tree, bodies=bodies, fixed=fixed)
-    return tuple(map(robot.order, SIMULATORS))
+    return tuple(robot.order(name) for name in SIMULATORS if name != "PyBullet" or robot.is_urdf)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,9 +114,10 @@ class _Robot:
         key: _Key | None = None
         if simulator == "Genesis":
             key = self._file_index
-        elif simulator != "MuJoCo" and self.is_urdf:
+        elif simulator not in ("MuJoCo", "PyBullet") and self.is_urdf:
             key = _joint_name
-        tree = self._merge(merged_joints(self.fixed, simulator))
+        keeps = self.model.keeps_fixed_links
+        tree = self._merge(merged_joints(self.fixed, simulator, keeps_fixed_links=keeps))
         traverse = _breadth_first if simulator == "Isaac Lab" else _depth_first
         joints = list(traverse(_sort_siblings(tree, key), tree.base))
         virtual = {link.name for body in self.bodies for link in body.links if link.virtual}
@@ -131,7 +134,7 @@ class _Robot:
         if any(joint.kind not in JOINT_TYPES for joint in self.model.joints):
             return False, "a joint has an unknown type"
         match simulator:
-            case "MuJoCo":
+            case "MuJoCo" | "PyBullet":
                 siblings = "joints" if self.is_urdf else "bodies"
                 return True, f"depth first, siblings in the order of their {siblings} in the file"
             case "Genesis":

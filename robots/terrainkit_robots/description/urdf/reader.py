@@ -85,6 +85,7 @@ class _Reader:
         }
         links = tuple(self._link(element) for element in root.iterchildren("link"))
         joints = tuple(self._joint(element) for element in root.iterchildren("joint"))
+        compiler = root.find("mujoco/compiler")
         return RobotModel(
             name=root.get("name", "").strip(),
             kind="urdf",
@@ -92,6 +93,7 @@ class _Reader:
             source=source,
             links=links,
             joints=joints,
+            keeps_fixed_links=compiler is not None and compiler.get("fusestatic") == "false",
             problems=tuple(self._problems),
             sources=(self._doc.file,),
         )

@@ -6,7 +6,6 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.xml.document import RobotFileError, parse_xml, read_bytes
 from terrainkit_robots.lint.compare.robot_pairs import RobotPairs, trunk_pose_in_link
 from terrainkit_robots.transforms import Matrix
 
@@ -73,24 +72,6 @@ def relative_difference(a: float, b: float) -> float:
     """Return the difference of two numbers relative to the larger one, or 0 for two zeros."""
     largest = max(abs(a), abs(b))
     return abs(a - b) / largest if largest != 0 else 0.0
-
-
-def dropped_mass(robot: Facts) -> float:
-    """Return the mass that MuJoCo drops when it loads an unmodified URDF [kg].
-
-    MuJoCo welds the trunk to the world and drops its mass, unless the file has a floating joint
-    above it or sets `fusestatic="false"`.
-    """
-    is_floating = any(joint.kind == "floating" for joint in robot.model.joints)
-    if robot.model.kind != "urdf" or is_floating or not robot.bodies:
-        return 0.0
-    try:
-        root = parse_xml(robot.model.file, read_bytes(robot.model.file)).root
-    except RobotFileError:
-        return 0.0
-    compiler = None if root is None else root.find("mujoco/compiler")
-    is_kept = compiler is not None and compiler.get("fusestatic") == "false"
-    return 0.0 if is_kept else robot.bodies[0].mass
 
 
 def _center(body: Body, frame: Matrix) -> Matrix:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit_robots.analysis.legs.legs import mean_length
+from terrainkit_robots.analysis.simulator_conventions.loaded_robot import loaded_robots
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
     from terrainkit_robots.analysis.legs.legs import Leg
+    from terrainkit_robots.analysis.simulator_conventions.loaded_robot import LoadedRobot
 
 _DIGITS = 6
 """Significant digits of each number."""
@@ -23,7 +25,9 @@ def facts_json(facts: "Facts", *, may_simulate: bool = False) -> dict[str, Any]:
     legged_gym policy without height scan: 12 values for velocities, gravity and command, and
     position, velocity and last action of each actuated joint. `joint_orders` contains the joints
     in the order of the file as `file`, and for each simulator `joints`, `bodies`, whether the
-    order is `certain`, and the `reason`.
+    order is `certain`, and the `reason`. `simulators` contains what each simulator makes of the
+    file: `total_mass`, `bodies`, the body that each `merged` link is a part of, `feet` that are
+    bodies of their own, and what is `lost`; the order of its joints is in `joint_orders`.
 
     Args:
         facts: The robot.
@@ -42,6 +46,7 @@ def facts_json(facts: "Facts", *, may_simulate: bool = False) -> dict[str, Any]:
         "feet": [leg.foot for leg in legs],
         "leg_length": number(mean_length(legs)) if legs else None,
         "joint_orders": _joint_orders(facts),
+        "simulators": {robot.order.key: _loaded_robot(robot) for robot in loaded_robots(facts)},
         "mirror_plane": {
             "normal": [number(float(x)) for x in facts.mirror.normal],
             "offset": number(facts.mirror.offset),
@@ -89,6 +94,16 @@ def _joint_orders(facts: "Facts") -> dict[str, Any]:
             "reason": order.reason,
         }
     return orders
+
+
+def _loaded_robot(robot: "LoadedRobot") -> dict[str, Any]:
+    return {
+        "total_mass": number(robot.mass),
+        "bodies": len(robot.bodies),
+        "merged": dict(robot.merged),
+        "feet": list(robot.feet),
+        "lost": list(robot.losses),
+    }
 
 
 def _leg(leg: "Leg") -> dict[str, Any]:

@@ -1,13 +1,20 @@
 """Summarize a robot in a few lines: mass, size, legs, standing pose and joints."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from terrainkit_robots.analysis.simulator_conventions.loaded_robot import loaded_robots
 from terrainkit_robots.lint.report.facts_json import facts_json
-from terrainkit_robots.text import count, numbers
+from terrainkit_robots.text import count, names, numbers
 
 if TYPE_CHECKING:
+    from terrainkit_robots.analysis.facts import Facts
+    from terrainkit_robots.analysis.simulator_conventions.loaded_robot import LoadedRobot
     from terrainkit_robots.lint.runner import Report
+
+_MASS_TOLERANCE = 1e-3
+"""Relative difference of masses that rounding explains."""
 
 
 def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
@@ -19,14 +26,38 @@ def robot_summary(report: "Report") -> Iterator[tuple[str, str]]:
     yield "size", ", ".join(_size(data))
     if not data["legs"]:
         yield "legs", "none detected"
-        return
+    else:
+        yield from _legs(data, {joint.name: joint.effort for joint in facts.joints})
+    if facts.joints:
+        yield "loaded by", "simulators with their default options"
+        for robot in loaded_robots(facts):
+            yield f"  {robot.order.simulator:<9}", "; ".join(_loaded(robot, facts))
+
+
+def _legs(data: Mapping[str, Any], limits: Mapping[str, float | None]) -> Iterator[tuple[str, str]]:
+    """Yield the legs, the standing pose, and the joints by role."""
     feet = ", ".join(data["feet"])
     yield "legs", f"{len(data['legs'])}, {_length(data['leg_length'])} long; feet: {feet}"
     if data["standing_pose"] is None:
         return
     yield "standing", ", ".join(_standing(data))
-    limits = {joint.name: joint.effort for joint in facts.joints}
     yield from _joints(data, {name: limit for name, limit in limits.items() if limit})
+
+
+def _loaded(robot: "LoadedRobot", facts: "Facts") -> Iterator[str]:
+    """Yield what a simulator makes of the file: mass, bodies, feet, joint order and losses."""
+    total = facts.total_mass
+    is_changed = abs(robot.mass - total) > _MASS_TOLERANCE * abs(total)
+    declared = f" instead of {total:.4g} kg" if is_changed else ""
+    mass = "unknown mass" if math.isnan(robot.mass) else f"{robot.mass:.4g} kg{declared}"
+    yield f"{mass} in {len(robot.bodies)} bodies"
+    merged = [leg.foot for leg in facts.legs if leg.foot in robot.merged]
+    if merged:
+        yield f"feet are part of {names(robot.merged[foot] for foot in merged)}"
+    order = robot.order
+    if order.joints != facts.file_order:
+        yield f"joints reordered{'' if order.certain else ' (to be verified)'}"
+    yield from robot.losses
 
 
 def _size(data: Mapping[str, Any]) -> Iterator[str]:

@@ -45,16 +45,18 @@ def test_simulator_orders_by_hand():
         "Isaac Gym": "ja jz jc jk jx1 jx3 jy1",
         "Isaac Lab": "ja jc jx1 jx3 jy1 jz jk",
         "Genesis": "jc jk jx3 jx1 jy1 ja jz",  # as genesis-world 1.4.5 lists this tree
+        "PyBullet": "jc jk jx3 jy1 jx1 ja jz",  # as pybullet 3.2.7 lists this tree
     }
     assert bodies(robot) == {
         "MuJoCo": "b c k x3 y1 x1 a z",
         "Isaac Gym": "b a z c k x1 x3 y1",
         "Isaac Lab": "b a c x1 x3 y1 z k",
         "Genesis": "b c k x3 x1 y1 a z",
+        "PyBullet": "b c k F x3 G y1 x1 a z",
     }
-    assert certain(robot) == ["MuJoCo", "Genesis"]
+    assert certain(robot) == ["MuJoCo", "Genesis", "PyBullet"]
     keys = [order.key for order in robot.simulator_orders]
-    assert keys == ["mujoco", "isaac_gym", "isaac_lab", "genesis"]
+    assert keys == ["mujoco", "isaac_gym", "isaac_lab", "genesis", "pybullet"]
     reasons = {name: order.reason for name, order in orders(robot).items()}
     assert reasons["MuJoCo"] == "depth first, siblings in the order of their joints in the file"
     assert reasons["Isaac Lab"].endswith("up to Isaac Sim 5.1; compare with robot.joint_names")
@@ -67,10 +69,11 @@ def test_kept_link_is_a_body():
         "Isaac Gym": "b a F c",
         "Isaac Lab": "b a F c",
         "Genesis": "b a c",
+        "PyBullet": "b a F c",
     }
 
 
-ALL_SIMULATORS = ["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis"]
+ALL_SIMULATORS = ["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis", "PyBullet"]
 
 
 @pytest.mark.parametrize(
@@ -147,7 +150,7 @@ def test_isaac_orders_match_published_lists_of_a1():
     assert orders(robot)["Isaac Lab"].joints == tuple(
         f"{leg}_{part}_joint" for part in parts for leg in legs
     )
-    assert certain(robot) == ["MuJoCo", "Genesis"]
+    assert certain(robot) == ["MuJoCo", "Genesis", "PyBullet"]
 
 
 def check(robot, model):
@@ -160,8 +163,8 @@ def check(robot, model):
 
 
 def check_urdf(text):
-    robot = facts(text)
     text = re.sub("<mujoco>.*?</mujoco>", "", text, flags=re.DOTALL)
+    robot = facts(text)
     check(robot, mujoco.MjModel.from_xml_string(floating(text, robot.bodies[0].top.name)))
 
 

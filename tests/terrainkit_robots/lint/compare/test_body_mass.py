@@ -1,16 +1,13 @@
-import mujoco
 import numpy as np
 import pytest
 
 from terrainkit_robots.lint.compare.body_mass import (
     body_difference,
-    dropped_mass,
     has_valid_inertial,
     relative_difference,
 )
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
-from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from tests.small_robots import facts, joint, link, mjcf
+from tests.small_robots import facts, mjcf
 
 
 def gaps(one, other):
@@ -60,28 +57,3 @@ def test_has_valid_inertial_needs_explicit_values(robot_of):
     mesh = '<asset><mesh name="m" file="m.stl"/></asset>'
     meshed = mjcf('<body name="a"><geom type="mesh" mesh="m"/></body>', mesh)
     assert not has_valid_inertial(meshed.bodies[0])
-
-
-FUSED = ('<compiler discardvisual="false" fusestatic="false"/>', "")
-FLOATING = (
-    "<!-- Trunk and head.",
-    '<link name="world"/><joint name="root" type="floating"><parent link="world"/>'
-    '<child link="base"/></joint><!-- Trunk and head.',
-)
-
-
-@pytest.mark.parametrize(
-    ("file", "edits", "mass"),
-    [
-        ("quadruped.urdf", [], 0.0),
-        ("quadruped.urdf", [FUSED], 6.921),
-        ("quadruped.urdf", [FUSED, FLOATING], 0.0),
-        ("quadruped.xml", [], 0.0),
-    ],
-)
-def test_dropped_mass_matches_mujoco(robot_of, file, edits, mass):
-    robot = robot_of(file, *edits)
-    with quiet_mujoco():
-        compiled = mujoco.MjModel.from_xml_path(str(robot.model.file))
-    left = float(compiled.body_mass.sum())
-    assert dropped_mass(robot) == pytest.approx(mass) == pytest.approx(robot.total_mass - left)

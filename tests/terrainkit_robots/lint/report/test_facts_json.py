@@ -21,6 +21,13 @@ def test_facts_json_quadruped():
     assert facts["total_mass"] == 15.017  # 6.921 + 4 (0.678 + 1.152 + 0.154 + 0.04)
     assert (facts["links"], facts["bodies"], facts["joints"]) == (17, 13, 12)
     assert facts["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
+    assert facts["simulators"]["genesis"] == {
+        "total_mass": 15.017,
+        "bodies": 13,
+        "merged": {f"{leg}_foot": f"{leg}_calf" for leg in ("FL", "FR", "RL", "RR")},
+        "feet": [],
+        "lost": ["joints without armature get 0.1 kg m2"],
+    }
     assert facts["legs"][0]["joints"] == [
         {"name": "FL_hip_joint", "role": "roll"},
         {"name": "FL_thigh_joint", "role": "hip"},
@@ -54,12 +61,12 @@ def test_facts_json_joint_orders_by_simulator(tmp_path):
     file = tmp_path / "robot.urdf"
     file.write_text(re.sub("|".join(other), lambda m: other[m[0]], QUADRUPED.read_text()))
     orders = record(file)["joint_orders"]
-    assert list(orders) == ["file", "mujoco", "isaac_gym", "isaac_lab", "genesis"]
+    assert list(orders) == ["file", "mujoco", "isaac_gym", "isaac_lab", "genesis", "pybullet"]
     legs = {name: [joint[:2] for joint in orders[name]["joints"]] for name in list(orders)[1:]}
     assert [joint[:2] for joint in orders["file"]][::3] == ["FR", "FL", "RR", "RL"]
     assert legs["mujoco"][::3] == legs["genesis"][::3] == ["FR", "FL", "RR", "RL"]
     assert legs["isaac_gym"][::3] == legs["isaac_lab"][:4] == ["FL", "FR", "RL", "RR"]
-    assert orders["mujoco"]["bodies"][:5] == ["base", "FR_hip", "FR_thigh", "FR_calf", "FL_hip"]
+    assert orders["mujoco"]["bodies"][:5] == ["base", "FR_hip", "FR_thigh", "FR_calf", "FR_foot"]
     assert orders["mujoco"]["certain"] is True
     assert all(orders[name]["reason"] for name in legs)
 

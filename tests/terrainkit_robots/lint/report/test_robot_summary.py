@@ -14,7 +14,13 @@ def summary(path, **options):
 
 def test_summary_of_a_quadruped():
     lines = summary(QUADRUPED)
-    assert list(lines) == ["robot", "size", "legs", "standing", "  roll", "  hip", "  knee"]
+    assert list(lines)[:7] == ["robot", "size", "legs", "standing", "  roll", "  hip", "  knee"]
+    loaded = [label.strip() for label in list(lines)[7:]]
+    assert loaded == ["loaded by", "MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis", "PyBullet"]
+    assert lines["  Isaac Lab"] == "15.02 kg in 17 bodies; joints reordered"
+    assert lines["  Genesis  "].startswith(
+        "15.02 kg in 13 bodies; feet are part of FL_calf, FR_calf, RL_calf, RR_calf; "
+    )
     assert lines["robot"] == "quadruped (URDF)"
     assert lines["size"] == "15.02 kg, 17 links in 13 rigid bodies, 12 joints"
     assert lines["legs"] == "4, 0.448 m long; feet: FL_foot, FR_foot, RL_foot, RR_foot"

@@ -4,7 +4,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.bodies.bounds import half_diagonal
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.inertial import bodies_with_mass, mass_source
+from terrainkit_robots.analysis.inertia.inertial import because_of, bodies_with_mass, mass_source
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import contrast
 from terrainkit_robots.transforms import Matrix
@@ -40,15 +40,16 @@ def com_outside_body(robot: Facts) -> Violations:
         box = body_bounds.box_if(body, is_invalid)
         if box is None:
             continue
+        cause, *_ = max(body.parts(), key=lambda part: part[1] * _distance(part[2][:3, 3], box))
         distance, limit = _distance(body.center, box), _max_distance(box)
         got, expected = contrast(distance, limit, ".3g")
         yield Violation(
-            subject=body.name,
-            source=mass_source(body.main_link),
+            subject=cause.name,
+            source=mass_source(cause),
             severity="error" if distance > _COM_ERROR * limit else "warning",
             message=f"center of mass of body {body.name}: got {got} m outside of the "
             f"bounding box, whose diagonal is {2 * half_diagonal(box):.3g} m; expected at most "
-            f"{expected} m",
+            f"{expected} m" + because_of(cause, body),
             measured={"outside": distance, "allowed": limit},
         )
 

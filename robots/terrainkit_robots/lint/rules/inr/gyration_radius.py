@@ -7,8 +7,10 @@ from terrainkit_robots.analysis.bodies.bodies import Body
 from terrainkit_robots.analysis.bodies.bounds import half_diagonal
 from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.analysis.inertia.inertial import (
+    because_of,
     bodies_with_mass,
     inertia_source,
+    main_cause,
     max_inertia,
 )
 from terrainkit_robots.analysis.inertia.physical import (
@@ -18,6 +20,7 @@ from terrainkit_robots.analysis.inertia.physical import (
     is_in_range,
 )
 from terrainkit_robots.analysis.inertia.placeholder import placeholder_inertias
+from terrainkit_robots.analysis.simulator_conventions.fixed_joints import kept_bodies
 from terrainkit_robots.export.canonical import has_floating_base
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, findings_of, rule
 from terrainkit_robots.transforms import Matrix
@@ -31,6 +34,10 @@ Mass inside a box cannot exceed 1; the margin is for shapes that omit a small pa
 _MIN_GYRATION = 0.05
 """The same ratio for a body that is nearly a point mass. Solid parts have 0.3 to 0.6; a heavy motor
 in a light shell five times as long has 0.1."""
+
+_MIN_KEPT_MASS = 0.01
+"""Mass of a link that dont_collapse keeps as a body, below which it is a placeholder [kg]. The
+published Go2 has a head of 1 g."""
 
 
 @rule("INR006", "inertia-too-large", "warning")
@@ -61,15 +68,7 @@ def inertia_too_large(robot: Facts) -> Violations:
                 f"{MAX_INERTIA:.0e} kg m2",
                 measured={"inertia": inertia},
             )
-    body_bounds, candidates = robot.body_bounds, []
-    for body, radius in _body_radii(robot):
-
-        def is_invalid(box: Matrix, radius: float = radius) -> bool:
-            return radius > _MAX_GYRATION * half_diagonal(box)
-
-        box = body_bounds.box_if(body, is_invalid)
-        if box is not None:
-            candidates.append((body, radius, box))
+    candidates = list(oversized_bodies(robot))
     reported = _invalid_bodies(robot) if candidates else set()
     for body, radius, box in candidates:
         if body.name not in reported:
@@ -78,6 +77,27 @@ def inertia_too_large(robot: Facts) -> Violations:
             severity: Severity = "note" if is_fixed else "error" if is_error else "warning"
             limit = f"at most {_MAX_GYRATION:g}"
             yield _report_radius(body, radius, box, limit, severity)
+
+
+def oversized_bodies(robot: Facts) -> Iterator[tuple[Body, float, Matrix]]:
+    """Yield the bodies with too large a radius of gyration: the radius [m], and the box [m]."""
+    body_bounds = robot.body_bounds
+    for body, radius in _body_radii(robot):
+
+        def is_invalid(box: Matrix, radius: float = radius) -> bool:
+            return radius > _MAX_GYRATION * half_diagonal(box)
+
+        box = body_bounds.box_if(body, is_invalid)
+        if box is not None:
+            yield body, radius, box
+        for part, radius in _kept_radii(robot, body):
+
+            def needs_mesh(length: float, radius: float = radius) -> bool:
+                return radius > _MAX_GYRATION * length
+
+            box = body_bounds.shape_box(part, needs_mesh)
+            if box is not None and radius > _MAX_GYRATION * half_diagonal(box):
+                yield part, radius, box
 
 
 @rule("INR007", "inertia-too-small", "warning")
@@ -100,7 +120,8 @@ def inertia_too_small(robot: Facts) -> Violations:
         index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
         part = slice(index, index + 1)
         main = replace(whole, links=whole.links[part], poses=whole.poses[part])
-        for body in (whole, main):
+        kept = (each for each, _ in _kept_radii(robot, whole))
+        for body in (whole, main, *kept):
             radius = gyration_radius(body.principal, body.mass)
 
             def needs_mesh(length: float, radius: float = radius) -> bool:
@@ -129,14 +150,15 @@ def is_far_too_large(robot: Facts, body: Body) -> bool:
 def _report_radius(
     body: Body, radius: float, box: Matrix, limit: str, severity: Severity
 ) -> Violation:
-    half = half_diagonal(box)
+    half, cause = half_diagonal(box), main_cause(body)
     return Violation(
-        subject=body.name,
-        source=inertia_source(body.main_link),
+        subject=cause.name,
+        source=inertia_source(cause),
         severity=severity,
         message=f"radius of gyration of body {body.name}: got {radius:.3g} m (mass "
         f"{body.mass:.4g} kg, largest principal moment {body.principal[2]:.3g} kg m2); expected "
-        f"{limit} times half the diagonal of the body, which is {half:.3g} m",
+        f"{limit} times half the diagonal of the body, which is {half:.3g} m"
+        + because_of(cause, body),
         measured={"radius": radius, "half_diagonal": half},
     )
 
@@ -147,6 +169,13 @@ def _invalid_bodies(robot: Facts) -> set[str]:
     reported = {link.name for _, links in placeholder_inertias(robot.bodies) for link in links}
     reported |= {f.subject for f in findings_of(robot, "INR003", "INR004") if f.severity == "error"}
     return reported | {finding.subject for finding in findings_of(robot, "INR010", "INR008")}
+
+
+def _kept_radii(robot: Facts, body: Body) -> Iterator[tuple[Body, float]]:
+    """Yield the parts of a body that stay bodies, and their radii of gyration [m]."""
+    for part in bodies_with_mass(kept_bodies(robot.tree, body)):
+        if part.mass >= _MIN_KEPT_MASS and part.principal[0] > MIN_INERTIA:
+            yield part, gyration_radius(part.principal, part.mass)
 
 
 def _body_radii(robot: Facts) -> Iterator[tuple[Body, float]]:

@@ -46,7 +46,8 @@ def not_positive_definite(robot: Facts) -> Violations:
     All principal moments of a rigid body are positive. If one of them is not, MuJoCo rejects the
     file; in other simulators, the rotation of the body is unstable and its state becomes NaN. The
     usual cause is that the products ixy, ixz, iyz are too large compared with ixx, iyy, izz. A zero
-    inertia is allowed on a small link that is fixed to a body with an inertia.
+    inertia is allowed on a small link that is fixed to a body with an inertia. It is a warning if
+    `dont_collapse` keeps such a link as a separate body.
 
     Fix:
         Take the six numbers from CAD, about the center of mass, in kg m2. The unsafe fix writes the
@@ -56,6 +57,7 @@ def not_positive_definite(robot: Facts) -> Violations:
         MuJoCo 4.0: "inertia must have positive eigenvalues", "missing element: 'inertia'".
     """
     main = {id(body.main_link) for body in robot.bodies}
+    kept = {joint.child for joint in robot.fixed_joints if joint.dont_collapse}
     for link in robot.model.links:
         if not _has_finite_mass(link) or robot.unparsed.has(link.name, *_INERTIA_ATTRIBUTES):
             continue
@@ -65,17 +67,20 @@ def not_positive_definite(robot: Facts) -> Violations:
             if robot.model.kind != "mjcf" or _needs_inertia(robot, link, main):
                 yield _missing_inertia(robot, link)
             continue
-        zero = is_zero(inertia)
-        if not is_in_range(inertia) or (zero and not _needs_inertia(robot, link, main)):
+        zero, needs_inertia = is_zero(inertia), _needs_inertia(robot, link, main)
+        is_kept = link.name in kept and not needs_inertia and bool(link.inertial.mass)
+        if not is_in_range(inertia) or (zero and not (needs_inertia or is_kept)):
             continue
         moments = principal_moments(inertia)
         if zero or moments[0] <= MIN_INERTIA:
             yield Violation(
                 subject=link.name,
                 source=inertia_source(link),
+                severity="warning" if zero and is_kept else None,
                 message=f"principal moments of link {link.name}: got "
                 f"{numbers(moments, '.4g', ', ')} kg m2 "
-                f"({'zero' if zero else 'not positive definite'}); expected all above 0 kg m2",
+                f"({'zero' if zero else 'not positive definite'}); expected all above 0 kg m2"
+                + (", since dont_collapse keeps it as a body" if zero and is_kept else ""),
                 measured=_measured(moments),
                 fix=robot.inertia_repair.fix(link),
             )

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.analysis.inertia.density import shape_volume
+from terrainkit_robots.analysis.inertia.density import default_mass
 from terrainkit_robots.analysis.inertia.inertial import has_valid_mass, mass_source, max_inertia
 from terrainkit_robots.analysis.inertia.physical import MIN_INERTIA
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, findings_of, rule
@@ -21,9 +21,6 @@ _MAX_MASS_RATIO = 1000.0
 # The 7 published files with an error have 6 % to 305 %.
 _MAX_INFERRED, _MAX_INFERRED_ERROR = 0.01, 0.05
 """Inferred mass divided by the declared mass: limits of the warning and the error."""
-
-_DEFAULT_DENSITY = 1000.0
-"""Density that MuJoCo assigns to the collision shapes of links without <inertial> [kg/m3]."""
 
 
 @rule("INR001", "massless-body", "error")
@@ -190,7 +187,7 @@ def inferred_mass(robot: Facts) -> Violations:
     if robot.model.kind == "mjcf" or robot.total_mass <= MIN_INERTIA:
         return
     inferred = {
-        link: _DEFAULT_DENSITY * sum(shape_volume(shape, robot.meshes) for shape in link.collisions)
+        link: default_mass(link, robot.meshes)
         for body in robot.bodies
         if body.mass > MIN_INERTIA
         for link in body.links

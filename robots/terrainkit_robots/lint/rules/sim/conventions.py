@@ -12,9 +12,13 @@ from terrainkit_robots.analysis.simulator_conventions.armature import (
 from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     KEEP_LINK_OPTIONS,
     SIMULATORS,
-    find_merged_feet,
 )
 from terrainkit_robots.analysis.simulator_conventions.joint_order import SimulatorOrder
+from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
+    dropped_mass,
+    is_welded,
+    loaded_robots,
+)
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import conjunction
 
@@ -44,7 +48,7 @@ def joint_order(robot: Facts) -> Violations:
     others = [order for order in robot.simulator_orders if order.joints != file]
     if not others:
         return
-    same = [name for name in SIMULATORS if name not in {order.simulator for order in others}]
+    same = [order.simulator for order in robot.simulator_orders if order not in others]
     orders = "; ".join(_format_order(order, file) for order in others)
     rest = f"; {conjunction(same)}: same as the file" if same else ""
     yield Violation(
@@ -80,22 +84,61 @@ def merged_feet(robot: Facts) -> Violations:
         MuJoCo's `fusestatic`, which is enabled for URDF; legged_gym's `collapse_fixed_joints`;
         Isaac Lab's `merge_fixed_joints`; `merge_fixed_links` of genesis-world 1.4.5.
     """
-    merges = find_merged_feet(robot.tree, robot.bodies, robot.legs, robot.fixed_joints)
+    loaded = loaded_robots(robot)
+    feet = {
+        leg.foot: {r.order.simulator: r.merged[leg.foot] for r in loaded if leg.foot in r.merged}
+        for leg in robot.legs
+        if robot.tree.links[leg.foot].collisions
+    }
+    merges = {foot: bodies for foot, bodies in feet.items() if bodies}
     if not merges:
         return
-    first = merges[0]
-    by = [s for s in SIMULATORS if any(s in merge.merged_body for merge in merges)]
-    into = next(iter(first.merged_body.values()))
-    example = f"{first.foot} into {into}" + (", ..." if len(merges) > 1 else "")
+    foot, bodies = next(iter(merges.items()))
+    by = [name for name in SIMULATORS if any(name in each for each in merges.values())]
+    example = f"{foot} into {next(iter(bodies.values()))}" + ", ..." * (len(merges) > 1)
     yield Violation(
-        subject=first.foot,
-        source=first.joint.source,
+        subject=foot,
+        source=robot.tree.parent_joint[foot].source,
         message=(
             f"{conjunction(by)} merge{'s' * (len(by) == 1)} {len(merges)} feet into their parent "
             f"links by default ({example})"
         ),
         hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
         measured={"feet": len(merges)},
+    )
+
+
+@rule("SIM006", "welded-trunk", "note", needs=("legs",))
+def welded_trunk(robot: Facts) -> Violations:
+    """MuJoCo welds the trunk of a URDF to the world and drops its mass.
+
+    A URDF has no free joint, and MuJoCo merges a root link without joint into the world: the robot
+    cannot move, and its mass is too small. Other simulators make the base floating by an option.
+
+    Fix:
+        Convert the file to MJCF with a <freejoint/> in the trunk, as `terrainkit onboard` does. For
+        MuJoCo alone, an empty link `world` and a joint of type floating above the trunk have the
+        same effect; PyBullet turns such a joint into a fixed one.
+
+    Source:
+        Compared with MuJoCo 4.0. With `fusestatic="false"` the mass is kept, but the trunk does not
+        move either.
+    """
+    trunk = robot.bodies[0]
+    loaded = next((r for r in loaded_robots(robot) if r.order.simulator == "MuJoCo"), None)
+    if loaded is None or not is_welded(robot):
+        return
+    dropped = dropped_mass(robot)
+    drops = (
+        f" and drops its mass: {loaded.mass:.4g} of {loaded.mass + dropped:.4g} kg are left in "
+        f"{len(loaded.bodies)} bodies"
+        if dropped > 0
+        else ""
+    )
+    yield Violation(
+        element=trunk.main_link,
+        message=f"MuJoCo welds {trunk.name} to the world{drops}; expected a floating base",
+        measured={"dropped": dropped, "left": loaded.mass},
     )
 
 

@@ -6,9 +6,9 @@ from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.inertia.inertial import mass_source
+from terrainkit_robots.analysis.simulator_conventions.loaded_robot import dropped_mass
 from terrainkit_robots.lint.compare.body_mass import (
     body_difference,
-    dropped_mass,
     has_valid_inertial,
     relative_difference,
 )

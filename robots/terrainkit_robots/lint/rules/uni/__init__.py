@@ -1,0 +1,1 @@
+"""Rules on units: one quantity that is off by the same factor everywhere (UNI)."""
