@@ -7,7 +7,7 @@ from terrainkit_robots.lint.compare.body_mass import (
     relative_difference,
 )
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
-from tests.small_robots import facts, mjcf
+from tests.small_robots import facts, joint, link, mjcf
 
 
 def gaps(one, other):
