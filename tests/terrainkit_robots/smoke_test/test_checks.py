@@ -14,20 +14,6 @@ from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.smoke_test import checks as module
-from terrainkit_robots.smoke_test.checks import (
-    SmokeTestResult,
-    check_action_scale,
-    check_observations,
-    check_rewards,
-    check_spawn_height,
-    check_stand,
-    check_standing,
-    check_training,
-    check_trends,
-    random_state,
-    run_checks,
-    smoke_test,
-)
 from terrainkit_robots.smoke_test.short_training import TrainingRecord
 from terrainkit_robots.spec.robot import Robot
 
@@ -62,7 +48,7 @@ def env(quadruped):
 
 def test_bundled_robot_can_be_trained(biped):
     fractions = []
-    result = run_checks(biped, Task(), 1, fractions.append)
+    result = module.run_checks(biped, Task(), 1, fractions.append)
     assert fractions == [1.0]
     assert result.passed, failed(result)
     assert (result.robot, result.checks[0].measured) == ("biped", "16 robots")
@@ -79,12 +65,12 @@ def test_bundled_robot_can_be_trained(biped):
         "trains for 1 iteration",
     ]
     assert names == expected
-    untrained = [check.name for check in run_checks(biped, Task(), 0).checks]
+    untrained = [check.name for check in module.run_checks(biped, Task(), 0).checks]
     assert untrained == names[:-1]
 
 
 def test_invalid_spec_fails_the_first_check(quadruped):
-    result = run_checks(replace_spec(quadruped, penalized_contacts=("tail",)), Task(), 1)
+    result = module.run_checks(replace_spec(quadruped, penalized_contacts=("tail",)), Task(), 1)
     (check,) = result.checks
     assert not result.passed
     assert check.name == "environment initializes"
@@ -103,7 +89,7 @@ def test_invalid_spec_fails_the_first_check(quadruped):
 )
 def test_spawn_height_is_that_of_the_feet(quadruped, offset, passed, height):
     robot = replace_spec(quadruped, spawn_height=quadruped.spec.spawn_height + offset)
-    check = check_spawn_height(still_env(robot))
+    check = module.check_spawn_height(still_env(robot))
     assert check.passed is passed
     assert height in check.measured
     assert f"spawn_height {robot.spec.spawn_height:.4g} m" in check.measured
@@ -114,24 +100,24 @@ def test_spawn_height_names_feet_without_shapes(quadruped):
     foot = env.scene.model.body("FL_foot").id
     geoms = env.scene.geoms[env.scene.model.geom_bodyid[env.scene.geoms] != foot]
     env.scene = replace(env.scene, geoms=geoms)
-    check = check_spawn_height(env)
+    check = module.check_spawn_height(env)
     assert not check.passed
     assert check.measured.startswith("FL_foot has no shape, FR_foot 1.0 cm, ")
 
 
 def test_spawn_height_is_measured_at_the_lowest_corner(biped):
-    assert check_spawn_height(still_env(biped)).passed
+    assert module.check_spawn_height(still_env(biped)).passed
     pose = biped.spec.per_joint("default_pose")
     pose["left_ankle_pitch_joint"] += 0.2
-    check = check_spawn_height(still_env(replace_spec(biped, default_pose=pose)))
+    check = module.check_spawn_height(still_env(replace_spec(biped, default_pose=pose)))
     assert not check.passed
     assert "left_ankle_roll_link -" in check.measured
 
 
 def test_observations_must_be_finite(env):
-    assert all(check.passed for check in check_observations(env))
+    assert all(check.passed for check in module.check_observations(env))
     env.get_observations()["policy"][3, 4] = torch.nan
-    policy, privileged = check_observations(env)
+    policy, privileged = module.check_observations(env)
     assert privileged.passed
     assert not policy.passed
     assert policy.measured == "47 numbers, some not finite"
@@ -140,16 +126,18 @@ def test_observations_must_be_finite(env):
 @pytest.mark.parametrize(("share", "passed"), [(0.51, True), (0.49, False)])
 def test_base_stays_above_half_of_its_height(quadruped, share, passed):
     env = still_env(quadruped)
-    stands = check_stand(env)
+    stands = module.check_stand(env)
     height = float(env.state.base_height.min())
     percent = 100 * height / quadruped.base_height_target
     assert stands.measured == f"base at {height:.3f} m, {percent:.0f} % of its height"
-    check = check_stand(still_env(replace_spec(quadruped, base_height_target=height / share)))
+    check = module.check_stand(
+        still_env(replace_spec(quadruped, base_height_target=height / share))
+    )
     assert (check.passed, f"{100 * share:.0f} % of its height" in check.measured) == (passed, True)
 
 
 def test_weak_gains_do_not_stand(quadruped):
-    check = check_stand(still_env(quadruped, control=Control(stiffness=0.1, damping=0.1)))
+    check = module.check_stand(still_env(quadruped, control=Control(stiffness=0.1, damping=0.1)))
     assert not check.passed
     assert "fell after 0." in check.measured
 
@@ -165,7 +153,7 @@ def test_weak_gains_do_not_stand(quadruped):
 )
 def test_constant_rewards_fail(env, reward, passed, measured):
     env.reward_terms["torques"] = (lambda state, *_: reward(state), -0.1)
-    (check,) = (check for check in check_rewards(env, {}) if check.name == "reward torques")
+    (check,) = (check for check in module.check_rewards(env, {}) if check.name == "reward torques")
     assert (check.passed, check.measured) == (passed, measured)
 
 
@@ -173,13 +161,15 @@ def test_every_fourth_robot_stands_for_the_rewards(env):
     env.set_commands(np.full((env.num_envs, 3), 0.5, np.float32))
     stands = lambda state, *_: (state.commands == 0).all(axis=1).astype(float)  # noqa: E731
     env.reward_terms["torques"] = (stands, -0.1)
-    (check,) = (check for check in check_rewards(env, {}) if check.name == "reward torques")
+    (check,) = (check for check in module.check_rewards(env, {}) if check.name == "reward torques")
     assert check.measured == "0 to 1"
 
 
 def test_unreachable_reward_fails(quadruped):
     env = still_env(replace_spec(quadruped, penalized_contacts=()))
-    (check,) = (check for check in check_rewards(env, {}) if check.name == "reward collision")
+    (check,) = (
+        check for check in module.check_rewards(env, {}) if check.name == "reward collision"
+    )
     assert not check.passed
     assert check.measured == "0 in every state"
     assert "rewards.collision 0" in check.expected
@@ -187,26 +177,29 @@ def test_unreachable_reward_fails(quadruped):
 
 def test_random_state_triggers_every_reward(quadruped):
     env = still_env(quadruped, rewards=Rewards(**dict.fromkeys(REWARDS, 1.0)))
-    state = random_state(env.state, seed=1)
+    state = module.random_state(env.state, seed=1)
     for name, reward in REWARDS.items():
         assert reward(state, quadruped, env.cfg.rewards).any(), name
 
 
 def test_standing_earns_a_quarter_of_the_tracking(quadruped):
     env = still_env(quadruped)
-    assert check_standing(env).measured == "25%"
+    assert module.check_standing(env).measured == "25%"
     for share, passed in ((0.259, True), (0.261, False)):
         always = lambda state, *_, share=share: np.full(len(state.commands), share)  # noqa: E731
         env.reward_terms = {"tracking_lin_vel": (always, 3.0), "torques": (None, -1.0)}
-        assert (check_standing(env).measured, check_standing(env).passed) == ("26%", passed)
+        assert (module.check_standing(env).measured, module.check_standing(env).passed) == (
+            "26%",
+            passed,
+        )
     env.reward_terms = {}
-    assert (check_standing(env).measured, check_standing(env).passed) == ("0%", True)
+    assert (module.check_standing(env).measured, module.check_standing(env).passed) == ("0%", True)
 
 
 def test_large_action_scale_fails(quadruped):
     # 60 N m/rad, and an effort of 23.7 N m.
     for scale, passed, measured in ((0.39, True, 0.99), (0.4, False, 1), (0.5, False, 1.3)):
-        check = check_action_scale(still_env(quadruped, control=Control(action_scale=scale)))
+        check = module.check_action_scale(still_env(quadruped, control=Control(action_scale=scale)))
         assert check.measured == f"{measured:g} of the effort of FL_hip_joint"
         assert check.passed is passed
 
@@ -214,7 +207,7 @@ def test_large_action_scale_fails(quadruped):
 def test_excessive_penalties_fail_with_their_names(quadruped, monkeypatch):
     monkeypatch.setattr(module, "MIN_TREND_SAMPLES", 1)
     rewards = Rewards(termination=0.0, ang_vel_xy=-100.0, dof_acc=-0.15)
-    result = run_checks(quadruped, Task(rewards=rewards), 1)
+    result = module.run_checks(quadruped, Task(rewards=rewards), 1)
     assert {"reward ang_vel_xy", "reward dof_acc"} <= failed(result)
     (check,) = (check for check in result.checks if check.name == "reward ang_vel_xy")
     assert "% of the positive rewards" in check.measured
@@ -230,7 +223,7 @@ def test_excessive_penalties_fail_with_their_names(quadruped, monkeypatch):
 def test_falls_may_outweigh_the_rewards(env):
     trained = dict.fromkeys(env.reward_terms, 0.0) | {"progress": 0.25, "termination": -50.0}
     trained |= {"torques": -0.51, "dof_acc": -0.49}
-    checks = {check.name: check for check in check_rewards(env, trained)}
+    checks = {check.name: check for check in module.check_rewards(env, trained)}
     assert [name for name, check in checks.items() if not check.passed] == ["reward torques"]
     told = "; trained -0.510 /s, -204% of the positive rewards"
     assert checks["reward torques"].measured.endswith(told)
@@ -240,7 +233,7 @@ def test_falls_may_outweigh_the_rewards(env):
 def test_training_fails_with_the_reason(quadruped, monkeypatch):
     torques = lambda state, *_: np.nan * state.base_pos[:, 0]  # noqa: E731
     monkeypatch.setitem(REWARDS, "torques", torques)
-    result = run_checks(quadruped, Task(), 100_000)
+    result = module.run_checks(quadruped, Task(), 100_000)
     check = result.checks[-1]
     assert (check.name, check.passed) == ("trains for 0 iterations", False)
     assert "torques" in check.measured
@@ -262,7 +255,7 @@ def test_training_fails_with_the_reason(quadruped, monkeypatch):
 def test_trends_compare_quarters(rewards, falls, names):
     first, last = rewards
     record = replace(RECORD, first_rewards=first, last_rewards=last, falls=falls)
-    assert {check.name for check in check_trends(record) if not check.passed} == names
+    assert {check.name for check in module.check_trends(record) if not check.passed} == names
 
 
 @pytest.mark.parametrize(
@@ -275,13 +268,13 @@ def test_trends_compare_quarters(rewards, falls, names):
     ],
 )
 def test_training_must_be_finite(changed, passed, measured):
-    check = check_training(replace(RECORD, **changed))
+    check = module.check_training(replace(RECORD, **changed))
     assert (check.passed, check.measured) == (passed, measured)
 
 
 def test_random_states_have_all_magnitudes(quadruped):
     env = LeggedEnv(TASK, quadruped, Plane())
-    state, again, other = (random_state(env.state, seed) for seed in (1, 1, 2))
+    state, again, other = (module.random_state(env.state, seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(state.dof_vel, again.dof_vel)
     assert (state.dof_vel != other.dof_vel).any()
     sizes = np.abs(state.foot_force).mean(axis=(1, 2))  # of a normal distribution: 0.8
@@ -296,7 +289,9 @@ def quick(monkeypatch):
     """Run one check instead of all."""
 
     def check(robot, *_):
-        return SmokeTestResult(robot.spec.name, (check_spawn_height(still_env(robot)),))
+        return module.SmokeTestResult(
+            robot.spec.name, (module.check_spawn_height(still_env(robot)),)
+        )
 
     monkeypatch.setattr(module, "run_checks", check)
 
@@ -306,7 +301,7 @@ def test_smoke_test_onboards_a_file(tmp_path):
     urdf = tmp_path / "quadruped.urdf"
     shutil.copy(bundled.urdf_path("quadruped"), urdf)
     before = urdf.read_bytes()
-    result = smoke_test(str(urdf))
+    result = module.smoke_test(str(urdf))
     assert result.passed, failed(result)
     assert [check.name for check in result.checks] == ["can be onboarded", "spawn height"]
     assert [path.name for path in tmp_path.iterdir()] == ["quadruped.urdf"]
@@ -318,7 +313,7 @@ def test_smoke_test_rejects_a_file_with_errors(tmp_path):
     urdf = tmp_path / "bad.urdf"
     text = bundled.urdf_path("quadruped").read_text()
     urdf.write_text(text.replace('<mass value="', '<mass value="-', 1))
-    (check,) = smoke_test(str(urdf)).checks
+    (check,) = module.smoke_test(str(urdf)).checks
     assert (check.name, check.passed) == ("can be onboarded", False)
     assert "INR" in check.measured
 
@@ -331,11 +326,11 @@ def test_smoke_test_of_a_folder_uses_its_spec(tmp_path):
     edited = text.replace("spawn_height = 0.344", "spawn_height = 0.644")
     assert edited != text
     (folder / "robot.toml").write_text(edited)
-    (check,) = smoke_test(str(folder)).checks
+    (check,) = module.smoke_test(str(folder)).checks
     assert not check.passed
     assert check.measured.startswith("FL_foot 31.0 cm")
 
 
 def test_smoke_test_rejects_unknown_names():
     with pytest.raises(ConfigError, match="biped, quadruped"):
-        smoke_test("unicorn")
+        module.smoke_test("unicorn")

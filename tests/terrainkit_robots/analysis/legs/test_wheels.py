@@ -5,11 +5,11 @@ import pytest
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.spec.robot import Robot
-from tests.small_robots import URDF, box, facts, joint, link, shape
+from tests.small_robots import URDF, ball, box, facts, joint, link, shape
 
 FOUR = [f"{x} {y} 0" for x in (0.2, -0.2) for y in (0.2, -0.2)]
 TWO = ["0 0.2 0", "0 -0.2 0"]
-ROUND = ".006 .006 .006 0 0 0"
+ROUND, HEAVY = ".006 .006 .006 0 0 0", ".01 .01 .01 0 0 0"
 
 
 def wheel_legs(places, end=None, **hinge):
@@ -30,11 +30,6 @@ def body_at_axis(form='cylinder radius="0.1" length="0.05"', center="0 0 0", rpy
     return link("END", shape(form, center, rpy), center=center, inertia=ROUND)
 
 
-def last_role(end=None, **hinge):
-    (role,) = {leg.roles[-1] for leg in facts(wheel_legs(FOUR, end, **hinge)).legs}
-    return role
-
-
 @pytest.mark.parametrize(
     ("end", "hinge", "role"),
     [
@@ -48,10 +43,18 @@ def last_role(end=None, **hinge):
         (body_at_axis('box size="0.1 0.05 0.1"', rpy="0 0 0"), {}, "ankle"),  # radii of 1 to 1.41
         (body_at_axis(rpy="0 0 0"), {}, "ankle"),  # a cylinder across the axis
         (link("END", inertia=ROUND), {}, "ankle"),  # without shapes
+        (body_at_axis(center="0 0.5 0"), {}, "wheel"),  # along the axis
+        # The radius of gyration is sqrt(0.03 / 2) = 0.1225 m, and a quarter of it 0.0306 m.
+        (link("END", ball(0.02), center="0.0305 0 0", inertia=HEAVY), {}, "wheel"),
+        (link("END", ball(0.02), center="0.0307 0 0", inertia=HEAVY), {}, "ankle"),
+        # Off the axis by a ninth of its radius, a ball has radii of 10/9 to 8/9: 1.25.
+        (link("END", ball(0.02, "0 0 0.0022"), inertia=HEAVY), {}, "wheel"),
+        (link("END", ball(0.02, "0 0 0.0023"), inertia=HEAVY), {}, "ankle"),
     ],
 )
 def test_wheel_is_round_and_turns_without_limits(end, hinge, role):
-    assert last_role(end, **hinge) == role
+    legs = facts(wheel_legs(FOUR, end, **hinge)).legs
+    assert {leg.roles[-1] for leg in legs} == {role}
 
 
 def test_pose_of_legs_with_wheels_about_x():
@@ -65,7 +68,6 @@ def test_leg_ends_at_the_rim_of_the_wheel():
     assert [leg.roles for leg in robot.legs] == [("hip", "knee", "wheel")] * 4
     assert [leg.length for leg in robot.legs] == pytest.approx([0.5] * 4, abs=0.01)
     assert {robot.default_pose[f"end{k}_joint"] for k in range(4)} == {0.0}
-    assert robot.stance is not None
     # The axis is 0.75 of the length below the hip, less the radius that the wheel adds.
     assert robot.stance.height == pytest.approx(0.375, abs=0.005)
 
