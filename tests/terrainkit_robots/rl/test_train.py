@@ -219,7 +219,8 @@ def test_full_disk_keeps_the_last_checkpoint(task, tmp_path, capfd, fill_disk):
 )
 def test_failure_to_log_is_one_error(task, tmp_path, capfd, fill_disk, fails, told):
     run = tmp_path / "run"
-    harm = after(1, lambda: fill_disk(200) if fails == "disk" else shutil.rmtree(run))
+    # A thread writes logs into the folder, so that it cannot be deleted at any moment.
+    harm = after(1, lambda: fill_disk(200) if fails == "disk" else run.rename(tmp_path / "gone"))
     with pytest.raises(ExportError, match=f"cannot write .*: {told}"):
         train("quadruped", "plane", task, folder=run, progress_callback=harm)
     assert capfd.readouterr() == ("", "")
