@@ -229,7 +229,7 @@ def stand_as_written(
         mujoco.mj_setConst(model, data)
         for name, position in written.positions.items():
             data.qpos[model.joint(name).qposadr[0]] = position
-        targets = data.qpos[addresses]
+        targets, stiffness, limits = data.qpos[addresses], np.array(gains), np.array(efforts)
         for index in position_servos(model):
             joint = model.actuator_trnid[index, 0]
             length = model.actuator_gear[index, 0] * data.qpos[model.jnt_qposadr[joint]]
@@ -243,8 +243,8 @@ def stand_as_written(
         speeds = np.zeros((steps, model.nv - 6))
         forces, heights = np.zeros(steps), np.zeros(steps)
         for step in range(steps):
-            torques = gains * (targets - data.qpos[addresses])
-            data.qfrc_applied[dofs] = np.clip(torques, -np.array(efforts), efforts)
+            torques = stiffness * (targets - data.qpos[addresses])
+            data.qfrc_applied[dofs] = np.clip(torques, -limits, limits)
             mujoco.mj_step(model, data)
             if has_diverged(data):
                 return WrittenStand(**{each.name: np.inf for each in fields(WrittenStand)})

@@ -23,16 +23,11 @@ class Stop(BaseException):
     """No subclass of Exception."""
 
 
+pytestmark = pytest.mark.usefixtures("own_registry")
+
+
 def throw(error):
     raise error
-
-
-@pytest.fixture(autouse=True)
-def registered(monkeypatch):
-    monkeypatch.setattr(registry, "_registered", {})
-    registry._get.cache_clear()
-    yield
-    registry._get.cache_clear()
 
 
 def make_class(name, parent, **methods):

@@ -15,13 +15,7 @@ declared = dataclass(frozen=True, kw_only=True)
 FLAT, MIRROR = registry.get_terrain("flat"), registry.get_overlay("mirror")
 
 
-@pytest.fixture(autouse=True)
-def registered(monkeypatch):
-    """Forget what a test registers or installs."""
-    monkeypatch.setattr(registry, "_registered", {})
-    registry._get.cache_clear()
-    yield
-    registry._get.cache_clear()
+pytestmark = pytest.mark.usefixtures("own_registry")
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import math
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.terrain import parameter, registry
+from terrainkit.terrain import parameter
 from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit.terrains.flat import Flat
 
@@ -62,9 +62,8 @@ def test_friction_may_be_a_range(friction, expected):
     assert [ice.friction_at(d) for d in (0.0, 0.5, 1.0)] == expected
 
 
-def test_parameters_with_the_names_of_other_keys_are_rejected(monkeypatch):
-    monkeypatch.setattr(registry, "_registered", {})
-
+@pytest.mark.usefixtures("own_registry")
+def test_parameters_with_the_names_of_other_keys_are_rejected():
     @dataclasses.dataclass(frozen=True, kw_only=True)
     class Named(Flat):
         friction: float = parameter.scalar(1.0)

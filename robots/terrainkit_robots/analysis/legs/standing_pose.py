@@ -16,6 +16,7 @@ from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis,
 from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.analysis.legs.leg_model import LegModel
 from terrainkit_robots.analysis.legs.legs import Leg
+from terrainkit_robots.analysis.legs.wheels import MAX_LIMITED_RANGE
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.transforms import Matrix, axis_angle_to_matrix, invert_poses
 
@@ -344,7 +345,8 @@ def _round(objective: _LegObjective, best: Matrix) -> Matrix:
 
 def _search_range(joint: Joint) -> tuple[float, float]:
     lower, upper = joint_range(joint)
-    return (-_DEFAULT_RANGE, _DEFAULT_RANGE) if upper - lower > 4 * np.pi else (lower, upper)
+    is_unlimited = upper - lower > MAX_LIMITED_RANGE
+    return (-_DEFAULT_RANGE, _DEFAULT_RANGE) if is_unlimited else (lower, upper)
 
 
 def _make_objective(

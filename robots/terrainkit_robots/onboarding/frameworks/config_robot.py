@@ -9,7 +9,12 @@ from typing import Literal, TypeVar
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.settings.text import truncate
-from terrainkit_robots.onboarding.frameworks.source import comment, float_literal
+from terrainkit_robots.onboarding.frameworks.source import (
+    comment,
+    dict_entries,
+    float_literal,
+    format_collection,
+)
 from terrainkit_robots.spec.per_joint import by_joint, match_joints
 from terrainkit_robots.spec.robot_spec import RobotSpec, unit_of
 
@@ -140,6 +145,15 @@ class ConfigRobot:
         """Return the action scales of some joints."""
         scales = self.all_joint_values("action_scale")
         return {joint: scales[joint] for joint in joints}
+
+    def scale_table(self, name: str, target: Literal["position", "velocity"]) -> list[str]:
+        """Return the statement with the action scales of the joints with a kind of target."""
+        joints, origin = self.position_joints, self.provenance_comment("action_scale")
+        if target == "velocity":
+            joints, origin = self.velocity_joints, self.velocity_scale_comment()
+        entries = dict_entries(self.action_scales(joints))
+        heading = f"# Change of the {target} target for an action of 1."
+        return ["", heading, *origin, *format_collection(f"{name} = ", entries, "{}")]
 
     def shared_value(
         self, values: Iterable[float], kind: Literal["median", "largest"], *, depth: int = 0

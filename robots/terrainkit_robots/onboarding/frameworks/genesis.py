@@ -1,7 +1,5 @@
 """Write the configuration of a robot for Genesis: entity, gains and default pose."""
 
-from collections.abc import Iterator
-
 from terrainkit_robots.onboarding.frameworks import source
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.naming import package_name
@@ -90,7 +88,8 @@ def config_text(robot: ConfigRobot) -> str:
             ["", "# The order of actions and observations."],
             source.format_collection("JOINTS = ", source.format_strings(spec.joint_order)),
             *(["", *_table(robot, name, field)] for name, field in _TABLES.items()),
-            *_scales(robot),
+            robot.scale_table("ACTION_SCALE", "position"),
+            robot.scale_table("SPEED_SCALE", "velocity"),
             ["", *_FUNCTIONS.rstrip().split("\n")],
         ]
     )
@@ -139,16 +138,3 @@ def _table(robot: ConfigRobot, name: str, field: str) -> list[str]:
     values = robot.all_joint_values(field) if field in _REQUIRED else robot.joint_values(field)
     lines = source.format_collection(f"{name} = ", source.dict_entries(values), "{}")
     return [*robot.provenance_comment(field), *lines]
-
-
-def _scales(robot: ConfigRobot) -> Iterator[list[str]]:
-    """Yield the action scales of joints with position targets and with velocity targets."""
-    origin = robot.provenance_comment("action_scale")
-    for name, joints, target, comment in (
-        ("ACTION_SCALE", robot.position_joints, "position", origin),
-        ("SPEED_SCALE", robot.velocity_joints, "velocity", robot.velocity_scale_comment()),
-    ):
-        yield ["", f"# Change of the {target} target for an action of 1.", *comment]
-        yield source.format_collection(
-            f"{name} = ", source.dict_entries(robot.action_scales(joints)), "{}"
-        )

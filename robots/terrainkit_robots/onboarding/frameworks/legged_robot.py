@@ -125,15 +125,7 @@ def gains(robot: ConfigRobot, clash_note: str) -> list[str]:
 
 def speed_scale(robot: ConfigRobot) -> list[str]:
     """Return the table of the velocity of each wheel for an action of 1; empty without wheels."""
-    if not robot.velocity_joints:
-        return []
-    entries = source.dict_entries(robot.action_scales(robot.velocity_joints))
-    return [
-        "",
-        "# Change of the velocity target for an action of 1.",
-        *robot.velocity_scale_comment(),
-        *source.format_collection("SPEED_SCALE = ", entries, "{}"),
-    ]
+    return robot.scale_table("SPEED_SCALE", "velocity") if robot.velocity_joints else []
 
 
 def contacts(robot: ConfigRobot) -> list[str]:

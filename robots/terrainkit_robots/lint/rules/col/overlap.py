@@ -10,6 +10,7 @@ from terrainkit_robots.analysis.bodies.kinematics import ancestors
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.standing_pose import joint_range
+from terrainkit_robots.analysis.legs.wheels import MAX_LIMITED_RANGE
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.text import contrast
 
@@ -129,7 +130,7 @@ def overlap_in_range(robot: Facts) -> Violations:
     positions: dict[str, Matrix] = {}
     for index, joint in enumerate(robot.joints):
         lower, upper = joint_range(joint)
-        if upper - lower > 4 * np.pi:
+        if upper - lower > MAX_LIMITED_RANGE:
             lower, upper = -_DEFAULT_RANGE, _DEFAULT_RANGE
         # Multiples of the square roots of different primes are evenly distributed modulo 1.
         samples = np.arange(1, _NUM_SAMPLES + 1) * math.sqrt(_PRIMES[index % len(_PRIMES)]) % 1
