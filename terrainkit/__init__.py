@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from terrainkit.importing.options import ImportOptions
     from terrainkit.map.config import MapConfig
     from terrainkit.map.generation import generate
+    from terrainkit.map.import_curriculum import ImportedCurriculum, import_curriculum
     from terrainkit.map.import_map import ImportedMap, ImportReport, import_map
     from terrainkit.map.patch import Patch, make_patch
     from terrainkit.map.terrain_map import TerrainMap
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ImportOptions",
     "ImportReport",
+    "ImportedCurriculum",
     "ImportedMap",
     "MapConfig",
     "Overlay",
@@ -43,6 +45,7 @@ __all__ = [
     "generate",
     "generate_suite",
     "get_suite",
+    "import_curriculum",
     "import_map",
     "import_terrain_mesh",
     "make_boxes",
@@ -66,6 +69,7 @@ _NAMES = {
     "importing.options": ("ImportOptions",),
     "map.config": ("MapConfig",),
     "map.generation": ("generate",),
+    "map.import_curriculum": ("ImportedCurriculum", "import_curriculum"),
     "map.import_map": ("ImportReport", "ImportedMap", "import_map"),
     "map.patch": ("Patch", "make_patch"),
     "map.terrain_map": ("TerrainMap",),

@@ -1,11 +1,16 @@
 """The command import: a file of heights or a mesh becomes a map."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
+
+from terrainkit.errors import ConfigError
 from terrainkit.importing.options import ImportOptions
+from terrainkit.settings.type_hint import NonNegative
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import OutputPath, is_map
 from terrainkit_cli.config_options import ConfigCommand
@@ -15,18 +20,22 @@ from terrainkit_cli.parse import positional
 if TYPE_CHECKING:
     from terrainkit import ImportReport
 
+_MAX_LINES = 20
+"""Most lines of the report of several files."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Import(ConfigCommand):
-    """Import a file of heights or a mesh as a map with spawn origins.
+    """Import files of heights or meshes as a map with spawn origins.
 
+    Several files, or the files in a folder, become levels of difficulty: the rows, easiest first.
     The report says how many missing heights were filled, and what the map lost of a mesh whose
     parts hang over the ground.
     """
 
-    file: Annotated[Path, positional("FILE")]
+    files: Annotated[tuple[Path, ...], positional("FILE...")]
     """Image (.png with 16 bits, .tif), array (.npy), ASCII grid (.asc) or mesh (.obj, .stl, .ply,
-    .glb)."""
+    .glb); or a folder of such files."""
 
     output: OutputPath
     """File to write, as of terrainkit generate."""
@@ -34,22 +43,51 @@ class Import(ConfigCommand):
     overwrite: bool = False
     """Replace an existing file."""
 
+    blend: NonNegative = 1.0
+    """Several files: distance over which the heights fade to 0 at the edges of a patch [m]; 0 to
+    keep them."""
+
+    skip_invalid: bool = False
+    """Several files: skip files and patches that cannot be used, with a warning."""
+
     @classmethod
     def default_config(cls) -> ImportOptions:
         """Return the default options."""
         return ImportOptions()
 
     def run(self) -> int:
-        """Import the file, write the map, and print the report."""
-        from terrainkit import export, import_map
+        """Import the files, write the map, and print the report."""
+        from terrainkit import export, import_curriculum, import_map
 
         options: ImportOptions = self.changed_config()
         export.check_export(self.output, 0, overwrite=self.overwrite)
-        imported = import_map(self.file, options)
-        files = export.export_files(imported.terrain_map, self.output, overwrite=self.overwrite)
-        render.result(written(imported.terrain_map, *files))
-        for line in _report_lines(imported.report, has_solids=options.solids):
+        if len(self.files) == 1 and not self.files[0].is_dir():
+            if self.skip_invalid or self.blend != Import.blend:
+                raise ConfigError("--blend, --skip-invalid: got one file; expected several files")
+            imported = import_map(self.files[0], options)
+            terrain_map, reports = imported.terrain_map, {"": imported.report}
+        else:
+            curriculum = import_curriculum(
+                self.files,
+                options,
+                blend=self.blend,
+                skip_invalid=self.skip_invalid,
+                progress=partial(render.progress, of="files"),
+            )
+            terrain_map, reports = curriculum.terrain_map, {}
+            for (row, col), report in np.ndenumerate(curriculum.reports):
+                reports[f"patch ({row}, {col}), {terrain_map.patch_names[row, col]}: "] = report
+        files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
+        render.result(written(terrain_map, *files))
+        lines = [
+            f"{patch}{line}"
+            for patch, report in reports.items()
+            for line in _report_lines(report, has_solids=options.solids)
+        ]
+        for line in lines[:_MAX_LINES]:
             render.result(line)
+        if len(lines) > _MAX_LINES:
+            render.result(f"and {len(lines) - _MAX_LINES} more; import_curriculum returns all")
         if is_map(self.output):
             path = quote(str(self.output))
             render.result(f"next: terrainkit preview {path} -o preview.png  (render it)")

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
+
 from terrainkit.errors import ConfigError
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain import presets, registry
@@ -142,6 +144,21 @@ def _print_map(terrain_map: TerrainMap) -> None:
             )
         )
     render.table(rows)
+    _print_sources(terrain_map)
+
+
+def _print_sources(terrain_map: TerrainMap) -> None:
+    """Print the files that an imported map is made of, and the patches of each."""
+    rows = [("file", "SHA-256", "patches")]
+    for k in range(len(terrain_map.terrain_names)):
+        patches = [(row, col) for row, col in np.argwhere(terrain_map.terrain_types == k).tolist()]
+        record = terrain_map.parameters[patches[0]].realized if patches else {}
+        if digest := record.get("sha256"):
+            others = f" and {len(patches) - 5} more" if len(patches) > 5 else ""
+            rows.append((str(record["file"]), str(digest), f"{str(patches[:5])[1:-1]}{others}"))
+    if len(rows) > 1:
+        render.result("")
+        render.table(rows)
 
 
 def _solids_text(terrain_map: TerrainMap) -> str:

@@ -85,8 +85,9 @@ class ImportOptions(ReadOptions):
     spawn_radius: Size = 0.5
     """Radius of the flat disk without obstacles around each spawn position [m]."""
 
-    spawn_tolerance: NonNegative = 0.01
-    """Largest height difference within that disk [m]; natural ground needs 0.1 or more."""
+    spawn_tolerance: NonNegative | None = None
+    """Largest height difference within that disk [m]; a patch without such a disk is an error.
+    none: 0.01, or the flattest disk of a patch, with a warning."""
 
     spawn_headroom: NonNegative = 1.0
     """Height above that disk that is free of solids [m]."""

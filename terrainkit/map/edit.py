@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.generation import pad_poses
@@ -86,11 +87,7 @@ def place_patch_spawns(
     Raises:
         ConfigError: if the patch has no place to spawn.
     """
-    grid = config.patch_grid(row, col)
-    block = heights[config.patch_cells(row, col)]
-    lower, upper = (corner[:, :2] for corner in solids.bounds())
-    reaches = np.all((upper >= grid.lower) & (lower <= grid.upper), axis=1)
-    near = solids.select(np.asarray(reaches))
+    grid, block, near = patch_ground(config, heights, solids, row, col)
     kept = [find_spawn(config, grid, block, near, (x, y)) for x, y in spawns[:, :2].tolist()]
     if None not in kept and np.allclose(np.array(kept)[:, :2], spawns[:, :2], atol=1e-4):
         positions = np.array(kept)
@@ -100,3 +97,21 @@ def place_patch_spawns(
         origin = find_origin(config, f"patch ({row}, {col})", grid, block, near, (x, y))
         positions = sample_spawns(config, grid, block, near, origin, rng)
     return with_heading(positions, goals)
+
+
+def patch_ground(
+    config: MapConfig, heights: NDArray[np.float32], solids: Solids, row: int, col: int
+) -> tuple[Grid, NDArray[np.float32], Solids]:
+    """Return the grid and the heights of a patch, and the solids that reach into it.
+
+    Args:
+        config: Configuration of the map.
+        heights: Heights of the map [m].
+        solids: Solids of the map.
+        row: Row of the patch.
+        col: Column of the patch.
+    """
+    grid = config.patch_grid(row, col)
+    lower, upper = (corner[:, :2] for corner in solids.bounds())
+    reaches = np.all((upper >= grid.lower) & (lower <= grid.upper), axis=1)
+    return grid, heights[config.patch_cells(row, col)], solids.select(np.asarray(reaches))

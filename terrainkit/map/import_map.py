@@ -18,8 +18,9 @@ from terrainkit.importing.options import ImportOptions
 from terrainkit.importing.overhangs import overhang_solids
 from terrainkit.importing.source import Source, fill_missing, open_source
 from terrainkit.map.config import MapConfig
-from terrainkit.map.edit import assign_solids, place_patch_spawns
+from terrainkit.map.edit import assign_solids
 from terrainkit.map.generation import pad_poses
+from terrainkit.map.import_spawns import place_spawns
 from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch import PatchParameters
 from terrainkit.map.terrain_map import TerrainMap
@@ -31,8 +32,6 @@ DEFAULT_CELL = 0.1
 """Distance between two samples of a map that is made from a mesh [m]."""
 
 _BYTES_PER_SAMPLE = 200
-
-_NO_GOALS = np.empty((0, 4), dtype=np.float32)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +78,8 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
         options: How it becomes a map.
 
     Warns:
-        TerrainkitWarning: if an image has 8 bits only.
+        TerrainkitWarning: if an image has 8 bits only, or a patch has no flat ground and
+            `spawn_tolerance` is None.
 
     Raises:
         HeightFileError: if the file cannot be read, or heights are missing.
@@ -88,7 +88,17 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
         MemoryLimitError: if the map would not fit in memory.
     """
     path, options = Path(path), options or ImportOptions()
-    source = open_source(path, options)
+    return import_source(path, open_source(path, options), options)
+
+
+def import_source(path: Path, source: Source, options: ImportOptions) -> ImportedMap:
+    """Return the map of a source that has been opened; see :func:`import_map`.
+
+    Args:
+        path: The file of the source.
+        source: The ground.
+        options: How it becomes a map.
+    """
     config, origin = _make_config(path, source, options)
     size = config.rows, config.cols
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
@@ -141,7 +151,10 @@ def make_map(
     heights = fill_missing(path, found, options.missing, x, y).astype(np.float32)
     if not (np.abs(heights) <= MAX_VALUE).all():
         raise HeightFileError(f"{path}: got heights beyond {MAX_VALUE:g} m")
-    terrain_map = _make_map(config, heights + np.float32(0), solids, spawn_xy, terrain_types)
+    heights = heights + np.float32(0)
+    relax = options.spawn_tolerance is None
+    config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
+    terrain_map = assemble_map(config, heights, solids, spawns, terrain_types)
     report = _report(terrain_map, columns, int(np.isnan(found).sum()))
     return ImportedMap(terrain_map=terrain_map, report=report)
 
@@ -192,8 +205,10 @@ def _make_config(
 
 def map_settings(options: ImportOptions) -> dict[str, Any]:
     """Return the options that are settings of the map as well: walls and spawn positions."""
-    names = ("slope_threshold", "spawns_per_patch", "spawn_radius")
-    return {name: getattr(options, name) for name in (*names, "spawn_tolerance", "spawn_headroom")}
+    names = ("slope_threshold", "spawns_per_patch", "spawn_radius", "spawn_headroom")
+    given = options.spawn_tolerance
+    tolerance = MapConfig.spawn_tolerance if given is None else given
+    return {**{name: getattr(options, name) for name in names}, "spawn_tolerance": tolerance}
 
 
 def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
@@ -217,20 +232,26 @@ def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
     )
 
 
-def _make_map(
+def assemble_map(
     config: MapConfig,
     heights: NDArray[np.float32],
     solids: Solids,
-    spawn_xy: NDArray[np.float64],
+    spawns: NDArray[np.object_],
     terrain_types: NDArray[np.int32],
 ) -> TerrainMap:
+    """Return a map of mode custom, whose difficulty is the rank by measured difficulty.
+
+    Args:
+        config: Configuration of the map.
+        heights: Heights of the map [m].
+        solids: Solids of the map.
+        spawns: Spawn positions of each patch, as :func:`.place_spawns` returns them.
+        terrain_types: Sub-terrain of each patch, shape (rows, cols).
+    """
     size = (config.rows, config.cols)
-    spawns, parameters = np.empty(size, dtype=object), np.empty(size, dtype=object)
-    measured = np.empty(size)
+    parameters, measured = np.empty(size, dtype=object), np.empty(size)
     records = [each.at(0.0).requested() for each in config.sub_terrains]
     for row, col in np.ndindex(size):
-        center = np.array([[*spawn_xy[row, col], 0.0, 0.0]], dtype=np.float32)
-        spawns[row, col] = place_patch_spawns(config, heights, solids, row, col, center, _NO_GOALS)
         record = records[terrain_types[row, col]]
         parameters[row, col] = PatchParameters(requested=record, realized=record)
         block, start = heights[config.patch_cells(row, col)], float(spawns[row, col][0, 2])

@@ -23,7 +23,7 @@ from terrainkit.map.layout import (
     patch_rng,
     terrain_and_difficulty,
 )
-from terrainkit.map.spawn import find_spawn, sample_spawns
+from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.overlay import Overlay
@@ -306,11 +306,18 @@ def find_origin(
     """
     origin = find_spawn(config, grid, heights, solids, position)
     if origin is None:
+        tolerance = flattest_tolerance(config, grid, heights, solids, position)
+        largest = 0.45 * (min(grid.shape) - 1) * grid.cell
+        if tolerance is not None:
+            expected = f"spawn_tolerance {tolerance:g}, a larger platform or a smaller spawn_radius"
+        elif config.spawn_radius > largest or not len(solids):
+            expected = f"larger patches, or a spawn_radius of at most {largest:.2g} m"
+        else:
+            expected = "a smaller spawn_radius or spawn_headroom"
         raise ConfigError(
             f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
             f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
-            f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; increase the platform or "
-            "spawn_tolerance, or reduce spawn_radius or spawn_headroom"
+            f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; expected {expected}"
         )
     return origin
 

@@ -56,6 +56,39 @@ def test_import_keeps_existing_file(rejected, tmp_path, bridge):
     assert (tmp_path / "a.npz").read_text() == "mine"
 
 
+def test_import_folder_prints_its_sources(terrainkit, rejected, tmp_path):
+    (tmp_path / "scans").mkdir()
+    for name, height in (("steep", 0.4), ("gentle", 0.1)):
+        heights = np.zeros((20, 20))
+        heights[2:5] = height
+        heights[0, 0] = np.nan
+        np.save(tmp_path / "scans" / f"{name}.npy", heights)
+    words = ("import", "scans", "--file-cell", 0.1, "--missing", "nearest", "-o")
+    run = terrainkit(*words, "a.npz")
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "wrote a.npz: 2 x 1 patches of 2 m x 2 m" in run.stdout
+    assert "patch (1, 0), steep.npy: filled 1 missing heights" in run.stdout
+    info = terrainkit("info", "a.npz").stdout.splitlines()
+    assert info[-3].split() == ["file", "SHA-256", "patches"]
+    assert info[-2].split()[0::2] == ["gentle.npy", "(0,"]
+    assert terrainkit("check-map", "a.npz").returncode == 0
+    files = ("scans/steep.npy", "scans/gentle.npy")
+    assert terrainkit("import", *files, *words[2:], "b.npz").returncode == 0
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    error = rejected("import scans/steep.npy -o c.npz --blend 0")
+    assert error.startswith("--blend, --skip-invalid: got one file")
+    assert rejected("import -o c.npz") == "FILE...: missing; see terrainkit import --help\n"
+
+
+def test_import_of_rough_ground_warns(terrainkit, tmp_path):
+    np.save(tmp_path / "a.npy", np.random.default_rng(0).uniform(0, 0.05, (30, 20)))
+    run = terrainkit("import", "a.npy", "-o", "a.npz", "--file-cell", 0.1)
+    assert run.returncode == 0
+    assert run.stderr.count("\n") == 1
+    assert "no free disk of radius 0.5 m is flat within 0.01 m" in run.stderr
+    assert terrainkit("check-map", "a.npz").returncode == 0
+
+
 def test_generate_from_imported_map_is_rejected(terrainkit, rejected, bridge):
     terrainkit("import", bridge, "-o", "a.npz")
     error = rejected("generate --config a.npz -o b.npz")

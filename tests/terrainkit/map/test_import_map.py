@@ -162,12 +162,60 @@ def test_import_difficulty_is_rank(tmp_path):
     np.testing.assert_allclose(terrain_map.difficulty, [[0, 1], [0.5, 1]])
 
 
-def test_import_without_flat_disc_is_an_error(tmp_path):
-    rough = np.random.default_rng(0).uniform(0, 0.05, (60, 40))
-    with pytest.raises(ConfigError, match=r"patch \(0, 0\): no disk .* increase .*spawn_tolerance"):
-        import_array(tmp_path, rough)
-    terrain_map = import_array(tmp_path, rough, spawn_tolerance=0.06).terrain_map
+def rough_but_for_one_patch():
+    heights = np.random.default_rng(0).uniform(0, 0.05, (60, 40))
+    heights[:30, :20] = 0.0
+    return heights
+
+
+def test_import_without_flat_disk_starts_on_the_flattest(tmp_path):
+    options = {"rows": 2, "cols": 2}
+    expected = "3 of 4 patches: no free disk .* flat within 0.01 m; .* robots start there$"
+    with pytest.warns(tk.TerrainkitWarning, match=expected) as caught:
+        terrain_map = import_array(tmp_path, rough_but_for_one_patch(), **options).terrain_map
+    assert len(caught) == 1
+    tolerance = terrain_map.config.spawn_tolerance
+    assert f"--spawn-tolerance {tolerance:g} accepts" in str(caught[0].message)
+    assert 0.04 < tolerance <= 0.05
     assert validate(terrain_map) == []
+    assert terrain_map.env_origins[0, 0].tolist() == [1.5, 1.0, 0.0]  # flat, so at the center
+    loaded = tk.TerrainMap.load(terrain_map.save(tmp_path / "map.npz"))
+    raised = loaded.edited(heights=loaded.heights + 1)
+    np.testing.assert_allclose(raised.spawns, loaded.spawns + np.array([0, 0, 1, 0]), atol=1e-6)
+    given = import_array(
+        tmp_path, rough_but_for_one_patch(), **options, spawn_tolerance=tolerance
+    ).terrain_map
+    assert validate(given) == []
+
+
+def test_import_with_several_spawn_positions_that_are_as_flat(tmp_path):
+    slope = np.broadcast_to(0.02 * np.arange(60)[:, None], (60, 60))
+    with pytest.warns(tk.TerrainkitWarning, match="and at up to 3 positions that are as flat$"):
+        terrain_map = import_array(tmp_path, slope, spawns_per_patch=4).terrain_map
+    assert terrain_map.spawns[0, 0, 0, :2].tolist() == [3.0, 3.0]
+    assert not np.isnan(terrain_map.spawns).any()
+    assert terrain_map.config.spawn_tolerance == 0.24  # over 12 cells
+    assert validate(terrain_map) == []
+
+
+def test_import_with_spawn_tolerance_demands_it(tmp_path):
+    with pytest.raises(ConfigError, match=r"3 of 4 patches: .* 0\.02 m; .*--spawn-tolerance 0\.0"):
+        import_array(tmp_path, rough_but_for_one_patch(), rows=2, cols=2, spawn_tolerance=0.02)
+
+
+@pytest.mark.parametrize(
+    ("number", "radius", "message"),
+    [
+        (12, 0.5, None),
+        (11, 0.5, r"in a patch of 1\.1 m x 4 m; .* a spawn_radius of at most 0\.45 m"),
+        (11, 0.45, None),
+        (2, 0.5, "spawn_radius of at most 0.045 m$"),
+    ],
+)
+def test_import_of_tiny_patch(tmp_path, number, radius, message):
+    expected = pytest.raises(ConfigError, match=message) if message else nullcontext()
+    with expected:
+        import_array(tmp_path, np.zeros((number, 40)), spawn_radius=radius)
 
 
 def test_import_of_other_files_is_rejected(tmp_path):

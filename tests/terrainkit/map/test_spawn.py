@@ -1,3 +1,4 @@
+import dataclasses
 import math
 from functools import partial
 
@@ -7,7 +8,7 @@ import pytest
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.map.config import MapConfig
-from terrainkit.map.spawn import find_spawn, sample_spawns
+from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
 EVERY = slice(None)
@@ -97,6 +98,65 @@ def test_find_spawn_avoids_solids_within_the_radius(side, distance, is_free):
     x, y = 2.0 + (distance + 0.05) * np.array(side)
     post = make_boxes((x, y, 0.2), (0.1, 0.1, 0.2))
     assert (spawn(ground(), solids=post) == (2.0, 2.0, 0.0)) == is_free
+
+
+@pytest.mark.parametrize(
+    ("grade", "cell", "tolerance"),
+    [
+        (0.02, 0.1, 0.024),  # the samples that influence a disk are up to 1.2 m apart
+        (0.0987, 0.1, 0.12),  # 0.11844 m, rounded up
+        # Within one cell the slope counts: the disk is 1 m wide, and the samples are 2 m apart.
+        (0.25, 1.0, 0.25),
+        (0.7, 30.0, 0.7),
+        (0.0, 0.1, 0.0),
+    ],
+)
+def test_flattest_tolerance_of_a_slope(grade, cell, tolerance):
+    grid = Grid(shape=(10, 10) if cell > 0.1 else (40, 40), cell=cell)
+    heights = np.broadcast_to((grade * grid.axis(0)).astype(np.float32), grid.shape)
+    config, center = MapConfig(cell=cell, patch_size=(10 * cell, 10 * cell), border=0), grid.center
+    ground = grid, heights, Solids.empty(), center
+    assert flattest_tolerance(config, *ground) == pytest.approx(tolerance, rel=1e-6)
+    works = dataclasses.replace(config, spawn_tolerance=tolerance * (1 + 1e-5))
+    assert find_spawn(works, *ground) == pytest.approx((*center, grade * center[1]), rel=1e-4)
+    if grade:
+        fails = dataclasses.replace(config, spawn_tolerance=tolerance * 0.9)
+        assert find_spawn(fails, *ground) is None
+
+
+def test_flattest_tolerance_is_of_the_flattest_free_disk():
+    heights = np.random.default_rng(0).uniform(0, 1, PLOT.shape).astype(np.float32)
+    heights[5:18, 5:18] *= 0.2
+    heights[22:35, 22:35] *= 0.1
+    config = MapConfig()
+    for solids, highest in (
+        (Solids.empty(), 0.1),
+        (make_boxes((2.85, 2.85, 0.5), (0.1, 0.1, 1.0)), 0.2),
+    ):
+        needed = flattest_tolerance(config, PLOT, heights, solids, (2.0, 2.0))
+        assert 0.9 * highest < needed <= highest
+    roof = make_boxes((2.0, 2.0, 1.0), (4.0, 4.0, 0.2))
+    assert flattest_tolerance(config, PLOT, heights, roof, (2.0, 2.0)) is None
+    large = MapConfig(spawn_radius=2.0)
+    assert flattest_tolerance(large, PLOT, heights, Solids.empty(), (2.0, 2.0)) is None
+
+
+@pytest.mark.parametrize(("bottom", "is_free"), [(1.12, True), (1.1, False)])
+def test_find_spawn_has_headroom_above_the_highest_point_of_a_slope(bottom, is_free):
+    """The samples around the disk at (2, 2) reach 0.11 m, and the ground at its center 0."""
+    heights = np.broadcast_to(0.2 * (PLOT.axis(0) - 2.0)[:, None], PLOT.shape).astype(np.float32)
+    roof = make_boxes((2.0, 2.0, bottom + 1.0), (4.0, 4.0, 2.0))
+    found = spawn(heights, tolerance=0.25, solids=roof)
+    assert found[0] == pytest.approx(2.0) if is_free else found[0] < 1.96
+
+
+@pytest.mark.parametrize(("top", "is_free"), [(-0.03, False), (-0.12, True)])
+def test_find_spawn_avoids_a_post_below_its_center(top, is_free):
+    """On the slope, the ground of the post at x = 1.6 is at -0.08 m; the disk is at (2, 2, 0)."""
+    heights = np.broadcast_to(0.2 * (PLOT.axis(0) - 2.0)[:, None], PLOT.shape).astype(np.float32)
+    post = make_boxes((1.6, 2.0, top - 0.5), (0.1, 0.1, 1.0))
+    found = spawn(heights, tolerance=0.25, solids=post)
+    assert (found[0] == pytest.approx(2.0)) == is_free
 
 
 def sampled(heights, number, *, origin=(2.0, 2.0, 0.0), radius=0.5, solids=None, seed=0):
