@@ -17,7 +17,8 @@ from terrainkit_cli.argument_types import (
     TerrainName,
     is_map,
 )
-from terrainkit_cli.parse import Command, option, positional
+from terrainkit_cli.parse import option, positional
+from terrainkit_cli.plugin_command import PluginCommand
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import (
@@ -32,7 +33,7 @@ DEFAULT_REPETITIONS, MAX_REPETITIONS = 10, 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class PolicyCommand(Command):
+class PolicyCommand(PluginCommand):
     """A command that rolls out a policy."""
 
     source: Annotated[str, positional("RUN")] = ""

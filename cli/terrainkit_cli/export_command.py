@@ -12,11 +12,12 @@ from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import Checkpoint, OutputPath, is_map
 from terrainkit_cli.map_text import written
-from terrainkit_cli.parse import Command, option, positional
+from terrainkit_cli.parse import option, positional
+from terrainkit_cli.plugin_command import PluginCommand
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(Command):
+class Export(PluginCommand):
     """Export a map to other formats, or a policy to ONNX.
 
     A map (.npz) is written as .xml (MuJoCo), .usd, .sdf (Gazebo), .yaml (ROS), .stl, .ply, .obj,

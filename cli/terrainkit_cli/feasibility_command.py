@@ -20,7 +20,8 @@ from terrainkit_cli.argument_types import (
     RobotName,
     parse_pairs,
 )
-from terrainkit_cli.parse import Command, value_of
+from terrainkit_cli.parse import value_of
+from terrainkit_cli.plugin_command import PluginCommand
 from terrainkit_cli.worker_pool import worker_pool
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ MAX_LISTED = 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class Feasibility(Command):
+class Feasibility(PluginCommand):
     """Show whether a robot can cross each patch, and what blocks it.
 
     The demand of a patch is 0 on level ground and 1 at the limit of the robot. It is the largest

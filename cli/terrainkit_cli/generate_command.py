@@ -7,8 +7,8 @@ from shlex import quote
 from typing import Annotated, Any
 
 from terrainkit.errors import ConfigError
+from terrainkit.export.npz import read_config
 from terrainkit.map.config import MapConfig
-from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain import registry
 from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, parameters_of
@@ -18,11 +18,12 @@ from terrainkit_cli.argument_types import Jobs, Limits, OutputPath, RobotName, i
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import option, value_of
+from terrainkit_cli.plugin_command import PluginCommand
 from terrainkit_cli.worker_pool import worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)
-class Generate(ConfigCommand):
+class Generate(PluginCommand, ConfigCommand):
     """Generate a map of terrain patches and write it to a file.
 
     Rows of patches are difficulty levels, columns are terrains. --config, --terrain and --preset
@@ -81,7 +82,7 @@ class Generate(ConfigCommand):
         """Return the config in the file of --config, or the default one."""
         path = cls.split(argv)[0].get("config", "")
         if is_map(path):
-            return TerrainMap.load(path).config
+            return read_config(path)
         return MapConfig.load(path) if path else MapConfig()
 
     def run(self) -> int:

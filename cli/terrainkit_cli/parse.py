@@ -157,7 +157,7 @@ def options_of(
             options += options_of(default, aliases, f"{key}.")
         elif hint.origin is not Mapping and not any(map(is_table, (hint.kind, *hint.args))):
             options.append(_option(kind, key, default, annotation, (aliases or {}).get(key, "")))
-    return options
+    return sorted(options, key=lambda each: each.key == "plugin")  # which many commands inherit
 
 
 def _option(owner: Any, key: str, default: Any, annotation: Any, alias: str) -> Option:

@@ -13,11 +13,12 @@ from terrainkit.terrain.parameter import format_value
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import Limits, MapFile, OutputPath, RobotName
 from terrainkit_cli.map_text import bytes_text, size_text, written
-from terrainkit_cli.parse import Command, option, positional
+from terrainkit_cli.parse import option, positional
+from terrainkit_cli.plugin_command import PluginCommand
 
 
 @dataclass(frozen=True, kw_only=True)
-class List(Command):
+class List(PluginCommand):
     """List terrains, overlays and presets, or the contents of one."""
 
     terrain: Annotated[str, positional("[NAME]")] = ""
@@ -77,7 +78,7 @@ def _print_preset(name: str) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Info(Command):
+class Info(PluginCommand):
     """Print the size, terrains and difficulty of a map, or one patch."""
 
     map: MapFile
@@ -119,7 +120,8 @@ def _print_map(terrain_map: TerrainMap) -> None:
         "patches": f"{config.rows} x {config.cols} of {size_text(*config.patch_size)}",
         "samples": f"{grid.shape[0]} x {grid.shape[1]}, one every {config.cell:g} m",
         "extent": f"{size_text(*grid.size)}, from ({grid.lower[0]:g}, {grid.lower[1]:g})",
-        "border": f"{config.border:g} m",
+        "border": f"{config.border:g} m"
+        + (f" at height {config.border_height:g} m" if config.border_height else ""),
         "heights": f"{heights.min():g} to {heights.max():g} m",
         "solids": _solids_text(terrain_map),
         "mode": f"{config.mode}, seed {config.seed}",
@@ -226,7 +228,7 @@ def _print_patch(terrain_map: TerrainMap, row: int, col: int) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Preview(Command):
+class Preview(PluginCommand):
     """Render a map from above, with terrain names and spawn origins."""
 
     map: MapFile
@@ -252,7 +254,7 @@ class Preview(Command):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CheckMap(Command):
+class CheckMap(PluginCommand):
     """Validate a map: spawn origins, patches, sizes, difficulty, mesh.
 
     It also prints the largest height difference between neighboring patches, which does not count
@@ -304,7 +306,7 @@ class CheckMap(Command):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Diff(Command):
+class Diff(PluginCommand):
     """Compare two maps: config, and each patch.
 
     Exit code 0: the maps are the same. 1: they differ. 2: a file cannot be read.

@@ -13,6 +13,7 @@ from terrainkit_cli import render
 from terrainkit_cli.argument_types import Device, TerrainName
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.parse import is_option, option, positional
+from terrainkit_cli.plugin_command import PluginCommand
 from terrainkit_cli.signals import stop_on_signals
 from terrainkit_cli.training_extra import require_training
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Train(ConfigCommand):
+class Train(PluginCommand, ConfigCommand):
     """Train a policy for a robot on a terrain, and save it as a run.
 
     A run is a folder with the task, checkpoints (model_100.pt is written after 100 iterations) and

@@ -29,6 +29,7 @@ from terrainkit_cli.argument_types import (
     parse_settings,
 )
 from terrainkit_cli.parse import Command, positional
+from terrainkit_cli.plugin_command import PluginCommand
 from terrainkit_cli.signals import Terminated
 from terrainkit_cli.training_extra import require_training
 
@@ -119,7 +120,7 @@ class Demo(ViewerCommand):
 
 
 @dataclass(frozen=True, kw_only=True)
-class View(ViewerCommand):
+class View(PluginCommand, ViewerCommand):
     """Show a map, a robot or a policy in the browser, in 3D.
 
     A robot has sliders for its joints and a list of the findings of check-robot. A policy walks

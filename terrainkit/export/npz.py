@@ -3,6 +3,8 @@
 import dataclasses
 import json
 import math
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -10,7 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, MapFileError, listing
+from terrainkit.errors import ConfigError, MapFileError, TerrainkitWarning, is_built_in, listing
 from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, check_solids
@@ -18,6 +20,7 @@ from terrainkit.map.config import MapConfig
 from terrainkit.map.patch import PatchParameters, Values
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.patch_geometry import MAX_GOALS
+from terrainkit.terrain.sub_terrain import SubTerrain, UnavailableSubTerrain
 
 if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
@@ -97,6 +100,9 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
         cls: Class of the map.
         path: The .npz file.
 
+    Warns:
+        TerrainkitWarning: if classes of the user are not available; see :meth:`MapConfig.from_map`.
+
     Raises:
         MapFileError: if the file is missing, truncated, or not a map.
         MemoryLimitError: if its arrays would not fit in memory.
@@ -121,6 +127,13 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             raise MapFileError(
                 f"{path}: terrain_types: got an index out of range; expected 0 to {len(names) - 1}"
             )
+        if config.problems:
+            warnings.warn(
+                f"{path}: loaded as a custom map, not compared with its config or generated again: "
+                + "; ".join(config.problems),
+                TerrainkitWarning,
+                stacklevel=3,
+            )
         return cls(
             config=config,
             grid=grid,
@@ -134,6 +147,16 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             solids=_read_solids(archive, size),
             goals=_read_poses(archive, "goals", size, MAX_GOALS),
         )
+
+
+def read_config(path: str | Path) -> MapConfig:
+    """Return the config of the map in the .npz file `path`, to generate the map again.
+
+    Raises:
+        MapFileError: if the file is not a map, or a class of its config is not available.
+    """
+    with open_archive(path) as archive:
+        return _read_config(archive, MapConfig.from_toml)
 
 
 def is_map_file(path: Path) -> bool:
@@ -166,7 +189,9 @@ def read_mesh(path: str | Path) -> TriMesh | None:
     return TriMesh(vertices=vertices, triangles=triangles)
 
 
-def _read_config(archive: Archive) -> MapConfig:
+def _read_config(
+    archive: Archive, read: Callable[[str], MapConfig] = MapConfig.from_map
+) -> MapConfig:
     """Return the config of the map, after checking the format version."""
     if "format_version" not in archive.names():
         raise MapFileError(f"{archive.path}: not a terrainkit map; format_version is missing")
@@ -176,7 +201,7 @@ def _read_config(archive: Archive) -> MapConfig:
             f"{archive.path}: got format version {version}; expected {FORMAT_VERSION}"
         )
     try:
-        return MapConfig.from_toml(archive.text("config"))
+        return read(archive.text("config"))
     except ConfigError as error:
         raise MapFileError(f"{archive.path}: config: {error}") from error
 
@@ -263,15 +288,24 @@ def _read_parameters(
     archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
-    names = [set(each.declarations) for each in config.sub_terrains]
+    names = [_parameter_names(each) for each in config.sub_terrains]
     text = archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
     try:
         rows = msgspec.json.decode(text, type=list[list[_Record]])
         for row, col in np.ndindex(table.shape):
             record, expected = rows[row][col], names[terrain_types[row, col]]
-            if not record["requested"].keys() == record["realized"].keys() == expected:
-                raise ValueError(f"expected {listing(sorted(expected))}, requested and realized")
+            keys = record["requested"].keys() if expected is None else expected
+            if not record["requested"].keys() == record["realized"].keys() == keys:
+                raise ValueError(f"expected {listing(sorted(keys))}, requested and realized")
             table[row, col] = PatchParameters(**record)
     except (msgspec.DecodeError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise MapFileError(f"{archive.path}: parameters cannot be read: {error}") from error
     return table
+
+
+def _parameter_names(sub_terrain: SubTerrain) -> set[str] | None:
+    """Return the names of the parameters in a file; None where a class of the user decides."""
+    if isinstance(sub_terrain, UnavailableSubTerrain):
+        return None
+    classes = sub_terrain.terrain_class, *map(type, sub_terrain.overlays)
+    return set(sub_terrain.declarations) if all(map(is_built_in, classes)) else None

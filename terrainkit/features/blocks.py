@@ -41,8 +41,12 @@ def make_standing_boxes(
     *,
     floor: ArrayLike = 0.0,
     yaw: ArrayLike = 0.0,
+    tilt: ArrayLike = 0.0,
 ) -> Solids:
     """Return n boxes that stand on the ground and extend `SINK` below it.
+
+    A tilted box is turned around its middle, and moved along z so that its surface above its middle
+    is at the height of the upper side.
 
     Args:
         xy: Centers [m], shape (n, 2).
@@ -50,6 +54,7 @@ def make_standing_boxes(
         top: Heights of the upper sides [m], shape (n,) or ().
         floor: Heights of the ground [m], shape (n,) or ().
         yaw: Rotations around z [rad], shape (n,) or ().
+        tilt: Rotations around the fixed axes x and y, before `yaw` [rad], shape (n, 2) or ().
 
     Raises:
         ConfigError: if a value is not finite, or a size is not above 0.
@@ -57,11 +62,16 @@ def make_standing_boxes(
     center = np.asarray(xy, float)
     columns = (top, np.asarray(floor, float) - SINK, yaw)
     top, bottom, yaw = (np.broadcast_to(np.asarray(each, float), len(center)) for each in columns)
-    return make_boxes(
-        np.column_stack([center, (top + bottom) / 2]),
-        np.column_stack([np.broadcast_to(size, center.shape), top - bottom]),
-        rpy=np.column_stack([0 * yaw, 0 * yaw, yaw]),
-    )
+    sizes = np.column_stack([np.broadcast_to(size, center.shape), top - bottom])
+    z, turned = (top + bottom) / 2, np.broadcast_to(np.asarray(tilt, float), center.shape)
+    if turned.any():
+        roll, pitch = turned.T
+        # Components of the vertical along the axes of the box.
+        vertical = [-np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)]
+        with np.errstate(divide="ignore"):
+            z = top - (sizes / 2 / np.abs(vertical).T).min(axis=1)
+    rpy = np.column_stack([turned, yaw])
+    return make_boxes(np.column_stack([center, z]), sizes, rpy=rpy)
 
 
 def make_blocks(lower: ArrayLike, upper: ArrayLike) -> Solids:

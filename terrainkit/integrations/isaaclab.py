@@ -85,6 +85,7 @@ def terrain_importer_cfg(
         num_rows=config.rows,
         num_cols=config.cols,
         border_width=config.border,
+        border_height=-config.edge_height,  # downward in Isaac Lab
         horizontal_scale=config.cell,
         sub_terrains={name: column.copy() for name in column_names(terrain_map)},
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.curriculum import SamplerName
+from terrainkit.errors import ExportError
 from terrainkit.export.mjcf import Collision
 from terrainkit.importing.options import ImportOptions
 from terrainkit.integrations import column_names, missing
@@ -50,10 +51,20 @@ def terrain_entity_cfg(
             accepted.
         collision: Geometry that robots collide with; see :func:`terrainkit.export.mjcf.export`.
         max_init_terrain_level: Highest initial level; None for the last row.
+
+    Raises:
+        ExportError: if the border is a trench or has a rim, which mjlab's border cannot represent.
     """
     path = str(Path(path).resolve())
     terrain_map = _load(path)
     config = terrain_map.config
+    if config.border_height < 0 or config.border_rim:
+        raise ExportError(
+            f"mjlab's border: got border_height {config.border_height:g} and border_rim "
+            f"{config.border_rim:g}; expected a level border at height 0 or above"
+        )
+    # Downward in mjlab, whose border is a solid from height 0 to this height.
+    border = {"border_height": -config.border_height} if config.border_height else {}
     sampling = {
         name: FlatPatchSamplingCfg(num_patches=points.shape[2], patch_radius=config.spawn_radius)
         for name, points in _point_sets(terrain_map).items()
@@ -70,6 +81,7 @@ def terrain_entity_cfg(
         num_rows=config.rows,
         num_cols=config.cols,
         border_width=config.border,
+        **border,
         sub_terrains=columns,
     )
     return TerrainEntityCfg(

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from msgspec import Meta
@@ -13,9 +13,17 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, listing
 from terrainkit.geometry.grid import Grid, whole_cells
 from terrainkit.settings.schema import Config
-from terrainkit.settings.type_hint import SORTED, Count, Fraction, NonNegative, Size
+from terrainkit.settings.toml_text import parse_toml
+from terrainkit.settings.type_hint import (
+    MAX_VALUE,
+    SORTED,
+    Count,
+    Fraction,
+    NonNegative,
+    Size,
+)
 from terrainkit.terrain import presets
-from terrainkit.terrain.sub_terrain import SubTerrain
+from terrainkit.terrain.sub_terrain import SubTerrain, UnavailableSubTerrain
 
 MAX_CELLS = 10**6
 """Largest number of cells along a side of a map; memory would not hold more."""
@@ -44,7 +52,14 @@ class MapConfig(Config):
     """Distance between two height samples [m]; must divide the patch size and the border."""
 
     border: NonNegative = 25.0
-    """Width of the flat ground around the patches [m]."""
+    """Width of the ground around the patches [m]."""
+
+    border_height: Annotated[float, Meta(ge=-MAX_VALUE, le=MAX_VALUE)] = 0.0
+    """Height of the border [m]: above 0, a wall around the patches; below 0, a trench."""
+
+    border_rim: NonNegative = 0.0
+    """Width of the outer part of the border that has this height [m], for a wall at the edge of the
+    map; 0 for the whole border."""
 
     preset: str = "legged_gym"
     """Named set of sub-terrains, such as legged_gym or parkour; `terrainkit list` prints all."""
@@ -101,6 +116,9 @@ class MapConfig(Config):
     restitution: Fraction = 0.0
     """Restitution of the ground, 0 to 1."""
 
+    _text: ClassVar[str] = ""
+    """Text of the file of a map without the classes of its terrains, which saving it keeps."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.terrains:
@@ -114,7 +132,8 @@ class MapConfig(Config):
     ) -> Self:
         """Return the config that a TOML table describes; see :meth:`Config.from_table`."""
         terrains = table.get("terrains", [{}])
-        if not isinstance(terrains, list) or not all(isinstance(t, Mapping) for t in terrains):
+        is_list = isinstance(terrains, list)
+        if not is_list or not all(isinstance(t, Mapping | SubTerrain) for t in terrains):
             terrains = []
         if not terrains:
             raise ConfigError(
@@ -123,6 +142,43 @@ class MapConfig(Config):
         if "terrains" in table and "preset" in table:
             raise ConfigError("preset, terrains: got both; expected one of them")
         return super().from_table(table, default, path)
+
+    @classmethod
+    def from_map(cls, text: str) -> Self:
+        """Return the config in a map file, which needs no classes of the user.
+
+        Without them, its mode is custom: everything but generating the map again works. Saving such
+        a map keeps the text, so that it can be generated where the classes are available.
+
+        Args:
+            text: The TOML text.
+
+        Raises:
+            ConfigError: if the text is not TOML, or a key or value is invalid.
+        """
+        try:
+            return cls.from_toml(text)
+        except ConfigError:
+            table = parse_toml(text)
+            tables = table.get("terrains")
+            if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
+                raise
+            terrains = [SubTerrain.from_map(t, f"terrains[{k}]") for k, t in enumerate(tables)]
+            config = cls.from_table({**table, "terrains": terrains, "mode": "custom"})
+            if not config.problems:
+                raise
+        object.__setattr__(config, "_text", text)
+        return config
+
+    def to_toml(self) -> str:
+        """Return the config as TOML with comments; see :meth:`Config.to_toml`."""
+        return self._text or super().to_toml()
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """Why classes of the sub-terrains are not available, without repetitions."""
+        found = (each for each in self.terrains if isinstance(each, UnavailableSubTerrain))
+        return tuple(dict.fromkeys(each.problem for each in found))
 
     def to_table(self) -> dict[str, Any]:
         """Return the values that a TOML file holds: the preset or the sub-terrains, by key."""
@@ -174,6 +230,18 @@ class MapConfig(Config):
             lower = (-self.border, -self.border)
         return Grid(shape=shape, cell=self.cell, lower=lower)
 
+    @property
+    def edge_height(self) -> float:
+        """Height of the border where it meets the patches [m]."""
+        return 0.0 if self.border_rim else self.border_height
+
+    def border_heights(self) -> NDArray[np.float32]:
+        """Return the heights of the border [m] in an array for the map, shape `grid.shape`."""
+        heights = np.full(self.grid.shape, self.border_height, dtype=np.float32)
+        if rim := whole_cells("border_rim", self.border_rim, self.cell, minimum=0):
+            heights[rim:-rim, rim:-rim] = 0.0
+        return heights
+
     def check_patch(self, row: int, col: int) -> None:
         """Check that the map has a patch.
 
@@ -215,6 +283,17 @@ class MapConfig(Config):
                 raise ConfigError(
                     f"cells of the map along {axis}: got {cells:.7g}; expected at most {MAX_CELLS}"
                 )
+        if self.border_height and not self.border:
+            raise ConfigError(
+                f"border_height: got {self.border_height:g} m without a border; expected a border, "
+                "such as 1 m"
+            )
+        rim = whole_cells("border_rim", self.border_rim, self.cell, minimum=0)
+        if rim > self.border_cells or (rim and not self.border_height):
+            raise ConfigError(
+                f"border_rim: got {self.border_rim:g} m; expected at most the border, "
+                f"{self.border:g} m, and a border_height, such as 1 m"
+            )
 
     def _check_sub_terrains(self) -> None:
         names = [terrain.name for terrain in self.sub_terrains]

@@ -90,7 +90,7 @@ class _MapBuilder:
 
         grid, size = config.grid, (config.rows, config.cols)
         self._config, self._grid = config, grid
-        self._heights = np.zeros(grid.shape, dtype=np.float32)
+        self._heights = config.border_heights()
         # A view of one number takes no memory, and most maps have one friction.
         self._friction = uniform_friction(config.static_friction, grid.shape)
         self._patch_friction = uniform_friction(config.static_friction, config.patch_shape)

@@ -59,6 +59,8 @@ def column_types(config: MapConfig) -> list[int]:
     Raises:
         ConfigError: if a custom sub-terrain gets no column, or the map is not generated.
     """
+    if config.problems:
+        raise ConfigError("; ".join(config.problems))
     if config.mode == "custom":
         raise ConfigError(
             "mode custom: the map was imported or edited, and cannot be generated from its config; "

@@ -69,7 +69,8 @@ def _values(config: MapConfig) -> dict[str, Any]:
     for k, sub_terrain in enumerate(table.pop("terrains", ())):
         values = sub_terrain.to_table()
         for number, overlay in enumerate(values.pop("overlays", ())):
-            values |= {f"overlays[{number}].{key}": v for key, v in overlay.to_table().items()}
+            keys = overlay if isinstance(overlay, Mapping) else overlay.to_table()
+            values |= {f"overlays[{number}].{key}": v for key, v in keys.items()}
         table |= {f"terrains[{k}].{key}": v for key, v in values.items()}
     return table
 

@@ -68,6 +68,7 @@ class PatchParameters:
             name
             for name, requested in self.requested.items()
             if requested != self.realized[name]
+            and name in parameters  # a class of the user may have changed
             and parameters[name].deviates(requested, self.realized[name], cell)
         ]
 

@@ -43,14 +43,15 @@ class PatchEdges:
         A patch edge is a cliff if it is higher than `MIN_CLIFF_HEIGHT` and higher than the largest
         steps within the two patches added together. The holes of stepping stones, which end at the
         edge of their patch, are therefore not cliffs, but the side of a flight of stairs is. An
-        edge is not a cliff if walls stand along its whole length on both sides.
+        edge is not a cliff if walls stand along its whole length on both sides, or if the border
+        beside it is a wall or a trench of the config.
         """
         candidates = list(self._find_edges(MIN_CLIFF_HEIGHT))
         steps = {p: self._max_step(p) for p in {p for edge in candidates for p in edge.patches}}
         cliffs = [
             edge
             for edge in candidates
-            if edge.height > sum(steps[p] for p in edge.patches) and not self._has_solids(edge)
+            if edge.height > sum(steps[p] for p in edge.patches) and not self._is_intended(edge)
         ]
         return sorted(cliffs, key=lambda edge: -edge.height)
 
@@ -88,12 +89,11 @@ class PatchEdges:
         steps = heights[1:] - heights[:-1], heights[:, 1:] - heights[:, :-1]
         return float(max(max(s.max(initial=0.0), -s.min(initial=0.0)) for s in steps))
 
-    def _has_solids(self, edge: PatchEdge) -> bool:
-        """Return whether solids cover the samples on both sides of the edge of two patches."""
-        first, second = edge.patches
+    def _is_intended(self, edge: PatchEdge) -> bool:
+        """Return whether solids cover both sides of the edge, or the border has a height."""
+        (first, second), config = edge.patches, self.terrain_map.config
         if first is None or second is None:
-            return False
-        config = self.terrain_map.config
+            return config.edge_height != 0
         (i, j), (nx, ny) = config.patch_start(*second), config.patch_shape
         across_x = first[1] == second[1]
         x = config.grid.axis(0)[slice(i - 1, i + 1) if across_x else slice(i, i + nx)]

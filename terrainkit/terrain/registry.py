@@ -215,7 +215,7 @@ def _unknown_name(group: _Group, name: str, plugins: Mapping[str, Any]) -> Confi
     near = closest_names(name, [*_module_names(group), *plugins, *_registered_names(group)])
     hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
     return ConfigError(
-        f"no {group.label} {name!r} is built in, installed, or registered with "
+        f"no {group.label} {name!r} is built in, installed, or registered with --plugin FILE.py or "
         f"terrainkit.register_{group.label}; {hint}terrainkit list prints all"
     )
 

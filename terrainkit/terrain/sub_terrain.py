@@ -1,15 +1,21 @@
 """SubTerrain: an entry of a map's configuration."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Annotated, Any, Self
 
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors, prefixed_errors
+from terrainkit.errors import (
+    ConfigError,
+    PluginError,
+    TerrainkitError,
+    plugin_errors,
+    prefixed_errors,
+)
 from terrainkit.settings.schema import Config, field_keys
-from terrainkit.settings.text import closest
+from terrainkit.settings.text import closest, truncate
 from terrainkit.settings.type_hint import MAX_VALUE, convert, show
 from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.overlay import Overlay
@@ -99,6 +105,32 @@ class SubTerrain(Config):
                 own["overlays"] = _read_overlays(own["overlays"])
             return super().from_table({**own, "parameters": parameters}, default)
 
+    @classmethod
+    def from_map(cls, table: Mapping[str, Any], path: str) -> "SubTerrain":
+        """Return the sub-terrain in a map file; without its class, an `UnavailableSubTerrain`.
+
+        Args:
+            table: Values by key.
+            path: Prefix of the keys in error messages.
+
+        Raises:
+            ConfigError: if a value is invalid that does not depend on a class of the user.
+        """
+        try:
+            return cls.from_table(table, path=path)
+        except PluginError:  # a class that fails is not a class that is missing
+            raise
+        except ConfigError as error:
+            if {*registry.terrain_names(), *registry.overlay_names()}.issuperset(_names(table)):
+                raise
+            own = {key: table[key] for key in ("proportion", "name") if key in table}
+            return UnavailableSubTerrain(
+                terrain=table.get("terrain"),
+                **own,
+                parameters={k: v for k, v in table.items() if k not in {"terrain", *own}},
+                problem=truncate(str(error).removeprefix(f"{path}: "), MAX_PROBLEM),
+            )
+
     def to_table(self) -> dict[str, Any]:
         """Return the keys of a `[[terrains]]` table."""
         optional = {
@@ -142,12 +174,45 @@ class SubTerrain(Config):
         return declared
 
 
+@dataclass(frozen=True, kw_only=True)
+class UnavailableSubTerrain(SubTerrain):
+    """A sub-terrain of a map file whose class, or the class of a part of it, is not available.
+
+    Its patches are in the file. Whatever needs the class raises :class:`ConfigError`. `parameters`
+    has all other keys of its table, such as `overlays`.
+    """
+
+    problem: str
+    """Why the class is not available, and how to add it."""
+
+    def __post_init__(self) -> None:
+        Config.__post_init__(self)
+        object.__setattr__(self, "name", self.name or convert("terrain", self.terrain, str))
+
+    @cached_property
+    def terrain_class(self) -> type[Terrain]:
+        """Raise ConfigError."""
+        raise ConfigError(self.problem)
+
+
 _FRICTION = Parameter(easy=1.0, hard=1.0)
+
+MAX_PROBLEM = 300
+"""Longest text about an unavailable class [characters]."""
 
 
 def overlay_path(number: int, name: str) -> str:
     """Return the name of a parameter of overlay `number` in the parameters of a patch."""
     return f"overlays[{number}].{name}"
+
+
+def _names(value: Any) -> Iterator[str]:
+    """Yield the names of the classes in a `[[terrains]]` table."""
+    for key, each in value.items() if isinstance(value, Mapping) else enumerate(value):
+        if key in ("terrain", "overlay") and isinstance(each, str):
+            yield each
+        elif isinstance(each, Mapping | list):
+            yield from _names(each)
 
 
 def _read_overlays(tables: Any) -> tuple[Overlay, ...]:

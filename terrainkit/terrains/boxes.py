@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.blocks import make_standing_boxes
+from terrainkit.features.blocks import SINK, make_standing_boxes
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -19,7 +19,8 @@ class Boxes(FlatTerrain):
     """Boxes and pyramids of boxes to climb, at random positions around a flat platform.
 
     The boxes are solids with random sides and directions; the ground is flat. There is a goal on
-    each. In mode curriculum, the rows of a column differ only in `height`.
+    each. In mode curriculum, the rows of a column differ only in `height`, unless the boxes are
+    tilted: they are then farther apart the higher they are. Tilted boxes may overhang the ground.
     """
 
     has_column_seed: ClassVar[bool] = True
@@ -40,6 +41,10 @@ class Boxes(FlatTerrain):
     max_side: float = parameter.size(1.8)
     """Maximum side of the lowest box [m]."""
 
+    # Isaac Lab tilts its repeated boxes by up to max_yx_angle.
+    tilt: float = parameter.scalar(0.0)
+    """Largest angle of a box around its horizontal axes [rad]; its height is above its middle."""
+
     platform: float = parameter.platform(2.0)
     """Side of the square at the center without boxes [m]."""
 
@@ -55,6 +60,7 @@ class Boxes(FlatTerrain):
             np.column_stack([side, side]),
             self.height * (layer + 1) / layers[box],
             yaw=np.pi / 2 * rng.random(len(xy))[box],
+            tilt=self.tilt * (2 * rng.random((len(xy), 2)) - 1)[box],
         )
 
     def goals(
@@ -73,7 +79,10 @@ class Boxes(FlatTerrain):
         """Return the centers and the radii of the boxes [m]."""
         radius = self.min_side / 2**0.5, self.max_side / 2**0.5
         platform = grid.length(max(grid.centered(self.platform)))
-        xy, r = scatter(grid, rng, radius, number=self.number, platform=platform)
+        # No rotation takes a box beyond the sphere around it.
+        half = (self.height + SINK) / 2 if self.tilt else 0.0
+        gap = 2 * (np.hypot(radius[0], half) - radius[0])
+        xy, r = scatter(grid, rng, radius, number=self.number, gap=gap, platform=platform + gap)
         if not self.min_side <= self.max_side or not len(xy):
             raise ConfigError(
                 f"boxes: got min_side {self.min_side:g} m and max_side {self.max_side:g} m; "

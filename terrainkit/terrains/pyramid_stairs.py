@@ -41,11 +41,14 @@ class PyramidStairs(Terrain):
         risers = min(grid.margin(platform)) // width
         if risers == 0:
             raise ConfigError(
-                f"pyramid_stairs: no step of {self.step_width:g} m fits between the platform of "
+                f"{self.kind()}: no step of {self.step_width:g} m fits between the platform of "
                 f"{self.platform:g} m and the edge of a patch of "
                 f"{grid.size[0]:g} m x {grid.size[1]:g} m"
             )
-        rise = grid.by_ring(
-            platform, lambda k: self.step_height * (risers - np.minimum(-(-k // width), risers))
-        )
+        levels = self._levels(risers, rng)
+        rise = grid.by_ring(platform, lambda k: levels[np.minimum(-(-k // width), risers)])
         return -rise if self.inverted else rise
+
+    def _levels(self, number: int, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the heights of the platform and of the `number` treads around it [m]."""
+        return self.step_height * np.arange(number, -1, -1)

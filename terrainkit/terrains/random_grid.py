@@ -30,15 +30,21 @@ class RandomGrid(Terrain):
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the blocks, with the platform cleared."""
         side = grid.cells(self.block)
-        number = tuple((n - 2) // side for n in grid.shape)
+        number = (grid.shape[0] - 2) // side, (grid.shape[1] - 2) // side
         if min(number) < 1:
             raise ConfigError(
-                f"random_grid: no block of {self.block:g} m fits in a rim of {grid.cell:g} m in "
+                f"{self.kind()}: no block of {self.block:g} m fits in a rim of {grid.cell:g} m in "
                 f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m"
             )
-        blocks = self.height * (2 * rng.random(number) - 1)
         ground = np.zeros(grid.shape)
         extent = (number[0] * side, number[1] * side)
-        ground[grid.centered_slices(extent)] = np.kron(blocks, np.ones((side, side)))
+        ground[grid.centered_slices(extent)] = self.blocks(grid, number, rng)
         ground[grid.centered_slices(grid.centered(self.platform))] = 0.0
         return ground
+
+    def blocks(
+        self, grid: Grid, number: tuple[int, int], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return the heights of the cells of `number` blocks along x and y [m]."""
+        side = grid.cells(self.block)
+        return np.kron(self.height * (2 * rng.random(number) - 1), np.ones((side, side)))

@@ -104,7 +104,7 @@ def test_generate_adds_overlays_to_all_terrains(run_main, tmp_path):
 @pytest.mark.parametrize(
     ("overlay", "message"),
     [
-        ("nois", "with terrainkit.register_overlay; did you mean 'noise'? terrainkit list"),
+        ("nois", "or terrainkit.register_overlay; did you mean 'noise'? terrainkit list"),
         ("noise:amplitude", "--overlay: got 'amplitude'; expected name=value"),
     ],
 )

@@ -1,4 +1,11 @@
+import sys
+from pathlib import Path
+
 import pytest
+
+from terrainkit.terrain import plugin_file, registry
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 MODULE = """
 import os, sys
@@ -81,3 +88,51 @@ def test_plugin_that_fails_later_is_one_line(terrainkit_process, monkeypatch):
     run = terrainkit_process("check-map", "map.npz")
     assert run.returncode == 2
     assert run.stderr == f"terrainkit: error: map.npz: config: terrains[0]: {IMPORT}\n"
+
+
+# python_api.md defines the class in a script.
+SCRIPT = (DOCS / "python_api.md").read_text().split("```python\n")[6].partition("```")[0]
+
+
+@pytest.fixture
+def own_registry(monkeypatch):
+    """Forget what a test registers and imports."""
+    monkeypatch.setattr(registry, "_registered", {})
+    monkeypatch.setattr(plugin_file, "_loaded", {})
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    registry._get.cache_clear()
+    yield
+    registry._get.cache_clear()
+
+
+@pytest.mark.usefixtures("own_registry")
+def test_map_of_a_class_in_the_docs(terrainkit, terrainkit_process, tmp_path):
+    script = tmp_path / "side_step.py"
+    script.write_text(SCRIPT.replace("MapConfig(", "MapConfig(rows=2, cols=1, border=1.0, "))
+    plugin = ("--plugin", "side_step.py")
+    size = ("--rows", 2, "--cols", 2, "--border", 0, "--jobs", 2)
+    made = terrainkit_process("generate", "-o", "map.npz", *plugin, "--terrain", "side_step", *size)
+    assert (made.returncode, made.stderr) == (0, "")
+    for options in ((), plugin):
+        for words in (
+            ("preview", "map.npz", "-o", "map.png", "--overwrite"),
+            ("info", "map.npz"),
+            ("check-map", "map.npz"),
+            ("feasibility", "map.npz", "--robot", "quadruped"),
+            ("export", "map.npz", "-o", "map.xml", "--overwrite"),
+            ("diff", "map.npz", "map.npz"),
+        ):
+            run = terrainkit(*words, *options)
+            assert run.returncode == 0, run.stderr
+            warned = 0 if options else words.count("map.npz")
+            assert run.stderr.count("no terrain 'side_step'") == warned
+        again = terrainkit("generate", "-o", "again.npz", "--config", "map.npz", *options)
+        if not options:
+            assert again.returncode == 2
+            assert (
+                "map.npz: config: terrains[0]: no terrain 'side_step' is built in" in again.stderr
+            )
+            assert "--plugin FILE.py" in again.stderr
+            # Nothing but the option imports the file, which has the name of the class.
+            assert not registry.registered_terrains()
+    assert (tmp_path / "again.npz").read_bytes() == (tmp_path / "map.npz").read_bytes()

@@ -1,8 +1,10 @@
+import multiprocessing
 import os
 
 import cv2
 import numpy as np
 
+from terrainkit.terrain import plugin_file
 from terrainkit_cli.worker_pool import worker_pool
 
 
@@ -20,3 +22,16 @@ def test_worker_pool_does_not_wait_for_threads_of_opencv():
     cv2.distanceTransform(np.ones((2000, 2000), np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     with worker_pool(2) as executor:
         assert executor.submit(cv2.getNumThreads).result() == 1
+
+
+def test_worker_pool_imports_plugin_files_in_processes_that_are_not_forked(tmp_path, monkeypatch):
+    path = tmp_path / "bump.py"
+    path.write_text("")
+    monkeypatch.setattr(plugin_file, "_loaded", {"plugin_bump": path})
+    method = multiprocessing.get_start_method()
+    multiprocessing.set_start_method("spawn", force=True)
+    try:
+        with worker_pool(2) as executor:
+            assert executor.submit(plugin_file.plugin_files).result() == (path,)
+    finally:
+        multiprocessing.set_start_method(method, force=True)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from terrainkit import MapConfig, TerrainMap
-from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.errors import ConfigError, ExportError, listing, prefixed_errors
 from terrainkit.files.atomic_write import atomic_folder, atomic_write
 from terrainkit.settings.schema import Config
 from terrainkit.settings.text import expected_names
@@ -292,8 +292,10 @@ def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:
 
 
 def _map_config(terrain: str | Path) -> MapConfig | None:
-    """Return the config of a map, or None for a plane."""
+    """Return the config of a map, or None for a plane; it needs no classes of the user."""
     if str(terrain) == "plane":
         return None
-    is_config = Path(terrain).suffix == ".toml"
-    return MapConfig.load(terrain) if is_config else TerrainMap.load(terrain).config
+    if Path(terrain).suffix != ".toml":
+        return TerrainMap.load(terrain).config
+    with prefixed_errors(f"{terrain}: "):
+        return MapConfig.from_map(read_text(terrain))

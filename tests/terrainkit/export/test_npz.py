@@ -307,7 +307,7 @@ def test_npz_solids_are_checked(solid_map, bad, tmp_path):
         (None, '"a\nb" = 1', "config: not a TOML file"),
         ("rows = 2", "rows = 0", "config: rows: got 0"),
         ('"curriculum"', "[1]", "mode"),
-        ('"pit"', '"moat"', "moat"),
+        ('"pit"', "5", "terrain: got 5; expected a string"),
         ("side = 0.6", f"side = {'9' * 400}", "side"),
     ],
     ids=["two lines", "range", "type", "terrain", "digits"],

@@ -61,6 +61,7 @@ def test_importer_has_a_sub_terrain_for_each_column(isaaclab, parkour, parkour_p
         "num_rows": 2,
         "num_cols": 7,
         "border_width": 1.0,
+        "border_height": 0.0,
         "horizontal_scale": 0.1,
     }
     material = Cfg(

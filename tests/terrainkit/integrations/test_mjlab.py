@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import terrainkit as tk
+from terrainkit.errors import ExportError
 from terrainkit.integrations import terrain_curriculum
 from tests.rays import cast_rays
 from tests.terrainkit.integrations.stand_ins import Cfg
@@ -56,6 +57,17 @@ def test_terrain_entity_has_a_sub_terrain_for_each_column(mjlab, parkour, parkou
     for column, each in enumerate(columns.values()):
         expected = str(parkour_path), column, "hfield", sampling
         assert (each.path, each.column, each.collision, each.flat_patch_sampling) == expected
+
+
+def test_border_is_a_wall_of_mjlab(mjlab, tmp_path):
+    flat = {"rows": 1, "cols": 1, "border": 1.0, "terrains": (tk.SubTerrain(terrain="flat"),)}
+    path = tk.generate(tk.MapConfig(**flat, border_height=0.4)).save(tmp_path / "wall.npz")
+    generator = mjlab.terrain_entity_cfg(path).terrain_generator
+    assert (generator.border_width, generator.border_height) == (1.0, -0.4)  # mjlab: downward
+    for other in ({"border_height": -0.1}, {"border_height": 0.4, "border_rim": 0.1}):
+        path = tk.generate(tk.MapConfig(**flat, **other)).save(tmp_path / "no.npz", overwrite=True)
+        with pytest.raises(ExportError, match="mjlab's border: got border_height"):
+            mjlab.terrain_entity_cfg(path)
 
 
 def test_columns_place_the_map_once_and_return_its_points(mjlab, parkour, parkour_path):

@@ -69,7 +69,7 @@ def test_validate_presets_realize_their_parameters_without_cliffs(preset):
         # Patch (1, 6) begins at cell 10 + 80 along x, 10 + 480 along y.
         ("heights", (91, 491), 3.0, ["patch (1, 6): heights differ by up to 3.000 m from"]),
         ("heights", (91, 491), 9e-4, []),
-        ("heights", (0, 0), 1.1e-3, ["the border is not flat at height 0"]),
+        ("heights", (0, 0), 1.1e-3, ["the border does not have the height in its config"]),
         ("heights", (0, 0), 9e-4, []),
         ("spawns", (1, 2, 0, 2), 0.5, [f"{ORIGIN} is 0.500 m above the ground"]),
         ("spawns", (1, 2, 0, 2), -0.5, [f"{ORIGIN} is 0.500 m below the ground"]),

@@ -6,10 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from terrainkit import MapConfig, SubTerrain, TerrainMap, generate, terrains
-from terrainkit.errors import ConfigError, MapFileError
+from terrainkit import MapConfig, SubTerrain, TerrainMap, generate, make_patch, terrains
+from terrainkit.errors import ConfigError, MapFileError, TerrainkitWarning
+from terrainkit.map.validate import validate
+from terrainkit.settings.toml_text import value_text
 from terrainkit.terrain import Terrain, parameter, registry
 from terrainkit.terrain.overlay import Overlay
+from tests.terrainkit.maps import contents
 
 declared = dataclass(frozen=True, kw_only=True)
 FLAT, MIRROR = registry.get_terrain("flat"), registry.get_overlay("mirror")
@@ -204,7 +207,7 @@ def test_register_overlay_replaces_class_defined_again():
     assert MapConfig.from_toml(toml).sub_terrains[0].overlays == (again(height=0.2),)
 
 
-def test_map_of_own_classes_needs_registration(tmp_path):
+def test_map_of_own_classes_is_custom_without_them(tmp_path):
     ramp, lift = make_ramp(), make_lift()
     sub_terrains = (SubTerrain(terrain=ramp, overlays=(lift(),)),)
     config = MapConfig(rows=2, cols=1, border=0.0, terrains=sub_terrains)
@@ -213,12 +216,75 @@ def test_map_of_own_classes_needs_registration(tmp_path):
     assert loaded.config == config
     assert loaded.env_origins[:, 0, 2].tolist() == pytest.approx([0.1, 0.5])
     assert generate(loaded.config).heights.tobytes() == loaded.heights.tobytes()
-    for register, own, message in (
+    for register, own, problem in (
         (registry.register_overlay, lift, "no terrain 'ramp_up' is built in, installed, or "),
-        (registry.register_terrain, ramp, "no overlay 'lift' is built in, installed, or "),
+        (registry.register_terrain, ramp, r"overlays\[0\]: no overlay 'lift' is built in, inst"),
     ):
         registry._registered.clear()
         registry._get.cache_clear()
         register(own)
-        with pytest.raises(MapFileError, match=message):
-            TerrainMap.load(path)
+        loaded = load_custom(path, problem)
+        assert loaded.save(tmp_path / "copy.npz", overwrite=True).read_bytes() == path.read_bytes()
+        for build in (generate, lambda config: make_patch(config, 0, 0)):
+            with pytest.raises(ConfigError, match=f"{problem}.*--plugin FILE.py"):
+                build(loaded.config)
+        edited = loaded.edited(heights=loaded.heights + 1).save(tmp_path / "b.npz", overwrite=True)
+        again = load_custom(edited, problem)
+        assert contents(again) == contents(loaded.edited(heights=loaded.heights + 1))
+        registry.register_overlay(lift)
+        registry.register_terrain(ramp)
+        assert TerrainMap.load(edited).config == replace(config, mode="custom")
+
+
+def load_custom(path, problem):
+    with pytest.warns(TerrainkitWarning, match=f"loaded as a custom map.*{problem}") as warned:
+        loaded = TerrainMap.load(path)
+    assert len(warned) == 1
+    assert loaded.config.mode == "custom"
+    assert validate(loaded) == []
+    return loaded
+
+
+def test_map_is_custom_where_its_class_rejects_the_parameters(tmp_path):
+    registry.register_terrain(
+        make_ramp(height=parameter.height(0.1), __annotations__={"height": float})
+    )
+    ramp = SubTerrain(terrain="ramp_up", parameters={"height": 0.2})
+    path = generate(MapConfig(rows=2, cols=1, terrains=(ramp,))).save(tmp_path / "map.npz")
+    registry.register_terrain(make_ramp())  # written anew, without the parameter
+    load_custom(path, "ramp_up has no parameter 'height'")
+
+
+def test_map_with_own_element_of_a_course_is_custom_without_it(tmp_path):
+    registry.register_terrain(make_ramp())
+    elements = {"elements": [{"terrain": "ramp_up"}, {"terrain": "flat"}]}
+    course = SubTerrain(terrain="course", parameters=elements)
+    config = MapConfig(rows=2, cols=1, border=0.0, terrains=(course,))
+    path = generate(config).save(tmp_path / "map.npz")
+    registry._registered.clear()
+    registry._get.cache_clear()
+    load_custom(path, r"course.elements\[0\].*no terrain 'ramp_up'")
+    registry.register_terrain(make_ramp())
+    assert TerrainMap.load(path).config == config
+
+
+@pytest.mark.parametrize(
+    ("table", "problem"),
+    [
+        ({"terrain": "stairs", "height": 1.0}, r"config: terrains\[1\]: .*no parameter 'height'"),
+        ({"terrain": "ramp_up", "proportion": -1.0}, "config: .*proportion: got -1.0"),
+        ({"terrain": "x\n" * 1000, "name": "ramp_up"}, "terrains: got 2 of name 'ramp_up'"),
+    ],
+)
+def test_map_with_invalid_values_is_no_custom_map(tmp_path, table, problem):
+    text = MapConfig(terrains=(SubTerrain(terrain="flat"),)).to_toml()
+    own, other = ({"terrain": "ramp_up"}, table)
+    tables = "".join(f"[[terrains]]\n{''.join(map(line, t.items()))}" for t in (own, other))
+    arrays = {"format_version": np.int64(1), "config": np.array(text.partition("\n#")[0] + tables)}
+    np.savez(tmp_path / "map.npz", **arrays)
+    with pytest.raises(MapFileError, match=problem):
+        TerrainMap.load(tmp_path / "map.npz")
+
+
+def line(item):
+    return f"{item[0]} = {value_text(item[1])}\n"

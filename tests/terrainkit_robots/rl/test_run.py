@@ -106,6 +106,19 @@ def test_modified_map_is_another_terrain(tmp_path, task, mixed_map):
         parts_to_load(run, "quadruped", path, task)
 
 
+@pytest.mark.filterwarnings("ignore:.*loaded as a custom map")
+def test_run_on_a_map_of_a_class_that_is_not_registered(tmp_path, task, mixed_map):
+    with np.load(mixed_map.save(tmp_path / "map.npz")) as file:
+        arrays = dict(file)
+    name = mixed_map.config.terrains[0].terrain
+    own = str(arrays["config"]).replace(f'terrain = "{name}"', 'terrain = "own"', 1)
+    np.savez(tmp_path / "own.npz", **arrays | {"config": np.array(own)})
+    run = create_run(tmp_path / "run", task, "quadruped", tmp_path / "own.npz")
+    assert is_same_terrain(run, tmp_path / "own.npz")
+    assert not is_same_terrain(run, tmp_path / "map.npz")
+    assert (run.folder / MAP_FILE).read_text() == own  # to generate it where the class is
+
+
 def test_checkpoints_are_ordered_by_iteration(run):
     for name in ("model_9.pt", "model_10.pt", "model_100.pt", "model_x.pt", "my_model_7.pt"):
         (run / name).touch()
