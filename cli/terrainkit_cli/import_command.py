@@ -34,8 +34,8 @@ class Import(ConfigCommand):
     """
 
     files: Annotated[tuple[Path, ...], positional("FILE...")]
-    """Image (.png with 16 bits, .tif), array (.npy), ASCII grid (.asc) or mesh (.obj, .stl, .ply,
-    .glb); or a folder of such files."""
+    """Image (.png with 16 bits, .tif), array (.npy, .npz), table (.txt, .csv), ASCII grid (.asc),
+    geodata (.hgt, .dem) or mesh (.obj, .stl, .ply, .glb); or a folder of such files."""
 
     output: OutputPath
     """File to write, as of terrainkit generate."""
@@ -96,8 +96,6 @@ class Import(ConfigCommand):
 
 def _report_lines(report: "ImportReport", *, has_solids: bool) -> list[str]:
     lines = []
-    if report.num_missing:
-        lines.append(f"filled {report.num_missing} missing heights")
     if report.max_error_at:
         x, y = report.max_error_at
         lines.append(

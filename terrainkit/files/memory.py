@@ -1,6 +1,6 @@
 """Check that work fits in memory before it starts."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from terrainkit.errors import MemoryLimitError
@@ -13,7 +13,12 @@ MIN_CHECKED_BYTES = 1 << 28
 """Requests below this size always pass [bytes]."""
 
 
-def check_memory(needed: int, what: str, parts: tuple[str, int] = ("", 0)) -> None:
+def check_memory(
+    needed: int,
+    what: str,
+    parts: tuple[str, int] = ("", 0),
+    hint: Callable[[float], str] | None = None,
+) -> None:
     """Raise an error if more memory is needed than is free.
 
     Args:
@@ -21,6 +26,7 @@ def check_memory(needed: int, what: str, parts: tuple[str, int] = ("", 0)) -> No
         what: Name of the work in the error.
         parts: Name and number of equal parts of the work, such as ("env.num_envs", 4096); the error
             says how many would fit.
+        hint: Function that returns the end of the error from the share of the memory that is free.
 
     Raises:
         MemoryLimitError: if `needed` exceeds the free memory.
@@ -31,9 +37,10 @@ def check_memory(needed: int, what: str, parts: tuple[str, int] = ("", 0)) -> No
     if needed > free:
         name, num_parts = parts
         num_fitting = num_parts * free // needed
-        hint = f"; {name} {num_fitting} would fit" if num_fitting > 0 else ""
+        advice = f"; {name} {num_fitting} would fit" if num_fitting > 0 else ""
         raise MemoryLimitError(
-            f"{what} needs {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB free{hint}"
+            f"{what} needs {needed / 1e9:.1f} GB of memory; {free / 1e9:.1f} GB free{advice}"
+            + (hint(free / needed) if hint else "")
         )
 
 

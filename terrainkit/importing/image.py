@@ -1,29 +1,31 @@
-"""Read heights from a 16-bit PNG or a TIFF image."""
+"""Read heights from an image, such as a 16-bit PNG or a GeoTIFF."""
 
 import json
 import os
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, HeightFileError, TerrainkitWarning
-from terrainkit.importing.geotiff import GeoTags, read_geo_tags
+from terrainkit.errors import HeightFileError, install_command
+from terrainkit.importing.gdal import is_gdal_installed, read_gdal
+from terrainkit.importing.georeference import Georeference
+from terrainkit.importing.geotiff import read_geo_tags
 from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.raster import Raster, make_raster
+from terrainkit.importing.pixels import MAX_PIXELS, pixels_raster
+from terrainkit.importing.raster import Raster
 from terrainkit.importing.source import decode
 from terrainkit.settings.toml_text import read_text
 
 _TIFF_SUFFIXES = (".tif", ".tiff")
-SUFFIXES = (".png", *_TIFF_SUFFIXES)
-
-MAX_PIXELS = 1 << 28
-"""Most pixels of an image: a map of so many samples takes tens of gigabytes."""
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".pgm", *_TIFF_SUFFIXES)
 
 
 def read(path: Path, options: ReadOptions) -> Raster:
     """Return the heights of a gray image: column 0 has the lowest x, row 0 the highest y.
+
+    Colors that are equal are gray. Transparent pixels are missing heights.
 
     A .json file of the same name may state `scale` and `offset` [m], `cell` [m] and `first_sample`
     (x, y) [m], as written by the .png exporter. The tags of a GeoTIFF state the cell, the position
@@ -34,42 +36,49 @@ def read(path: Path, options: ReadOptions) -> Raster:
         options: How to read the file.
 
     Raises:
-        HeightFileError: if the file cannot be read.
-        ConfigError: if an option is missing, or the cells of a GeoTIFF are not squares in meters.
+        HeightFileError: if the file cannot be read, or has colors or several bands.
+        ConfigError: if an option is missing.
     """
+    pixels, reference = read_image(path)
+    return pixels_raster(path, pixels, reference, options, _read_json(path.with_suffix(".json")))
+
+
+def read_image(path: Path) -> tuple[NDArray[np.generic], Georeference]:
+    """Return the pixels of an image, shape (rows, cols) or (rows, cols, colors), and its cells.
+
+    Args:
+        path: The image.
+
+    Raises:
+        HeightFileError: if the file cannot be read.
+    """
+    if path.suffix.lower() not in _TIFF_SUFFIXES:
+        return _pixels(path), Georeference()
+    return read_gdal(path) if is_gdal_installed() else _read_tiff(path)
+
+
+def _read_tiff(path: Path) -> tuple[NDArray[np.generic], Georeference]:
+    """Return the pixels and tags of a TIFF file without GDAL."""
+    hint = f"; for BigTIFF, several bands and all compressions, run: {install_command('geo')}"
+    try:
+        pixels = _pixels(path)
+    except HeightFileError as error:
+        raise HeightFileError(f"{error}{hint}") from None
+    reference = read_geo_tags(path)
+    if pixels.ndim == 2 and reference.num_bands > 1:
+        raise HeightFileError(f"{path}: got 1 of {reference.num_bands} bands; expected all{hint}")
+    return pixels, reference
+
+
+def _pixels(path: Path) -> NDArray[np.generic]:
+    """Return the pixels of an image, red first; transparent ones are masked."""
     pixels = decode(_read_pixels, path)["pixels"]
-    tags = read_geo_tags(path) if path.suffix.lower() in _TIFF_SUFFIXES else GeoTags()
-    stated = _read_json(path.with_suffix(".json"))
-    cell, (x, y) = stated.get("cell"), stated.get("first_sample", (0.0, 0.0))
-    half = (options.file_cell or cell or 0.0) / 2 if "first_sample" in stated else 0.0
-    if tags.cell and not (options.file_cell or cell):
-        dx, dy = tags.cell
-        if not tags.is_in_meters or not dx > 0 or abs(dx - dy) > 1e-6 * dx:
-            unit = " m" if tags.is_in_meters else ", not in meters"
-            raise ConfigError(
-                f"file_cell: missing; {path} has cells of {dx:g} x {dy:g}{unit}; expected squares "
-                "in meters"
-            )
-        cell, (x, y) = dx, tags.lower
-    raster = make_raster(
-        path,
-        pixels[::-1].T,
-        options,
-        cell=cell,
-        lower=(x - half, y - half),
-        scale=stated.get("scale"),
-        offset=stated.get("offset", 0.0),
-        nodata=tags.nodata,
-    )
-    if pixels.dtype.itemsize == 1:
-        step = (raster.values.max() - raster.values.min()) / max(1, int(pixels.max()))
-        warnings.warn(
-            f"{path}: an 8-bit image has terraces: heights in steps of about {step:.3g} m; "
-            "use 16 bits",
-            TerrainkitWarning,
-            stacklevel=2,
-        )
-    return raster
+    if pixels.ndim == 2:
+        return pixels
+    colors = pixels[..., 2::-1]  # OpenCV has blue first
+    if pixels.shape[2] < 4 or pixels.dtype.kind != "u" or not (pixels[..., 3:] > 0).any():
+        return colors
+    return np.ma.masked_array(colors, np.broadcast_to(pixels[..., 3:] == 0, colors.shape))
 
 
 def _read_pixels(path: Path) -> dict[str, Any]:

@@ -1,26 +1,30 @@
-"""Read heights from an .npy file."""
+"""Read heights from an array in an .npy or .npz file."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from terrainkit.errors import HeightFileError
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
+from terrainkit.importing.source import decode
 
-SUFFIXES = (".npy",)
+SUFFIXES = (".npy", ".npz")
 
 
 def read(path: Path, options: ReadOptions) -> Raster:
     """Return the heights of an array whose first index is along x and second along y.
 
     Args:
-        path: The .npy file.
+        path: The file.
         options: How to read the file.
 
     Raises:
-        HeightFileError: if the file is not an .npy file, or is truncated.
+        HeightFileError: if the file has another format, is truncated, or has several arrays.
     """
+    if path.suffix.lower() == ".npz":
+        return make_raster(path, decode(_read_npz, path, options.key)["values"], options)
     try:
         # Mapped: a file that claims a larger array than it holds is an error, not an allocation.
         values = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -28,3 +32,15 @@ def read(path: Path, options: ReadOptions) -> Raster:
         reason = " ".join(str(error).split())
         raise HeightFileError(f"{path}: not an .npy file, or truncated: {reason}") from error
     return make_raster(path, values, options)
+
+
+def _read_npz(path: Path, key: str) -> dict[str, Any]:
+    with np.load(path, allow_pickle=False) as arrays:
+        grids = [name for name in arrays.files if arrays[name].ndim == 2]
+        keys = [name for name in grids if name == key or not key]
+        if len(keys) != 1:
+            raise ValueError(
+                f"got key {key!r} and the grids {', '.join(grids) or 'none'}; --key "
+                f"{(grids or ['NAME'])[0]} selects one"
+            )
+        return {"values": arrays[keys[0]]}

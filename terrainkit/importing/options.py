@@ -6,7 +6,13 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from terrainkit.settings.schema import Config
-from terrainkit.settings.type_hint import MAX_VALUE, Count, NonNegative, Size
+from terrainkit.settings.type_hint import (
+    MAX_VALUE,
+    Count,
+    NonNegative,
+    NonNegativeInterval,
+    Size,
+)
 
 MAX_POSITION = 1e8
 """Largest coordinate in a file [m]: beyond the northings of all map projections."""
@@ -14,6 +20,9 @@ MAX_POSITION = 1e8
 Number = Annotated[float, Meta(ge=-MAX_VALUE, le=MAX_VALUE)]
 Position = Annotated[float, Meta(ge=-MAX_POSITION, le=MAX_POSITION)]
 Missing = Literal["reject", "nearest", "lowest"]
+CellSides = Annotated[
+    tuple[Size, ...], Meta(min_length=1, max_length=2, extra={"metavar": "X [Y]"})
+]
 UpAxis = Literal["z", "y"]
 
 
@@ -25,8 +34,9 @@ class ReadOptions(Config):
         ConfigError: if a value is invalid; the message names the field.
     """
 
-    file_cell: Size | None = None
-    """Distance between two samples of an image or array [m]; none: as its .json states."""
+    file_cell: CellSides | None = None
+    """Distance between two samples of an image or array along x and y, or one for both [m]; none:
+    as the file or its .json states."""
 
     height_range: tuple[Number, Number] | None = None
     """Heights of the smallest and the largest value of an unsigned integer type, such as 0 and
@@ -37,10 +47,36 @@ class ReadOptions(Config):
     states, or 1 for files with decimal numbers."""
 
     nodata: float | None = None
-    """Value that marks missing heights, as NaN does; .asc files state it."""
+    """Value that marks missing heights, as NaN does; GeoTIFF and .asc files state it."""
+
+    detect_nodata: bool = True
+    """Take a value far from all others, such as -9999 or -32768, as missing heights as well, with a
+    warning."""
+
+    band: Count | None = None
+    """Band of a file with several, or color of an image (1: red), that has the heights; none: the
+    only one, or equal colors."""
+
+    key: str = ""
+    """Name of the array in an .npz file; empty: the only one with two axes."""
 
     up: UpAxis = "z"
     """Axis of a mesh that points up; glTF files of most programs have y."""
+
+    def __post_init__(self) -> None:
+        """Validate the values; one number for `file_cell` is the distance along both axes.
+
+        Raises:
+            ConfigError: if a value is invalid; the message names the field.
+        """
+        if isinstance(self.file_cell, int | float):
+            object.__setattr__(self, "file_cell", (self.file_cell,))
+        super().__post_init__()
+
+    @property
+    def file_spacing(self) -> tuple[float, float] | None:
+        """Distance between two samples along x and y [m], if it is given."""
+        return (self.file_cell[0], self.file_cell[-1]) if self.file_cell else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,8 +90,19 @@ class ImportOptions(ReadOptions):
     cell: Size | None = None
     """Distance between two samples of the map [m]; none: as in the file, 0.1 for meshes."""
 
-    missing: Missing = "reject"
-    """Missing heights: an error, the nearest height, or the lowest height of the map."""
+    missing: Missing = "nearest"
+    """Missing heights: an error, the nearest height (with a warning), or the lowest height of the
+    map."""
+
+    friction: str = ""
+    """Image of the friction coefficients of the ground, of the whole file; empty: one coefficient
+    everywhere."""
+
+    friction_range: NonNegativeInterval | None = None
+    """Coefficients of black and white in that image."""
+
+    friction_classes: str = ""
+    """TOML file with the coefficient of each gray value in that image, such as 255 = 0.8."""
 
     origin: tuple[Position, Position, Position] | None = None
     """Point of the file that becomes (0, 0, 0), the lower corner of patch (0, 0) [m]; none: the

@@ -1,4 +1,4 @@
-"""Raster: heights at the centers of square cells."""
+"""Raster: heights at the centers of cells."""
 
 import math
 from dataclasses import dataclass
@@ -10,14 +10,29 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.files.memory import check_memory
+from terrainkit.importing.nodata import find_nodata
 from terrainkit.importing.options import Missing, ReadOptions
-from terrainkit.importing.source import Array, fill_missing, open_source
+from terrainkit.importing.source import Array, fill_missing, open_source, warn
 from terrainkit.settings.type_hint import MAX_VALUE
 
-BYTES_PER_VALUE = 24
+BYTES_PER_VALUE = 40
 """Peak memory of a height of a file [bytes]."""
 
 _BYTES_PER_SAMPLE = 100
+
+_HEIGHT_OPTIONS = {
+    "u": "--height-range 0 2 (0 m to 2 m) or --scale 1 (meters)",
+    "i": "--scale 0.01 (centimeters)",
+}
+
+_MIN_SIDE, _MAX_SIDE = 0.25, 10_000.0
+"""Sides of a raster that are usual for the ground of a robot [m]."""
+
+MAX_RELIEF = 10.0
+"""Largest usual difference of two heights, as a share of the longer side."""
+
+_MIN_SHARE = 0.5 - 1e-9
+"""Share of known heights around a position below which its height is missing."""
 
 _ALIGNED = 1e-4
 """Distance to a sample below which its height is taken without interpolation [cells]."""
@@ -25,26 +40,34 @@ _ALIGNED = 1e-4
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Raster:
-    """Heights at the centers of square cells."""
+    """Heights at the centers of rectangular cells."""
 
     values: NDArray[np.float32]
     """Heights [m], shape (nx, ny), NaN where they are missing."""
 
-    cell: float
-    """Side of a cell [m]."""
+    spacing: tuple[float, float]
+    """Sides of a cell along x and y [m]."""
 
     lower: tuple[float, float] = (0.0, 0.0)
     """Corner of cell (0, 0) with the smallest x and y [m]."""
 
     @property
+    def cell(self) -> float:
+        """Shorter side of a cell [m]."""
+        return min(self.spacing)
+
+    @property
     def upper(self) -> tuple[float, float]:
         """Corner of the last cell [m]."""
         nx, ny = self.values.shape
-        return self.lower[0] + nx * self.cell, self.lower[1] + ny * self.cell
+        return self.lower[0] + nx * self.spacing[0], self.lower[1] + ny * self.spacing[1]
 
     def heights(self, x: Array, y: Array) -> Array:
-        """Return the heights at a grid of positions, interpolated linearly.
+        """Return the heights at a grid of positions.
 
+        Between samples, heights are interpolated linearly. Along an axis where the distance of the
+        positions is at least two cells, a height is the mean over about this distance: single
+        samples would miss steps or show a pattern that is not there.
         Positions beyond the corners get the heights of the edge.
 
         Args:
@@ -52,20 +75,40 @@ class Raster:
             y: Positions along y [m], shape (ny,).
 
         Returns:
-            Heights [m], shape (nx, ny), NaN where they are missing.
+            Heights [m], shape (nx, ny), NaN where most of them are missing.
         """
-        from scipy.ndimage import map_coordinates
+        from scipy.ndimage import map_coordinates, uniform_filter
 
+        step = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in (x, y))
+        widths = [
+            2 * int(min(step / side / 2 + _ALIGNED, n)) + 1
+            for side, n in zip(self.spacing, self.values.shape, strict=True)
+        ]
         index = [
-            np.clip((position - low) / self.cell - 0.5, 0, n - 1)
-            for position, low, n in zip((x, y), self.lower, self.values.shape, strict=True)
+            np.clip((position - low) / side - 0.5, 0, n - 1)
+            for position, low, side, n in zip(
+                (x, y), self.lower, self.spacing, self.values.shape, strict=True
+            )
         ]
         nearest = [np.rint(each) for each in index]
-        if all(np.abs(a - b).max() < _ALIGNED for a, b in zip(index, nearest, strict=True)):
+        is_aligned = all(
+            np.abs(a - b).max() < _ALIGNED for a, b in zip(index, nearest, strict=True)
+        )
+        if is_aligned and widths == [1, 1]:
             i, j = (each.astype(int) for each in nearest)
             return np.asarray(self.values[np.ix_(i, j)], dtype=float)
         grid = np.meshgrid(*index, indexing="ij")
-        return np.asarray(map_coordinates(self.values.astype(float), grid, order=1, mode="nearest"))
+
+        def sample(values: NDArray[Any]) -> Array:
+            means = uniform_filter(values.astype(float), widths, mode="nearest")
+            return np.asarray(map_coordinates(means, grid, order=1, mode="nearest"))
+
+        is_missing = np.isnan(self.values)
+        if not is_missing.any():
+            return sample(self.values)
+        share = sample(~is_missing)
+        known = sample(np.where(is_missing, 0.0, self.values))
+        return np.where(share > _MIN_SHARE, known / np.maximum(share, _MIN_SHARE), np.nan)
 
 
 def read_raster(path: Path, options: ReadOptions, missing: Missing, cell: float) -> Raster:
@@ -94,16 +137,16 @@ def read_raster(path: Path, options: ReadOptions, missing: Missing, cell: float)
         for low, count in zip(source.lower, counts, strict=True)
     )
     heights = fill_missing(path, source.heights(x, y), missing, x, y)
-    return Raster(values=heights.astype(np.float32), cell=cell, lower=source.lower)
+    return Raster(values=heights.astype(np.float32), spacing=(cell, cell), lower=source.lower)
 
 
 def make_raster(
     path: Path,
     values: NDArray[np.generic],
     options: ReadOptions,
-    *,
-    cell: float | None = None,
+    cell: tuple[float, float] | None = None,
     lower: tuple[float, float] = (0.0, 0.0),
+    *,
     scale: float | None = None,
     offset: float = 0.0,
     nodata: float | None = None,
@@ -112,13 +155,17 @@ def make_raster(
 
     Args:
         path: The file, for errors.
-        values: Values, shape (nx, ny).
+        values: Values, shape (nx, ny); masked ones are missing.
         options: Options, which override what the file states.
-        cell: Distance between two samples [m], if the file states it.
+        cell: Distance between two samples along x and y [m], if the file states it.
         lower: Lower corner [m].
         scale: Meters per unit, if the file states it.
         offset: Height of the value 0 [m].
         nodata: Value that marks missing heights.
+
+    Warns:
+        TerrainkitWarning: if values are taken as missing although no tag or option says so, or the
+            size of the raster is not that of ground.
 
     Raises:
         HeightFileError: if the values are no heights.
@@ -131,27 +178,67 @@ def make_raster(
             "array of numbers with two axes"
         )
     check_memory(values.size * BYTES_PER_VALUE, f"reading {values.size} heights from {path}")
-    cell = options.file_cell or cell
-    if cell is None:
-        raise ConfigError(f"file_cell: missing; {path} does not state the distance of its samples")
+    spacing = options.file_spacing or cell
     scale, offset = _scale_and_offset(path, values.dtype, options, scale, offset)
-    heights = values.astype(np.float64) * scale + offset
-    for missing in (nodata, options.nodata):
-        if missing is not None:
-            heights[values == np.float64(missing)] = np.nan
+    if spacing is None or scale is None:
+        needed = ["--file-cell 0.1 (0.1 m between samples)"] * (spacing is None)
+        needed += [_HEIGHT_OPTIONS.get(kind, "")] * (scale is None)
+        raise ConfigError(
+            f"{path}: got {values.dtype} values without their distance or height in meters; "
+            f"expected for example {' '.join(needed)}, or a .json beside it"
+        )
+    heights = np.ma.filled(values.astype(np.float64), np.nan)
+    for marker in (nodata, options.nodata):
+        if marker is not None:
+            with np.errstate(over="ignore"):  # a tag may state more digits than float32 has
+                heights[heights == (values.dtype.type(marker) if kind == "f" else marker)] = np.nan
+    found = find_nodata(heights, values.dtype, scale) if options.detect_nodata else {}
+    for marker, count in found.items():
+        heights[heights == marker] = np.nan
+        warn(
+            f"{path}: {count} of {values.size} values are {marker:g}, far from all others: they "
+            "are taken as missing heights (--no-detect-nodata keeps them)"
+        )
+    heights *= scale
+    heights += offset
     invalid = np.abs(heights) > MAX_VALUE
     if invalid.any():
         raise HeightFileError(
             f"{path}: got {int(invalid.sum())} heights beyond {MAX_VALUE:,} m; expected another "
             "scale, or nodata for missing heights"
         )
-    return Raster(values=heights.astype(np.float32), cell=cell, lower=lower)
+    raster = Raster(values=heights.astype(np.float32), spacing=spacing, lower=lower)
+    _warn_of_size(path, raster)
+    return raster
+
+
+def _warn_of_size(path: Path, raster: Raster) -> None:
+    """Warn if lengths are likely in another unit, or far larger than a robot."""
+    sides = [n * side for n, side in zip(raster.values.shape, raster.spacing, strict=True)]
+    size, side = f"{path}: got {sides[0]:.6g} m x {sides[1]:.6g} m", max(sides)
+    known = raster.values[~np.isnan(raster.values)]
+    relief = float(np.ptp(known)) if known.size else 0.0
+    factor = 111_000 if relief > MAX_RELIEF * side else 0.1 / raster.cell if side > 1 else 100
+    file_cell = "--file-cell " + " ".join(f"{factor * each:.6g}" for each in raster.spacing)
+    if relief > MAX_RELIEF * side:
+        warn(
+            f"{size} with heights over {relief:.4g} m; are they in centimeters (--scale 0.01), or "
+            f"positions in degrees ({file_cell} is in meters)?"
+        )
+    elif side > _MAX_SIDE:
+        warn(
+            f"{size}, a height every {raster.cell:.4g} m; --cell 1 --patch-size 50 50 --rows 1 "
+            f"--cols 1 takes a part for a robot, {file_cell} with heights times {factor:.3g} makes "
+            "a small model"
+        )
+    elif side < _MIN_SIDE:
+        warn(f"{size}; {file_cell} is 100 times larger")
 
 
 def _scale_and_offset(
     path: Path, dtype: np.dtype[Any], options: ReadOptions, scale: float | None, offset: float
-) -> tuple[float, float]:
-    """Return the height of a unit and of the value 0 [m], from the options or the file."""
+) -> tuple[float | None, float]:
+    """Return the height of a unit, None if unknown, and of the value 0 [m]."""
     if options.height_range:
         if dtype.kind != "u":
             raise ConfigError(
@@ -162,9 +249,4 @@ def _scale_and_offset(
         return (high - low) / np.iinfo(dtype).max, low
     if options.scale:
         return options.scale, offset
-    if scale is None and dtype.kind != "f":
-        raise ConfigError(
-            f"height_range: missing; {path} has {dtype} values of unknown height; expected "
-            "height_range, scale, or a .json beside it"
-        )
-    return scale or 1.0, offset
+    return scale or (1.0 if dtype.kind == "f" else None), offset

@@ -3,6 +3,7 @@
 Positions are in the file's frame: x to the right and y up for images, east and north for grids.
 """
 
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -10,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import HeightFileError
+from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.files.child_process import ProcessError, run_in_process
 from terrainkit.files.suffix import find_module
 from terrainkit.importing.options import Missing, ReadOptions
@@ -86,20 +87,28 @@ def check_file(path: Path) -> None:
         raise HeightFileError(f"{path}: got {size} bytes; expected at most {MAX_FILE_BYTES}")
 
 
-def decode(function: Callable[[Path], Mapping[str, Any]], path: Path) -> dict[str, NDArray[Any]]:
+def decode(
+    function: Callable[..., Mapping[str, Any]], path: Path, *arguments: Any
+) -> dict[str, NDArray[Any]]:
     """Return the arrays that a decoder reads in a child process.
 
     Args:
         function: The decoder, a function of a module.
         path: The file.
+        *arguments: Further arguments of the decoder.
 
     Raises:
         HeightFileError: if the file cannot be decoded within the limits.
     """
     try:
-        return run_in_process(function, path)
+        return run_in_process(function, path, *arguments)
     except ProcessError as error:
         raise HeightFileError(f"{path}: cannot be read: {error}") from None
+
+
+def warn(message: str) -> None:
+    """Warn that a file was not taken as it is."""
+    warnings.warn(message, TerrainkitWarning, stacklevel=3)
 
 
 def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Array) -> Array:
@@ -112,6 +121,9 @@ def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Arra
         x: Positions along x in the file [m], shape (nx,), for the error.
         y: Positions along y in the file [m], shape (ny,), for the error.
 
+    Warns:
+        TerrainkitWarning: if missing heights become the nearest ones.
+
     Raises:
         HeightFileError: if heights are missing and may not be, or all are.
     """
@@ -119,16 +131,17 @@ def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Arra
     if not is_missing.any():
         return heights
     count = int(is_missing.sum())
+    i, j = np.unravel_index(int(np.argmax(is_missing)), is_missing.shape)
+    found = (
+        f"{path}: {count} of {heights.size} heights are missing, the first at ({x[i]:g}, {y[j]:g})"
+    )
     if missing == "reject" or count == heights.size:
-        i, j = np.argwhere(is_missing)[0].tolist()
-        hint = "" if count == heights.size else "; missing = nearest or lowest fills them"
-        raise HeightFileError(
-            f"{path}: {count} of {heights.size} heights are missing, the first at "
-            f"({x[i]:g}, {y[j]:g}){hint}"
-        )
+        hint = "" if count == heights.size else "; --missing nearest or lowest fills them"
+        raise HeightFileError(found + hint)
     if missing == "lowest":
         return np.where(is_missing, np.nanmin(heights), heights)
     from scipy.ndimage import distance_transform_edt
 
+    warn(f"{found}; they become the nearest heights, --missing reject makes this an error")
     nearest = distance_transform_edt(is_missing, return_distances=False, return_indices=True)
     return np.asarray(heights[tuple(nearest)])

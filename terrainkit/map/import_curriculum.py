@@ -96,10 +96,7 @@ def import_curriculum(
         MemoryLimitError: if the map would not fit in memory.
     """
     options = options or ImportOptions()
-    if options.origin:
-        raise ConfigError("origin: got a position; several files are cropped at their centers")
-    if options.solids and blend:
-        raise ConfigError(f"solids: got blend {blend:g}; expected 0, since solids cannot fade")
+    _check_options(options, blend)
     files, is_whole = _find_files(paths), options.patch_size is None
     options = _with_common_size(files, options)
     patches: list[_Patch] = []
@@ -126,6 +123,15 @@ def import_curriculum(
             raise HeightFileError(f"skipped all files: {listing(reasons)}")
         warnings.warn(f"skipped {listing(reasons)}", TerrainkitWarning, stacklevel=2)
     return _arrange(patches, options)
+
+
+def _check_options(options: ImportOptions, blend: float) -> None:
+    if options.origin:
+        raise ConfigError("origin: got a position; several files are cropped at their centers")
+    if options.solids and blend:
+        raise ConfigError(f"solids: got blend {blend:g}; expected 0, since solids cannot fade")
+    if options.friction:
+        raise ConfigError(f"friction: got {options.friction}; expected one file of heights")
 
 
 def _find_files(paths: Sequence[str | Path]) -> list[Path]:

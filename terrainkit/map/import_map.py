@@ -13,6 +13,7 @@ from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.solids import Solids
 from terrainkit.importing.columns import Columns
+from terrainkit.importing.friction import read_friction
 from terrainkit.importing.mesh_file import MeshSource
 from terrainkit.importing.options import ImportOptions
 from terrainkit.importing.overhangs import overhang_solids
@@ -74,12 +75,13 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     1 for the hardest; the patches stay where they are in the file.
 
     Args:
-        path: The file: .png, .tif, .npy, .asc, .obj, .stl, .ply or .glb.
+        path: The file: an image, an array, a table, geodata or a mesh.
         options: How it becomes a map.
 
     Warns:
-        TerrainkitWarning: if an image has 8 bits only, or a patch has no flat ground and
-            `spawn_tolerance` is None.
+        TerrainkitWarning: if heights are missing, an image has 8 bits only, cells are not squares,
+            lengths are likely in another unit, or a patch has no flat ground and `spawn_tolerance`
+            is None.
 
     Raises:
         HeightFileError: if the file cannot be read, or heights are missing.
@@ -122,7 +124,7 @@ def make_map(
         source: The ground.
         config: Configuration of the map.
         origin: Point of the source that becomes (0, 0, 0), shape (3,) [m].
-        options: `missing` and `solids` are used.
+        options: `missing`, `solids` and those of friction are used.
         spawn_xy: Preferred spawn position of each patch in the map, shape (rows, cols, 2) [m].
         terrain_types: Sub-terrain of each patch, shape (rows, cols).
 
@@ -133,7 +135,14 @@ def make_map(
     """
     grid = config.grid
     samples = math.prod(grid.shape)
-    check_memory(samples * _BYTES_PER_SAMPLE, f"a map of {samples} samples")
+    check_memory(
+        samples * _BYTES_PER_SAMPLE,
+        f"a map of {samples} samples",
+        hint=lambda share: (
+            f"; --cell {1.05 * grid.cell / share**0.5:.2g} would fit, or a part of the file by "
+            "--origin, --patch-size, --rows and --cols"
+        ),
+    )
     x, y = (grid.axis(k) + origin[k] for k in (0, 1))
     solids, columns = Solids.empty(), None
     if isinstance(source, MeshSource):
@@ -151,10 +160,11 @@ def make_map(
     heights = fill_missing(path, found, options.missing, x, y).astype(np.float32)
     if not (np.abs(heights) <= MAX_VALUE).all():
         raise HeightFileError(f"{path}: got heights beyond {MAX_VALUE:g} m")
+    friction = read_friction(options, source, x, y)
     heights = heights + np.float32(0)
     relax = options.spawn_tolerance is None
     config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
-    terrain_map = assemble_map(config, heights, solids, spawns, terrain_types)
+    terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
     report = _report(terrain_map, columns, int(np.isnan(found).sum()))
     return ImportedMap(terrain_map=terrain_map, report=report)
 
@@ -216,6 +226,7 @@ def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     low, high = options.height_range or (0.0, 0.0)
+    x, y = options.file_spacing or (0.0, 0.0)
     return SubTerrain(
         terrain="imported",
         name=path.stem,
@@ -223,7 +234,8 @@ def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
             "file": path.name[:MAX_TEXT_LENGTH],
             "sha256": digest,
             "vertical_exaggeration": 1.0,
-            "file_cell": options.file_cell or 0.0,
+            "file_cell": x,
+            "file_cell_y": 0.0 if y == x else y,
             "height_span": abs(high - low),
             "scale": options.scale or 0.0,
             "up": options.up,
@@ -238,6 +250,7 @@ def assemble_map(
     solids: Solids,
     spawns: NDArray[np.object_],
     terrain_types: NDArray[np.int32],
+    friction: NDArray[np.float32] | None = None,
 ) -> TerrainMap:
     """Return a map of mode custom, whose difficulty is the rank by measured difficulty.
 
@@ -247,6 +260,8 @@ def assemble_map(
         solids: Solids of the map.
         spawns: Spawn positions of each patch, as :func:`.place_spawns` returns them.
         terrain_types: Sub-terrain of each patch, shape (rows, cols).
+        friction: Friction coefficients of the ground on the samples of the map; None for the
+            default.
     """
     size = (config.rows, config.cols)
     parameters, measured = np.empty(size, dtype=object), np.empty(size)
@@ -261,7 +276,9 @@ def assemble_map(
         config=config,
         grid=config.grid,
         heights=heights,
-        friction=np.broadcast_to(np.float32(config.static_friction), heights.shape),
+        friction=np.broadcast_to(np.float32(config.static_friction), heights.shape)
+        if friction is None
+        else friction,
         spawns=pad_poses(spawns),
         terrain_types=terrain_types,
         terrain_names=tuple(each.name for each in config.sub_terrains),

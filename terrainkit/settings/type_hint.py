@@ -28,7 +28,10 @@ MAX_VALUE = 1_000_000
 """Largest number that a setting or parameter accepts. It is beyond any terrain, and far below
 overflow."""
 
-Size = Annotated[float, Meta(ge=1e-4, le=MAX_VALUE)]
+MIN_SIZE = 1e-4
+"""Smallest length that a setting accepts [m]."""
+
+Size = Annotated[float, Meta(ge=MIN_SIZE, le=MAX_VALUE)]
 NonNegative = Annotated[float, Meta(ge=0, le=MAX_VALUE)]
 Count = Annotated[int, Meta(ge=1, le=MAX_VALUE)]
 PositiveFloat = Annotated[float, Meta(gt=0)]

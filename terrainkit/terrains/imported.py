@@ -37,8 +37,8 @@ class Imported(Terrain):
     has_column_seed: ClassVar[bool] = True
 
     file: str = parameter.text()
-    """The file (.png, .tif, .npy, .asc, .obj, .stl, .ply, .glb), relative to the working folder;
-    empty for an example of 16 m x 16 m."""
+    """The file, of any format that `terrainkit import` reads, relative to the working folder; empty
+    for an example of 16 m x 16 m."""
 
     sha256: str = parameter.text()
     """SHA-256 that the file must have; empty for any."""
@@ -53,7 +53,10 @@ class Imported(Terrain):
     """Side of the flat square at the center [m]."""
 
     file_cell: float = parameter.scalar(0.0)
-    """Distance between two samples of an image or array [m]; 0 as its .json states."""
+    """Distance between two samples of an image or array [m]; 0 as the file or its .json states."""
+
+    file_cell_y: float = parameter.scalar(0.0)
+    """That distance along y, if it differs from the distance along x [m]; 0 if not."""
 
     height_span: float = parameter.height(0.0)
     """Height of the brightest gray above the darkest that an image can have [m]; 0 as its .json
@@ -65,8 +68,8 @@ class Imported(Terrain):
     up: str = parameter.choice("z", "y")
     """Axis of a mesh that points up."""
 
-    missing: str = parameter.choice("reject", "nearest", "lowest")
-    """Missing heights: an error, the nearest height, or the lowest height of the file."""
+    missing: str = parameter.choice("nearest", "reject", "lowest")
+    """Missing heights: the nearest height, an error, or the lowest height of the file."""
 
     @classmethod
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
@@ -103,8 +106,9 @@ class Imported(Terrain):
     def _read(self, cell: float) -> tuple[Raster, str]:
         path = Path(self.file) if self.file else _EXAMPLE
         check_file(path)
+        side = self.file_cell or (0.0 if self.file else _EXAMPLE_CELL)
         options = ReadOptions(
-            file_cell=self.file_cell or (None if self.file else _EXAMPLE_CELL),
+            file_cell=(side, self.file_cell_y or side) if side else None,
             height_range=(0.0, self.height_span) if self.height_span else None,
             scale=self.scale or None,
             up=self.up,  # type: ignore[arg-type]

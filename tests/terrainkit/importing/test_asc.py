@@ -3,7 +3,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from terrainkit.errors import HeightFileError, MemoryLimitError
+from terrainkit.errors import HeightFileError, MemoryLimitError, TerrainkitWarning
 from terrainkit.files import memory
 from terrainkit.importing import asc
 from terrainkit.importing.asc import read
@@ -105,3 +105,30 @@ def test_asc_memory_is_checked_before_parsing(read_text, monkeypatch):
     monkeypatch.setattr(asc, "_parse", None)
     with pytest.raises(MemoryLimitError, match=r"reading 6 heights from .*a\.asc"):
         read_text(GRID)
+
+
+# At latitude 60, a degree is 55.8 km along x and 111.4 km along y.
+NORTH = GRID.replace("500000.0", "10").replace("5400000.5", "59.999").replace("2.0", "0.001")
+
+
+@pytest.mark.parametrize(
+    ("text", "projection", "spacing", "lower"),
+    [
+        (GRID.replace("cellsize 2.0", "dx 2\ndy 3"), "", (2, 3), (5e5, 5400000.5)),
+        (NORTH, "GEOGCS[]", (55.8, 111.4), (0, 0)),
+        (NORTH, "", (55.8, 111.4), (0, 0)),
+    ],
+    ids=["not square", ".prj", "a tower"],
+)
+def test_asc_cells_that_are_not_square(tmp_path, text, projection, spacing, lower):
+    if projection:
+        (tmp_path / "a.prj").write_text(projection)
+    (tmp_path / "a.asc").write_text(text)
+    with pytest.warns(TerrainkitWarning, match="got cells of .*aspect ratio"):
+        raster = read(tmp_path / "a.asc", ReadOptions())
+    assert raster.spacing == pytest.approx(spacing, rel=1e-3)
+    assert raster.lower == lower
+    if projection:
+        (tmp_path / "a.prj").write_text("PROJCS[]")
+        with pytest.warns(TerrainkitWarning, match="positions in degrees"):
+            assert read(tmp_path / "a.asc", ReadOptions()).spacing == (0.001, 0.001)

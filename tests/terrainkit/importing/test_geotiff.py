@@ -1,9 +1,11 @@
 import struct
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
-from terrainkit.errors import ConfigError, HeightFileError
+from terrainkit.errors import ConfigError, HeightFileError, TerrainkitWarning
+from terrainkit.importing import image
 from terrainkit.importing.image import read
 from terrainkit.importing.options import ReadOptions
 
@@ -13,17 +15,28 @@ SCALE, TIE_POINT = (2.0, 2.0, 0.0), (0.0, 0.0, 0.0, 500000.0, 4649776.0, 0.0)
 UTM = (1, 1, 0, 1, 1024, 0, 1, 1)
 DEGREES = (1, 1, 0, 1, 1024, 0, 1, 2)
 US_FEET = (1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 9003)
+WEB_MERCATOR = (1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 3857)
 POINTS = (1, 1, 0, 2, 1024, 0, 1, 1, 1025, 0, 1, 2)
 
 
-def write(path, scale=SCALE, tie_point=TIE_POINT, keys=UTM, nodata=b"-9999\0", order="<"):
+def write(
+    path,
+    scale=SCALE,
+    tie_point=TIE_POINT,
+    keys=UTM,
+    nodata=b"-9999\0",
+    order="<",
+    matrix=(),
+    bands=1,
+):
     """Write a GeoTIFF of one strip as GDAL does."""
     rows, cols = HEIGHTS.shape
     tags = [
         (256, "H", (cols,)), (257, "H", (rows,)), (258, "H", (32,)), (259, "H", (1,)),
-        (262, "H", (1,)), (273, "I", (8,)), (277, "H", (1,)), (278, "H", (rows,)),
+        (262, "H", (1,)), (273, "I", (8,)), (277, "H", (bands,)), (278, "H", (rows,)),
         (279, "I", (HEIGHTS.nbytes,)), (339, "H", (3,)),
-        (33550, "d", scale), (33922, "d", tie_point), (34735, "H", keys), (42113, "s", nodata),
+        (33550, "d", scale), (33922, "d", tie_point), (34264, "d", matrix),
+        (34735, "H", keys), (42113, "s", nodata),
     ]  # fmt: skip
     kinds = {"s": 2, "H": 3, "I": 4, "d": 12}
     tags = [each for each in tags if len(each[2])]
@@ -59,22 +72,98 @@ def test_geotiff_of_points_is_half_a_cell_lower(tmp_path):
     assert raster.lower == (10.0 - 3.0, 20.0 - 1.0)
 
 
+@pytest.fixture(autouse=True)
+def no_gdal(monkeypatch):
+    """Read the tags without GDAL, also where rasterio is installed."""
+    monkeypatch.setattr(image, "is_gdal_installed", lambda: False)
+
+
+# At latitude 60, a degree is 55.8 km along x and 111.4 km along y.
+NORTH = (0.0, 0.0, 0.0, 10.0, 60.001, 0.0)
+MATRIX = (0.0, 2.0, 0.0, 7.0, 1.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
 @pytest.mark.parametrize(
-    ("tags", "message"),
+    ("tags", "spacing", "lower", "warning"),
     [
-        ({"keys": DEGREES}, r"has cells of 2 x 2, not in meters; expected squares in meters"),
-        ({"keys": US_FEET}, r"has cells of 2 x 2, not in meters; expected squares in meters"),
-        ({"scale": (2.0, 3.0, 0.0)}, r"has cells of 2 x 3 m; expected squares in meters"),
-        ({"scale": (np.nan, 1.0, 0.0)}, r"has cells of nan x 1 m; expected squares in meters"),
-        ({"scale": ()}, r"does not state the distance of its samples"),
+        ({"scale": (2.0, 2.001, 0.0)}, (2.0, 2.001), (500000.0, 4649776.0 - 4.002), None),
+        (
+            {"scale": (2.0, 3.0, 0.0)},
+            (2.0, 3.0),
+            (500000.0, 4649776.0 - 6.0),
+            r"cells of 2 x 3 m \(aspect ratio 1\.5\); they become squares of 2 m$",
+        ),
+        (
+            {"keys": US_FEET},
+            (2400 / 3937,) * 2,
+            (500000 * 1200 / 3937, 4649772 * 1200 / 3937),
+            None,
+        ),
+        (
+            {"keys": DEGREES, "scale": (0.001, 0.001, 0.0), "tie_point": NORTH},
+            (55.800, 111.412),
+            (0.0, 0.0),
+            r"0\.001 x 0\.001 degrees at latitude 60, .*ratio 2\); .*corner becomes \(0, 0\)",
+        ),
+        (
+            {"keys": WEB_MERCATOR, "tie_point": (0.0, 0.0, 0.0, 0.0, 8399737.9, 0.0)},
+            (1.0, 1.0),
+            (0.0, 0.0),
+            r"cells of 2 x 2 m of web maps at latitude 60, which are 1 m x 1 m",
+        ),
+        (
+            {"scale": (), "matrix": MATRIX},
+            (1.0, 2.0),
+            (0.0, 0.0),
+            r"cells of 1 x 2 m along turned axes \(aspect ratio 2\)",
+        ),
     ],
+    ids=["almost square", "not square", "feet", "degrees", "web map", "turned"],
 )
-def test_geotiff_without_cells_in_meters_needs_file_cell(tmp_path, tags, message):
+def test_geotiff_cells_become_squares_in_meters(tmp_path, tags, spacing, lower, warning):
     path = write(tmp_path / "a.tif", **tags)
-    with pytest.raises(ConfigError, match=rf"^file_cell: missing; .*a\.tif {message}$"):
+    with pytest.warns(TerrainkitWarning, match=warning) if warning else nullcontext():
+        raster = read(path, ReadOptions())
+    assert raster.spacing == pytest.approx(spacing, rel=1e-4)
+    assert raster.lower == pytest.approx(lower)
+    raster = read(path, ReadOptions(file_cell=(0.5, 0.75)))
+    assert (raster.spacing, raster.lower) == ((0.5, 0.75), (0.0, 0.0))
+
+
+def test_geotiff_without_cells_needs_file_cell(tmp_path):
+    path = write(tmp_path / "a.tif", scale=())
+    with pytest.raises(
+        ConfigError, match=r"a\.tif: got float32 values .*example --file-cell 0\.1 \(.*\), or"
+    ):
         read(path, ReadOptions())
-    raster = read(path, ReadOptions(file_cell=0.5))
-    assert (raster.cell, raster.lower) == (0.5, (0.0, 0.0))
+
+
+def test_geotiff_heights_in_feet(tmp_path):
+    path = write(tmp_path / "a.tif", keys=(1, 1, 0, 2, 1024, 0, 1, 1, 4099, 0, 1, 9002))
+    assert read(path, ReadOptions()).values[2, 1] == pytest.approx(3 * 0.3048)
+
+
+@pytest.mark.parametrize(
+    "tags",
+    [
+        {"scale": (0.0, 1.0, 0.0)},
+        {"scale": (np.nan, 1.0, 0.0)},
+        {"scale": (1.0, 0.99e-4, 0.0)},
+        {"scale": (1.01e6, 1.0, 0.0)},
+        {"keys": DEGREES, "tie_point": (0.0, 0.0, 0.0, 10.0, 93.0, 0.0)},
+    ],
+    ids=["zero", "NaN", "small", "large", "beyond the pole"],
+)
+def test_geotiff_with_cells_without_size_is_rejected(tmp_path, tags):
+    with pytest.raises(HeightFileError, match=r"expected 0\.0001 m to 1,000,000 m"):
+        read(write(tmp_path / "a.tif", **tags), ReadOptions())
+
+
+def test_geotiff_whose_bands_opencv_drops_is_rejected(tmp_path, monkeypatch):
+    path = write(tmp_path / "a.tif", bands=4)
+    monkeypatch.setattr(image, "decode", lambda *_: {"pixels": HEIGHTS})
+    with pytest.raises(HeightFileError, match=r"got 1 of 4 bands; expected all; .* pip install"):
+        read(path, ReadOptions())
 
 
 @pytest.mark.parametrize("tags", [{"scale": (1.0,)}, {"tie_point": (1.0,)}, {"nodata": b"none\0"}])

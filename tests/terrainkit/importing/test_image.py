@@ -7,6 +7,7 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError
+from terrainkit.importing import image
 from terrainkit.importing.image import read
 from terrainkit.importing.options import ReadOptions
 
@@ -36,6 +37,7 @@ RANGE = {"file_cell": 0.5, "height_range": (-1.0, 4.0)}
         (SAMPLE, {"scale": 0.002, "file_cell": 0.4}, 26.214, 0.0, 0.4, 2.9),
     ],
 )
+@pytest.mark.filterwarnings("ignore:.*with heights over")
 def test_image_columns_are_x_and_rows_go_down(
     tmp_path, sidecar, options, level, offset, cell, lower
 ):
@@ -67,17 +69,64 @@ def test_image_with_8_bits_warns_about_terraces(tmp_path):
         read(path, ReadOptions(file_cell=1.0, height_range=(0.0, 5.1)))
 
 
+GRAY = (np.arange(20).reshape(4, 5) * 3000).astype(np.uint16)
+
+
+def tinted(*offsets):
+    """Return an image whose blue, green, red (and opacity) are a gray plus offsets."""
+    return np.stack([GRAY + np.uint16(each) for each in offsets], axis=2)
+
+
+@pytest.mark.parametrize("opacity", [(), (0,)])
+def test_image_of_equal_colors_is_gray(tmp_path, opacity):
+    path = write(tmp_path / "a.png", tinted(0, 0, 0, *opacity))
+    raster = read(path, ReadOptions(file_cell=9.0, height_range=(0.0, 65.535)))
+    expected = GRAY[::-1].T * 1e-3
+    if opacity:
+        expected[0, 3] = np.nan  # the pixel of opacity 0
+    np.testing.assert_allclose(raster.values, expected, atol=1e-5)
+
+
+# 4 % of 65535 are 2621.
+@pytest.mark.parametrize(("tint", "is_gray"), [(2621, True), (2622, False)])
+def test_image_of_other_colors_needs_a_band(tmp_path, tint, is_gray):
+    path = write(tmp_path / "a.png", tinted(0, tint, 10))
+    options = {"file_cell": 9.0, "height_range": (0.0, 65.535)}
+    if is_gray:
+        with pytest.warns(tk.TerrainkitWarning, match=r"differ by up to 2621 of 65535; .* \(red\)"):
+            assert read(path, ReadOptions(**options)).values[0, 3] == pytest.approx(0.01)
+    else:
+        with pytest.raises(HeightFileError, match=r"got 3 colors .* by up to 2622; .*--band 1"):
+            read(path, ReadOptions(**options))
+    green = read(path, ReadOptions(**options, band=2))
+    assert green.values[0, 3] == pytest.approx(tint * 1e-3)
+    with pytest.raises(ConfigError, match=r"^band: got 4; .* has 3"):
+        read(path, ReadOptions(**options, band=4))
+
+
 METER = {"file_cell": 1.0}
-COLORS, FLOATS = np.zeros((4, 5, 3), np.uint16), PIXELS.astype(np.float32)
+FLOATS = PIXELS.astype(np.float32)
 
 
 @pytest.mark.parametrize(
     ("name", "pixels", "options", "error", "message"),
     [
-        ("a.png", PIXELS, METER, ConfigError, "^height_range: missing; .* uint16 values"),
-        ("a.png", PIXELS, {"scale": 1.0}, ConfigError, "^file_cell: missing"),
+        (
+            "a.png",
+            PIXELS,
+            {},
+            ConfigError,
+            r"got uint16 values .*--file-cell 0\.1 .* --height-range 0 2 ",
+        ),
+        ("a.png", PIXELS, METER, ConfigError, "got uint16 values.*example --height-range 0 2"),
+        (
+            "a.png",
+            PIXELS,
+            {"scale": 1.0},
+            ConfigError,
+            "got uint16 values.*example --file-cell 0.1 [^-]*$",
+        ),
         ("a.tif", FLOATS, RANGE, ConfigError, "^height_range: got float32 values"),
-        ("a.png", COLORS, METER, HeightFileError, r"got shape .*3.* expected a gray image"),
     ],
 )
 def test_image_needs_options_and_gray_pixels(tmp_path, name, pixels, options, error, message):
@@ -86,7 +135,8 @@ def test_image_needs_options_and_gray_pixels(tmp_path, name, pixels, options, er
 
 
 @pytest.mark.parametrize("suffix", [".png", ".tif"])
-def test_image_truncated_is_rejected(tmp_path, suffix):
+def test_image_truncated_is_rejected(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr(image, "is_gdal_installed", lambda: False)
     pixels = np.random.default_rng(0).integers(0, 65535, (64, 64)).astype(np.uint16)
     path = write(tmp_path / f"a{suffix}", pixels)
     path.write_bytes(path.read_bytes()[:3000])

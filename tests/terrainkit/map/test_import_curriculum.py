@@ -91,6 +91,7 @@ def test_import_curriculum_crops_at_the_center(tmp_path):
 
 
 @pytest.mark.parametrize(("blend", "expected"), [(0.0, [1, 1, 1, 1]), (0.2, [0, 0.5, 1, 1])])
+@pytest.mark.filterwarnings("ignore:.*with heights over")
 def test_import_curriculum_blends_the_edges(tmp_path, blend, expected):
     heights = np.ones((20, 20))
     heights[10:] = -1  # the median of the edges is 0

@@ -6,7 +6,8 @@ import pytest
 import trimesh
 
 import terrainkit as tk
-from terrainkit.errors import ConfigError, HeightFileError
+from terrainkit.errors import ConfigError, HeightFileError, MemoryLimitError
+from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
 from terrainkit.map.import_map import ImportReport
 from terrainkit.map.validate import validate
@@ -48,10 +49,11 @@ def test_import_records_the_file(tmp_path):
         "sha256": hashlib.sha256((tmp_path / "a.npy").read_bytes()).hexdigest(),
         "vertical_exaggeration": 1.0,
         "file_cell": 0.1,
+        "file_cell_y": 0.0,
         "height_span": 0.0,
         "scale": 0.0,
         "up": "z",
-        "missing": "reject",
+        "missing": "nearest",
         "crop": "random",
         "platform": 2.0,
     }
@@ -146,10 +148,22 @@ def test_import_fills_missing_heights(tmp_path, missing, expected):
     heights = steps()
     heights[0, 0] = -0.5
     heights[35, 12:14] = np.nan
-    imported = import_array(tmp_path, heights, missing=missing)
+    message = r"2 of 2400 heights are missing, the first at \(3\.55, 1\.25\).* --missing reject"
+    is_default = missing == "nearest"
+    with pytest.warns(tk.TerrainkitWarning, match=message) if is_default else nullcontext():
+        imported = import_array(tmp_path, heights, **({} if is_default else {"missing": missing}))
     assert imported.report.num_missing == 2
     assert imported.terrain_map.heights[35, 12] == pytest.approx(expected)
     assert validate(imported.terrain_map) == []
+
+
+def test_import_of_too_many_samples_names_a_cell_that_fits(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "MIN_CHECKED_BYTES", 100_000)
+    monkeypatch.setattr(memory, "_free_memory", lambda: 120_000)
+    # 2400 samples of 200 bytes are 4 times as much as is free: cells of 0.2 m, and some more.
+    with pytest.raises(MemoryLimitError, match=r"map of 2400 samples .*; --cell 0\.21 would fit"):
+        import_array(tmp_path, steps())
+    assert import_array(tmp_path, steps(), cell=0.21).terrain_map.grid.shape == (28, 19)
 
 
 def test_import_difficulty_is_rank(tmp_path):
@@ -221,7 +235,7 @@ def test_import_of_tiny_patch(tmp_path, number, radius, message):
 def test_import_of_other_files_is_rejected(tmp_path):
     (tmp_path / "b.npy").mkdir()
     for name, message in (
-        ("a.npz", r"there are: .*\.asc"),
+        ("a.xyz0", r"there are: .*\.asc"),
         ("a", r"there are: .*\.asc"),
         ("a.npy", "^no file"),
         ("b.npy", "got a special file or folder"),

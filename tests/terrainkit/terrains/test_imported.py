@@ -83,8 +83,19 @@ def test_imported_missing_heights(save):
     heights[5, 5] = np.nan
     parameters = save(heights)
     with pytest.raises(HeightFileError, match="1 of 10000 heights are missing"):
-        heights_of(Imported(**parameters))
-    assert np.isfinite(heights_of(Imported(**parameters, missing="nearest"))).all()
+        heights_of(Imported(**parameters, missing="reject"))
+    with pytest.warns(tk.TerrainkitWarning, match="1 of 10000 heights are missing"):
+        assert np.isfinite(heights_of(Imported(**parameters))).all()
+
+
+def test_imported_cells_may_be_longer_along_y(save):
+    # Along x, 0.01 m per sample; along y, -0.005 m per sample of 0.2 m.
+    terrain = Imported(
+        **save(plane((160, 60), 0.1)), file_cell_y=0.2, crop="center", vertical_exaggeration=1.0
+    )
+    heights = heights_of(terrain)
+    assert heights[65, 20] - heights[64, 20] == pytest.approx(0.01, abs=1e-5)
+    assert heights[20, 65] - heights[20, 63] == pytest.approx(-0.005, abs=1e-5)
 
 
 def imported_map(file):

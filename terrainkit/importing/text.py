@@ -1,0 +1,92 @@
+"""Read heights from a table of numbers in a text file."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from terrainkit.importing import asc
+from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.raster import Raster, make_raster
+from terrainkit.importing.source import decode
+
+SUFFIXES = (".txt", ".csv")
+
+_COMMENTS = ("#", "%", "//")
+_DELIMITERS = (";", ",", "\t", " ")
+_MAX_LINES = 20
+"""Lines in which numbers have to begin."""
+
+_MIN_POINTS = 50
+"""Rows of three numbers from which on they are taken for points (x, y, z)."""
+
+
+def read(path: Path, options: ReadOptions) -> Raster:
+    """Return the heights of a table: rows along x, columns along y, as numpy.savetxt writes arrays.
+
+    Numbers are separated by commas, semicolons, tabs or spaces. Comments, lines of text before the
+    numbers and pandas' numbers of rows and columns are skipped. Empty cells are missing heights. An
+    ESRI ASCII grid is read as such.
+
+    Args:
+        path: The file.
+        options: How to read the file.
+
+    Raises:
+        HeightFileError: if the file is no table of numbers.
+        ConfigError: if an option is missing or does not apply.
+    """
+    if asc.is_grid(path):
+        return asc.read(path, options)
+    return make_raster(path, decode(_read_table, path)["heights"], options)
+
+
+def _read_table(path: Path) -> dict[str, Any]:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        stripped = (line.strip(" \r\n") for line in file)
+        lines = [line for line in stripped if line and not line.startswith(_COMMENTS)]
+    found = ((k, each) for k, line in enumerate(lines[:_MAX_LINES]) for each in _delimiters(line))
+    start, delimiter = next(found, (0, ""))
+    if not delimiter:
+        raise ValueError("got text; expected a table of numbers")
+    end = delimiter if lines[start].endswith(delimiter) else ""
+    rows = [_with_points(line, delimiter).removesuffix(end) for line in lines[start:]]
+    separator = None if delimiter == " " else delimiter
+    try:
+        table = np.loadtxt(
+            rows, delimiter=separator, comments=None, ndmin=2, converters=_float_or_nan
+        )
+    except ValueError as error:
+        raise ValueError(str(error).partition("; use")[0]) from None
+    # pandas numbers columns, in whole numbers above decimals, and rows below an empty cell.
+    is_numbered = bool(np.isnan(table[0, 0]))
+    if is_numbered or ("." not in lines[start] and (table[1:] % 1 != 0).any()):
+        row = table[0, is_numbered:]
+        if len(row) > 2 and np.array_equal(row, np.arange(len(row))):
+            table = table[1:, is_numbered:]
+    if min(table.shape) < 2 or (table.shape[1] == 3 and len(table) >= _MIN_POINTS):
+        raise ValueError(
+            f"got {len(table)} rows of {table.shape[1]} numbers; expected a row of heights per "
+            "line; rename points (x, y, z) to .xyz"
+        )
+    return {"heights": table}
+
+
+def _delimiters(line: str) -> Iterator[str]:
+    """Yield the delimiters with which a line is a row of numbers."""
+    for delimiter in _DELIMITERS:
+        cells = _with_points(line, delimiter).split(None if delimiter == " " else delimiter)
+        with suppress(ValueError):
+            if not np.isnan([_float_or_nan(each) for each in cells]).all():
+                yield delimiter
+
+
+def _with_points(line: str, delimiter: str) -> str:
+    """Return a line with decimal points: unless it is the delimiter, a comma is one."""
+    return line if delimiter == "," else line.replace(",", ".")
+
+
+def _float_or_nan(text: str) -> float:
+    return float(text.strip() or "nan")

@@ -1,0 +1,61 @@
+from contextlib import nullcontext
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from terrainkit.errors import TerrainkitWarning
+from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.raster import Raster, make_raster
+
+
+def centers(count, step):
+    return (np.arange(count) + 0.5) * step
+
+
+@pytest.mark.parametrize("spacing", [(0.5, 0.5), (0.5, 0.8), (2.0, 0.3)])
+@pytest.mark.parametrize("step", [0.1, 0.5, 0.6, 1.3, 2.0])
+def test_heights_of_a_plane_are_exact_away_from_the_edge(spacing, step):
+    x, y = centers(40, spacing[0]), centers(60, spacing[1])
+    raster = Raster(values=np.add.outer(0.3 * x, -0.2 * y).astype(np.float32), spacing=spacing)
+    at_x = np.arange(4.0, 14.0, step)
+    at_y = np.arange(4.0, 12.0, step)
+    expected = np.add.outer(0.3 * at_x, -0.2 * at_y)
+    np.testing.assert_allclose(raster.heights(at_x, at_y), expected, atol=2e-6)
+
+
+@pytest.mark.parametrize(("factor", "kept"), [(1, 1.0), (2, 0.0), (3, 1 / 3), (4, 0.0), (5, 0.2)])
+def test_coarse_heights_are_means(factor, kept):
+    # Teeth of 2 m and 0 m: of 3 or 5 samples, one more is high or low.
+    values = np.tile([0.0, 2.0], 30).astype(np.float32)[:, None] * np.ones((1, 60), np.float32)
+    raster = Raster(values=values, spacing=(0.1, 0.1))
+    found = raster.heights(*(centers(60 // factor, 0.1 * factor),) * 2)
+    np.testing.assert_allclose(np.abs(found - 1.0)[2:-2], kept, atol=1e-5)
+
+
+def test_heights_where_most_is_missing_are_missing():
+    values = np.ones((4, 4), np.float32)
+    values[0, 0] = values[2, 0] = values[2:, 2:] = np.nan
+    found = Raster(values=values, spacing=(1.0, 1.0)).heights(*(np.array([1.0, 3.0]),) * 2)
+    np.testing.assert_array_equal(found, [[1.0, 1.0], [1.0, np.nan]])
+
+
+@pytest.mark.parametrize(
+    ("cell", "relief", "message"),
+    [
+        (1.0, 100.0, None),
+        (
+            1.0,
+            101.0,
+            r"got 10 m x 5 m with heights over 101 m; .*--scale 0\.01.*--file-cell 111000 111000 ",
+        ),
+        (0.025, 0.1, None),
+        (0.0249, 0.1, r"got 0\.249 m x 0\.1245 m; --file-cell 2\.49 2\.49 is 100 times larger"),
+        (1000.0, 9.0, None),
+        (1010.0, 9.0, r"got 10100 m x 5050 m, .*--cell 1 --patch-size 50 50"),
+    ],
+)
+def test_sizes_that_are_not_of_ground_are_warned_of(cell, relief, message):
+    values = np.linspace(0, relief, 50).reshape(10, 5)
+    with pytest.warns(TerrainkitWarning, match=message) if message else nullcontext():
+        make_raster(Path("a.npy"), values, ReadOptions(file_cell=cell))
