@@ -238,7 +238,7 @@ class Preview(PluginCommand):
     """The image to write (.png)."""
 
     width: int = 1600
-    """Minimum width of the map in the image [pixels]."""
+    """Width of the map in the image [pixels]; a tall map is narrower, and a long one is divided."""
 
     overwrite: bool = False
     """Replace an existing file."""

@@ -67,15 +67,18 @@ class Grid:
         """Return the length of `count` cells [m], rounded to a nanometer."""
         return round(count * self.cell, 9)
 
-    def centered(self, size: float) -> tuple[int, int]:
+    def centered(self, size: float, *, margin: int = 0) -> tuple[int, int]:
         """Return the cells along x and y of a centered square of `size` [m].
 
         A block can only be centered if its count is even where the grid's is even, and odd where it
         is odd. The count is the nearest of that parity, so it may differ from `size` by one cell.
+
+        Args:
+            size: Side of the square [m].
+            margin: Cells to leave free on each side; the square is shortened where it is longer.
         """
-        odd_x, odd_y = (n % 2 for n in self.shape)
-        x = _centered(size / self.cell, odd_x)
-        return x, x if odd_x == odd_y else _centered(size / self.cell, odd_y)
+        x, y = (min(_centered(size / self.cell, n % 2), max(0, n - 2 * margin)) for n in self.shape)
+        return x, y
 
     def rings(self, inner: tuple[int, int]) -> NDArray[np.int32]:
         """Return the ring around the centered block `inner` of each cell, shape `shape`, read-only.

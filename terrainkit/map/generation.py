@@ -3,7 +3,7 @@
 import itertools
 import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING
@@ -19,7 +19,9 @@ from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types, terrain_and_difficulty
 from terrainkit.map.patch import Patch, build_patch
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text
+from terrainkit.map.repeated_levels import repeated_levels
 from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.terrain.parameter import format_value
 from terrainkit.terrain.patch_geometry import uniform_friction
 
 if TYPE_CHECKING:
@@ -85,6 +87,9 @@ class _MapBuilder:
         self.deviations: Counter[str] = Counter()
         """Number of patches on which a parameter differs from the request, by parameter."""
 
+        self.examples: dict[str, str] = {}
+        """The realized and the requested value on the last of these patches, by parameter."""
+
         self.moved_spawns: Counter[str] = Counter()
         """Number of patches whose spawn origin was moved, by sub-terrain."""
 
@@ -117,7 +122,10 @@ class _MapBuilder:
         self._spawns[row, col], self._goals[row, col] = patch.spawns, patch.goals
         self._solids.append(patch.solids)
         deviating = patch.parameters.deviating(sub_terrain.declarations, config.cell)
-        self.deviations.update(f"{patch.terrain}.{name}" for name in deviating)
+        for name in deviating:
+            self.deviations[key := f"{patch.terrain}.{name}"] += 1
+            values = patch.parameters.realized[name], patch.parameters.requested[name]
+            self.examples[key] = " instead of ".join(map(format_value, values))
         if patch.spawn_offset > config.cell:
             self.moved_spawns[sub_terrain.name] += 1
 
@@ -186,7 +194,8 @@ def _warnings(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
     if builder.deviations:
         yield (
             f"cells of {config.cell:g} m, height steps or patches are too coarse or too small for "
-            f"the requested parameters: {_counts_text(builder.deviations)}; the map records the "
+            f"the requested parameters: {_counts_text(builder.deviations, builder.examples)}; "
+            "reduce them, the cells or the platform, or increase patch_size; the map records the "
             "realized values"
         )
     if builder.moved_spawns:
@@ -195,29 +204,15 @@ def _warnings(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
             f"{_counts_text(builder.moved_spawns)}; the nearest flat disk is used; increase the "
             "platform or reduce spawn_radius"
         )
-    if collapsed := list(_collapsed_ranges(terrain_map)):
-        yield (
-            f"cells of {config.cell:g} m or height steps are too coarse for a range: "
-            f"{listing(collapsed)} on every patch"
-        )
+    for text in repeated_levels(terrain_map):
+        yield f"cells of {config.cell:g} m or steps are too coarse for the levels of {text}"
     if cliffs := PatchEdges(terrain_map=terrain_map).cliffs():
         text = cliffs_text(cliffs, terrain_map.patch_names)
         yield f"cliffs between patches: {text}; a robot cannot climb them"
 
 
-def _counts_text(counts: Counter[str]) -> str:
-    return listing(f"{name} on {count} patches" for name, count in counts.items())
-
-
-def _collapsed_ranges(terrain_map: TerrainMap) -> Iterator[str]:
-    """Yield the parameters that have several requested values but only one realized value."""
-    for terrain_type, sub_terrain in enumerate(terrain_map.config.sub_terrains):
-        records = terrain_map.parameters[terrain_map.terrain_types == terrain_type].tolist()
-        for name in records[0].requested if records else ():
-            requested = {record.requested[name] for record in records}
-            realized = {record.realized[name] for record in records}
-            if len(requested) > 1 and len(realized) == 1:
-                yield (
-                    f"{sub_terrain.name}.{name} from {min(requested):g} to {max(requested):g} is "
-                    f"{realized.pop()}"
-                )
+def _counts_text(counts: Counter[str], examples: Mapping[str, str] | None = None) -> str:
+    return listing(
+        f"{name} on {count} patches" + (f", such as {examples[name]}" if examples else "")
+        for name, count in counts.items()
+    )

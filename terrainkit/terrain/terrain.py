@@ -41,8 +41,8 @@ class Terrain(Parameterized, ABC):
     has_column_seed: ClassVar[bool] = False
     """Whether the rows of a column have the same random numbers in mode curriculum.
 
-    Set it where single random objects decide how hard a patch is. Otherwise a row could be easier
-    than the previous row.
+    Set it where the random layout decides how hard a patch is. Otherwise a row could be easier than
+    the previous row.
     """
 
     has_random_heights: ClassVar[bool] = True

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -24,6 +24,7 @@ class Beams(Lane):
     """
 
     has_column_seed: ClassVar[bool] = True
+    has_random_heights: ClassVar[bool] = False
 
     # Width, gap and yaw (15 degrees) are in the range of Isaac Lab's and BeamDojo's beams.
     width: float = parameter.size(0.5, 0.2)
@@ -65,8 +66,10 @@ class Beams(Lane):
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each beam, and one behind the pit."""
         first, last = self._beams(grid, rng)
-        x = np.append((first + last) / 2, (last[-1] + self.gap + grid.upper[0]) / 2)
-        return np.column_stack([x, 0 * x + grid.center[1], 0 * x, 0 * x])
+        behind = (last[-1] + self.gap + grid.upper[0]) / 2
+        goals = lane_goals(grid, np.append((first + last) / 2, behind))
+        goals[:-1, 2] = 0.0  # the beams; noise may change the ground behind the pit
+        return goals
 
     def _beams(
         self, grid: Grid, rng: np.random.Generator

@@ -1,6 +1,7 @@
 """Terraces along the contour lines of hills."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,11 @@ from terrainkit.terrain import Terrain, parameter
 class Contour(Terrain):
     """Hills and hollows in level terraces, as in a model cut along contour lines.
 
-    The platform at the center and the edges of the patch are at height 0.
+    The platform at the center and the edges of the patch are at height 0. In mode curriculum, the
+    rows of a column differ only in `step_height`. Some columns have a level way between the hills.
     """
+
+    has_column_seed: ClassVar[bool] = True
 
     step_height: float = parameter.height(0.05, 0.25)
     """Height from one terrace to the next [m]."""

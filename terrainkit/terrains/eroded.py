@@ -1,6 +1,7 @@
 """Natural ground that rain has eroded."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,11 @@ class Eroded(Terrain):
     """Natural ground with ridges, gullies and flat sediment around a flat platform.
 
     Noise is eroded by gravity and by rain, and then scaled to the amplitude. The heights fade to 0
-    at the platform and at the edges of the patch.
+    at the platform and at the edges of the patch. In mode curriculum, the rows of a column differ
+    only in `amplitude`.
     """
+
+    has_column_seed: ClassVar[bool] = True
 
     amplitude: float = parameter.height(0.05, 0.6)
     """Height of the highest hill or depth of the deepest hollow, whichever is larger [m]."""

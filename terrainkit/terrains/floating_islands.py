@@ -24,6 +24,7 @@ class FloatingIslands(Terrain):
     """
 
     has_column_seed: ClassVar[bool] = True
+    has_random_heights: ClassVar[bool] = False
 
     # Isaac Lab: 8 to 5 platforms with a radius of 0.9 m, walkways of 0.4 m to 0.25 m.
     walkway: float = parameter.size(0.4, 0.25)

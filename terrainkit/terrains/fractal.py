@@ -1,6 +1,7 @@
 """Rugged natural ground."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,11 @@ from terrainkit.terrain import Terrain, parameter
 class Fractal(Terrain):
     """Rugged natural ground (a sum of Perlin noises) around a flat platform.
 
-    The heights fade to 0 at the platform and at the edges of the patch.
+    The heights fade to 0 at the platform and at the edges of the patch. In mode curriculum, the
+    rows of a column differ only in `amplitude`.
     """
+
+    has_column_seed: ClassVar[bool] = True
 
     amplitude: float = parameter.height(0.05, 0.4)
     """Height of the highest hill or depth of the deepest hollow, whichever is larger [m]."""

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ class KRails(Lane):
     field mirrors the first. The field may rise to a ridge in the middle. The robot is spawned at
     low x, and there is a goal behind the field. The rails are solids.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # The tests for response robots have beams of 0.1 m, or 0.2 m for large robots, on panels of 1.2
     # m.

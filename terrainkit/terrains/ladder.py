@@ -1,6 +1,7 @@
 """Ladders up to a deck and down from it."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ class Ladder(Terrain):
     The robot is spawned at low x. There is a goal on the deck, and one behind the second ladder.
     The deck spans the width of the patch. The ladders are solids with round rungs.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # 70 to 90 degrees, and the distances of the rungs, are from arXiv:2409.17731.
     angle: float = parameter.scalar(1.222, 1.57, allow_zero=False)

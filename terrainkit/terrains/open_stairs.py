@@ -55,7 +55,7 @@ class OpenStairs(FlatTerrain, Lane):
         """Return a goal on the top, and one behind the stairs."""
         first, last, number = self._stairs(grid)
         goals = lane_goals(grid, [(first + last) / 2, (last + grid.upper[0]) / 2])
-        goals[:, 2] = self.riser * (number + 1), 0.0
+        goals[0, 2] = self.riser * (number + 1)
         return goals
 
     def _stairs(self, grid: Grid) -> tuple[float, float, int]:

@@ -1,6 +1,7 @@
 """A grid of square blocks at random heights."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,11 @@ from terrainkit.terrain import Terrain, parameter
 class RandomGrid(Terrain):
     """Square blocks at random heights around a flat platform.
 
-    The blocks are centered. The remaining cells at the edges, at least one, are at height 0.
+    The blocks are centered. The remaining cells at the edges, at least one, are at height 0. In
+    mode curriculum, the rows of a column differ only in `height`.
     """
+
+    has_column_seed: ClassVar[bool] = True
 
     # mjlab's heights and cells; Isaac Lab has 0.05 m to 0.2 m on cells of 0.45 m.
     height: float = parameter.height(0.0, 0.3)

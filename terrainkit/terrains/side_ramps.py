@@ -1,13 +1,14 @@
 """Ramps that are tilted sideways."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_ramps
-from terrainkit.features.lane import Lane
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -22,6 +23,8 @@ class SideRamps(Lane):
     robot is spawned at low x. There is a goal on each ramp, and one behind the pit. The ramps are
     solids, so that their angles and the gaps are exact, but for the last gap, which ends at a cell.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # 10 to 30 degrees, and gaps up to 0.4 m, span Extreme Parkour and Robot Parkour Learning.
     roll: float = parameter.scalar(0.175, 0.524)
@@ -77,8 +80,10 @@ class SideRamps(Lane):
         """Return a goal in the middle of each ramp, and one behind the pit."""
         edges = self._slots(grid)
         x = [*(edges[:-1] + self.gap + edges[1:]) / 2, (edges[-1] + self.gap + grid.upper[0]) / 2]
-        y = grid.center[1] + np.append(self._side_signs(edges), 0.0) * self.offset
-        return np.column_stack([x, y, 0 * y, 0 * y])
+        goals = lane_goals(grid, x)
+        goals[:-1, 1] += self._side_signs(edges) * self.offset
+        goals[:-1, 2] = 0.0  # the ramps; noise may change the ground behind the pit
+        return goals
 
     def _side_signs(self, edges: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return 1 for each ramp on the left, and -1 for each on the right."""

@@ -1,6 +1,7 @@
 """Stairs with quarter-turn landings."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ class StairsTurning(Terrain):
     front of the first flight. The ground around the loop and the court are at height 0. There is a
     goal on each landing.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # The risers span Eurekaverse and terrain-generator.
     riser: float = parameter.height(0.1, 0.2)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ class Stakes(Terrain):
 
     Each stake has the same distance from its six neighbors.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # The plum-blossom piles of Unitree's demonstrations and of BeamDojo.
     diameter: float = parameter.size(0.3, 0.15)

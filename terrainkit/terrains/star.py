@@ -1,6 +1,7 @@
 """Beams that radiate from a platform."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ class Star(Terrain):
     The angles between neighboring beams are equal, and the first beam has a random direction. The
     beams are solids, so that their width is exact. The rim of the patch is flat.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # Isaac Lab: 12 beams to 1, 0.7 m to 0.4 m wide.
     number: int = parameter.count(12, 1)

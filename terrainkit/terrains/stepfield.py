@@ -1,6 +1,7 @@
 """Fields of square posts."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,11 @@ class Stepfield(Lane):
 
     Flat fields, hills and diagonal hills alternate, as in the stepfields of response-robot tests.
     Neighboring posts, and the outermost posts and the ground, differ by at most 2 units. The robot
-    is spawned at low x. There is a goal on each field but the last, and one behind the fields.
+    is spawned at low x. There is a goal on each field but the last, and one behind the fields. In
+    mode curriculum, the rows of a column differ only in `unit`.
     """
+
+    has_column_seed: ClassVar[bool] = True
 
     # The tests for response robots have units and posts of 0.1 m.
     unit: float = parameter.height(0.02, 0.1)

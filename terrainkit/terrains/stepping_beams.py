@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane
+from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.features.pit_ground import pit_between
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -25,6 +25,7 @@ class SteppingBeams(Lane):
     """
 
     has_column_seed: ClassVar[bool] = True
+    has_random_heights: ClassVar[bool] = False
 
     # Width, gap, yaw and length are in the range of Isaac Lab's and BeamDojo's beams.
     width: float = parameter.size(0.5, 0.2)
@@ -79,8 +80,7 @@ class SteppingBeams(Lane):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal behind the pit."""
-        x = (self._slots(grid)[-1] + self.gap + grid.upper[0]) / 2
-        return np.array([[x, grid.center[1], 0.0, 0.0]])
+        return lane_goals(grid, (self._slots(grid)[-1] + self.gap + grid.upper[0]) / 2)
 
     def _slots(self, grid: Grid) -> NDArray[np.float64]:
         pitch, end = self.width + self.gap, max(self.end, self.gap + grid.cell)

@@ -1,6 +1,7 @@
 """Two rows of stones along a lane."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,11 @@ from terrainkit.terrain import parameter
 class StoneRows(Lane):
     """Two rows of square stones across a pit, one for the left feet and one for the right.
 
-    The robot is spawned at low x and walks along x. There is a goal at each pair of stones and one
-    behind the pit. A block behind the last pair takes the rest of the pit.
+    The robot is spawned at low x and walks along x. There is a goal behind the pit; the middle of
+    the lane is between the stones. A block behind the last pair takes the rest of the pit.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # The first and the last of BeamDojo's nine levels, with its variation and depth.
     stone: float = parameter.size(0.8, 0.2)
@@ -63,11 +66,8 @@ class StoneRows(Lane):
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
-        """Return a goal at each pair of stones, and one behind the pit."""
-        behind = grid.upper[0] - grid.length(grid.cells(self.start)) / 2
-        goals = lane_goals(grid, [*(self._rows(grid) + self.stone / 2), behind])
-        goals[:, 2] = 0.0
-        return goals
+        """Return a goal behind the pit."""
+        return lane_goals(grid, grid.upper[0] - grid.length(grid.cells(self.start)) / 2)
 
     def _rows(self, grid: Grid) -> NDArray[np.float64]:
         """Return the first edge of each pair of stones along x [m]."""

@@ -1,6 +1,7 @@
 """Stones with random offsets all around a platform."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ class StonesEverywhere(Terrain):
 
     Stones are truncated at the platform and at the edges of the pit.
     """
+
+    has_random_heights: ClassVar[bool] = False
 
     # The ranges of Isaac Lab's development branch.
     stone: float = parameter.size(0.96, 0.2)

@@ -1,9 +1,8 @@
 """Preview: a shaded relief of a map with labels, spawn origins, solids and goals."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +12,11 @@ from numpy.typing import NDArray
 from terrainkit.errors import ExportError
 from terrainkit.export.requirements import require_finite
 from terrainkit.files.atomic_write import atomic_write
+from terrainkit.geometry.solids import Solids
+from terrainkit.views.preview_layout import ABOVE, BELOW, LEFT, RIGHT, Block, make_blocks
 
 if TYPE_CHECKING:
+    from terrainkit.geometry.mesh.tri_mesh import TriMesh
     from terrainkit.map.config import MapConfig
     from terrainkit.map.terrain_map import TerrainMap
 
@@ -37,17 +39,23 @@ _GOAL_COLOR = (40, 90, 160)
 _PASSABLE_COLOR, _IMPASSABLE_COLOR = (30, 120, 60), (200, 30, 30)
 _SOLID_OPACITY = 0.75
 _BACKGROUND = (250, 249, 246)
-_MARGIN = (250, 60, 130, 70)
-"""Margin to the left, below, to the right and above the relief [px]."""
+_HATCH = 12
+"""Distance between the hatching lines of hanging solids along an axis [px]."""
+
+_HANGING = 0.02
+"""Height above the ground below its center from which a solid hangs [m]."""
+
+_GOAL_DISTANCE = 14
+"""Smallest distance of the numbers of two goals [px]."""
 
 _BAR_WIDTH, _MAX_BAR_HEIGHT = 22, 500
 """Size of the color bar [px]; it is lower where the relief is."""
 
 MAX_PIXELS = 10_000
-"""Largest side of the relief [px]."""
+"""Largest width of the relief [px]."""
 
 NOTEBOOK_PIXELS = 800
-"""Approximate length of the longer side of the relief in notebooks [px]."""
+"""Width of the relief in notebooks [px]."""
 
 _LABEL_HEIGHT, _LABEL_WIDTH = 18, 80
 """Size of a label [px]; where patches are smaller, only some are labeled."""
@@ -89,7 +97,7 @@ def write_preview(
     Args:
         terrain_map: The map.
         path: Target.
-        width: Minimum width of the relief [px].
+        width: Width of the relief [px]. A tall map is narrower, and a long map is divided.
         overwrite: Replace an existing file.
         routes: Paths to draw.
 
@@ -109,10 +117,7 @@ def write_preview(
 
 def notebook_preview(terrain_map: "TerrainMap") -> bytes:
     """Return the preview as a PNG, in the size of a notebook's output."""
-    heights, _ = _without_border(terrain_map)
-    # The longer side of the relief is limited.
-    width = round(NOTEBOOK_PIXELS * min(1.0, heights.shape[0] / heights.shape[1]))
-    return _png(render_preview(terrain_map, max(1, width)))
+    return _png(render_preview(terrain_map, NOTEBOOK_PIXELS))
 
 
 def _png(image: Picture) -> bytes:
@@ -126,36 +131,57 @@ def render_preview(
     terrain_map: "TerrainMap", width: int = 1600, routes: Sequence[Route] = ()
 ) -> Picture:
     """Return the preview as an RGB image, shape (height, width, 3): x to the right, y up."""
-    heights, crop = _without_border(terrain_map)
-    cell = terrain_map.config.cell
-    extent = heights.shape[0] * cell
-    # A tall map is drawn narrower to limit the height of the picture.
-    width = max(1, min(width, MAX_PIXELS * heights.shape[0] // heights.shape[1]))
-    if heights.shape[0] > width:
-        heights, cell = _downsample(heights, width), extent / width
-    # Image rows go down. Each sample is a square of whole pixels.
-    factor = max(1, min(-(-width // heights.shape[0]), MAX_PIXELS // max(heights.shape)))
-    ground = (
-        shaded_relief(heights, cell)
-        .swapaxes(0, 1)[::-1]
-        .repeat(factor, axis=0)
-        .repeat(factor, axis=1)
-    )
-    scale = ground.shape[1] / extent
-    left, below, right, above = _MARGIN
-    height, span = ground.shape[:2]
-    image = np.full((height + above + below, span + left + right, 3), _BACKGROUND, dtype=np.uint8)
-    image[above : above + height, left : left + span] = ground
+    blocks, axis = make_blocks(terrain_map, width)
+    pictures = [_draw_block(terrain_map, block, routes) for block in blocks]
+    sizes = np.array([each.shape[:2] for each in pictures])
+    height, span = np.where(np.arange(2) == axis, sizes.sum(axis=0), sizes.max(axis=0)).tolist()
+    image = np.full((height + ABOVE, span + RIGHT, 3), _BACKGROUND, dtype=np.uint8)
+    corner = [ABOVE, 0]
+    for picture in pictures:
+        y, x = corner
+        image[y : y + picture.shape[0], x : x + picture.shape[1]] = picture
+        corner[axis] += picture.shape[axis]
+    _write(image, "columns (y): terrain", (10, ABOVE - 14))
+    _write(image, map_title(terrain_map.config), (LEFT, 40), 0.7)
     tops = terrain_map.solids.bounds()[1][:, 2]  # the color of a solid shows the height of its top
-    low = min(float(heights.min()), tops.min(initial=np.inf))
-    high = max(float(heights.max()), tops.max(initial=-np.inf))
-    _draw_color_bar(image[above : above + height, left + span :], low, high)
-    zero = (left - crop[0] * scale, above + height + crop[1] * scale)
-    _draw_solids(image, terrain_map, scale, zero)
-    _draw_labels(image, terrain_map, scale, zero)
-    for route in routes:
-        _draw_route(image, route, scale, zero)
+    shown = [terrain_map.heights[each.cells] for each in blocks]
+    low = min([*(float(each.min()) for each in shown), tops.min(initial=np.inf)])
+    high = max([*(float(each.max()) for each in shown), tops.max(initial=-np.inf)])
+    _draw_color_bar(image[:, span:], low, high, blocks[0].size[1])
+    if _is_hanging(terrain_map, terrain_map.solids).any():
+        y = ABOVE + min(blocks[0].size[1], _MAX_BAR_HEIGHT)
+        _write(image, "hatched:", (span + 20, y + 26))
+        _write(image, "hangs", (span + 20, y + 42))
     return image
+
+
+def _draw_block(terrain_map: "TerrainMap", block: Block, routes: Sequence[Route]) -> Picture:
+    """Return the picture of a block with its labels to the left and below."""
+    width, height = block.size
+    relief = _relief(terrain_map.heights[block.cells], block)
+    _draw_solids(relief, terrain_map, block)
+    _draw_poses(relief, terrain_map, block)
+    for route in routes:
+        _draw_route(relief, route, block)
+    picture = np.full((height + BELOW, LEFT + width, 3), _BACKGROUND, dtype=np.uint8)
+    picture[:height, LEFT:] = relief
+    _draw_labels(picture, terrain_map, block)
+    return picture
+
+
+def _relief(heights: NDArray[np.float32], block: Block) -> Picture:
+    """Return the relief of the heights of a block in its size: averages, or a square per sample."""
+    import cv2
+
+    width, height = block.size
+    if width < heights.shape[0]:
+        # OpenCV's x is the second index.
+        heights = cv2.resize(heights, (height, width), interpolation=cv2.INTER_AREA)
+        heights = np.asarray(heights, dtype=np.float32).reshape(width, height)
+    cell = max(block.grid.cell, 1 / block.scale)
+    relief = np.ascontiguousarray(shaded_relief(heights, cell).swapaxes(0, 1)[::-1])
+    resized = cv2.resize(relief, (width, height), interpolation=cv2.INTER_NEAREST)
+    return np.asarray(resized, dtype=np.uint8)
 
 
 def shaded_relief(heights: NDArray[np.float32], cell: float) -> Picture:
@@ -209,26 +235,6 @@ def map_title(config: "MapConfig") -> str:
     return f"{patches}, seed {config.seed}"
 
 
-def _without_border(terrain_map: "TerrainMap") -> tuple[NDArray[np.float32], tuple[float, float]]:
-    """Return the heights with 1 m of the border, and their lower corner [m]."""
-    config = terrain_map.config
-    cut = max(0, config.border_cells - round(1.0 / config.cell))
-    heights = terrain_map.heights[cut : len(terrain_map.heights) - cut, :]
-    heights = heights[:, cut : heights.shape[1] - cut]
-    lower = terrain_map.grid.lower
-    return heights, (lower[0] + cut * config.cell, lower[1] + cut * config.cell)
-
-
-def _downsample(heights: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-    """Return the heights averaged to `width` samples along x."""
-    import cv2
-
-    other = max(1, round(heights.shape[1] * width / heights.shape[0]))
-    # OpenCV's x is the second index.
-    shrunk = cv2.resize(heights, (other, width), interpolation=cv2.INTER_AREA)
-    return np.asarray(shrunk.reshape(width, other), dtype=np.float32)
-
-
 def color_levels(low: float, high: float) -> NDArray[np.float64]:
     """Return the heights of the ticks of a color bar [m], ascending.
 
@@ -243,95 +249,146 @@ def color_levels(low: float, high: float) -> NDArray[np.float64]:
     return np.unique([low, *inner, high])
 
 
-def _draw_color_bar(image: Picture, low: float, high: float) -> None:
-    """Draw the color bar of heights from `low` to `high` [m] into the margin `image`."""
+def _draw_color_bar(image: Picture, low: float, high: float, length: int) -> None:
+    """Draw the color bar of heights from `low` to `high` [m] into the right margin `image`.
+
+    It is as long as the relief, `length` [px], but limited.
+    """
     levels = color_levels(low, high)
-    height = min(len(image) - 1, _MAX_BAR_HEIGHT)
+    height = min(length - 1, _MAX_BAR_HEIGHT)
     ticks = np.linspace(height, 0, len(levels))
     rows = np.interp(np.arange(height + 1), ticks[::-1], levels[::-1])
-    bar = image[: height + 1, 20 : 20 + _BAR_WIDTH]
+    bar = image[ABOVE : ABOVE + height + 1, 20 : 20 + _BAR_WIDTH]
     bar[:] = height_colors(rows)[:, None]
     bar[[0, -1]] = bar[:, [0, -1]] = _TEXT_COLOR
     every = max(1, math.ceil(_LABEL_HEIGHT * len(levels) / (height + 1)))
     for row, level in list(zip(ticks.round().astype(int).tolist(), levels, strict=True))[::every]:
-        image[row, 20 + _BAR_WIDTH : 26 + _BAR_WIDTH] = _TEXT_COLOR
-        y = min(max(row + 5, 11), len(image) - 2)
+        image[ABOVE + row, 20 + _BAR_WIDTH : 26 + _BAR_WIDTH] = _TEXT_COLOR
+        y = ABOVE + min(max(row + 5, 11), length - 2)
         _write(image, f"{level:.2f} m".replace("-0.00", "0.00"), (32 + _BAR_WIDTH, y))
+    if len(levels) > 2 and np.ptp(np.diff(levels)) > 1e-3:
+        _write(image, "scale not", (20, ABOVE - 26))
+        _write(image, "linear", (20, ABOVE - 10))
 
 
-def _write(image: Picture, text: str, at: tuple[int, int], size: float = 0.5) -> None:
+def _write(
+    image: Picture,
+    text: str,
+    at: tuple[int, int],
+    size: float = 0.5,
+    color: tuple[int, int, int] = _TEXT_COLOR,
+) -> None:
     import cv2
 
-    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, _TEXT_COLOR, 1, cv2.LINE_AA)
+    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, color, 1, cv2.LINE_AA)
 
 
-def _draw_solids(
-    image: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
-) -> None:
-    """Draw the outline of each solid, filled in the color of its top, the highest one last."""
+def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:
+    """Draw each solid: its upper facets, shaded, in the color of their height; the highest last.
+
+    The ground shows through. Solids that hang above the ground are hatched.
+    """
     import cv2
 
     from terrainkit.geometry.mesh.solid_mesh import solid_meshes
 
-    for mesh in sorted(solid_meshes(terrain_map.solids), key=lambda m: m.vertices[:, 2].max()):
-        corners = np.array(zero) + mesh.vertices[:, :2] * (scale, -scale)
-        outline = cv2.convexHull(np.rint(corners).astype(np.int32))
-        x, y, width, height = cv2.boundingRect(outline)
-        window = image[y : y + height, x : x + width]
-        top = height_colors(mesh.vertices[:, 2].max())
-        layer = cv2.fillConvexPoly(window.copy(), outline - (x, y), top.tolist(), cv2.LINE_AA)
-        # The ground shows through, since a solid may hang above it.
+    lower, upper = (corner[:, :2] for corner in terrain_map.solids.bounds())
+    is_near = np.all((lower < block.grid.upper) & (upper > block.grid.lower), axis=1)
+    solids = terrain_map.solids.select(np.asarray(is_near))
+    meshes = zip(solid_meshes(solids), _is_hanging(terrain_map, solids), strict=True)
+    for mesh, hangs in sorted(meshes, key=lambda each: each[0].vertices[:, 2].max()):
+        outline = cv2.convexHull(block.pixels(mesh.vertices[:, :2]))
+        first = np.maximum(outline.min(axis=(0, 1)), 0)
+        x, y = first.tolist()
+        last_x, last_y = (outline.max(axis=(0, 1)) + 1).tolist()
+        window = image[y:last_y, x:last_x]
+        if not window.size:
+            continue
+        layer = window.copy()
+        for points, color in _facets(mesh):
+            facet = cv2.convexHull(block.pixels(points[:, :2])) - first
+            cv2.fillConvexPoly(layer, facet, color.tolist(), cv2.LINE_AA)
+        edge = height_colors(mesh.vertices[:, 2].max()) * 0.6
+        if hangs:
+            inside = cv2.fillConvexPoly(np.zeros(layer.shape[:2], np.uint8), outline - first, 1)
+            i, j = np.indices(inside.shape)
+            layer[(inside > 0) & ((x + j + y + i) % _HATCH < 2)] = edge
         window[:] = cv2.addWeighted(layer, _SOLID_OPACITY, window, 1 - _SOLID_OPACITY, 0)
-        cv2.polylines(image, [outline], True, (top * 0.6).tolist(), 1, cv2.LINE_AA)
+        cv2.polylines(image, [outline], True, edge.tolist(), 1, cv2.LINE_AA)
 
 
-def _draw_labels(
-    image: Picture, terrain_map: "TerrainMap", scale: float, zero: tuple[float, float]
-) -> None:
-    import cv2
+def _is_hanging(terrain_map: "TerrainMap", solids: Solids) -> NDArray[np.bool_]:
+    """Return whether each solid hangs above the ground below its center."""
+    lower, upper = solids.bounds()
+    ground = terrain_map.height((lower + upper)[:, :2] / 2)
+    return np.asarray(lower[:, 2] > ground + _HANGING)
 
-    config, (rows, cols) = terrain_map.config, terrain_map.difficulty.shape
-    first = config.patch_grid(0, 0).lower
-    write = partial(_write, image)
 
-    def pixel(x: float, y: float) -> tuple[int, int]:
-        return round(zero[0] + x * scale), round(zero[1] - y * scale)
+def _facets(mesh: "TriMesh") -> Iterator[tuple[NDArray[np.float32], NDArray[np.float64]]]:
+    """Yield the points of each upper facet of a convex mesh, and its color."""
+    z, top = mesh.vertices[:, 2], mesh.vertices[:, 2].max()
+    is_top = z > top - 1e-4
+    if (np.ptp(mesh.vertices[is_top, :2], axis=0) >= np.ptp(mesh.vertices[:, :2], axis=0)).all():
+        yield mesh.vertices[is_top], height_colors(top)  # most solids have a level top
+        return
+    corners = mesh.vertices[mesh.triangles].astype(float)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    light = LIGHT / LIGHT[2]
+    for each in np.unique(normal[normal[:, 2] > 1e-3].round(3), axis=0):
+        points = mesh.vertices[mesh.triangles[(np.abs(normal - each) < 1e-3).all(axis=1)].ravel()]
+        yield points, shaded_colors(height_colors(points[:, 2].mean()), np.asarray(each @ light))
 
+
+def _draw_labels(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:
+    """Write the names of the columns to the left, and the difficulties of the rows below."""
+    config, (_, height) = terrain_map.config, block.size
     size_x, size_y = config.patch_size
-    by_column = config.mode != "randomized"
-    for col in range(0, cols, max(1, math.ceil(_LABEL_HEIGHT / (size_y * scale)))):
-        _, y = pixel(0, first[1] + (col + 0.5) * size_y)
-        name = terrain_map.terrain_names[terrain_map.terrain_types[0, col]] if by_column else ""
-        write(f"{col:>3}  {name}", (10, y + 5))
-    for row in range(0, rows, max(1, math.ceil(_LABEL_WIDTH / (size_x * scale)))):
-        x, _ = pixel(first[0] + (row + 0.5) * size_x, 0)
+    for col in block.cols[:: max(1, math.ceil(_LABEL_HEIGHT / (size_y * block.scale)))]:
+        _, y = block.pixels(config.patch_grid(block.rows[0], col).center).tolist()
+        is_type = config.mode != "randomized"
+        name = terrain_map.terrain_names[terrain_map.terrain_types[0, col]] if is_type else ""
+        _write(image, f"{col:>3}  {name}", (10, y + 5))
+    for row in block.rows[:: max(1, math.ceil(_LABEL_WIDTH / (size_x * block.scale)))]:
+        x, _ = block.pixels(config.patch_grid(row, block.cols[0]).center).tolist()
         low, high = terrain_map.difficulty[row].min(), terrain_map.difficulty[row].max()
         level = f"{low:.2f}" if low == high else f"{low:.2f}-{high:.2f}"
-        write(f"{row}: d {level}", (x - 36, image.shape[0] - _MARGIN[1] + 24))
-    write("columns (y): terrain", (10, _MARGIN[3] - 14))
-    write("rows (x): difficulty", (10, image.shape[0] - _MARGIN[1] + 24))
-    write(map_title(config), (_MARGIN[0], 40), 0.7)
-    radius = max(2, round(scale * config.spawn_radius))
-    for origin in terrain_map.env_origins.reshape(-1, 3).tolist():
-        cv2.circle(image, pixel(*origin[:2]), radius, _BACKGROUND, 3, cv2.LINE_AA)
-        cv2.circle(image, pixel(*origin[:2]), radius, _SPAWN_COLOR, 1, cv2.LINE_AA)
-        cv2.circle(image, pixel(*origin[:2]), 2, _SPAWN_COLOR, -1, cv2.LINE_AA)
-    goals = terrain_map.goals[~np.isnan(terrain_map.goals[..., 0])].tolist()
-    for x, y, _, heading in goals:
-        tip = x + 0.4 * math.cos(heading), y + 0.4 * math.sin(heading)
-        cv2.arrowedLine(image, pixel(x, y), pixel(*tip), _GOAL_COLOR, 1, cv2.LINE_AA, tipLength=0.4)
+        x = min(LEFT + x - 36, image.shape[1] - _LABEL_WIDTH)
+        _write(image, f"{row}: d {level}", (x, height + 24))
+    _write(image, "rows (x): difficulty", (10, height + 24))
 
 
-def _draw_route(image: Picture, route: Route, scale: float, zero: tuple[float, float]) -> None:
+def _draw_poses(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:
+    """Draw the spawn origins, and the goals with their numbers where there is space."""
+    import cv2
+
+    radius = max(2, round(block.scale * terrain_map.config.spawn_radius))
+    for origin in block.pixels(terrain_map.env_origins[..., :2]).reshape(-1, 2).tolist():
+        cv2.circle(image, origin, radius, _BACKGROUND, 3, cv2.LINE_AA)
+        cv2.circle(image, origin, radius, _SPAWN_COLOR, 1, cv2.LINE_AA)
+        cv2.circle(image, origin, 2, _SPAWN_COLOR, -1, cv2.LINE_AA)
+    for row, col in np.ndindex(terrain_map.difficulty.shape):
+        goals = terrain_map.goals[row, col].astype(float)
+        goals = goals[~np.isnan(goals[:, 0])]
+        tips = goals[:, :2] + 0.4 * np.column_stack([np.cos(goals[:, 3]), np.sin(goals[:, 3])])
+        last = np.full(2, -_GOAL_DISTANCE)
+        arrows = np.stack([block.pixels(goals[:, :2]), block.pixels(tips)], axis=1)
+        for number, (at, tip) in enumerate(arrows.tolist(), start=1):
+            cv2.arrowedLine(image, at, tip, _GOAL_COLOR, 1, cv2.LINE_AA, tipLength=0.4)
+            if len(goals) > 1 and np.abs(at - last).max() >= _GOAL_DISTANCE:
+                last = np.array(at)
+                _write(image, f"{number}", (at[0] + 2, at[1] - 5), 0.45, _GOAL_COLOR)
+
+
+def _draw_route(image: Picture, route: Route, block: Block) -> None:
     """Draw a path, and its mark with the label to the right."""
     import cv2
 
     color = _PASSABLE_COLOR if route.is_passable else _IMPASSABLE_COLOR
-    pixels = np.rint(np.array(zero) + route.points * (scale, -scale)).astype(np.int32)
-    cv2.polylines(image, [pixels], False, color, 2, cv2.LINE_AA)
+    cv2.polylines(image, [block.pixels(route.points)], False, color, 2, cv2.LINE_AA)
     if route.place is not None:
-        x, y = round(zero[0] + route.place[0] * scale), round(zero[1] - route.place[1] * scale)
+        x, y = block.pixels(route.place).tolist()
         cv2.drawMarker(image, (x, y), color, cv2.MARKER_TILTED_CROSS, 14, 3, cv2.LINE_AA)
-        at, font = (x + 10, y - 6), cv2.FONT_HERSHEY_SIMPLEX
+        at, font = (min(x + 10, image.shape[1] - 36), y - 6), cv2.FONT_HERSHEY_SIMPLEX
         cv2.putText(image, route.label, at, font, 0.5, _BACKGROUND, 4, cv2.LINE_AA)
         _write(image, route.label, at)

@@ -81,7 +81,7 @@ def test_generate_warns_of_coarse_cells(terrainkit):
     words = ("--rows", 2, "--cell", 1, "--terrain", "pyramid_stairs")
     run = terrainkit("generate", "-o", "a.npz", *words)
     assert (run.returncode, run.stderr.count("\n")) == (0, 1)
-    told = "pyramid_stairs.step_width on 20 patches; the map records the realized values"
+    told = "pyramid_stairs.step_width on 20 patches, such as 1 instead of 0.31; reduce"
     assert told in run.stderr
 
 

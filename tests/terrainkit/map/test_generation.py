@@ -136,9 +136,21 @@ def test_generate_with_an_executor_reports_the_first_error_and_cancels_the_rest(
 @pytest.mark.parametrize(
     ("terrain", "given", "message"),
     [
-        ("rough", {"amplitude": 0.004}, r"height steps .* rough\.amplitude on 3 patches; the map"),
-        ("stepping_stones", {"distance": (0.05, 0.1)}, "distance from 0.05 to 0.1 is 0.1 on every"),
-        ("stepping_stones", {"stone": (0.26, 0.34)}, "stone from 0.26 to 0.34 is 0.3 on every"),
+        (
+            "rough",
+            {"amplitude": 0.004},
+            "rough.amplitude on 3 patches, such as 0 instead of 0.004; r",
+        ),
+        (
+            "stepping_stones",
+            {"distance": (0.05, 0.1)},
+            "distance is the same as before in rows 1, 2; u",
+        ),
+        (
+            "stepping_stones",
+            {"stone": (0.26, 0.34)},
+            "stone is .* use cells of 0.025 m or a larger r",
+        ),
         ("pit", {"side": 1.0}, "at the preferred spawn position: pit on 2 patches"),
         ("stairs", {"landing": 1.0, "step_width": 0.7}, "spawn position: stairs on 3 patches"),
     ],

@@ -11,7 +11,9 @@ from tests.terrains import heights_of
     [
         ((80, 80), 2.0, (20, 20)),
         ((80, 51), 4.0, (40, 41)),
-        ((80, 40), 4.0, (40, 40)),  # a trench as wide as the patch
+        ((80, 40), 3.8, (38, 38)),
+        ((80, 40), 4.0, (40, 38)),  # as wide as the patch: a wall on each side remains
+        ((41, 120), 4.0, (39, 40)),
     ],
 )
 def test_pit_is_square_and_centered(shape, asked, sides):

@@ -8,6 +8,7 @@ import terrainkit as tk
 from terrainkit.errors import ExportError
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.views.preview import (
+    LIGHT,
     Route,
     color_levels,
     height_colors,
@@ -15,8 +16,8 @@ from terrainkit.views.preview import (
     shaded_relief,
     write_preview,
 )
+from terrainkit.views.preview_layout import ABOVE, BELOW, LEFT, RIGHT, make_blocks
 
-LEFT, BELOW, RIGHT, ABOVE = 250, 60, 130, 70
 PAPER = (250, 249, 246)
 FLAT = tk.SubTerrain(terrain="flat")
 
@@ -46,30 +47,54 @@ def test_preview_has_x_to_the_right_and_y_up(pits):
     assert np.abs(last - first).max() > 40
     assert (picture[:, :LEFT] != PAPER).any()  # labels
     bowl = dataclasses.replace(slope(inverted=True), name="bowl")
-    picture = render_preview(map_of(FLAT, bowl, cols=2, difficulty_range=(1.0, 1.0)), 160)
+    # 8 m x 16 m in 256 px x 320 px: 20 px for a meter.
+    picture = render_preview(map_of(FLAT, bowl, cols=2, difficulty_range=(1.0, 1.0)), 256)
     top, bottom = (picture[ABOVE + 30 + i, LEFT + 30].astype(int) for i in (80, 240))
     assert bottom.tolist() == shaded_relief(np.zeros((3, 3), np.float32), 0.1)[1, 1].tolist()
     assert np.abs(top - bottom).max() > 40
 
 
-@pytest.mark.parametrize(("width", "expected"), [(100, 100), (260, 260), (261, 520), (520, 520)])
-def test_preview_has_the_minimum_width(pits, width, expected):
-    assert render_preview(pits, width).shape[1] == LEFT + expected + RIGHT
+@pytest.mark.parametrize("width", [100, 260, 261, 1600])
+def test_preview_has_the_width(pits, width):
+    assert render_preview(pits, width).shape[1] == LEFT + width + RIGHT
 
 
-def test_preview_of_a_long_map_is_limited():
-    long = map_of(FLAT, cols=300, patch_size=(2.0, 2.0), cell=0.2)
-    height, width, _ = render_preview(long, 1600).shape
-    assert (height, width) == (ABOVE + 9000 + BELOW, LEFT + 30 + RIGHT)
+@pytest.mark.parametrize(
+    ("rows", "cols", "axis", "parts"),
+    [
+        (3, 3, 1, 1),
+        (5, 10, 1, 1),  # tall: 1.25 times as high as wide
+        # 24 m x 480 m. Three blocks of 24 m x 160 m have 12.5 px for a meter, four only 8.9 px:
+        # 1600 px are 4 x 24 m and three margins of 250 px.
+        (3, 60, 1, 3),
+        # 480 m x 24 m. Four blocks of 120 m x 24 m have 13.3 px for a meter, five 14.7 px:
+        # 2000 px are 5 x 24 m and four margins of 60 px.
+        (60, 3, 0, 5),
+    ],
+)
+def test_preview_divides_long_maps_to_fit_a_screen(rows, cols, axis, parts):
+    terrain_map = map_of(FLAT, rows=rows, cols=cols, cell=0.2)
+    blocks, found_axis = make_blocks(terrain_map, 1600)
+    assert (found_axis, len(blocks)) == (axis, parts)
+    patches = [(row, col) for block in blocks for row in block.rows for col in block.cols]
+    assert sorted(patches) == [*np.ndindex(rows, cols)]
+    seen = np.zeros(terrain_map.heights.shape)
+    for block in blocks:
+        seen[block.cells] += 1
+        assert block.pixels(block.grid.lower).tolist() == [0, block.size[1]]
+        assert block.pixels(block.grid.upper).tolist() == [block.size[0], 0]
+    assert (seen == 1).all()
+    height, width, _ = render_preview(terrain_map, 1600).shape
+    assert height <= ABOVE + 2000 + BELOW + 2
+    assert width <= LEFT + 1600 + RIGHT + 2
+    assert max(height / (ABOVE + 2000 + BELOW), width / (LEFT + 1600 + RIGHT)) > 0.9
 
 
-@pytest.mark.parametrize(("rows", "cols", "longer"), [(1, 40, 0), (40, 1, 1), (3, 3, 0)])
-def test_map_in_a_notebook_is_a_picture_of_limited_size(rows, cols, longer):
+@pytest.mark.parametrize(("rows", "cols"), [(1, 40), (40, 1), (3, 3)])
+def test_map_in_a_notebook_is_a_picture_of_limited_size(rows, cols):
     data = map_of(FLAT, rows=rows, cols=cols, border=20.0)._repr_png_()
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
-    relief = np.subtract(picture.shape[:2], (ABOVE + BELOW, LEFT + RIGHT))
-    assert relief.argmax() == longer or rows == cols
-    assert 700 <= relief.max() <= 1100
+    assert 700 <= max(picture.shape) <= ABOVE + 1000 + BELOW + 250
 
 
 def test_color_levels_are_ends_and_color_stops():
@@ -139,10 +164,12 @@ def test_write_preview_rejects_invalid_input(pits, tmp_path, name, width, said):
 
 
 def render_with(terrain_map, solids, goals=np.nan, routes=()):
-    """Return a function that returns the color at a position of a map of 7 m on 700 pixels."""
+    """Return a function that returns the color at a position of a map with 100 px for a meter."""
     goals = np.full_like(terrain_map.goals, goals) if np.isscalar(goals) else goals
     changed = dataclasses.replace(terrain_map, solids=solids, goals=goals)
-    picture = render_preview(changed, 700, routes)
+    extent = changed.grid.size
+    assert extent[0] == pytest.approx(7.0)
+    picture = render_preview(changed, round(100 * max(7.0, extent[1] / 1.25)), routes)
     bottom = picture.shape[0] - BELOW
 
     def pixel(x, y):
@@ -182,3 +209,40 @@ def test_preview_draws_spawns_and_routes(solid_map):
     assert color(1.5, 3).tolist() == color(5, 3).tolist() == [200, 30, 30]
     label = [color(5 + dx / 100, 3 + dy / 100) for dx in range(10, 30) for dy in range(6, 17)]
     assert [40, 40, 46] in np.array(label).tolist()
+
+
+def test_preview_shades_tilted_solids_and_hatches_hanging_ones(solid_map):
+    roll = np.pi / 6
+    solids = make_boxes([(1, 6, 0.5), (3, 6, 0.5)], (1.0, 1.0, 0.2), rpy=[(0, 0, 0), (roll, 0, 0)])
+    standing = make_boxes([(1, 6, 0.0), (3, 6, 0.0)], (1.0, 1.0, 1.0))
+    bare, drawn = (render_with(solid_map, each) for each in (Solids.empty(), solids))
+    # The normal (0, -sin, cos) turns away from the light.
+    shade = (np.cos(roll) * LIGHT[2] - np.sin(roll) * LIGHT[1]) / LIGHT[2]
+    top = 0.5 + 0.1 * np.cos(roll)
+    expected = 0.75 * height_colors(np.array(top)) * shade + 0.25 * bare(2, 6)
+    edge = 0.75 * 0.6 * height_colors(np.array(0.6)) + 0.25 * bare(1, 6)
+    line = [(x / 100, 6.05) for x in range(285, 315)]
+    tilted = np.array([drawn(x, y) for x, y in line])
+    assert (np.abs(tilted - expected).max(axis=1) < 4).sum() > 20
+    level = np.array([drawn(x - 2, y) for x, y in line])
+    dark = np.abs(level - edge).max(axis=1) < 4
+    assert 4 <= dark.sum() <= 6  # two of twelve pixels
+    below = render_with(solid_map, standing)
+    assert len(np.unique([below(x - 2, y) for x, y in line], axis=0)) == 1
+
+
+def test_preview_numbers_goals_in_order_where_there_is_space():
+    lane = tk.SubTerrain(terrain="hurdles")
+    terrain_map = map_of(lane)
+    texts = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cv2, "putText", lambda *put: texts.append((put[1], put[2][0])))
+        render_preview(terrain_map, 800)
+        numbers = [each for each in texts if each[0].isdigit()]
+        assert numbers == [("1", 372), ("2", 542), ("3", 712)]  # goals at 3.7, 5.4 and 7.1 m
+        assert ("scale not", 20) not in texts  # 0 to 5 cm
+        texts.clear()
+        # 8 px for a meter: 13.6 px from goal to goal.
+        render_preview(map_of(lane, rows=20, cols=20), 1280)
+        assert {text for text, _ in texts if text.isdigit()} == {"1", "3"}
+        assert ("scale not", 20) in texts  # 0 to 50 cm, with a change of the slope at 40 cm
