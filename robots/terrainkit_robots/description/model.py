@@ -118,6 +118,9 @@ class MeshFile:
     scale_source: Source | None = None
     """Element that holds the scale, if it is not `source`."""
 
+    implied_name: str = ""
+    """Name of a mesh asset without a name, which follows from its file name."""
+
 
 ShapeKind = Literal["box", "sphere", "cylinder", "capsule", "ellipsoid", "plane", "mesh", "unknown"]
 

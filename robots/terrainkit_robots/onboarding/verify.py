@@ -85,7 +85,12 @@ def verify(
     """
     from terrainkit_robots.simulation.pd_gains import suggest_gains
     from terrainkit_robots.simulation.sim_model import SimModel
-    from terrainkit_robots.simulation.standing import contact_areas, ground_normal, stand_test
+    from terrainkit_robots.simulation.standing import (
+        contact_areas,
+        ground_normal,
+        stand_test,
+        why_it_balances,
+    )
 
     floating = bool(robot.facts.model.floating)
     # MuJoCo releases the interpreter lock while it compiles. The scene includes robot.xml.
@@ -100,8 +105,8 @@ def verify(
     if not robot.facts.legs or not floating:
         return Verification(equivalences=equivalences)
     joints_locked = not is_statically_stable(robot.facts.legs)
-    if joints_locked and robot.facts.wheels:
-        return Verification(equivalences=equivalences, skipped="it balances on its wheels")
+    if reason := why_it_balances(robot.facts):
+        return Verification(equivalences=equivalences, skipped=reason)
     stand_gains = soft_gains and not joints_locked
     test = partial(
         stand_test,

@@ -10,6 +10,7 @@ import numpy as np
 from terrainkit_robots.analysis.bodies.contact import contact_points
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
+from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.gain import Gain
 from terrainkit_robots.simulation.rollout import Rollout
@@ -25,6 +26,10 @@ _DECIMATION = 4
 
 _FINAL_SECONDS = 0.1
 """A foot that touches the ground within the last tenth of a second touches it at the end [s]."""
+
+_MIN_MARGIN = 0.005
+"""Distance of the center of mass from the edge of the support that a biped needs to stand with
+locked joints [m]; with point feet it does not stand at all."""
 
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -94,6 +99,18 @@ class StandResult:
 
     seconds: float
     """Simulated time [s]; shorter than requested if the simulation diverged."""
+
+
+def why_it_balances(facts: "Facts") -> str:
+    """Return why a biped does not stand even with locked joints; empty for other robots."""
+    if facts.stance is None or is_statically_stable(facts.legs):
+        return ""
+    if facts.wheels:
+        return "it balances on its wheels"
+    has_feet = any(body.has_contacts for body in facts.bodies)  # else it falls through the floor
+    if has_feet and not facts.stance.margin > _MIN_MARGIN:
+        return "the center of mass of the biped is not above its feet"
+    return ""
 
 
 def contact_areas(facts: "Facts") -> tuple[ContactArea, ...]:

@@ -321,6 +321,17 @@ def test_onboard_replaces_crouching_keyframe(tmp_path):
     assert any("keyframe is not the default pose" in change for change in result.robot.changes)
 
 
+def test_biped_on_points_is_not_expected_to_stand(tmp_path):
+    file = tmp_path / "biped.urdf"
+    file.write_text(
+        bundled.urdf_path("biped").read_text().replace("0.18 0.066 0.03", "0.004 0.004 0.03")
+    )
+    checks = onboard(file, tmp_path / "robot", options()).verification
+    assert checks.skipped == "the center of mass of the biped is not above its feet"
+    assert checks.standing is None
+    assert checks.is_stable
+
+
 def test_onboard_training_gains(onboarded, tmp_path):
     stiff = onboarded(QUADRUPED)
     result = onboard(QUADRUPED, tmp_path / "robot", options(gains="train"))

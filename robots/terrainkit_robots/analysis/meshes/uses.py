@@ -149,13 +149,18 @@ def relative_name(model: RobotModel, path: Path) -> str:
 def rename_edits(
     model: RobotModel, uses: Iterable[MeshUse], name: str
 ) -> tuple[SetAttribute, ...] | None:
-    """Return the edits that change the name of a file; None if its uses are not editable."""
-    edits: dict[Source, SetAttribute] = {}
+    """Return the edits that change the name of a file; None if its uses are not editable.
+
+    A mesh asset whose name follows from the file gets this name, which geoms refer to.
+    """
+    edits: dict[tuple[Source, str], SetAttribute] = {}
     for use in uses:
-        source = use.mesh.source
+        source, implied = use.mesh.source, use.mesh.implied_name
         if source.element is None or model.kind == "xacro":
             return None
-        edits[source] = SetAttribute(source=source, name=use.mesh.attribute, value=name)
+        for attribute, value in ((use.mesh.attribute, name), ("name", implied)):
+            if value:
+                edits[source, attribute] = SetAttribute(source=source, name=attribute, value=value)
     return tuple(edits.values())
 
 

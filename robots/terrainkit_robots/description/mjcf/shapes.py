@@ -83,6 +83,7 @@ def mesh_file(mesh: Any, node: Node, strip: bool) -> MeshFile | None:
         found_by=found_by,
         attribute="file",
         scale=(x, y, z),
+        implied_name="" if "name" in node.written else mesh_name(mesh),
     )
 
 

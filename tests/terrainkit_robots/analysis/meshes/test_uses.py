@@ -17,6 +17,7 @@ from terrainkit_robots.analysis.meshes.uses import (
 )
 from terrainkit_robots.description.fix import WriteFile
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.fixes.edits import EditedBytes
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 TWO_LINKS = """<robot name="r">
@@ -116,6 +117,20 @@ def test_replace_edits_of_mjcf_are_relative_to_meshdir(robot):
     </mujoco>"""
     write, edit = replaced(robot(text, "robot.xml"))
     assert (write.path.name, edit.name, edit.value) == ("foot_hull.stl", "file", "foot_hull.stl")
+
+
+@pytest.mark.parametrize("mesh", ['file="foot.stl"', 'class="c" file="foot.stl"'])
+def test_replaced_mesh_keeps_the_name_that_its_file_implied(robot, mesh):
+    text = f"""<mujoco><compiler meshdir="m"/><default><default class="c"/></default>
+      <asset><mesh {mesh}/></asset>
+      <worldbody><body name="a"><freejoint/>
+        <geom type="mesh" mesh="foot" mass="1"/></body></worldbody>
+    </mujoco>"""
+    facts = robot(text, "robot.xml")
+    _, *edits = replaced(facts)
+    edited = EditedBytes(text.encode())
+    edited.apply(edited.prepare(edits))
+    assert f'<mesh {mesh.replace("foot", "foot_hull")} name="foot"/>' in edited.result().decode()
 
 
 def test_replace_edits_of_xacro_and_malformed_files_are_none(robot):

@@ -117,7 +117,7 @@ def test_biped_needs_its_center_of_mass_above_its_feet(monkeypatch):
         (margin, ["the center of mass of the biped is not above its feet"]),
         (0.99 * margin, []),
     ):
-        monkeypatch.setattr(stability, "_MIN_MARGIN", limit)
+        monkeypatch.setattr("terrainkit_robots.simulation.standing._MIN_MARGIN", limit)
         assert [each.reason for each in lint(robot, [rule]).skipped] == reasons
 
 

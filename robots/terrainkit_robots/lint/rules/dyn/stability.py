@@ -13,6 +13,7 @@ from terrainkit_robots.simulation.standing import (
     contact_areas,
     ground_normal,
     stand_test,
+    why_it_balances,
 )
 
 # 7 of 536 published files exceed the first limit, with overlapping hulls or tiny inertias.
@@ -28,10 +29,6 @@ _MAX_SINGLE_LEGS = 6
 the real robot may stand."""
 
 _LEVELS: tuple[Severity, ...] = ("note", "warning", "error")
-
-_MIN_MARGIN = 0.005
-"""Distance of the center of mass from the edge of the support that a biped needs to stand with
-locked joints [m]; with point feet it does not stand at all."""
 
 _OVERLAP_HINT = "Shapes of the robot push each other apart: check for overlaps (COL005)."
 
@@ -112,7 +109,7 @@ def does_not_stand(robot: Facts) -> Violations:
         MuJoCo for 2 s at a time step of 5 ms; gains as suggested by `terrainkit onboard`.
     """
     locked = not is_statically_stable(robot.legs)
-    _check_can_stand(robot, locked=locked)
+    _check_can_stand(robot)
     standing = _stand(robot, locked=locked)
     assessment = assess(standing)
     if assessment.stands:
@@ -156,14 +153,12 @@ def _stand(robot: Facts, *, locked: bool, self_collision: bool = True) -> StandR
     )
 
 
-def _check_can_stand(robot: Facts, *, locked: bool) -> None:
+def _check_can_stand(robot: Facts) -> None:
     """Raise CannotCheckError if the robot cannot stand for a reason that other rules report."""
     if not any(body.has_contacts for body in robot.bodies):
         raise CannotCheckError("the robot has no collision shapes and falls through the floor")
-    if locked and robot.wheels:
-        raise CannotCheckError("it balances on its wheels")
-    if locked and robot.stance is not None and not robot.stance.margin > _MIN_MARGIN:
-        raise CannotCheckError("the center of mass of the biped is not above its feet")
+    if reason := why_it_balances(robot):
+        raise CannotCheckError(reason)
     actuated = {joint.name for joint in robot.actuated}
     for index in sorted(robot.leg_bodies):
         joint = robot.bodies[index].joint
