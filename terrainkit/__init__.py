@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from terrainkit.map.config import MapConfig
     from terrainkit.map.generation import generate
     from terrainkit.map.import_curriculum import ImportedCurriculum, import_curriculum
-    from terrainkit.map.import_map import ImportedMap, ImportReport, import_map
+    from terrainkit.map.import_map import ImportedMap, import_map
+    from terrainkit.map.import_report import ImportReport
     from terrainkit.map.patch import Patch, make_patch
     from terrainkit.map.terrain_map import TerrainMap
     from terrainkit.map.terrain_mesh import import_terrain_mesh
@@ -70,7 +71,8 @@ _NAMES = {
     "map.config": ("MapConfig",),
     "map.generation": ("generate",),
     "map.import_curriculum": ("ImportedCurriculum", "import_curriculum"),
-    "map.import_map": ("ImportReport", "ImportedMap", "import_map"),
+    "map.import_map": ("ImportedMap", "import_map"),
+    "map.import_report": ("ImportReport",),
     "map.patch": ("Patch", "make_patch"),
     "map.terrain_map": ("TerrainMap",),
     "map.terrain_mesh": ("import_terrain_mesh",),

@@ -53,7 +53,8 @@ class Export(PluginCommand):
     """For meshes: add a skirt and a bottom, for a watertight solid."""
 
     y_up: bool = False
-    """For meshes: rotate the map so that y is up, as glTF viewers and game engines expect."""
+    """For .stl, .ply and .obj: rotate the map so that y is up, as game engines expect; .glb always
+    has y up."""
 
     max_step: Annotated[float, option("M")] | None = None
     """For .yaml: height of the largest step that a robot takes, by default 0.2 [m]; cells at the

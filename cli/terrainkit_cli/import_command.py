@@ -1,5 +1,6 @@
 """The command import: a file of heights or a mesh becomes a map."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -26,16 +27,17 @@ _MAX_LINES = 20
 
 @dataclass(frozen=True, kw_only=True)
 class Import(ConfigCommand):
-    """Import files of heights or meshes as a map with spawn origins.
+    """Import files of heights, meshes or point clouds as a map with spawn origins.
 
     Several files, or the files in a folder, become levels of difficulty: the rows, easiest first.
-    The report says how many missing heights were filled, and what the map lost of a mesh whose
-    parts hang over the ground.
+    The report says the largest difference in height from the file, and what the map lost: parts
+    that are narrower than a cell or hang over the ground.
     """
 
     files: Annotated[tuple[Path, ...], positional("FILE...")]
     """Image (.png with 16 bits, .tif), array (.npy, .npz), table (.txt, .csv), ASCII grid (.asc),
-    geodata (.hgt, .dem) or mesh (.obj, .stl, .ply, .glb); or a folder of such files."""
+    geodata (.hgt, .dem), mesh (.obj, .stl, .ply, .glb, .gltf, .dae), point cloud (.ply, .xyz, .pcd,
+    .las, .laz) or MuJoCo scene (.xml); or a folder of such files."""
 
     output: OutputPath
     """File to write, as of terrainkit generate."""
@@ -94,13 +96,31 @@ class Import(ConfigCommand):
         return 0
 
 
-def _report_lines(report: "ImportReport", *, has_solids: bool) -> list[str]:
-    lines = []
-    if report.max_error_at:
-        x, y = report.max_error_at
-        lines.append(
-            f"overhangs over {report.overhang_area:.2f} m2, of which {report.lost_area:.2f} m2 are "
-            f"lost; largest error {report.max_error:.3f} m at ({x:.2f}, {y:.2f})"
-            + ("" if has_solids else "; --solids keeps overhangs of closed bodies")
+def _report_lines(report: "ImportReport", *, has_solids: bool) -> Iterator[str]:
+    if report.num_thin_bodies:
+        yield f"closed bodies narrower than a cell, now solids: {report.num_thin_bodies}"
+    if report.lost_at:
+        hint = "" if has_solids else ", or --solids for closed bodies"
+        yield (
+            f"the file reaches {report.lost_top:.2f} m at {_place(report.lost_at)}, the map "
+            f"{report.map_top:.2f} m: parts narrower than a cell are lost, "
+            f"{report.num_lost_faces} faces (smaller --cell{hint})"
         )
-    return lines
+    if report.overhang_error_at:
+        hint = "" if has_solids else "; --solids keeps overhangs of closed bodies"
+        error, at = report.overhang_error, _place(report.overhang_error_at)
+        yield (
+            f"overhangs over {report.overhang_area:.2f} m2, of which {report.lost_area:.2f} m2 are "
+            f"lost; largest error {error:.3f} m at {at}{hint}"
+        )
+    if report.num_open_bodies and (report.lost_area or report.lost_at):
+        yield f"bodies that are not closed, and cannot become solids: {report.num_open_bodies}"
+    at = f" at {_place(report.max_error_at)}" if report.max_error_at else ""
+    yield (
+        f"largest difference from the file {report.max_error:.3f} m{at}, apart from walls, which "
+        "move by less than a cell"
+    )
+
+
+def _place(xy: tuple[float, float]) -> str:
+    return f"({xy[0]:.2f}, {xy[1]:.2f})"

@@ -24,7 +24,7 @@ for size, center in (
     parts.append(trimesh.creation.box(size).apply_translation(center))
 trimesh.util.concatenate(parts).export("scan.ply")
 
-# `solids` keeps what hangs over the ground, here the table. Most .glb files need `up="y"`.
+# `solids` keeps what hangs over the ground, here the table.
 options = ImportOptions(solids=True, spawn_tolerance=0.06)
 imported = import_map("scan.ply", options)
 terrain_map, report = imported.terrain_map, imported.report

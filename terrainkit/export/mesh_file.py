@@ -46,14 +46,14 @@ def export(
         path: Target.
         full: Write two triangles per cell instead of merging coplanar faces.
         closed: Add sides and a bottom to make a watertight solid.
-        y_up: Rotate the map so that y is up, as glTF viewers expect; by default z is up.
+        y_up: Rotate the map so that y is up, as game engines expect. A .glb always has y up.
     """
     warn_about_loss(terrain_map, "a mesh file")
     mesh = terrain_map.mesh(merged=not full, closed=closed)
-    if y_up:
+    suffix = path.suffix.lower()
+    if y_up or suffix == ".glb":
         y, z = mesh.vertices[:, 1].copy(), mesh.vertices[:, 2].copy()
         mesh.vertices[:, 1], mesh.vertices[:, 2] = z, -y
-    suffix = path.suffix.lower()
     if suffix == ".stl":
         write_stl(mesh, path)
         return

@@ -17,6 +17,7 @@ from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, writ
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, check_solids
 from terrainkit.map.config import MapConfig
+from terrainkit.map.import_report import ImportReport
 from terrainkit.map.patch import PatchParameters, Values
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.patch_geometry import MAX_GOALS
@@ -90,6 +91,9 @@ def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
         "friction": np.array([config.static_friction, config.dynamic_friction]),
         "restitution": np.float64(config.restitution),
     }
+    if terrain_map.import_report:
+        text = msgspec.json.encode(terrain_map.import_report).decode()
+        arrays["import_report"] = np.array(text)
     write_arrays(path, arrays)
 
 
@@ -146,6 +150,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             parameters=_read_parameters(archive, config, terrain_types),
             solids=_read_solids(archive, size),
             goals=_read_poses(archive, "goals", size, MAX_GOALS),
+            import_report=_read_import_report(archive),
         )
 
 
@@ -282,6 +287,16 @@ def _read_poses(
     if (is_padding[..., :-1] & ~is_padding[..., 1:]).any():
         raise MapFileError(f"{archive.path}: {key}: got a gap; expected NaN at the end only")
     return poses
+
+
+def _read_import_report(archive: Archive) -> ImportReport | None:
+    if "import_report" not in archive.names():
+        return None
+    text = archive.text("import_report", limit=MAX_PATCH_RECORD_BYTES)
+    try:
+        return msgspec.json.decode(text, type=ImportReport)
+    except msgspec.DecodeError as error:
+        raise MapFileError(f"{archive.path}: import_report cannot be read: {error}") from error
 
 
 def _read_parameters(

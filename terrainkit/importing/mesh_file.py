@@ -1,5 +1,7 @@
 """Read the ground from a mesh file."""
 
+import json
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
@@ -11,10 +13,16 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
 from terrainkit.importing.columns import Columns, make_columns
+from terrainkit.importing.mesh_extent import warn_about_up
 from terrainkit.importing.options import MAX_POSITION, ReadOptions
-from terrainkit.importing.source import Array, decode
+from terrainkit.importing.point_cloud import make_point_source
+from terrainkit.importing.source import Array, Source, cover_positions, decode
 
-SUFFIXES = (".obj", ".stl", ".ply", ".glb")
+SUFFIXES = (".obj", ".stl", ".ply", ".glb", ".gltf", ".dae")
+
+_ASIDE = 1e-4
+"""Distance by which a sample is moved aside [steps]: bodies that should touch at a round number are
+often a rounding error apart, and a sample there would be on the ground between them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,6 +36,9 @@ class MeshSource:
     """Triangles, counterclockwise seen from outside, shape (nf, 3)."""
 
     cell: float | None = None
+
+    is_metric: bool = True
+    """Whether the file or an option states the unit, so that the vertices are surely in meters."""
 
     @cached_property
     def lower(self) -> tuple[float, float]:
@@ -62,46 +73,97 @@ class MeshSource:
             x: Positions along x [m], increasing and evenly spaced, shape (nx,).
             y: Positions along y [m], increasing and evenly spaced, shape (ny,).
         """
-        inner, number = [], []
-        for position, low, high in zip((x, y), self.lower, self.upper, strict=True):
-            step = min(position[1] - position[0] if len(position) > 1 else 0.0, high - low)
-            moved = np.clip(position, low + step / 2, high - step / 2)
-            used, index = np.unique(moved, return_inverse=True)
-            inner.append(used)
-            number.append(index)
-        found = make_columns(self.vertices, self.faces, *inner)
+        inner, number = cover_positions((x, y), self.lower, self.upper)
+        aside = [each + _ASIDE * np.ptp(each[:2]) for each in inner]
+        found = make_columns(self.vertices, self.faces, *aside)
         if all(len(a) == len(b) for a, b in zip(inner, (x, y), strict=True)):
             return found
         cells = np.ix_(*number)
         return Columns(top=found.top[cells], floor=found.floor[cells], ceiling=found.ceiling[cells])
 
 
-def read(path: Path, options: ReadOptions) -> MeshSource:
-    """Return the mesh, with z up and in meters.
+def read(path: Path, options: ReadOptions) -> Source:
+    """Return the mesh or point cloud, with z up and in meters.
 
     Raises:
-        HeightFileError: if it has no triangles, or a vertex is invalid.
+        HeightFileError: if it has neither triangles nor points, or a vertex is invalid.
     """
     arrays = decode(_read_mesh, path)
+    if not len(arrays["faces"]) and len(arrays.get("points", ())):
+        return make_point_source(path, arrays["points"], options)
+    return make_mesh_source(path, arrays, options)
+
+
+def make_mesh_source(
+    path: Path, arrays: dict[str, NDArray[Any]], options: ReadOptions
+) -> MeshSource:
+    """Return a decoded mesh, with z up and in meters.
+
+    Args:
+        path: The file, for errors.
+        arrays: The arrays `vertices`, `faces`, and, if the file states them, `unit` [m] and `up`.
+        options: How the file is read.
+
+    Raises:
+        HeightFileError: if there are no triangles, or a vertex is invalid.
+    """
     vertices, faces = np.asarray(arrays["vertices"], float), np.asarray(arrays["faces"], np.int64)
     if not len(faces) or vertices.ndim != 2 or faces.ndim != 2:
         raise HeightFileError(f"{path}: got a file without triangles; expected a mesh")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise HeightFileError(f"{path}: got a face with a vertex that does not exist")
     used, index = np.unique(faces, return_inverse=True)
-    vertices = vertices[used] * (options.scale or 1.0)
+    vertices = vertices[used] * (options.scale or float(arrays.get("unit", 1.0)))
     if not (np.abs(vertices) <= MAX_POSITION).all():
         raise HeightFileError(f"{path}: got vertices that are not finite")
-    if options.up == "y":
+    up = str(arrays.get("up", "z")) if options.up == "auto" else options.up
+    if up == "y":
         vertices = vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
-    return MeshSource(vertices=vertices, faces=index.reshape(faces.shape))
+    is_metric = options.scale is not None or "unit" in arrays
+    source = MeshSource(vertices=vertices, faces=index.reshape(faces.shape), is_metric=is_metric)
+    if options.up == "auto":
+        warn_about_up(path, source, up)
+    return source
 
 
 def _read_mesh(path: Path) -> dict[str, Any]:
     import trimesh
 
     # Without a path, no other files are opened.
-    file_type = path.suffix.lower().removeprefix(".")
-    data = BytesIO(path.read_bytes())
-    mesh = trimesh.load(data, file_type=file_type, force="mesh", process=False)
-    return {"vertices": np.asarray(mesh.vertices, float), "faces": np.asarray(mesh.faces, np.int64)}
+    suffix, data = path.suffix.lower(), path.read_bytes()
+    stated = {"unit": 1.0, "up": "y"} if suffix in (".glb", ".gltf") else {}
+    if suffix == ".gltf":
+        _check_gltf(data)
+    elif suffix == ".dae":
+        stated = _read_dae_asset(data)
+    scene = trimesh.load(BytesIO(data), file_type=suffix[1:], force="scene", process=False)
+    mesh = scene.to_mesh()
+    points = [np.asarray(each.vertices, float) for each in scene.geometry.values()]
+    return {
+        "vertices": np.asarray(mesh.vertices, float),
+        "faces": np.asarray(mesh.faces, np.int64),
+        "points": np.concatenate([np.empty((0, 3)), *points]),
+        **stated,
+    }
+
+
+def _check_gltf(data: bytes) -> None:
+    uris = [each.get("uri", "") for each in json.loads(data).get("buffers", ())]
+    other = next((uri for uri in uris if not uri.startswith("data:")), None)
+    if other is not None:
+        raise ValueError(
+            f"its data are in another file, {other!r}, which is not opened; expected a .glb, or a "
+            ".gltf with embedded data"
+        )
+
+
+def _read_dae_asset(data: bytes) -> dict[str, Any]:
+    """Return the unit [m] and the vertical axis that a COLLADA file states."""
+    if b"<!ENTITY" in data or b"<!DOCTYPE" in data:
+        raise ValueError("got a document type declaration; expected COLLADA, which has none")
+    unit = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)", data)
+    up = re.search(rb"<up_axis>\s*([XYZ])_UP", data)
+    axis = up[1].decode().lower() if up else "y"
+    if axis == "x":
+        raise ValueError("got the vertical axis x; expected y or z")
+    return {"unit": float(unit[1]) if unit else 1.0, "up": axis}

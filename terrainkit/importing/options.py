@@ -23,7 +23,7 @@ Missing = Literal["reject", "nearest", "lowest"]
 CellSides = Annotated[
     tuple[Size, ...], Meta(min_length=1, max_length=2, extra={"metavar": "X [Y]"})
 ]
-UpAxis = Literal["z", "y"]
+UpAxis = Literal["auto", "z", "y"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,8 +60,9 @@ class ReadOptions(Config):
     key: str = ""
     """Name of the array in an .npz file; empty: the only one with two axes."""
 
-    up: UpAxis = "z"
-    """Axis of a mesh that points up; glTF files of most programs have y."""
+    up: UpAxis = "auto"
+    """Axis of a mesh or point cloud that points up; auto: y for glTF, what a .dae states, z for
+    others."""
 
     def __post_init__(self) -> None:
         """Validate the values; one number for `file_cell` is the distance along both axes.

@@ -1,6 +1,8 @@
 """Convex solids of the parts of a mesh that hang over the ground."""
 
+import itertools
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,15 @@ from terrainkit.geometry.convex_decomposition import SEARCH, convex_decompositio
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.mesh import closed_mesh, merged_mesh
 from terrainkit.geometry.mesh.solid_mesh import manifold
-from terrainkit.geometry.solids import MAX_HULL_VERTICES, Solids, make_hulls
+from terrainkit.geometry.solids import (
+    MAX_HULL_VERTICES,
+    MIN_SIZE,
+    Solids,
+    make_boxes,
+    make_hulls,
+)
 from terrainkit.importing.columns import MIN_GAP, Columns
+from terrainkit.importing.mesh_file import MeshSource
 
 PARAMETERS = {**SEARCH, "threshold": 0.03, "max_convex_hull": 32}
 """Parameters of CoACD."""
@@ -25,72 +34,177 @@ MIN_VOLUME = 1e-6
 _TOLERANCE = 1e-4
 """Distance by which a solid may be simplified [m]."""
 
+_THIN = 0.499
+"""Least radius of a disk in the outline of a body that is not thin [cells]."""
+
 _CONVEX = 0.99
 """Share of its convex hull that a body fills to be convex."""
 
 
+_MAX_THIN_FACES = 10_000
+"""Most faces of a body that is examined for being thin: the outline of more takes minutes."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bodies:
+    """The connected parts of a mesh, in the frame of the file."""
+
+    thin: tuple[Any, ...] = ()
+    """Closed bodies narrower than a cell, as manifolds."""
+
+    thin_faces: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    """Indices of their faces."""
+
+    others: tuple[Any, ...] = ()
+    """The other closed bodies, as manifolds."""
+
+    num_open: int = 0
+    """Number of bodies that are not closed."""
+
+
+def find_bodies(mesh: MeshSource, cell: float) -> Bodies:
+    """Return the connected parts of a mesh, with faces that point outward.
+
+    Args:
+        mesh: The mesh.
+        cell: Distance between two samples of the map [m]. A body is thin if no disk of this
+            diameter fits in its outline seen from above: samples miss it or make it wider.
+    """
+    import manifold3d
+    import trimesh
+
+    whole = trimesh.Trimesh(vertices=mesh.vertices, faces=mesh.faces, process=True)
+    nodes = np.arange(len(whole.faces))
+    groups = trimesh.graph.connected_components(whole.face_adjacency, min_len=1, nodes=nodes)
+    thin, thin_faces, others = [], [np.empty(0, np.int64)], []
+    for faces, body in zip(groups, whole.submesh(groups, append=False), strict=True):
+        if not body.is_watertight:
+            continue
+        if body.volume < 0:
+            body.invert()
+        solid = manifold(np.asarray(body.vertices), np.asarray(body.faces))
+        if solid.status() != manifold3d.Error.NoError:
+            continue
+        if len(faces) <= _MAX_THIN_FACES and solid.project().offset(-_THIN * cell).is_empty():
+            thin.append(solid)
+            thin_faces.append(faces)
+        else:
+            others.append(solid)
+    return Bodies(
+        thin=tuple(thin),
+        thin_faces=np.concatenate(thin_faces),
+        others=tuple(others),
+        num_open=len(groups) - len(thin) - len(others),
+    )
+
+
 def overhang_solids(
     path: Path,
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
+    bodies: Bodies,
+    origin: NDArray[np.float64],
     columns: Columns,
     grid: Grid,
     threshold: float,
 ) -> Solids:
-    """Return the parts of the closed bodies of a mesh above the lowest free space as solids.
+    """Return thin bodies, and the parts of others above the lowest free space, as solids.
 
-    The union of the bodies is cut halfway up the free space, on the grid. A part that is convex
-    becomes one solid; CoACD decomposes the others.
+    The bodies are cut halfway up the free space, on the grid: each convex body for itself, and the
+    union of the others. A part that is convex becomes one solid; CoACD decomposes the others.
 
     Args:
         path: The file, for errors.
-        vertices: Vertices in the frame of the map [m].
-        faces: Triangles, counterclockwise seen from outside.
-        columns: The columns of the mesh on the samples of `grid`.
+        bodies: The parts of the mesh.
+        origin: Point of the file that is at (0, 0, 0) in the map, shape (3,) [m].
+        columns: The columns of the mesh on the samples of `grid`, in the frame of the map, without
+            the thin bodies.
         grid: Grid of the map.
         threshold: Difference between neighboring samples above which there is a wall [m].
 
     Raises:
         HeightFileError: if no body is closed, or one cannot be decomposed.
     """
-    import manifold3d
-
-    if np.isnan(columns.ceiling).all():
-        return Solids.empty()
-    bodies = list(_closed_bodies(vertices, faces))
-    if not bodies:
-        raise HeightFileError(f"{path}: solids: got a mesh without closed bodies that overhang")
-    whole = manifold3d.Manifold.batch_boolean(bodies, manifold3d.OpType.Add)
-    parts = whole ^ _upper_space(columns, grid, threshold, vertices[:, 2].max())
-    # CoACD is exact only without the slivers that the cut leaves. As an original, coplanar faces of
-    # different bodies merge.
-    parts = parts.as_original().simplify(_TOLERANCE).decompose()
-    hulls: list[NDArray[np.float64]] = []
+    parts = [body.translate(-origin) for body in bodies.thin]
+    if not np.isnan(columns.ceiling).all():
+        if not bodies.others:
+            raise HeightFileError(f"{path}: solids: got a mesh without closed bodies that overhang")
+        cut = _cut(columns)
+        for body in _united(bodies.others):
+            parts += _above(body.translate(-origin), cut, grid, threshold)
+    solids: list[Solids] = []
     for part in parts:
         if part.volume() < MIN_VOLUME:
             continue
-        hull = part.hull()
-        is_convex = part.volume() > _CONVEX * hull.volume() and hull.num_vert() <= MAX_HULL_VERTICES
-        hulls += [_points(hull)] if is_convex else _decompose(path, part)
-    return make_hulls(hulls)
+        hulls = [_points(part.hull())] if _is_convex(part) else _decompose(path, part)
+        solids += map(_make_solid, hulls)
+    return Solids.concatenate(solids)
 
 
-def _closed_bodies(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Iterator[Any]:
-    """Yield the closed connected parts of a mesh as manifolds, with faces that point outward."""
+def _is_convex(body: Any) -> bool:
+    hull = body.hull()
+    return bool(body.volume() > _CONVEX * hull.volume() and hull.num_vert() <= MAX_HULL_VERTICES)
+
+
+def _united(bodies: tuple[Any, ...]) -> Iterator[Any]:
+    """Yield the convex bodies, whose parts are convex as well, and the union of the others."""
     import manifold3d
-    import trimesh
 
-    mesh = trimesh.Trimesh(vertices=vertices, faces=faces, process=True)
-    for body in mesh.split(only_watertight=True):
-        if body.volume < 0:
-            body.invert()
-        solid = manifold(np.asarray(body.vertices), np.asarray(body.faces))
-        if solid.status() == manifold3d.Error.NoError:
-            yield solid
+    is_convex = [_is_convex(body) for body in bodies]
+    yield from itertools.compress(bodies, is_convex)
+    others = [body for body, skip in zip(bodies, is_convex, strict=True) if not skip]
+    yield manifold3d.Manifold.batch_boolean(others, manifold3d.OpType.Add)
 
 
-def _upper_space(columns: Columns, grid: Grid, threshold: float, max_z: float) -> Any:
-    """Return the space above the cut as a manifold; elsewhere the cut is above the mesh."""
+def _above(body: Any, cut: NDArray[np.float64], grid: Grid, threshold: float) -> list[Any]:
+    """Return the parts of a body above the cut.
+
+    Args:
+        body: The body in the frame of the map.
+        cut: Height of the cut at the samples [m], NaN where nothing is above it.
+        grid: Grid of the map.
+        threshold: Difference between neighboring samples above which there is a wall [m].
+    """
+    if body.is_empty():
+        return []
+    low, high = np.array(body.bounding_box()).reshape(2, 3)
+    start = np.floor((low[:2] - grid.lower) / grid.cell).astype(int) - 1
+    end = np.ceil((high[:2] - grid.lower) / grid.cell).astype(int) + 1
+    start, end = (np.clip(each, 0, grid.shape) for each in (start, end))
+    block = cut[start[0] : end[0], start[1] : end[1]]
+    surface = np.where(np.isnan(block), high[2] + 1.0, block).astype(np.float32)
+    if min(surface.shape) < 2 or surface.min() >= high[2]:
+        return []
+    if surface.max() <= low[2]:
+        return [body]
+    # A closed mesh extends downward, so the space is built upside down.
+    part = grid.block((int(start[0]), int(start[1])), block.shape)
+    mesh = closed_mesh(merged_mesh(-surface, part, threshold))
+    space = manifold(mesh.vertices * np.array([1.0, 1.0, -1.0]), mesh.triangles[:, ::-1])
+    # CoACD is exact only without the slivers that the cut leaves. As an original, coplanar faces of
+    # different bodies merge.
+    return list((body ^ space).as_original().simplify(_TOLERANCE).decompose())
+
+
+def _make_solid(points: NDArray[np.float64]) -> Solids:
+    """Return the box that has these corners, or else their convex hull."""
+    edges = points[1:] - points[0]
+    lengths = np.linalg.norm(edges, axis=1)
+    first, second = edges[np.argsort(lengths)[:2]]
+    axes = np.array([first, second, np.cross(first, second)])
+    axes /= np.maximum(np.linalg.norm(axes, axis=1, keepdims=True), MIN_SIZE)
+    center = points.mean(axis=0)
+    corners = np.abs((points - center) @ axes.T)
+    if (
+        len(points) == 8
+        and np.ptp(corners, axis=0).max() < _TOLERANCE
+        and abs(first @ second) < 1e-6
+    ):
+        size = 2 * corners.mean(axis=0)
+        return make_boxes((0.0, 0.0, 0.0), size).transform(axes.T, center)
+    return make_hulls([points])
+
+
+def _cut(columns: Columns) -> NDArray[np.float64]:
+    """Return the height halfway up the lowest free space, NaN where nothing hangs over it."""
     from scipy.ndimage import (
         binary_dilation,
         binary_fill_holes,
@@ -114,10 +228,7 @@ def _upper_space(columns: Columns, grid: Grid, threshold: float, max_z: float) -
     cut[is_open] = beside[is_open]
     is_leg = is_support & binary_fill_holes(has_ceiling)
     cut[is_leg] = beneath[is_leg]
-    surface = np.where(np.isnan(cut), max_z + 1.0, cut).astype(np.float32)
-    # A closed mesh extends downward, so the space is built upside down.
-    mesh = closed_mesh(merged_mesh(-surface, grid, threshold))
-    return manifold(mesh.vertices * np.array([1.0, 1.0, -1.0]), mesh.triangles[:, ::-1])
+    return np.asarray(cut)
 
 
 def _decompose(path: Path, part: Any) -> list[NDArray[np.float64]]:

@@ -111,6 +111,29 @@ def warn(message: str) -> None:
     warnings.warn(message, TerrainkitWarning, stacklevel=3)
 
 
+def cover_positions(
+    positions: tuple[Array, Array], lower: tuple[float, float], upper: tuple[float, float]
+) -> tuple[list[Array], list[NDArray[np.int64]]]:
+    """Return positions inside of a source that stand for those beyond its corners as well.
+
+    Args:
+        positions: Evenly spaced positions along x and along y [m].
+        lower: Lower corner of the source [m].
+        upper: Upper corner of the source [m].
+
+    Returns:
+        For each axis, the positions at least half a step inside, and the index of each given one.
+    """
+    inner, number = [], []
+    for position, low, high in zip(positions, lower, upper, strict=True):
+        step = min(position[1] - position[0] if len(position) > 1 else 0.0, high - low)
+        moved = np.clip(position, low + step / 2, high - step / 2)
+        used, index = np.unique(moved, return_inverse=True)
+        inner.append(used)
+        number.append(index)
+    return inner, number
+
+
 def fill_missing(path: Path, heights: Array, missing: Missing, x: Array, y: Array) -> Array:
     """Return the heights without NaN.
 

@@ -26,7 +26,7 @@ from terrainkit.importing.options import ImportOptions
 from terrainkit.importing.source import Source, open_source
 from terrainkit.map import import_map
 from terrainkit.map.config import MapConfig
-from terrainkit.map.import_map import ImportReport
+from terrainkit.map.import_report import ImportReport
 from terrainkit.map.import_spawns import place_on_flattest, relaxed_config
 from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text

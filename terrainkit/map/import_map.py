@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,16 @@ from terrainkit.files.memory import check_memory
 from terrainkit.geometry.solids import Solids
 from terrainkit.importing.columns import Columns
 from terrainkit.importing.friction import read_friction
+from terrainkit.importing.mesh_extent import check_length, check_samples
 from terrainkit.importing.mesh_file import MeshSource
 from terrainkit.importing.options import ImportOptions
-from terrainkit.importing.overhangs import overhang_solids
+from terrainkit.importing.overhangs import Bodies, find_bodies, overhang_solids
+from terrainkit.importing.raster import Raster
 from terrainkit.importing.source import Source, fill_missing, open_source
 from terrainkit.map.config import MapConfig
 from terrainkit.map.edit import assign_solids
 from terrainkit.map.generation import pad_poses
+from terrainkit.map.import_report import ImportReport, make_report
 from terrainkit.map.import_spawns import place_spawns
 from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch import PatchParameters
@@ -36,33 +39,11 @@ _BYTES_PER_SAMPLE = 200
 
 
 @dataclass(frozen=True, kw_only=True)
-class ImportReport:
-    """What the map does not have in common with the file."""
-
-    num_missing: int
-    """Number of missing heights, which were filled."""
-
-    overhang_area: float = 0.0
-    """Area over which a part of the mesh hangs over the ground [m2]."""
-
-    lost_area: float = 0.0
-    """Part of that area where the map has no overhang [m2]: its ground is the top of the mesh, or
-    the sky is open."""
-
-    max_error: float = 0.0
-    """Largest difference in height between the map and the mesh where something hangs over the
-    ground [m]: of the ground, or of the lower or upper side of a solid."""
-
-    max_error_at: tuple[float, float] | None = None
-    """Where that is in the map, x and y [m]; None without overhangs."""
-
-
-@dataclass(frozen=True, kw_only=True)
 class ImportedMap:
     """A map and the differences from its file."""
 
     terrain_map: TerrainMap
-    """The map, of mode custom."""
+    """The map, of mode custom, with the report."""
 
     report: ImportReport
     """The differences."""
@@ -75,7 +56,7 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     1 for the hardest; the patches stay where they are in the file.
 
     Args:
-        path: The file: an image, an array, a table, geodata or a mesh.
+        path: The file: heights, a mesh, a point cloud or an MJCF scene; see docs/importing.md.
         options: How it becomes a map.
 
     Warns:
@@ -101,6 +82,8 @@ def import_source(path: Path, source: Source, options: ImportOptions) -> Importe
         source: The ground.
         options: How it becomes a map.
     """
+    if not isinstance(source, Raster):
+        check_length(path, source, options.cell or source.cell or DEFAULT_CELL)
     config, origin = _make_config(path, source, options)
     size = config.rows, config.cols
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
@@ -135,6 +118,10 @@ def make_map(
     """
     grid = config.grid
     samples = math.prod(grid.shape)
+    if isinstance(source, MeshSource):
+        check_samples(path, source, samples, config.cell)
+    elif options.solids:
+        raise ConfigError(f"solids: got {path}; expected a mesh")
     check_memory(
         samples * _BYTES_PER_SAMPLE,
         f"a map of {samples} samples",
@@ -144,18 +131,19 @@ def make_map(
         ),
     )
     x, y = (grid.axis(k) + origin[k] for k in (0, 1))
-    solids, columns = Solids.empty(), None
+    solids, columns, bodies = Solids.empty(), None, Bodies()
     if isinstance(source, MeshSource):
-        given, z = source.columns(x, y), origin[2]
+        ground = source
+        if options.solids:
+            bodies = find_bodies(source, config.cell)
+            ground = replace(source, faces=np.delete(source.faces, bodies.thin_faces, axis=0))
+        given, z = ground.columns(x, y), origin[2]
         columns = Columns(top=given.top - z, floor=given.floor - z, ceiling=given.ceiling - z)
         found = columns.floor if options.solids else columns.top
         if options.solids:
-            vertices, threshold = source.vertices - origin, config.wall_threshold
-            solids = overhang_solids(path, vertices, source.faces, columns, grid, threshold)
-            solids = assign_solids(config, solids)
+            parts = overhang_solids(path, bodies, origin, columns, grid, config.wall_threshold)
+            solids = assign_solids(config, parts)
     else:
-        if options.solids:
-            raise ConfigError(f"solids: got {path}; expected a mesh")
         found = source.heights(x, y) - origin[2]
     heights = fill_missing(path, found, options.missing, x, y).astype(np.float32)
     if not (np.abs(heights) <= MAX_VALUE).all():
@@ -165,8 +153,16 @@ def make_map(
     relax = options.spawn_tolerance is None
     config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
     terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
-    report = _report(terrain_map, columns, int(np.isnan(found).sum()))
-    return ImportedMap(terrain_map=terrain_map, report=report)
+    report = make_report(
+        terrain_map,
+        source,
+        origin,
+        columns,
+        num_missing=int(np.isnan(found).sum()),
+        num_thin_bodies=len(bodies.thin),
+        num_open_bodies=bodies.num_open,
+    )
+    return ImportedMap(terrain_map=replace(terrain_map, import_report=report), report=report)
 
 
 def _make_config(
@@ -286,29 +282,4 @@ def assemble_map(
         parameters=parameters,
         solids=solids,
         goals=np.empty((*size, 0, 4), dtype=np.float32),
-    )
-
-
-def _report(terrain_map: TerrainMap, columns: Columns | None, num_missing: int) -> ImportReport:
-    """Compare the map with the mesh at the samples where something hangs over the ground."""
-    if columns is None or np.isnan(columns.ceiling).all():
-        return ImportReport(num_missing=num_missing)
-    grid = terrain_map.grid
-    i, j = np.nonzero(~np.isnan(columns.ceiling))
-    xy = np.column_stack([grid.axis(0)[i], grid.axis(1)[j]])
-    top, ground, ceiling = columns.top[i, j], columns.floor[i, j], columns.ceiling[i, j]
-    map_ground = terrain_map.height(xy)
-    map_ceiling = map_ground + terrain_map.clearance(xy)
-    map_top = terrain_map.scan(np.column_stack([xy, top + 1.0]))
-    is_kept = np.isfinite(map_ceiling)
-    error = np.abs(map_ground - ground)
-    for mine, theirs in ((map_ceiling, ceiling), (map_top, top)):
-        error = np.maximum(error, np.where(is_kept, np.abs(mine - theirs), 0.0))
-    worst = int(np.argmax(error))
-    return ImportReport(
-        num_missing=num_missing,
-        overhang_area=len(i) * grid.cell**2,
-        lost_area=int((~is_kept).sum()) * grid.cell**2,
-        max_error=float(error[worst]),
-        max_error_at=(float(xy[worst, 0]), float(xy[worst, 1])),
     )

@@ -23,6 +23,7 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
+from terrainkit.map.import_report import ImportReport
 from terrainkit.map.patch import Patch
 from terrainkit.settings.type_hint import convert
 
@@ -73,6 +74,9 @@ class TerrainMap:
     goals: NDArray[np.float32]
     """Goals of each patch in their order: x, y, z [m] and heading [rad], shape (rows, cols, k, 4),
     NaN where a patch has fewer than k."""
+
+    import_report: ImportReport | None = None
+    """What an imported map lost of its file; None for generated maps."""
 
     def __repr__(self) -> str:
         rows, cols = self.difficulty.shape

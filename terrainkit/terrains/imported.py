@@ -65,8 +65,8 @@ class Imported(Terrain):
     scale: float = parameter.scalar(0.0)
     """Meters per unit of the file; 0 as its .json states, or 1 for decimal numbers."""
 
-    up: str = parameter.choice("z", "y")
-    """Axis of a mesh that points up."""
+    up: str = parameter.choice("auto", "z", "y")
+    """Axis of a mesh that points up; auto: y for glTF, what a .dae states, z for others."""
 
     missing: str = parameter.choice("nearest", "reject", "lowest")
     """Missing heights: the nearest height, an error, or the lowest height of the file."""

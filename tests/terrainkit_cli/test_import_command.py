@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+import trimesh
 
 import terrainkit as tk
-from tests.meshes import save_bridge
+from tests.meshes import box, save_bridge
 
 pytestmark = pytest.mark.usefixtures("import_in_process")
 
@@ -20,6 +21,7 @@ def test_import_writes_map_and_report(terrainkit, tmp_path, bridge):
         "overhangs over 4.00 m2, of which 4.00 m2 are lost; largest error 1.200 m at ("
         in run.stdout
     )
+    assert ", apart from walls, which move by less than a cell" in run.stdout
     assert tk.TerrainMap.load(tmp_path / "a.npz").config.mode == "custom"
     run = terrainkit("check-map", "a.npz")
     assert run.returncode == 0, run.stdout
@@ -95,3 +97,16 @@ def test_generate_from_imported_map_is_rejected(terrainkit, rejected, bridge):
     terrainkit("import", bridge, "-o", "a.npz")
     error = rejected("generate --config a.npz -o b.npz")
     assert error.startswith("mode custom: the map was imported or edited")
+
+
+def test_import_reports_what_is_lost(terrainkit, tmp_path):
+    parts = [box((4, 2, 0.1), (2, 1, -0.05)), box((0.03, 2, 0.5), (2, 1, 0.25))]
+    trimesh.util.concatenate(parts).export(tmp_path / "a.stl")
+    lost = terrainkit("import", "a.stl", "-o", "a.npz").stdout
+    assert (
+        "the map 0.00 m: parts narrower than a cell are lost, 10 faces (smaller --cell, or --solids"
+        in lost
+    )
+    kept = terrainkit("import", "a.stl", "-o", "b.npz", "--solids").stdout
+    assert "closed bodies narrower than a cell, now solids: 1" in kept
+    assert "lost" not in kept

@@ -24,7 +24,7 @@ def test_mesh_file_has_the_triangles_of_the_map(request, tmp_path, monkeypatch, 
     path = terrain_map.save(tmp_path / f"map{suffix}", **options)
     mesh = terrain_map.mesh(merged="full" not in options, closed="closed" in options)
     x, y, z = mesh.vertices.T
-    vertices = np.column_stack([x, z, -y] if "y_up" in options else [x, y, z])
+    vertices = np.column_stack([x, z, -y] if "y_up" in options or suffix == ".glb" else [x, y, z])
     found = trimesh.load_mesh(path, process=False)
     tolerance = 6e-7 if suffix == ".obj" else 0
     np.testing.assert_allclose(found.triangles, vertices[mesh.triangles], rtol=0, atol=tolerance)
@@ -46,6 +46,7 @@ def test_glb_is_a_scene_with_the_friction_as_extras(terrain_map, tmp_path):
     data = terrain_map.save(tmp_path / "map.glb").read_bytes()
     mesh = terrain_map.mesh()
     (vertices, _), (triangles, _) = mesh.vertices.shape, mesh.triangles.shape
+    low, high = (f(axis=0).tolist() for f in (mesh.vertices.min, mesh.vertices.max))
     magic, version, total, length, kind = struct.unpack("<4sIII4s", data[:20])
     assert (magic, version, total, kind) == (b"glTF", 2, len(data), b"JSON")
     assert json.loads(data[20 : 20 + length]) == {
@@ -65,8 +66,8 @@ def test_glb_is_a_scene_with_the_friction_as_extras(terrain_map, tmp_path):
                 "componentType": 5126,
                 "count": vertices,
                 "type": "VEC3",
-                "min": mesh.vertices.min(axis=0).tolist(),
-                "max": mesh.vertices.max(axis=0).tolist(),
+                "min": [low[0], low[2], -high[1]],  # y up
+                "max": [high[0], high[2], -low[1]],
             },
             {"bufferView": 1, "componentType": 5125, "count": 3 * triangles, "type": "SCALAR"},
         ],
@@ -83,7 +84,8 @@ def test_glb_is_a_scene_with_the_friction_as_extras(terrain_map, tmp_path):
     }
     assert length % 4 == 0
     last = struct.pack("<I4s", 12 * (vertices + triangles), b"BIN\0")
-    assert data[20 + length :] == last + mesh.vertices.tobytes() + mesh.triangles.tobytes()
+    turned = mesh.vertices[:, [0, 2, 1]] * np.float32([1, 1, -1])
+    assert data[20 + length :] == last + turned.tobytes() + mesh.triangles.tobytes()
 
 
 def test_glb_header_limits_size(terrain_map, tmp_path, monkeypatch):

@@ -1,3 +1,4 @@
+import base64
 import json
 import struct
 
@@ -16,7 +17,45 @@ def wedge():
     """Return a mesh of 4 m x 2 m whose height is x / 4 + 3 m on its left half, y < 1 m."""
     mesh = box((4, 2, 3), (2, 1, 1.5))
     mesh.vertices[:, 2] += np.where(mesh.vertices[:, 2] > 1, mesh.vertices[:, 0] / 4, 0)
-    return trimesh.util.concatenate([mesh, box((1, 1, 5), (0.5, 1.5, 2.5))])
+    return trimesh.util.concatenate([mesh, box((1, 1, 3.9), (0.5, 1.5, 1.95))])
+
+
+def save_gltf(mesh, path):
+    """Write a .gltf that contains its data, as trimesh does not."""
+    files = mesh.export(file_type="gltf")
+    tree = json.loads(files["model.gltf"])
+    for each in tree["buffers"]:
+        data = base64.b64encode(files[each["uri"]]).decode()
+        each["uri"] = f"data:application/octet-stream;base64,{data}"
+    path.write_text(json.dumps(tree))
+
+
+def test_mesh_file_opens_no_other_files(tmp_path):
+    files = trimesh.creation.box().export(file_type="gltf")
+    for name, data in files.items():
+        (tmp_path / name).write_bytes(data)
+    with pytest.raises(HeightFileError, match=r"in another file, '.*\.bin', which is not opened"):
+        read(tmp_path / "model.gltf", ReadOptions())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "scale", "axis"),
+    [
+        (b"", b"", 1.0, 1),
+        (b"<up_axis>Y_UP", b"<up_axis>Z_UP", 1.0, 2),
+        (b"<up_axis>", b'<unit name="cm" meter="0.01"/><up_axis>', 0.01, 1),
+    ],
+)
+def test_dae_states_its_unit_and_axis(tmp_path, old, new, scale, axis):
+    data = box((4, 5, 6), (0, 0, 0)).export(file_type="dae")
+    assert old in data
+    (tmp_path / "a.dae").write_bytes(data.replace(old, new))
+    source = read(tmp_path / "a.dae", ReadOptions())
+    expected = np.array([4, 6 if axis == 1 else 5, 5 if axis == 1 else 6]) * scale
+    np.testing.assert_allclose(np.ptp(source.vertices, axis=0), expected)
+    (tmp_path / "a.dae").write_bytes(b"<!DOCTYPE a>" + data)
+    with pytest.raises(HeightFileError, match="got a document type declaration"):
+        read(tmp_path / "a.dae", ReadOptions())
 
 
 @pytest.mark.parametrize(
@@ -24,23 +63,30 @@ def wedge():
     [
         ("obj", {}),
         ("glb", {}),
+        ("gltf", {}),
+        ("dae", {}),
         ("obj", {"up": "y"}),
-        ("glb", {"up": "y"}),
+        ("glb", {"up": "z"}),
         ("stl", {"scale": 0.001}),
     ],
 )
 def test_mesh_file_heights_and_axes(tmp_path, suffix, options):
     mesh = wedge()
-    if "up" in options:
+    # glTF has y up, and so has COLLADA, unless the file states another axis.
+    if options.get("up", "y" if suffix in ("glb", "gltf", "dae") else "z") == "y":
         mesh.vertices = mesh.vertices[:, [0, 2, 1]] * [1, 1, -1]  # x stays, z becomes y
     mesh.vertices /= options.get("scale", 1.0)
-    mesh.export(tmp_path / f"a.{suffix}")
+    if suffix == "gltf":
+        save_gltf(mesh, tmp_path / "a.gltf")
+    else:
+        mesh.export(tmp_path / f"a.{suffix}")
     source = read(tmp_path / f"a.{suffix}", ReadOptions(**options))
+    assert source.is_metric == (suffix not in ("obj", "stl") or "scale" in options)
     assert [*source.lower, *source.upper] == pytest.approx([0.0, 0.0, 4.0, 2.0], abs=1e-6)
     found = source.heights(np.arange(-1.5, 6, 1.0), np.array([0.5, 1.5]))
-    # Before 0 and after 4, the heights half a step inside. The post of 5 m is at x < 1 m, y > 1 m.
+    # Before 0 and after 4, the heights half a step inside. The post is at x < 1 m, y > 1 m.
     slope = np.array([3.125, 3.125, 3.125, 3.375, 3.625, 3.875, 3.875, 3.875])
-    expected = np.stack([slope, np.where(np.arange(8) < 3, 5.0, slope)], axis=1)
+    expected = np.stack([slope, np.where(np.arange(8) < 3, 3.9, slope)], axis=1)
     np.testing.assert_allclose(found, expected, atol=1e-3)
 
 
@@ -50,7 +96,7 @@ def test_mesh_file_scene_is_one_mesh(tmp_path):
     for x in (0.5, 2.5):
         scene.add_geometry(cube, transform=trimesh.transformations.translation_matrix((x, 0, x)))
     scene.export(tmp_path / "a.glb")
-    source = read(tmp_path / "a.glb", ReadOptions())
+    source = read(tmp_path / "a.glb", ReadOptions(up="z"))
     found = source.heights(np.array([0.5, 1.5, 2.5]), np.array([-0.2, 0.2]))
     np.testing.assert_allclose(found, [[1.0, 1.0], [np.nan, np.nan], [3.0, 3.0]])
 
@@ -125,3 +171,11 @@ def test_unused_vertices_are_dropped_and_the_rest_scaled_and_turned(decoded):
     mesh = decoded([[9, 9, np.inf], *TRIANGLE], [[1, 2, 3]], scale=0.5, up="y")
     assert mesh.faces.tolist() == [[0, 1, 2]]
     assert mesh.vertices.tolist() == [[0, 0, 0], [0.5, -1, 0], [0, 0, 1.5]]
+
+
+def test_bodies_that_touch_up_to_rounding_have_no_gap(decoded):
+    blocks = [box((1, 1, 1), (0.5, 0.5, 0.5)), box((1, 1, 1), (1.5 + 1e-9, 0.5, 0.5))]
+    mesh = trimesh.util.concatenate([*blocks, box((2, 1, 0.1), (1, 0.5, -0.05))])
+    source = decoded(mesh.vertices, mesh.faces)
+    found = source.heights(np.array([0.5, 1.0, 1.5]) + 5e-10, np.array([0.25, 0.75]))
+    np.testing.assert_allclose(found, 1.0)

@@ -9,9 +9,9 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError, MemoryLimitError
 from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
-from terrainkit.map.import_map import ImportReport
+from terrainkit.map.import_report import ImportReport
 from terrainkit.map.validate import validate
-from tests.meshes import save_bridge
+from tests.meshes import box, save_bridge
 
 
 def save(tmp_path, heights):
@@ -52,7 +52,7 @@ def test_import_records_the_file(tmp_path):
         "file_cell_y": 0.0,
         "height_span": 0.0,
         "scale": 0.0,
-        "up": "z",
+        "up": "auto",
         "missing": "nearest",
         "crop": "random",
         "platform": 2.0,
@@ -251,9 +251,13 @@ def test_import_mesh_reports_what_a_heightfield_loses(tmp_path):
         num_missing=0,
         overhang_area=pytest.approx(4.0),
         lost_area=pytest.approx(4.0),
-        max_error=pytest.approx(1.2),
-        max_error_at=pytest.approx((2.55, 0.05)),
+        overhang_error=pytest.approx(1.2),
+        overhang_error_at=pytest.approx((2.55, 0.05)),
+        max_error=pytest.approx(0.0, abs=1e-6),
+        max_error_at=imported.report.max_error_at,
     )
+    saved = imported.terrain_map.save(tmp_path / "a.npz")
+    assert tk.TerrainMap.load(saved).import_report == imported.report
     assert imported.terrain_map.height([3.0, 2.0]) == pytest.approx(1.2)
     assert len(imported.terrain_map.solids) == 0
 
@@ -263,7 +267,9 @@ def test_import_mesh_keeps_overhangs_as_solids(tmp_path):
     terrain_map, report = imported.terrain_map, imported.report
     assert (report.overhang_area, report.lost_area) == (pytest.approx(4.0), 0.0)
     assert report.max_error < 1e-3
-    assert len(terrain_map.solids.hull_counts) == 1
+    np.testing.assert_allclose(
+        np.sort(terrain_map.solids.boxes[0, 3:6]), [0.1, 0.5, 2.0], rtol=1e-5
+    )
     assert terrain_map.height([3.0, 2.0]) == pytest.approx(0.0, abs=1e-6)
     assert terrain_map.clearance([3.0, 2.0]) == pytest.approx(1.0, abs=1e-4)
     assert terrain_map.scan([3.0, 2.0, 5.0]) == pytest.approx(1.2, abs=1e-4)
@@ -285,3 +291,93 @@ def test_import_overhang_of_open_mesh_is_rejected(tmp_path):
     mesh.export(tmp_path / "open.stl")
     with pytest.raises(HeightFileError, match="solids: got a mesh without closed bodies"):
         import_map(tmp_path / "open.stl", ImportOptions(solids=True, missing="nearest"))
+
+
+def save_wall(folder, center=4.0, width=0.03):
+    """Write a floor of 8 m x 4 m with a wall across it, 0.5 m high."""
+    parts = [box((8, 4, 0.1), (4, 2, -0.05)), box((width, 4, 0.5), (center, 2, 0.25))]
+    trimesh.util.concatenate(parts).export(folder / "wall.stl")
+    return folder / "wall.stl"
+
+
+@pytest.mark.parametrize(
+    ("center", "width", "is_lost", "is_thin"),
+    [
+        (4.0, 0.03, True, True),  # between two samples, at 3.95 m and 4.05 m
+        (4.05, 0.03, False, True),  # on a sample: the map's wall is wider
+        (4.05, 0.0995, False, True),
+        (4.05, 0.101, False, False),
+        (4.0, 0.25, False, False),
+    ],
+)
+def test_import_of_a_thin_wall_is_reported_or_a_solid(tmp_path, center, width, is_lost, is_thin):
+    path = save_wall(tmp_path, center, width)
+    report = import_map(path).report
+    if is_lost:
+        # The two faces of its top, and the eight of its sides.
+        assert (report.num_lost_faces, report.lost_top, report.map_top) == (10, 0.5, 0.0)
+        assert report.max_error == pytest.approx(0.5)
+        assert report.lost_at[0] == pytest.approx(4.0, abs=0.02)
+    else:
+        assert (report.num_lost_faces, report.lost_at) == (0, None)
+        assert report.max_error < 1e-6
+    imported = import_map(path, ImportOptions(solids=True))
+    solids, report = imported.terrain_map.solids, imported.report
+    assert (report.num_thin_bodies, report.num_lost_faces) == (int(is_thin), 0)
+    assert report.max_error < 1e-6
+    if is_thin:
+        assert (imported.terrain_map.heights == 0).all()
+        half = np.sort(solids.boxes[0, 3:6])
+        np.testing.assert_allclose(half, [width / 2, 0.25, 2.0], rtol=1e-4)
+        np.testing.assert_allclose(solids.boxes[0, :3], [center, 2.0, 0.25], atol=1e-6)
+
+
+def test_import_reports_the_difference_between_samples(tmp_path):
+    # A roof from 0 m at x = 0 and 4 m to 0.4 m at x = 2.03 m, and a cell of 0.4 m.
+    x, z = np.array([0, 2.03, 4, 0, 2.03, 4]), np.array([0, 0.4, 0] * 2)
+    vertices = np.column_stack([x, [0, 0, 0, 4, 4, 4], z])
+    faces = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]
+    trimesh.Trimesh(vertices, faces).export(tmp_path / "roof.ply")
+    options = ImportOptions(cell=0.4, slope_threshold=None, spawn_tolerance=1.0, up="z")
+    report = import_map(tmp_path / "roof.ply", options).report
+    # Samples at 1.8 m and 2.2 m; the file has its ridge in between, less 0.1 % of the face.
+    low, high = 0.4 * 1.8 / 2.03, 0.4 * 1.8 / 1.97
+    expected = 0.4 - (low + (high - low) * 0.23 / 0.4)
+    assert report.max_error == pytest.approx(expected, abs=5e-4)
+    assert report.max_error_at[0] == pytest.approx(2.03, abs=2e-3)
+    assert report.num_lost_faces == 0
+
+
+def test_import_reports_what_a_coarser_cell_loses_of_heights(tmp_path):
+    heights = np.zeros((40, 40))
+    heights[10, 11] = 0.05
+    report = import_array(tmp_path, heights, cell=0.2, slope_threshold=1.0).report
+    # Means of 3 x 3 samples: 1/9 of the height at (1.1, 1.1), and 1/18 at (0.9, 1.1) and (1.1, 1.3).
+    # The point (1.05, 1.15) has a half of the first, and a quarter of each of the others.
+    assert report.max_error == pytest.approx(0.05 - 0.05 / 12, abs=1e-6)
+    assert report.max_error_at == pytest.approx((1.05, 1.15))
+    assert import_array(tmp_path, heights).report.max_error_at is None
+
+
+def test_import_of_a_cloud_has_its_cells(tmp_path):
+    x, y = np.meshgrid(np.arange(0, 4, 0.05), np.arange(0, 4, 0.05), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), 0.1 * (x.ravel() > 1.96)])
+    keep = np.random.default_rng(0).permutation(len(points))[: len(points) // 3]  # no regular grid
+    np.savetxt(tmp_path / "a.xyz", points[keep] + [0.0, 0.0, 3.0])
+    imported = import_map(tmp_path / "a.xyz", ImportOptions(cell=0.2, origin=(0, 0, 3)))
+    heights = imported.terrain_map.heights
+    assert heights.shape == (19, 19)
+    np.testing.assert_allclose(
+        heights, np.repeat(0.1 * (np.arange(19) > 9), 19).reshape(19, 19), atol=1e-6
+    )
+    with pytest.raises(ConfigError, match=r"solids: got .*a\.xyz; expected a mesh"):
+        import_map(tmp_path / "a.xyz", ImportOptions(solids=True))
+
+
+def test_import_of_open_bodies_is_reported(tmp_path):
+    wall = box((0.03, 4, 0.5), (4.0, 2, 0.25))
+    wall.update_faces(np.arange(12) != 3)
+    trimesh.util.concatenate([box((8, 4, 0.1), (4, 2, -0.05)), wall]).export(tmp_path / "a.stl")
+    report = import_map(tmp_path / "a.stl", ImportOptions(solids=True)).report
+    assert (report.num_open_bodies, report.num_thin_bodies) == (1, 0)
+    assert report.num_lost_faces > 0

@@ -1,0 +1,86 @@
+import mujoco
+import numpy as np
+import pytest
+
+from terrainkit.errors import HeightFileError, TerrainkitWarning
+from terrainkit.importing import mjcf_scene
+from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.source import open_source
+from tests.rays import cast_rays
+
+SCENE = """
+<mujoco>
+  <asset>
+    <hfield name="h" nrow="4" ncol="5" size="1 0.8 0.5 0.1"
+      elevation="0 1 2 3 4  1 5 2 7 0  3 1 4 1 5  9 2 6 5 3"/>
+    <mesh name="m" vertex="0 0 0  1 0 0  0 1 0  0 0 1" scale="0.7 0.7 0.7"/>
+    <mesh name="robot" file="missing.obj"/>
+  </asset>
+  <worldbody>
+    <geom type="plane" size="0 0 1" pos="0 0 0.1" euler="0 2 0"/>
+    <geom type="box" size="0.5 0.3 0.2" pos="3 0 0.5" euler="10 20 30"/>
+    <geom type="cylinder" size="0.4 0.3" pos="5 0 0.2"/>
+    <geom type="capsule" size="0.3 0.4" pos="0 3 0.5" euler="0 70 0"/>
+    <geom type="sphere" size="0.5" pos="3 3 0"/>
+    <geom type="ellipsoid" size="0.5 0.8 0.4" pos="5 3 0" euler="0 0 40"/>
+    <geom type="box" size="0.5 0.3 9" pos="0 0 0" contype="0" conaffinity="0"/>
+    <body pos="0 0 0.3" euler="0 0 30"><geom type="hfield" hfield="h"/></body>
+    <body pos="0 -3 0.3"><geom type="mesh" mesh="m"/></body>
+    <body name="robot" pos="0 0 5"><freejoint/><geom type="mesh" mesh="robot"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def save(folder, text):
+    (folder / "scene.xml").write_text(text)
+    return folder / "scene.xml"
+
+
+def test_scene_has_the_heights_of_rays(tmp_path):
+    with pytest.warns(TerrainkitWarning, match="bodies with joints are left out: robot$"):
+        source = open_source(save(tmp_path, SCENE), ReadOptions())
+    # The reference without the robot, whose mesh is missing, and without what does not collide.
+    lines = [line for line in SCENE.splitlines() if not {"robot", "contype"} & set(line.split('"'))]
+    lines = [line for line in lines if "contype" not in line]
+    model = mujoco.MjModel.from_xml_string("\n".join(lines))
+    x, y = np.linspace(-1.97, 6.03, 40), np.linspace(-3.93, 4.07, 40)
+    starts = np.stack([*np.meshgrid(x, y, indexing="ij"), np.full((40, 40), 9.0)], axis=-1)
+    expected, _ = cast_rays(model, starts.reshape(-1, 3))
+    found = source.heights(x, y).ravel()
+    difference = np.abs(found - expected)
+    is_beside = source.heights(x, y + 1e-2).ravel() - found  # steep sides amplify an error
+    assert difference[np.abs(is_beside) < 5e-3].max() < 2e-3  # the sphere's faces
+    assert np.median(difference) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("<mujoco/>", "got a scene without ground"),
+        ("<sdf/>", "cannot be read"),
+        ("<mujoco><include file='other.xml'/></mujoco>", "cannot be read"),
+        (SCENE.replace("0 2 0", "0 90 0").replace("freejoint", "inertial"), "cannot be read"),
+        (SCENE.replace("0 2 0", "0 90 0"), "expected one that faces up"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*bodies with joints")
+def test_scene_without_ground_is_rejected(tmp_path, text, message):
+    with pytest.raises(HeightFileError, match=rf"scene\.xml: .*{message}"):
+        open_source(save(tmp_path, text), ReadOptions())
+
+
+@pytest.mark.filterwarnings("ignore:.*bodies with joints")
+def test_scene_of_too_many_vertices_is_rejected(tmp_path, monkeypatch):
+    monkeypatch.setattr(mjcf_scene, "_MAX_VERTICES", 9000)
+    with pytest.raises(HeightFileError, match="got more than 9000 vertices"):
+        open_source(save(tmp_path, SCENE.replace('type="box"', 'type="sphere"')), ReadOptions())
+
+
+@pytest.mark.parametrize("suffix", [".sdf", ".world"])
+def test_gazebo_world_names_its_files(tmp_path, suffix):
+    (tmp_path / f"a{suffix}").write_text(
+        "<sdf><uri> model://hill/a.dae</uri><uri>b.png</uri></sdf>"
+    )
+    with pytest.raises(HeightFileError, match=r"refers to model://hill/a\.dae, b\.png$"):
+        open_source(tmp_path / f"a{suffix}", ReadOptions())
