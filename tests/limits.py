@@ -22,4 +22,5 @@ def columns_of(heights, ceiling=np.inf):
     floor = np.array(heights, float)
     floor = floor[..., None] if floor.ndim == 2 else floor
     ceiling = np.broadcast_to(ceiling, floor.shape).copy()
-    return Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling)
+    friction = np.ones_like(floor)
+    return Columns(spacing=0.1, lower=(0.0, 0.0), floor=floor, ceiling=ceiling, friction=friction)

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 MAX_LISTED = 20
 """Patches that the command lists one by one."""
 
+_DEFAULT_ROBOT = "quadruped"
+"""The robot whose limits are used for those that are not given, without a robot."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Feasibility(PluginCommand):
@@ -54,7 +57,8 @@ class Feasibility(PluginCommand):
     """Name of a bundled robot, or a folder written by terrainkit onboard."""
 
     limit: Limits = ()
-    """Limits of the robot that replace the derived limits, such as `step_up=0.2 gap=0.4`."""
+    """Limits that replace those of the robot, such as `step_up=0.2 gap=0.4`. Without --robot, the
+    limits that are not given come from the bundled quadruped."""
 
     output: OutputPath | None = None
     """Write PATH.json with all paths, and PATH.png with the paths on the preview."""
@@ -123,20 +127,31 @@ class Feasibility(PluginCommand):
 
 
 def robot_limits(robot: str, limits: Sequence[str]) -> "DerivedLimits":
-    """Return the limits of a robot, overridden by --limit.
+    """Return the limits of a robot, overridden by --limit, or the limits that --limit describes.
 
     Raises:
-        ConfigError: if there is no such robot, it has no legs, or a limit is invalid.
+        ConfigError: if there is neither a robot nor a limit, there is no such robot, it has no
+            legs, or a limit is invalid.
     """
     from terrainkit.feasibility.limits import limit_overrides
     from terrainkit_robots.rl.tasks import get_task
     from terrainkit_robots.simulation.robot_limits import derive_limits
 
-    if not robot:
-        raise ConfigError("--robot: missing; expected a bundled robot, or an onboarded folder")
+    if not robot and not limits:
+        raise ConfigError(
+            "--robot: missing; expected a bundled robot or an onboarded folder, such as --robot "
+            f"{_DEFAULT_ROBOT}, or --limit, such as --limit step_up=0.2 gap=0.4"
+        )
     values = parse_pairs("--limit", limits, "=", "NAME=VALUE, such as step_up=0.2")
     overrides = limit_overrides({name: value_of(text) for name, text in values.items()})
-    return derive_limits(get_task(robot).folder, overrides)
+    derived = derive_limits(get_task(robot or _DEFAULT_ROBOT).folder, overrides)
+    if robot:
+        return derived
+    reasons = {
+        name: reason if name in overrides else f"not given; {_DEFAULT_ROBOT}: {reason}"
+        for name, reason in derived.reasons.items()
+    }
+    return replace(derived, robot="the robot of --limit", reasons=reasons)
 
 
 def solve_demand(
@@ -175,9 +190,16 @@ def solve_demand(
 def print_impassable(
     results: "Sequence[PatchFeasibility]", derived: "DerivedLimits", path: Path
 ) -> int:
-    """Print the patches that the robot cannot cross, and return 1 if there are any."""
-    from terrainkit.feasibility.report import blocking_text, demand_text
+    """Print how many patches of each terrain the robot can cross, and those that it cannot.
 
+    Returns:
+        1 if there are any that it cannot cross, else 0.
+    """
+    from terrainkit.feasibility.report import blocking_text, crossed_texts, demand_text
+
+    render.result("")
+    for text in crossed_texts(results):
+        render.result(text)
     blocked = [each for each in results if not each.is_passable]
     if not blocked:
         render.result(f"\n{path}: {derived.robot} can cross {_patches(len(results))}")

@@ -59,7 +59,8 @@ class Generate(PluginCommand, ConfigCommand):
     ground, 1 the limit of the robot; see terrainkit feasibility."""
 
     limit: Limits = ()
-    """Limits of the robot that replace the derived limits, such as `step_up=0.2 gap=0.4`."""
+    """Limits that replace those of the robot, such as `step_up=0.2 gap=0.4`. Without --robot, the
+    limits that are not given come from the bundled quadruped."""
 
     jobs: Jobs = 1
     """Number of processes that build patches; the map does not depend on it. Processes start in a
@@ -98,8 +99,10 @@ class Generate(PluginCommand, ConfigCommand):
         samples = config.grid.shape[0] * config.grid.shape[1] if self.mesh else 0
         # Fail before generating.
         export.check_export(self.output, samples, overwrite=self.overwrite)
-        if bool(self.robot) != bool(self.demand) or (self.limit and not self.robot):
-            raise ConfigError("--robot, --demand, --limit: expected --robot and --demand together")
+        if bool(self.robot or self.limit) != bool(self.demand):
+            raise ConfigError(
+                "--robot, --demand, --limit: expected --demand together with --robot or --limit"
+            )
         with worker_pool(self.jobs) as executor:
             if self.demand:
                 config = solve_demand(config, self.robot, self.limit, self.demand, executor)

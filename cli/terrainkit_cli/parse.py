@@ -242,7 +242,7 @@ def split_args(
             value = ["false" if name == each.names[-1] else "true"]
             parser.add_argument(name, dest=each.key, action="store_const", const=value)
         else:
-            action = "extend" if each.is_repeated else "store"
+            action = "extend" if each.is_repeated or each.nargs == "*" else "store"
             parser.add_argument(name, dest=each.key, action=action, nargs=each.nargs)
     end = argv.index("--") if "--" in argv else len(argv)
     try:

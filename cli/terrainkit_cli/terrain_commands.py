@@ -269,7 +269,8 @@ class CheckMap(PluginCommand):
     written by terrainkit onboard."""
 
     limit: Limits = ()
-    """With --robot: limits that replace the derived limits, such as `step_up=0.2 gap=0.4`."""
+    """Limits that replace those of the robot, or describe one without --robot; see terrainkit
+    feasibility."""
 
     def run(self) -> int:
         """Print the issues and the largest patch edge, and return 1 if there are issues."""
@@ -280,9 +281,7 @@ class CheckMap(PluginCommand):
         from terrainkit_cli.feasibility_command import print_impassable, robot_limits
         from terrainkit_robots.text import count
 
-        if self.limit and not self.robot:
-            raise ConfigError("--limit: got limits without a robot; expected --robot")
-        derived = robot_limits(self.robot, self.limit) if self.robot else None
+        derived = robot_limits(self.robot, self.limit) if self.robot or self.limit else None
         terrain_map = TerrainMap.load(self.map)
         issues = validate(terrain_map, read_mesh(self.map))
         for issue in issues:

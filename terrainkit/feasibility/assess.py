@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.export.requirements import require_finite
+from terrainkit.feasibility.arrays import IntArray
 from terrainkit.feasibility.bottleneck import Segment, shortest_path
-from terrainkit.feasibility.columns import Columns, IntArray, columns_per_cell, sample_columns
+from terrainkit.feasibility.columns import Columns, columns_per_cell, sample_columns
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND, path_edges

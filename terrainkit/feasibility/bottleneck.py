@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.columns import FloatArray, IntArray
+from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.edges import Edges
 
 Segment = tuple[int, IntArray]

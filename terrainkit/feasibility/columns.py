@@ -4,8 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.solid_tops import Tops, solid_widths
 from terrainkit.geometry.free_space import free_intervals
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.surface import surface_at
@@ -17,9 +18,6 @@ of the map; the edge of a foothold of 0.1 m has to be found within a third of it
 
 STANCE = 0.1
 """Largest distance of a foot from the position of a robot, along x and y [m]."""
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +39,12 @@ class Columns:
 
     ceiling: FloatArray
     """Ceiling of each interval [m], shape (nx, ny, m); inf under the open sky."""
+
+    friction: FloatArray
+    """Friction coefficient of each floor, shape (nx, ny, m)."""
+
+    tops: Tops | None = None
+    """The solids below the floors; None for a patch without solids."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -111,14 +115,32 @@ def sample_columns(patch: Patch, threshold: float) -> Columns:
     lower = grid.lower[0] + spacing / 2, grid.lower[1] + spacing / 2
     if not len(solids):
         floor = patch.heights.astype(np.float64)[..., None]
-        ceiling = np.full_like(floor, np.inf)
-        return Columns(spacing=spacing, lower=lower, floor=floor, ceiling=ceiling)
+        return Columns(
+            spacing=spacing,
+            lower=lower,
+            floor=floor,
+            ceiling=np.full_like(floor, np.inf),
+            friction=patch.friction.astype(np.float64)[..., None],
+        )
     nx, ny = grid.shape[0] * n, grid.shape[1] * n
     index = np.stack(np.meshgrid(np.arange(nx), np.arange(ny), indexing="ij"), axis=-1)
     index = index.reshape(-1, 2)
     in_cells = (index + 0.5) / n - 0.5
     xy: FloatArray = index * spacing + np.array(lower)
     ground = surface_at(patch.heights, in_cells, threshold=threshold).height
-    bounds = SolidIndex(solids).intervals(xy)
-    intervals = free_intervals(ground, bounds).reshape(nx, ny, -1, 2)
-    return Columns(spacing=spacing, lower=lower, floor=intervals[..., 0], ceiling=intervals[..., 1])
+    # No solid fits between two columns.
+    widened = np.maximum(spacing - solid_widths(solids), 0.0) / 2
+    solid_index = SolidIndex(solids, radius=widened)
+    intervals = free_intervals(ground, solid_index.intervals(xy)).reshape(nx, ny, -1, 2)
+    floor, ceiling = intervals[..., 0], intervals[..., 1]
+    tops = Tops.build(solids, widened, floor, solid_index.crossings(xy))
+    friction = np.repeat(np.repeat(patch.friction, n, axis=0), n, axis=1)[..., None]
+    own = np.append(solids.friction, np.nan)[tops.solid]
+    return Columns(
+        spacing=spacing,
+        lower=lower,
+        floor=floor,
+        ceiling=ceiling,
+        friction=np.where(np.isnan(own), friction, own),
+        tops=tops,
+    )

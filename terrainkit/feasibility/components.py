@@ -6,8 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.feasibility.arrays import IntArray
 from terrainkit.feasibility.bottleneck import find_components
-from terrainkit.feasibility.columns import IntArray
 from terrainkit.feasibility.edges import Edges
 
 

@@ -6,7 +6,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.gradient import Gradient, step
 
 

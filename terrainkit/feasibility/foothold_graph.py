@@ -10,7 +10,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.columns import Columns, FloatArray
+from terrainkit.feasibility.arrays import FloatArray
+from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.edges import Edges, step_edges
 from terrainkit.feasibility.footholds import foothold_sizes
 from terrainkit.feasibility.free_width import FreeWidth
@@ -19,6 +20,9 @@ from terrainkit.feasibility.limits import RobotLimits
 
 DIGITS = 6
 """Digits of a demand, so that a step of exactly the limit is not above it."""
+
+_LEAST_FRICTION = 1e-9
+"""Friction coefficient in place of 0, on which only level ground is passable."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,7 +43,8 @@ class FootholdGraph:
 
     quantities: dict[str, FloatArray]
     """Quantity of each node by the name of its limit, shape (nodes,): slope (rise over run),
-    foothold (diameter [m]), body_width (free width [m]) and crouched_height (clearance [m])."""
+    friction (slope over friction coefficient), foothold (diameter [m]), body_width (free width [m])
+    and crouched_height (clearance [m])."""
 
     node_demand: FloatArray
     """Demand of each node, shape (nodes,)."""
@@ -57,8 +62,10 @@ class FootholdGraph:
         """
         gradient = gradient_of(columns.floor, columns.spacing)
         steps, free_width = step_edges(columns, gradient), FreeWidth.build(columns, limits)
+        slope = gradient.slope(columns.spacing)
         quantities = {
-            "slope": gradient.slope(columns.spacing),
+            "slope": slope,
+            "friction": slope / np.maximum(columns.friction, _LEAST_FRICTION),
             "foothold": foothold_sizes(columns, steps, limits),
             "body_width": free_width.at_nodes(),
             "crouched_height": columns.ceiling - columns.floor,

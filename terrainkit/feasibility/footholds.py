@@ -6,18 +6,21 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.solid_tops import Tops
 
 EDGE_FRACTION = 0.5
-"""A step of more than this fraction of the limits bounds a foothold. On the edge of a lower one, a
-foot is supported on both sides."""
+"""A step of more than this fraction of the limits bounds a foothold."""
 
 
 def foothold_sizes(columns: Columns, steps: Edges, limits: RobotLimits) -> FloatArray:
     """Return the diameter of the largest disk that covers each node and is on one surface [m].
 
+    A surface ends where the ground rises or falls, beyond its slope, by more than the steepest
+    slope does across the smallest foothold: a foot on it would be tilted by more than that slope.
     Larger disks than twice the smallest foothold are not distinguished.
 
     Args:
@@ -28,16 +31,86 @@ def foothold_sizes(columns: Columns, steps: Edges, limits: RobotLimits) -> Float
     Returns:
         Diameters [m], shape (nx, ny, m); 0 where there is no node.
     """
-    edge = EDGE_FRACTION * min(limits.step_up, limits.step_down)
     max_size = math.ceil(2 * limits.foothold / columns.spacing - 1e-9)
     # The second half of the steps has the same edges in the opposite direction.
-    half = len(steps.start) // 2
-    flat = np.maximum(steps.rise[:half], steps.drop[:half]) <= edge
-    start, end = steps.start[:half][flat], steps.end[:half][flat]
+    toward = steps.select(slice(len(steps.start) // 2))
+    flat = _flat_steps(columns, toward, limits)
+    start, end = toward.start[flat], toward.end[flat]
     sizes = np.zeros(columns.floor.size)
     for nodes, first, second in _surfaces(columns, start, end):
-        sizes[nodes] = _surface_sizes(columns, nodes, first, second, max_size)
-    return sizes.reshape(columns.floor.shape) * columns.spacing
+        sizes[nodes] = _surface_sizes(columns, nodes, first, second, max_size) * columns.spacing
+    if columns.tops is not None:
+        sizes = _with_tops(columns, columns.tops, sizes, (start, end), limits)
+    return sizes.reshape(columns.floor.shape)
+
+
+def _with_tops(
+    columns: Columns,
+    tops: Tops,
+    sizes: FloatArray,
+    steps: tuple[IntArray, IntArray],
+    limits: RobotLimits,
+) -> FloatArray:
+    """Return the diameters with the exact ones on the tops of solids.
+
+    Args:
+        columns: The columns.
+        tops: The solids of the columns.
+        sizes: Diameters that the columns show [m], shape (nodes,).
+        steps: Both ends of the steps that do not bound a foothold.
+        limits: The limits of the robot.
+    """
+    import cv2
+
+    solid, max_size = tops.solid.reshape(-1), 2 * limits.foothold
+    on_solid = np.flatnonzero(solid >= 0)
+    sizes[on_solid] = np.maximum(sizes[on_solid] - 2 * tops.widened[solid[on_solid]], 0.0)
+    exact = np.full(len(sizes), np.nan)
+    narrow = on_solid[sizes[on_solid] < max_size]
+    xy = columns.positions(narrow)[:, :2]
+    exact[narrow] = tops.sizes(narrow, xy, max_size, limits.slope)
+    # A disk may reach beyond the top where another surface joins it, and less far where something
+    # covers it.
+    first, second = steps
+    joined = np.zeros(columns.shape, dtype=bool)
+    joined[columns.column(first[solid[first] != solid[second]])] = True
+    reach = math.ceil(max_size / columns.spacing) + 1
+    kernel = np.ones((2 * reach + 1,) * 2, np.uint8)
+    is_covered, is_joined = (
+        np.repeat(cv2.dilate(each.astype(np.uint8), kernel).reshape(-1) > 0, columns.floor.shape[2])
+        for each in (tops.is_covered, joined)
+    )
+    known = ~np.isnan(exact) & ~is_covered & ~(is_joined & (sizes > exact))
+    return np.where(known, exact, sizes)
+
+
+def _flat_steps(columns: Columns, steps: Edges, limits: RobotLimits) -> NDArray[np.bool_]:
+    """Return which steps do not bound a foothold, shape (n,).
+
+    Args:
+        columns: The columns.
+        steps: Edges toward x and y.
+        limits: The limits of the robot.
+    """
+    edge = EDGE_FRACTION * min(limits.step_up, limits.step_down)
+    edge = min(edge, limits.slope * limits.foothold) + 1e-9
+    step = steps.rise - steps.drop
+    is_flat = np.abs(step) <= edge
+    along_x = columns.column(steps.start)[0] != columns.column(steps.end)[0]
+    is_rough = np.zeros(len(step), dtype=bool)
+    for axis in (along_x, ~along_x):
+        chains = [np.flatnonzero(is_flat & axis)]
+        following = np.full(columns.floor.size, -1)
+        following[steps.start[chains[0]]] = chains[0]
+        rise = step[chains[0]]
+        # The steps one after the other across the smallest foothold.
+        for _ in range(1, math.floor(limits.foothold / columns.spacing + 1e-9)):
+            after = following[steps.end[chains[-1]]]
+            chains = [each[after >= 0] for each in (*chains, after)]
+            rise = rise[after >= 0] + step[chains[-1]]
+            for each in chains:
+                is_rough[each[np.abs(rise) > edge]] = True
+    return is_flat & ~is_rough
 
 
 def _surfaces(

@@ -8,7 +8,8 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.gradient import SLOPE_LENGTH
 from terrainkit.feasibility.limits import RobotLimits
 

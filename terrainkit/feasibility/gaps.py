@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.columns import Columns, FloatArray, IntArray
+from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph, ratio
 
@@ -53,6 +54,7 @@ def gap_edges(
         pairs = batch.select(~is_entered[components[batch.end]]) if one_each else batch
         number = _MAX_SEARCHED_ENDS if one_each else _MAX_ENDS
         pairs = pairs.select(_best_pairs(graph, pairs, number, components[pairs.end], pairs.start))
+        pairs = _between_tops(graph.columns, pairs)
         number = 1 if one_each else len(pairs.start)
         while len(pairs.start):
             order = _best_pairs(graph, pairs, number, components[pairs.end])
@@ -90,7 +92,9 @@ def _pairs(
     columns, floor = graph.columns, graph.columns.floor.reshape(-1)
     shape = columns.floor.shape
     max_rise, max_drop = max_demand * graph.limits.step_up, max_demand * graph.limits.step_down
-    moves, widths = _offsets(columns, max_demand * graph.limits.gap)
+    # The side of a solid is within a column of a node, not halfway.
+    more = 0.0 if columns.tops is None else columns.spacing
+    moves, widths = _offsets(columns, max_demand * graph.limits.gap + more)
     n = int(moves.max(initial=0))
     is_usable = graph.node_demand < max_demand
     is_end = (end_mask & is_usable).reshape(shape)
@@ -135,6 +139,16 @@ def _offsets(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
     gaps = np.hypot(near, far) * columns.spacing * outside
     useful = ((far > 1) | (near > 0)) & (gaps < max_gap)
     return moves[useful], gaps[useful]
+
+
+def _between_tops(columns: Columns, pairs: Edges) -> Edges:
+    """Return the pairs with the exact gaps between the tops of solids."""
+    if columns.tops is None or not len(pairs.start):
+        return pairs
+    nodes = pairs.start, pairs.end
+    start, end = (columns.positions(node)[:, :2] for node in nodes)
+    gaps = columns.tops.gaps(nodes, (start, end), pairs.gap, columns.spacing)
+    return replace(pairs, gap=gaps)
 
 
 def _best_pairs(graph: FootholdGraph, pairs: Edges, number: int, *keys: IntArray) -> IntArray:

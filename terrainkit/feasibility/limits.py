@@ -47,6 +47,10 @@ class RobotLimits(Config):
     crouched_height: Limit
     """Lowest clearance under which the robot walks [m]."""
 
+    friction: Limit = 2 / 3
+    """Largest share of the friction coefficient that a slope takes, as rise over run divided by the
+    coefficient. A foot slides above 1; the rest is for the horizontal forces of walking."""
+
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.crouched_height >= self.standing_height:

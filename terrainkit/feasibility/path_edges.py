@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from terrainkit.feasibility.arrays import FloatArray
 from terrainkit.feasibility.bottleneck import Segment, bottleneck
-from terrainkit.feasibility.columns import FloatArray
 from terrainkit.feasibility.components import Components
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph

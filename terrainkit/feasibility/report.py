@@ -13,7 +13,7 @@ from terrainkit.views.preview import Route
 SCHEMA_VERSION = 1
 """Version of the JSON; it changes when a key changes its meaning or is removed."""
 
-_UNITS = {"slope": ""}
+_UNITS = {"slope": "", "friction": ""}
 """Units of the limits that are not lengths in meters."""
 
 
@@ -28,6 +28,33 @@ def demand_table(results: Sequence[PatchFeasibility]) -> list[tuple[str, ...]]:
             cells.append(demand_text(max(demands)) if demands else "-")
         table.append((terrain, *cells))
     return table
+
+
+def crossed_texts(results: Sequence[PatchFeasibility]) -> list[str]:
+    """Return how many patches of each terrain can be crossed, and up to which difficulty."""
+    return [
+        f"{name}: {each['passable']} of {each['patches']} patches"
+        + ("" if (most := each["max_difficulty"]) is None else f", up to difficulty {most:.2f}")
+        for name, each in _by_terrain(results).items()
+    ]
+
+
+def _by_terrain(results: Sequence[PatchFeasibility]) -> dict[str, dict[str, Any]]:
+    """Return the number of patches of each terrain, how many are passable, and the difficulty.
+
+    All patches up to this difficulty are passable; it is None if the easiest one is not.
+    """
+    terrains = {}
+    for name in dict.fromkeys(each.terrain for each in results):
+        patches = [each for each in results if each.terrain == name]
+        blocked = min((p.difficulty for p in patches if not p.is_passable), default=math.inf)
+        easy = [round(p.difficulty, 6) for p in patches if p.difficulty < blocked]
+        terrains[name] = {
+            "patches": len(patches),
+            "passable": sum(p.is_passable for p in patches),
+            "max_difficulty": max(easy, default=None),
+        }
+    return terrains
 
 
 def demand_text(demand: float) -> str:
@@ -65,6 +92,7 @@ def to_json(
         "limits": asdict(limits),
         "max_demand": MAX_DEMAND,
         "passable": all(each.is_passable for each in results),
+        "terrains": _by_terrain(results),
         "patches": [
             {
                 "row": each.row,

@@ -15,6 +15,9 @@ _MIN_BIN, _MAX_BINS = 0.5, 1_000_000
 _VERTICAL = 1e-6
 """Largest z component of the unit normal of a vertical face."""
 
+Crossings = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]
+"""Index of the line, index of the solid, bottom and top [m] of each crossing, shapes (k,)."""
+
 
 class SolidIndex:
     """Solids, sorted into square bins on the xy plane.
@@ -23,25 +26,26 @@ class SolidIndex:
     cylinder. A vertical line therefore meets a solid in one interval, which is computed exactly.
     """
 
-    def __init__(self, solids: Solids, *, radius: float = 0.0) -> None:
+    def __init__(self, solids: Solids, *, radius: float | NDArray[np.float64] = 0.0) -> None:
         """Index `solids`.
 
         Args:
             solids: The solids.
-            radius: Widen every solid horizontally by this distance [m]; edges become sharp, not
-                round, so corners are widened by more.
+            radius: Widen every solid horizontally by this distance [m], one number or shape (n,);
+                edges become sharp, not round, so corners are widened by more.
         """
         self._number = len(solids)
         if not self._number:
             return
-        self._radius = radius
-        self._planes, self._num_planes = _half_spaces(solids)
+        self._radius = np.broadcast_to(np.asarray(radius, float), self._number)
+        self._planes, self._num_planes = half_spaces(solids)
         self._first_plane = np.cumsum(self._num_planes) - self._num_planes
         self._cylinders, self._num_boxes = solids.cylinders.astype(float), len(solids.boxes)
         self._axes = rotation_matrices(solids.cylinders[:, 6:])[..., 2]
-        lower, upper = solids.bounds()
         # Single precision rounds by less than a tenth of a millimeter.
-        self._lower, self._upper = lower[:, :2] - radius - 1e-4, upper[:, :2] + radius + 1e-4
+        margin = self._radius[:, None] + 1e-4
+        lower, upper = solids.bounds()
+        self._lower, self._upper = lower[:, :2] - margin, upper[:, :2] + margin
         self._make_bins()
 
     def _make_bins(self) -> None:
@@ -69,8 +73,25 @@ class SolidIndex:
             Bottom and top of each solid on each line [m], shape (n, k, 2), in the order of the
             bottoms; NaN where a line has fewer than k solids.
         """
+        line, _, bottom, top = self.crossings(xy)
+        rank = np.arange(len(line)) - np.searchsorted(line, line)
+        result = np.full((len(xy), int(rank.max(initial=-1)) + 1, 2), np.nan)
+        result[line, rank] = np.column_stack([bottom, top])
+        return result
+
+    def crossings(self, xy: NDArray[np.float64]) -> Crossings:
+        """Return the solids that the vertical lines through `xy` cross.
+
+        Args:
+            xy: Points [m], shape (n, 2).
+
+        Returns:
+            Index of the line, index of the solid, bottom and top [m] of each crossing, each of
+            shape (k,), in the order of the lines and of the bottoms.
+        """
         if not self._number or not len(xy):
-            return np.empty((len(xy), 0, 2))
+            none = np.empty(0, np.int64)
+            return none, none, np.empty(0), np.empty(0)
         counts, starts = self._candidates(xy)
         # Lines are evaluated in blocks with a bounded number of candidates each.
         cuts = np.searchsorted(
@@ -78,13 +99,9 @@ class SolidIndex:
         )
         blocks = np.split(np.arange(len(xy)), np.unique(cuts))
         parts = [self._line_intervals(xy, counts, starts, block) for block in blocks]
-        line, bottom, top = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        line, solid, bottom, top = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         order = np.lexsort((bottom, line))
-        line = line[order]
-        rank = np.arange(len(line)) - np.searchsorted(line, line)
-        result = np.full((len(xy), int(rank.max(initial=-1)) + 1, 2), np.nan)
-        result[line, rank] = np.column_stack([bottom, top])[order]
-        return result
+        return line[order], solid[order], bottom[order], top[order]
 
     def _candidates(self, xy: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the number of solids in the bin of each point, and the position of the first."""
@@ -101,8 +118,8 @@ class SolidIndex:
         counts: NDArray[np.int64],
         starts: NDArray[np.int64],
         block: NDArray[np.int64],
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-        """Return line, bottom and top of each solid on the lines `block`."""
+    ) -> Crossings:
+        """Return line, solid, bottom and top of each crossing of the lines `block`."""
         row, place = segment_indices(counts[block])
         line = block[row]
         solid = self._solids[starts[line] + place]
@@ -115,7 +132,7 @@ class SolidIndex:
         bottom[round_] = np.maximum(bottom[round_], low)
         top[round_] = np.minimum(top[round_], high)
         hit = top > bottom
-        return line[hit], bottom[hit], top[hit]
+        return line[hit], solid[hit], bottom[hit], top[hit]
 
     def _between_planes(
         self, xy: NDArray[np.float64], solid: NDArray[np.int64]
@@ -126,7 +143,7 @@ class SolidIndex:
         pair, place = segment_indices(self._num_planes[solid])
         normal, distance = np.split(self._planes[self._first_plane[solid][pair] + place], [3], 1)
         # A half-space n . p <= d that is widened horizontally by r has the distance d + r |n_xy|.
-        left = distance[:, 0] + self._radius * np.hypot(normal[:, 0], normal[:, 1])
+        left = distance[:, 0] + self._radius[solid][pair] * np.hypot(normal[:, 0], normal[:, 1])
         left -= (normal[:, :2] * xy[pair]).sum(axis=1)
         nz = normal[:, 2]
         steep = np.abs(nz) <= _VERTICAL
@@ -143,7 +160,7 @@ class SolidIndex:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the interval of z inside the infinite cylinders `k`; empty if top < bottom."""
         axis, center = self._axes[k], self._cylinders[k, :3]
-        radius = self._cylinders[k, 3] + self._radius
+        radius = self._cylinders[k, 3] + self._radius[k + self._num_boxes]
         # The distance from the axis of the point at height center_z + t is |q + t e|.
         offset = np.column_stack([xy - center[:, :2], np.zeros(len(k))])
         q = offset - axis * (axis * offset).sum(axis=1, keepdims=True)
@@ -160,8 +177,11 @@ class SolidIndex:
         return np.where(miss, np.inf, low), np.where(miss, -np.inf, high)
 
 
-def _half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the half-spaces of each solid.
+
+    Args:
+        solids: The solids.
 
     Returns:
         Unit normal n and distance d of each, shape (k, 4): the points p with n . p <= d; and the

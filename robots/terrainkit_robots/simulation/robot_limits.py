@@ -76,6 +76,7 @@ def derive_limits(folder: Path, overrides: Mapping[str, float] | None = None) ->
         "step_down": (STEP_DOWN * leg, f"{STEP_DOWN:g} x {about_leg}"),
         "gap": (GAP * leg, f"{GAP:g} x {about_leg}"),
         "slope": (SLOPE, "30 degrees"),
+        "friction": (RobotLimits.friction, "of the friction coefficient; a foot slides above 1"),
         "foothold": (FOOTHOLD * foot, f"{FOOTHOLD:g} x foot_radius ({foot:g} m)"),
         "body_width": (width, "width of the collision shapes in the default pose"),
         "standing_height": (height, "height of the collision shapes in the default pose"),

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from terrainkit.feasibility.free_width import FreeWidth
+from terrainkit.feasibility.free_width import FreeWidth, _trace_ray
 from tests.limits import LIMITS, columns_of
 
 WIDE = replace(LIMITS, body_width=0.5)
@@ -53,9 +53,10 @@ def test_width_between_roofs_lower_than_the_crouched_height(height, width):
     assert found[20] == pytest.approx(1.0)
 
 
-def test_diagonal_corridor():
-    i, j = np.mgrid[:40, :40]
-    heights = np.where(np.abs(i - j) <= 4, 0.0, 1.0)
+@pytest.mark.parametrize("side", [1, -1])
+def test_diagonal_corridor(side):
+    i, j = np.mgrid[-20:20, -20:20]
+    heights = np.where(np.abs(i - side * j) <= 4, 0.0, 1.0)
     # The corners of the cells are 8 diagonals of 0.1 m / sqrt(2) apart, the lines of centers 10.
     assert 0.56 <= widths(heights)[20, 20] <= 0.71
 
@@ -71,3 +72,24 @@ def test_ceilings_are_the_lowest_and_highest_within_the_body_width():
     assert lowest[15, [8, 9, 15, 21, 22, 23]].tolist() == [np.inf, 1, 1, 1, 2, np.inf]
     assert highest[15, [8, 9, 10, 15, 22, 23]].tolist() == [-np.inf, 1, 2, 2, 2, -np.inf]
     assert lowest[[8, 9, 21, 22], 15].tolist() == [np.inf, 1, 1, np.inf]
+
+
+def test_ray_enters_cells_at_the_lines_between_them():
+    """A slope to a cell starts at the last cell that the ray entered 0.1 m before it, or at 0."""
+    assert _trace_ray(0.0, 0.21, 0.08) == [(1, 0, 0.04, 0), (2, 0, 0.12, 0), (3, 0, 0.2, 1)]
+    assert _trace_ray(np.pi, 0.2, 0.08) == [(-1, 0, 0.04, 0), (-2, 0, 0.12, 0)]
+    assert _trace_ray(-np.pi / 2, 0.12, 0.05) == [
+        (0, -1, 0.025, 0),
+        (0, -2, 0.075, 0),
+    ]
+    corner = 0.05 * 2**0.5
+    cells = _trace_ray(np.pi / 4, 0.2, 0.1)
+    assert [(c.i, c.j) for c in cells] == [(1, 0), (1, 1)]
+    assert [c.distance for c in cells] == pytest.approx([corner, corner])
+
+
+@pytest.mark.parametrize(("rise", "width"), [(0.2, 1.0), (0.20005, 1.0), (0.2002, 0.2)])
+def test_wall_is_higher_than_a_step_by_more_than_rounding(rise, width):
+    heights = np.full((30, 30), rise)
+    heights[10:12] = 0.0
+    assert widths(heights)[10:12] == pytest.approx(width)

@@ -3,6 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from terrainkit.feasibility import gaps as gaps_module
+from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.gaps import gap_edges
 from tests.limits import LIMITS, columns_of
@@ -57,3 +59,54 @@ def test_body_passes_over_a_hurdle_and_below_a_roof():
     heights[7, 5] = 0.21
     assert gap_from(first, last, heights) == ()
     assert gap_from(last, first, heights) != ()
+
+
+@pytest.mark.parametrize(("free", "width"), [(1, 0.1), (3, 0.3)])
+def test_gap_is_as_wide_as_the_passage_above_it(free, width):
+    """A ditch between two walls: the body passes in between, 0.1 m for each column."""
+    heights = np.full((12, 12), 1.0)
+    heights[:, 5 : 5 + free] = 0.0
+    heights[6:8, 5 : 5 + free] = -1.0
+    graph = FootholdGraph.build(columns_of(heights), replace(NARROW, body_width=0.2))
+    nodes = np.arange(heights.size)
+    middle = 5 + free // 2
+    found = gap_edges(graph, nodes, nodes == 5 * 12 + middle, nodes == 8 * 12 + middle, 3.0)
+    assert (found.gap.tolist(), found.width.tolist()) == (
+        [pytest.approx(0.2)],
+        [pytest.approx(width)],
+    )
+
+
+def edges_of(gap):
+    gap, none = np.array(gap, float), np.zeros(len(gap))
+    node, most = np.arange(len(gap)), np.full(len(gap), np.inf)
+    return Edges(start=node, end=node, rise=none, drop=none, gap=gap, clearance=most, width=most)
+
+
+def test_easiest_gaps_are_kept_for_each_combination_of_keys():
+    graph = FootholdGraph.build(columns_of(np.zeros((3, 3))), LIMITS)
+    pairs = edges_of([0.3, 0.1, 0.2, 0.4, 0.1, 0.2, 0.3])
+    first, second = np.array([0, 0, 0, 0, 1, 1, 1]), np.array([0, 0, 0, 1, 1, 1, 1])
+    best = [gaps_module._best_pairs(graph, pairs, n, first, second).tolist() for n in (1, 2)]
+    assert list(map(sorted, best)) == [[1, 3, 4], [1, 2, 3, 4, 5]]
+    assert sorted(gaps_module._best_pairs(graph, pairs, 2, first).tolist()) == [1, 2, 4, 5]
+
+
+def test_batches_have_at_least_the_number_of_pairs(monkeypatch):
+    monkeypatch.setattr(gaps_module, "_MAX_PAIRS", 5)
+    parts = [edges_of(np.full(n, n)) for n in (3, 2, 6, 1, 3)]
+    batches = [each.gap.tolist() for each in gaps_module._batches(parts)]
+    assert batches == [[3, 3, 3, 2, 2], [6] * 6, [1, 3, 3, 3]]
+    assert list(gaps_module._batches([])) == []
+
+
+def test_moves_stay_within_the_patch_and_below_the_widest_gap():
+    """Along an axis, n columns leave a gap of n - 1; a corner is (sqrt(2) - 1) columns wide."""
+    columns = columns_of(np.zeros((2, 3)))
+    moves, gaps = gaps_module._offsets(columns, 5.0)
+    assert np.abs(moves).max() == 3
+    found = {tuple(m): round(float(g), 4) for m, g in zip(moves.tolist(), gaps, strict=True)}
+    assert found.keys().isdisjoint([(0, 0), (1, 0), (0, -1)])
+    assert (found[2, 0], found[0, -3], found[1, -1], found[2, 2]) == (0.1, 0.2, 0.0414, 0.1414)
+    moves, gaps = gaps_module._offsets(columns, 0.1)
+    assert sorted(map(tuple, np.abs(moves).tolist())) == [(1, 1)] * 4

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from terrainkit.feasibility.assess import PatchFeasibility
-from terrainkit.feasibility.report import blocking_text, demand_table, demand_text, routes, to_json
+from terrainkit.feasibility.report import (
+    blocking_text,
+    crossed_texts,
+    demand_table,
+    demand_text,
+    routes,
+    to_json,
+)
 from tests.limits import LIMITS
 
 EASY = PatchFeasibility(
@@ -40,11 +47,33 @@ def test_table_has_the_largest_demand_of_each_terrain_and_row():
     ]
 
 
+def test_patches_are_counted_up_to_the_easiest_that_is_not_passable():
+    def patches(**demands):
+        return [
+            replace(EASY, terrain=name, difficulty=k / 4, demand=demand)
+            for name, each in demands.items()
+            for k, demand in enumerate(each)
+        ]
+
+    results = patches(stairs=[0, 1, 1.001, 1, np.inf], gap=[0.5, 1], pit=[2, 0.5])
+    assert crossed_texts(results) == [
+        "stairs: 3 of 5 patches, up to difficulty 0.25",
+        "gap: 2 of 2 patches, up to difficulty 0.25",
+        "pit: 1 of 2 patches",
+    ]
+    assert to_json(results, LIMITS)["terrains"]["pit"] == {
+        "patches": 2,
+        "passable": 1,
+        "max_difficulty": None,
+    }
+
+
 def test_blocking_text_has_value_limit_and_place():
     place = "at (1.00, 2.00, 0.07)"
     assert blocking_text(EASY, LIMITS) == f"step_up 0.15 m (limit 0.2 m) {place}"
-    slope = replace(EASY, limit="slope", value=0.3)
-    assert blocking_text(slope, LIMITS) == f"slope 0.3 (limit 0.5) {place}"
+    slope, slip = (replace(EASY, limit=name, value=0.7) for name in ("slope", "friction"))
+    assert blocking_text(slope, LIMITS) == f"slope 0.7 (limit 0.5) {place}"
+    assert blocking_text(slip, LIMITS) == f"friction 0.7 (limit 0.667) {place}"
     assert blocking_text(LOST, LIMITS) == "no path"
     assert blocking_text(replace(LOST, demand=0.0), LIMITS) == "level"
 
@@ -53,6 +82,8 @@ def test_json_has_null_for_what_is_not_finite():
     report = to_json([EASY, LOST], LIMITS, robot="a")
     patches = report.pop("patches")
     limits = report.pop("limits")
+    counts = {"patches": 2, "passable": 1, "max_difficulty": None}
+    assert report.pop("terrains") == {"stairs": counts}
     assert report == {"schema_version": 1, "robot": "a", "max_demand": 2.0, "passable": False}
     assert limits == vars(LIMITS)
     assert patches[0] == {

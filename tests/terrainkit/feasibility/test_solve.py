@@ -8,7 +8,7 @@ import pytest
 from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility import assess_patch, solve_ranges
-from terrainkit.feasibility.solve import _is_same
+from terrainkit.feasibility.solve import _is_same, _max_difficulty
 from terrainkit.map.patch import build_patch
 from terrainkit.terrain.registry import make_overlay
 from terrainkit.terrains.course import Element
@@ -147,3 +147,20 @@ def test_patches_are_the_same_up_to_their_places():
     assert not _is_same(first, replace(other, goals=other.goals + np.float32(1e-3)))
     assert not _is_same(first, replace(other, goals=other.goals[1:]))
     assert not _is_same(first, replace(other, heights=other.heights + np.float32(1e-3)))
+
+
+@pytest.mark.parametrize(
+    ("demand", "found"),
+    [
+        (lambda d: d, 0.5),
+        (lambda d: 0.5 if d <= 0.25 else 1.0, 0.25),
+        (lambda d: 0.0 * d, 1.0),  # the same at 1 as at the end of the search
+        (lambda d: 0.1 * max(d, 1.0), 3.0),  # more at the end than at 1
+        (lambda d: 2.0 + d, -1.0),  # too hard: the easiest
+        (lambda d: -np.inf if d < 0 else 1.0 + d, 0.0),  # easier values are invalid
+        (lambda d: np.inf if d > 0.3 else 0.0, 0.3),
+        (lambda d: 1.0 + 0.0 * d, 0.0),  # the same everywhere
+    ],
+)
+def test_largest_difficulty_of_at_most_a_demand(demand, found):
+    assert _max_difficulty(demand, 0.5) == pytest.approx(found, abs=4 / 2**9)

@@ -352,7 +352,7 @@ def test_import_reports_what_a_coarser_cell_loses_of_heights(tmp_path):
     heights = np.zeros((40, 40))
     heights[10, 11] = 0.05
     report = import_array(tmp_path, heights, cell=0.2, slope_threshold=1.0).report
-    # Means of 3 x 3 samples: 1/9 of the height at (1.1, 1.1), and 1/18 at (0.9, 1.1) and (1.1, 1.3).
+    # Means of 3 x 3: 1/9 of the height at (1.1, 1.1), and 1/18 at (0.9, 1.1) and (1.1, 1.3).
     # The point (1.05, 1.15) has a half of the first, and a quarter of each of the others.
     assert report.max_error == pytest.approx(0.05 - 0.05 / 12, abs=1e-6)
     assert report.max_error_at == pytest.approx((1.05, 1.15))

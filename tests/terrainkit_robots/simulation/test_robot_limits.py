@@ -17,6 +17,7 @@ def test_limits_of_the_quadruped_by_hand():
         "step_down": 0.5 * 0.448,
         "gap": 0.7 * 0.448,
         "slope": 0.577,
+        "friction": 2 / 3,
         "foothold": 4 * 0.022,
         "body_width": 0.328,
         "standing_height": 0.4,
