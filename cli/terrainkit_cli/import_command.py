@@ -27,7 +27,7 @@ _MAX_LINES = 20
 
 @dataclass(frozen=True, kw_only=True)
 class Import(ConfigCommand):
-    """Import heights, meshes or point clouds as a map with spawn origins.
+    """Import heights, meshes or point clouds as a map.
 
     Several files, or the files in a folder, become levels of difficulty: the rows, easiest first.
     The report says the largest difference in height from the file, and what the map lost: parts
