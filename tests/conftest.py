@@ -4,6 +4,7 @@ import os
 import resource
 import socket
 import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -135,3 +136,6 @@ def import_in_process(monkeypatch):
     )
     monkeypatch.setattr(child_process, "subprocess", child)
     monkeypatch.setattr(resource, "setrlimit", lambda *_: None)
+    yield
+    if "mujoco" in sys.modules:  # the child process does not restore it
+        sys.modules["mujoco"].set_mju_user_warning(None)
