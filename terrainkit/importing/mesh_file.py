@@ -2,11 +2,13 @@
 
 import json
 import re
+from base64 import b64encode
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from terrainkit.importing.columns import Columns, make_columns
 from terrainkit.importing.mesh_extent import warn_about_up
 from terrainkit.importing.options import MAX_POSITION, ReadOptions
 from terrainkit.importing.point_cloud import make_point_source
-from terrainkit.importing.source import Array, Source, cover_positions, decode
+from terrainkit.importing.source import Array, Source, check_file, cover_positions, decode
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb", ".gltf", ".dae")
 
@@ -129,11 +131,11 @@ def make_mesh_source(
 def _read_mesh(path: Path) -> dict[str, Any]:
     import trimesh
 
-    # Without a path, no other files are opened.
+    # Without a path, trimesh opens no other files.
     suffix, data = path.suffix.lower(), path.read_bytes()
     stated = {"unit": 1.0, "up": "y"} if suffix in (".glb", ".gltf") else {}
     if suffix == ".gltf":
-        _check_gltf(data)
+        data = _embed_buffers(path, data)
     elif suffix == ".dae":
         stated = _read_dae_asset(data)
     scene = trimesh.load(BytesIO(data), file_type=suffix[1:], force="scene", process=False)
@@ -147,14 +149,22 @@ def _read_mesh(path: Path) -> dict[str, Any]:
     }
 
 
-def _check_gltf(data: bytes) -> None:
-    uris = [each.get("uri", "") for each in json.loads(data).get("buffers", ())]
-    other = next((uri for uri in uris if not uri.startswith("data:")), None)
-    if other is not None:
-        raise ValueError(
-            f"its data are in another file, {other!r}, which is not opened; expected a .glb, or a "
-            ".gltf with embedded data"
-        )
+def _embed_buffers(path: Path, data: bytes) -> bytes:
+    """Return a .gltf that contains its data, which may be in files of the same folder."""
+    tree = json.loads(data)
+    for buffer in tree.get("buffers", ()):
+        name = unquote(buffer.get("uri", ""))
+        if name.startswith("data:"):
+            continue
+        if not name.strip(".") or set(name) & set("/\\:\0"):
+            raise ValueError(
+                f"its data are in another file, {name!r}, which is not opened; expected a .glb, or "
+                "a .gltf with embedded data or the name of a file beside it"
+            )
+        file = path.with_name(name)
+        check_file(file)
+        buffer["uri"] = "data:;base64," + b64encode(file.read_bytes()).decode()
+    return json.dumps(tree).encode()
 
 
 def _read_dae_asset(data: bytes) -> dict[str, Any]:

@@ -23,6 +23,12 @@ PLANE_MARGIN = 2.0
 _MAX_VERTICES = 5_000_000
 """Most vertices of all geoms: a sphere has 2562."""
 
+_UNUSED = (
+    *("keys", "sensors", "actuators", "equalities", "tendons", "pairs", "excludes", "tuples"),
+    *("skins", "lights", "cameras", "sites", "materials", "textures"),
+)
+"""Elements other than ground, which may refer to removed bodies or missing files."""
+
 _SECTIONS = 128
 """Sides of a cylinder of n sides: for a radius of 1 m, the error is 0.3 mm."""
 
@@ -75,13 +81,13 @@ def _read_scene(path: Path) -> dict[str, Any]:
     # What only robots and pictures need, which may be missing.
     for geom in spec.geoms:
         geom.material = ""
-    used = {geom.meshname for geom in spec.geoms}
-    for kind in ("keys", "sensors", "actuators", "skins", "materials", "textures"):
+    for kind in _UNUSED:
         for each in list(getattr(spec, kind)):
             spec.delete(each)
-    for mesh in list(spec.meshes):
-        if mesh.name not in used:
-            spec.delete(mesh)
+    used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
+    for asset in [*spec.meshes, *spec.hfields]:
+        if asset.name not in used:
+            spec.delete(asset)
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -28,6 +28,12 @@ _HEIGHT_OPTIONS = {
 _MIN_SIDE, _MAX_SIDE = 0.25, 10_000.0
 """Sides of a raster that are usual for the ground of a robot [m]."""
 
+_FULL_RANGE = 0.75
+"""Share of the largest value of an integer type from which on an image uses all of them."""
+
+_PART = 50.0
+"""Side of the part of a large raster that is proposed [m]."""
+
 MAX_RELIEF = 10.0
 """Largest usual difference of two heights, as a share of the longer side."""
 
@@ -199,6 +205,8 @@ def make_raster(
             f"{path}: {count} of {values.size} values are {marker:g}, far from all others: they "
             "are taken as missing heights (--no-detect-nodata keeps them)"
         )
+    if options.height_range:
+        _warn_of_range(path, heights, np.iinfo(values.dtype.name).max, *options.height_range)
     heights *= scale
     heights += offset
     invalid = np.abs(heights) > MAX_VALUE
@@ -210,6 +218,18 @@ def make_raster(
     raster = Raster(values=heights.astype(np.float32), spacing=spacing, lower=lower)
     _warn_of_size(path, raster)
     return raster
+
+
+def _warn_of_range(path: Path, values: Array, most: int, low: float, high: float) -> None:
+    """Warn if no value comes near the largest one of its type, which has the upper height."""
+    known = values[~np.isnan(values)]
+    top = float(known.max(initial=0.0))
+    if 0 < top < _FULL_RANGE * most:
+        warn(
+            f"{path}: got values from {known.min():g} to {top:g}; --height-range is for 0 and "
+            f"{most}. In MuJoCo and Gazebo, the largest value of the image has the upper height: "
+            f"--height-range {low:g} {low + (high - low) * most / top:.6g}"
+        )
 
 
 def _warn_of_size(path: Path, raster: Raster) -> None:
@@ -227,12 +247,28 @@ def _warn_of_size(path: Path, raster: Raster) -> None:
         )
     elif side > _MAX_SIDE:
         warn(
-            f"{size}, a height every {raster.cell:.4g} m; --cell 1 --patch-size 50 50 --rows 1 "
-            f"--cols 1 takes a part for a robot, {file_cell} with heights times {factor:.3g} makes "
-            "a small model"
+            f"{size}, a height every {raster.cell:.4g} m; {_part(raster)} takes a part for a "
+            f"robot, {file_cell} with heights times {factor:.3g} makes a small model"
         )
     elif side < _MIN_SIDE:
         warn(f"{size}; {file_cell} is 100 times larger")
+
+
+def _part(raster: Raster) -> str:
+    """Return the options that take the part nearest to the center whose heights are known."""
+    from scipy.ndimage import uniform_filter
+
+    spacing, lower = np.array(raster.spacing), np.array(raster.lower)
+    size = np.clip(np.floor(spacing * raster.values.shape), 1, _PART)
+    known = (~np.isnan(raster.values)).astype(np.float32)
+    share = uniform_filter(known, np.ceil(size / spacing).astype(int) + 1, mode="constant")
+    x, y = (np.abs(np.arange(n) + 0.5 - n / 2).astype(np.float32) for n in known.shape)
+    away = np.maximum.outer(spacing[0] * x, spacing[1] * y)
+    away[share < share.max() - 1e-3] = np.inf
+    middle = lower + (np.add(np.unravel_index(np.argmin(away), away.shape), 0.5)) * spacing
+    x, y = np.clip(middle - size / 2, lower, np.array(raster.upper) - size).round(1).tolist()
+    part = f"--origin {x:.10g} {y:.10g} 0 --patch-size {size[0]:g} {size[1]:g}"
+    return f"--cell 1 {part} --rows 1 --cols 1"
 
 
 def _scale_and_offset(

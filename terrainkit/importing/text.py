@@ -1,5 +1,6 @@
 """Read heights from a table of numbers in a text file."""
 
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +12,7 @@ from terrainkit.importing import asc
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
 from terrainkit.importing.source import decode
+from terrainkit.settings.text import truncate
 
 SUFFIXES = (".txt", ".csv")
 
@@ -26,9 +28,9 @@ _MIN_POINTS = 50
 def read(path: Path, options: ReadOptions) -> Raster:
     """Return the heights of a table: rows along x, columns along y, as numpy.savetxt writes arrays.
 
-    Numbers are separated by commas, semicolons, tabs or spaces. Comments, lines of text before the
-    numbers and pandas' numbers of rows and columns are skipped. Empty cells are missing heights. An
-    ESRI ASCII grid is read as such.
+    Numbers are separated by commas, semicolons, tabs or spaces. Comments, lines of text and a line
+    of sizes before the numbers, and pandas' numbers of rows and columns are skipped. Empty cells
+    are missing heights. An ESRI ASCII grid is read as such.
 
     Args:
         path: The file.
@@ -48,7 +50,7 @@ def _read_table(path: Path) -> dict[str, Any]:
         stripped = (line.strip(" \r\n") for line in file)
         lines = [line for line in stripped if line and not line.startswith(_COMMENTS)]
     found = ((k, each) for k, line in enumerate(lines[:_MAX_LINES]) for each in _delimiters(line))
-    start, delimiter = next(found, (0, ""))
+    start, delimiter = next((each for each in found if not _is_size(lines[each[0] :])), (0, ""))
     if not delimiter:
         raise ValueError("got text; expected a table of numbers")
     end = delimiter if lines[start].endswith(delimiter) else ""
@@ -59,7 +61,10 @@ def _read_table(path: Path) -> dict[str, Any]:
             rows, delimiter=separator, comments=None, ndmin=2, converters=_float_or_nan
         )
     except ValueError as error:
-        raise ValueError(str(error).partition("; use")[0]) from None
+        reason, hint = str(error).partition("; use")[0], ""
+        if re.search("columns changed .* at row 2$", reason):
+            hint = f"; delete the line {truncate(lines[start])!r} if it is no row of heights"
+        raise ValueError(reason + hint) from None
     # pandas numbers columns, in whole numbers above decimals, and rows below an empty cell.
     is_numbered = bool(np.isnan(table[0, 0]))
     if is_numbered or ("." not in lines[start] and (table[1:] % 1 != 0).any()):
@@ -81,6 +86,20 @@ def _delimiters(line: str) -> Iterator[str]:
         with suppress(ValueError):
             if not np.isnan([_float_or_nan(each) for each in cells]).all():
                 yield delimiter
+
+
+def _is_size(lines: list[str]) -> bool:
+    """Return whether the first line states the numbers of the rows and columns that follow it."""
+    numbers, cols = _cells(lines[0]), len(_cells(lines[1])) if len(lines) > 2 else 0
+    return 0 < cols != len(numbers) and {len(lines) - 1, cols} <= set(numbers)
+
+
+def _cells(line: str) -> list[float]:
+    """Return the numbers of a row; none if it is text."""
+    delimiter = next(_delimiters(line), None)
+    text = _with_points(line, delimiter or "").strip().removesuffix(delimiter or "")
+    cells = text.split(None if delimiter == " " else delimiter) if delimiter else ()
+    return [_float_or_nan(each) for each in cells]
 
 
 def _with_points(line: str, delimiter: str) -> str:

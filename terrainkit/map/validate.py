@@ -218,12 +218,13 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
             if free < config.spawn_headroom - TOLERANCE:
                 headroom = config.spawn_headroom
                 yield f"{subject} has {free:.3f} m of headroom; expected {headroom:g} m"
+            spread = float(ground.max() - ground.min())
+            slack = _rounding(terrain_map) * spread / config.spawn_radius
             above = float(z - terrain_map.height(xy))
-            if abs(above) > TOLERANCE:
+            if abs(above) > TOLERANCE + slack:
                 side = "above" if above > 0 else "below"
                 yield f"{subject} is {abs(above):.3f} m {side} the ground"
-            spread = float(ground.max() - ground.min())
-            if spread > config.spawn_tolerance + 1e-6:
+            if spread > config.spawn_tolerance + 1e-6 + slack:
                 yield (
                     f"{subject} is not on flat ground: heights within {config.spawn_radius:g} m "
                     f"differ by {spread:.3f} m; expected at most {config.spawn_tolerance:g} m"
@@ -254,6 +255,7 @@ def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
         yield "the mesh has no faces"
         return
     empty, downward, covered, largest, place = 0, 0, 0.0, 0.0, np.zeros(3)
+    rounding = _rounding(terrain_map)
     for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
         corners = mesh.vertices[mesh.triangles[start : start + _FACES_PER_BLOCK]].astype(np.float64)
         a, b, c = corners.swapaxes(0, 1)
@@ -265,7 +267,10 @@ def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
         downward += int(np.count_nonzero(normal[~vertical, 2] < 0))
         covered += normal[~vertical, 2].sum() / 2
         centroid = ((a + b + c) / 3)[~vertical]
-        error = np.abs(centroid[:, 2] - terrain_map.height(centroid[:, :2]))
+        # Rounding of a vertex moves its face sideways.
+        sloped = np.abs(normal[~vertical])
+        moved = rounding * np.hypot(*sloped[:, :2].T) / np.maximum(sloped[:, 2], 1e-300)
+        error = np.abs(centroid[:, 2] - terrain_map.height(centroid[:, :2])) - moved
         if error.max(initial=0.0) > largest:
             largest, place = error.max(), centroid[np.argmax(error)]
     if empty:
@@ -283,6 +288,12 @@ def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
         )
 
 
+def _rounding(terrain_map: TerrainMap) -> float:
+    """Return the distance between two single-precision numbers at the edge of the map [m]."""
+    farthest = np.abs([terrain_map.grid.lower, terrain_map.grid.upper]).max()
+    return float(np.spacing(np.float32(farthest)))
+
+
 def _check_edges(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
     numbers = mesh.edge_numbers()
     repeated = np.count_nonzero(numbers[1:] == numbers[:-1])
@@ -292,7 +303,7 @@ def _check_edges(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:
     corners = np.array([terrain_map.grid.lower, terrain_map.grid.upper])
     # Distance of each edge from the four sides of the map.
     distance = np.abs(boundary[:, :, None, :2] - corners).max(axis=1)
-    inside = (distance >= TOLERANCE).all(axis=(1, 2))
+    inside = (distance >= max(TOLERANCE, _rounding(terrain_map))).all(axis=(1, 2))
     if inside.any():
         x, y = boundary[inside][0, 0, :2]
         yield f"{int(inside.sum())} edges have only one face, for example at ({x:.2f}, {y:.2f})"

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 Picture = NDArray[np.uint8]
+Levels = NDArray[np.float64]
 
 _COLORS = (
     (-10.0, (38, 32, 44)),
@@ -32,6 +33,12 @@ _COLORS = (
     (4.0, (116, 66, 46)),
 )
 """Color (red, green, blue) by height [m]: blue below 0, brown above."""
+
+LEVELS = np.array([level for level, _ in _COLORS])
+"""Heights of the colors of generated maps [m]."""
+
+_NEAR = 0.4
+"""Distance of all heights from 0 above which the colors are relative to the median height [m]."""
 
 _TEXT_COLOR = (40, 40, 46)
 _SPAWN_COLOR = (196, 40, 40)
@@ -132,7 +139,8 @@ def render_preview(
 ) -> Picture:
     """Return the preview as an RGB image, shape (height, width, 3): x to the right, y up."""
     blocks, axis = make_blocks(terrain_map, width)
-    pictures = [_draw_block(terrain_map, block, routes) for block in blocks]
+    levels = map_levels(terrain_map.heights)
+    pictures = [_draw_block(terrain_map, block, routes, levels) for block in blocks]
     sizes = np.array([each.shape[:2] for each in pictures])
     height, span = np.where(np.arange(2) == axis, sizes.sum(axis=0), sizes.max(axis=0)).tolist()
     image = np.full((height + ABOVE, span + RIGHT, 3), _BACKGROUND, dtype=np.uint8)
@@ -147,7 +155,7 @@ def render_preview(
     shown = [terrain_map.heights[each.cells] for each in blocks]
     low = min([*(float(each.min()) for each in shown), tops.min(initial=np.inf)])
     high = max([*(float(each.max()) for each in shown), tops.max(initial=-np.inf)])
-    _draw_color_bar(image[:, span:], low, high, blocks[0].size[1])
+    _draw_color_bar(image[:, span:], low, high, blocks[0].size[1], levels)
     if _is_hanging(terrain_map, terrain_map.solids).any():
         y = ABOVE + min(blocks[0].size[1], _MAX_BAR_HEIGHT)
         _write(image, "hatched:", (span + 20, y + 26))
@@ -155,11 +163,13 @@ def render_preview(
     return image
 
 
-def _draw_block(terrain_map: "TerrainMap", block: Block, routes: Sequence[Route]) -> Picture:
+def _draw_block(
+    terrain_map: "TerrainMap", block: Block, routes: Sequence[Route], levels: Levels
+) -> Picture:
     """Return the picture of a block with its labels to the left and below."""
     width, height = block.size
-    relief = _relief(terrain_map.heights[block.cells], block)
-    _draw_solids(relief, terrain_map, block)
+    relief = _relief(terrain_map.heights[block.cells], block, levels)
+    _draw_solids(relief, terrain_map, block, levels)
     _draw_poses(relief, terrain_map, block)
     for route in routes:
         _draw_route(relief, route, block)
@@ -169,7 +179,7 @@ def _draw_block(terrain_map: "TerrainMap", block: Block, routes: Sequence[Route]
     return picture
 
 
-def _relief(heights: NDArray[np.float32], block: Block) -> Picture:
+def _relief(heights: NDArray[np.float32], block: Block, levels: Levels) -> Picture:
     """Return the relief of the heights of a block in its size: averages, or a square per sample."""
     import cv2
 
@@ -179,17 +189,18 @@ def _relief(heights: NDArray[np.float32], block: Block) -> Picture:
         heights = cv2.resize(heights, (height, width), interpolation=cv2.INTER_AREA)
         heights = np.asarray(heights, dtype=np.float32).reshape(width, height)
     cell = max(block.grid.cell, 1 / block.scale)
-    relief = np.ascontiguousarray(shaded_relief(heights, cell).swapaxes(0, 1)[::-1])
+    relief = np.ascontiguousarray(shaded_relief(heights, cell, levels).swapaxes(0, 1)[::-1])
     resized = cv2.resize(relief, (width, height), interpolation=cv2.INTER_NEAREST)
     return np.asarray(resized, dtype=np.uint8)
 
 
-def shaded_relief(heights: NDArray[np.float32], cell: float) -> Picture:
+def shaded_relief(heights: NDArray[np.float32], cell: float, levels: Levels = LEVELS) -> Picture:
     """Return the heights as a colored relief with Lambertian shading, shape (nx, ny, 3).
 
     Args:
         heights: Heights [m], shape (nx, ny).
         cell: Distance between two samples [m].
+        levels: Heights of the colors [m].
     """
     padded = np.pad(heights, 1, mode="edge")
     slope_x = (padded[2:, 1:-1] - padded[:-2, 1:-1]) / (2 * cell)
@@ -197,7 +208,7 @@ def shaded_relief(heights: NDArray[np.float32], cell: float) -> Picture:
     light = LIGHT / np.linalg.norm(LIGHT)
     steepness = np.sqrt(slope_x**2 + slope_y**2 + 1)
     shade = (light[2] - light[0] * slope_x - light[1] * slope_y) / steepness / light[2]
-    return shaded_colors(height_colors(heights), shade).astype(np.uint8)
+    return shaded_colors(height_colors(heights, levels), shade).astype(np.uint8)
 
 
 def shaded_colors(colors: NDArray[np.floating], shade: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -214,16 +225,30 @@ def shaded_colors(colors: NDArray[np.floating], shade: NDArray[np.floating]) -> 
     return np.asarray(np.clip(colors * brightness, 0, 255))
 
 
-def height_colors(heights: NDArray[np.floating]) -> NDArray[np.float64]:
+def map_levels(heights: NDArray[np.floating]) -> Levels:
+    """Return the heights of the colors of a map [m], ascending.
+
+    They are those of generated maps, unless this ground would have the colors of one end only.
+
+    Args:
+        heights: Heights of the map [m].
+    """
+    bottom, low, middle, high, top = np.percentile(heights, (0, 2, 50, 98, 100)).tolist()
+    center = 0.0 if bottom <= _NEAR and top >= -_NEAR else middle
+    factor = max(1.0, (low - center) / float(LEVELS[0]), (high - center) / float(LEVELS[-1]))
+    return np.asarray(center + factor * LEVELS)
+
+
+def height_colors(heights: NDArray[np.floating], levels: Levels = LEVELS) -> NDArray[np.float64]:
     """Return the colors of heights.
 
     Args:
         heights: Heights [m], any shape (...).
+        levels: Heights of the colors [m].
 
     Returns:
         Red, green and blue, 0 to 255, shape (..., 3).
     """
-    levels = [level for level, _ in _COLORS]
     channels = zip(*(color for _, color in _COLORS), strict=True)
     return np.stack([np.interp(heights, levels, channel) for channel in channels], axis=-1)
 
@@ -235,7 +260,7 @@ def map_title(config: "MapConfig") -> str:
     return f"{patches}, seed {config.seed}"
 
 
-def color_levels(low: float, high: float) -> NDArray[np.float64]:
+def color_levels(low: float, high: float, levels: Levels = LEVELS) -> NDArray[np.float64]:
     """Return the heights of the ticks of a color bar [m], ascending.
 
     They are both ends, and the levels in between at which the color scale changes its slope. The
@@ -244,29 +269,30 @@ def color_levels(low: float, high: float) -> NDArray[np.float64]:
     Args:
         low: Lowest height [m].
         high: Highest height [m].
+        levels: Heights of the colors [m].
     """
-    inner = [level for level, _ in _COLORS if low < level < high]
+    inner = [level for level in levels.tolist() if low < level < high]
     return np.unique([low, *inner, high])
 
 
-def _draw_color_bar(image: Picture, low: float, high: float, length: int) -> None:
+def _draw_color_bar(image: Picture, low: float, high: float, length: int, levels: Levels) -> None:
     """Draw the color bar of heights from `low` to `high` [m] into the right margin `image`.
 
     It is as long as the relief, `length` [px], but limited.
     """
-    levels = color_levels(low, high)
+    marks = color_levels(low, high, levels)
     height = min(length - 1, _MAX_BAR_HEIGHT)
-    ticks = np.linspace(height, 0, len(levels))
-    rows = np.interp(np.arange(height + 1), ticks[::-1], levels[::-1])
+    ticks = np.linspace(height, 0, len(marks))
+    rows = np.interp(np.arange(height + 1), ticks[::-1], marks[::-1])
     bar = image[ABOVE : ABOVE + height + 1, 20 : 20 + _BAR_WIDTH]
-    bar[:] = height_colors(rows)[:, None]
+    bar[:] = height_colors(rows, levels)[:, None]
     bar[[0, -1]] = bar[:, [0, -1]] = _TEXT_COLOR
-    every = max(1, math.ceil(_LABEL_HEIGHT * len(levels) / (height + 1)))
-    for row, level in list(zip(ticks.round().astype(int).tolist(), levels, strict=True))[::every]:
+    every = max(1, math.ceil(_LABEL_HEIGHT * len(marks) / (height + 1)))
+    for row, level in list(zip(ticks.round().astype(int).tolist(), marks, strict=True))[::every]:
         image[ABOVE + row, 20 + _BAR_WIDTH : 26 + _BAR_WIDTH] = _TEXT_COLOR
         y = ABOVE + min(max(row + 5, 11), length - 2)
         _write(image, f"{level:.2f} m".replace("-0.00", "0.00"), (32 + _BAR_WIDTH, y))
-    if len(levels) > 2 and np.ptp(np.diff(levels)) > 1e-3:
+    if len(marks) > 2 and np.ptp(np.diff(marks)) > 1e-3:
         _write(image, "scale not", (20, ABOVE - 26))
         _write(image, "linear", (20, ABOVE - 10))
 
@@ -283,7 +309,7 @@ def _write(
     cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, color, 1, cv2.LINE_AA)
 
 
-def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:
+def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block, levels: Levels) -> None:
     """Draw each solid: its upper facets, shaded, in the color of their height; the highest last.
 
     The ground shows through. Solids that hang above the ground are hatched.
@@ -305,10 +331,10 @@ def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block) -> Non
         if not window.size:
             continue
         layer = window.copy()
-        for points, color in _facets(mesh):
+        for points, color in _facets(mesh, levels):
             facet = cv2.convexHull(block.pixels(points[:, :2])) - first
             cv2.fillConvexPoly(layer, facet, color.tolist(), cv2.LINE_AA)
-        edge = height_colors(mesh.vertices[:, 2].max()) * 0.6
+        edge = height_colors(mesh.vertices[:, 2].max(), levels) * 0.6
         if hangs:
             inside = cv2.fillConvexPoly(np.zeros(layer.shape[:2], np.uint8), outline - first, 1)
             i, j = np.indices(inside.shape)
@@ -324,12 +350,14 @@ def _is_hanging(terrain_map: "TerrainMap", solids: Solids) -> NDArray[np.bool_]:
     return np.asarray(lower[:, 2] > ground + _HANGING)
 
 
-def _facets(mesh: "TriMesh") -> Iterator[tuple[NDArray[np.float32], NDArray[np.float64]]]:
+def _facets(
+    mesh: "TriMesh", levels: Levels
+) -> Iterator[tuple[NDArray[np.float32], NDArray[np.float64]]]:
     """Yield the points of each upper facet of a convex mesh, and its color."""
     z, top = mesh.vertices[:, 2], mesh.vertices[:, 2].max()
     is_top = z > top - 1e-4
     if (np.ptp(mesh.vertices[is_top, :2], axis=0) >= np.ptp(mesh.vertices[:, :2], axis=0)).all():
-        yield mesh.vertices[is_top], height_colors(top)  # most solids have a level top
+        yield mesh.vertices[is_top], height_colors(top, levels)  # most solids have a level top
         return
     corners = mesh.vertices[mesh.triangles].astype(float)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -337,7 +365,8 @@ def _facets(mesh: "TriMesh") -> Iterator[tuple[NDArray[np.float32], NDArray[np.f
     light = LIGHT / LIGHT[2]
     for each in np.unique(normal[normal[:, 2] > 1e-3].round(3), axis=0):
         points = mesh.vertices[mesh.triangles[(np.abs(normal - each) < 1e-3).all(axis=1)].ravel()]
-        yield points, shaded_colors(height_colors(points[:, 2].mean()), np.asarray(each @ light))
+        color = height_colors(points[:, 2].mean(), levels)
+        yield points, shaded_colors(color, np.asarray(each @ light))
 
 
 def _draw_labels(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:

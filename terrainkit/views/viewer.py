@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.views.preview import (
+    LEVELS,
     LIGHT,
+    Levels,
     height_colors,
+    map_levels,
     map_title,
     shaded_colors,
     shaded_relief,
@@ -136,7 +139,8 @@ def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
     from trimesh.visual.material import PBRMaterial
 
     mesh, grid = terrain_map.ground_mesh(), terrain_map.grid
-    relief = Image.fromarray(shaded_relief(terrain_map.heights, grid.cell))
+    levels = map_levels(terrain_map.heights)
+    relief = Image.fromarray(shaded_relief(terrain_map.heights, grid.cell, levels))
     relief.thumbnail((_MAX_TEXTURE, _MAX_TEXTURE))
     x, y = ((mesh.vertices[:, :2] - grid.lower) / grid.size).T
     uv = np.stack([y, 1 - x], axis=1)  # image rows are along x
@@ -148,11 +152,12 @@ def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
 def _add_solids(server: "viser.ViserServer", terrain_map: "TerrainMap") -> list[Any]:
     solids = terrain_map.solids
     is_usual, handles = solids.visible & solids.collides, []
+    levels = map_levels(terrain_map.heights)
     for name, chosen in (("solids", is_usual), ("special_solids", ~is_usual)):
         if chosen.any():
             mesh = concatenate_meshes(solid_meshes(solids.select(chosen)))
             corners = mesh.vertices[mesh.triangles].astype(np.float64)
-            colors = triangle_colors(corners, None if name == "solids" else _HIDDEN_COLOR)
+            colors = triangle_colors(corners, None if name == "solids" else _HIDDEN_COLOR, levels)
             linear = 255 * (colors / 255) ** 2.2  # as glTF defines the colors of vertices
             data = _shaded_glb(
                 corners.reshape(-1, 3),
@@ -164,20 +169,23 @@ def _add_solids(server: "viser.ViserServer", terrain_map: "TerrainMap") -> list[
 
 
 def triangle_colors(
-    corners: NDArray[np.float64], color: tuple[int, int, int] | None = None
+    corners: NDArray[np.float64],
+    color: tuple[int, int, int] | None = None,
+    levels: Levels = LEVELS,
 ) -> NDArray[np.float64]:
     """Return the colors of triangles, shaded by slope as in the preview.
 
     Args:
         corners: Corners [m], counter-clockwise, shape (n, 3, 3).
         color: Color of level triangles; None to color by height as in the preview.
+        levels: Heights of the colors [m].
 
     Returns:
         Red, green and blue, 0 to 255, shape (n, 3).
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    level = height_colors(corners[:, :, 2].max(axis=1)) if color is None else np.array(color)
+    level = np.array(color or height_colors(corners[:, :, 2].max(axis=1), levels))
     return shaded_colors(level, normals @ LIGHT / LIGHT[2])
 
 

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing import mesh_file
+from terrainkit.importing import mesh_file, source
 from terrainkit.importing.mesh_file import read
 from terrainkit.importing.options import ReadOptions
 from tests.meshes import box
@@ -30,12 +30,53 @@ def save_gltf(mesh, path):
     path.write_text(json.dumps(tree))
 
 
-def test_mesh_file_opens_no_other_files(tmp_path):
-    files = trimesh.creation.box().export(file_type="gltf")
-    for name, data in files.items():
-        (tmp_path / name).write_bytes(data)
-    with pytest.raises(HeightFileError, match=r"in another file, '.*\.bin', which is not opened"):
-        read(tmp_path / "model.gltf", ReadOptions())
+def split_gltf(folder, *uris):
+    """Write a .gltf whose buffers have the URIs, and a file "a b.bin" with their data."""
+    files = box((4, 5, 6), (0, 0, 0)).export(file_type="gltf")
+    tree = json.loads(files.pop("model.gltf"))
+    data = b"".join(files[each["uri"]] for each in tree["buffers"])
+    start = 0
+    for view in tree["bufferViews"]:
+        view.update(buffer=0, byteOffset=start)
+        start += -(-view["byteLength"] // 4) * 4
+    (folder / "a b.bin").write_bytes(data)
+    tree["buffers"] = [{"uri": uri, "byteLength": len(data)} for uri in uris]
+    (folder / "model.gltf").write_text(json.dumps(tree))
+    return folder / "model.gltf"
+
+
+@pytest.mark.parametrize("uri", ["a%20b.bin", "a b.bin"])
+def test_gltf_may_have_its_data_beside_it(tmp_path, uri):
+    source = read(split_gltf(tmp_path, uri), ReadOptions())
+    np.testing.assert_allclose(np.ptp(source.vertices, axis=0), [4, 6, 5])
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        *("../a b.bin", "..%2Fa b.bin", "x/a b.bin", "/a b.bin", "..%5ca b.bin", "..", "."),
+        *("file:a b.bin", "http://a/a b.bin", "c:a b.bin", "a b.bin%00", ""),
+    ],
+)
+def test_mesh_file_opens_no_files_elsewhere(tmp_path, uri):
+    (tmp_path / "x").mkdir()
+    path = split_gltf(tmp_path, uri).rename(tmp_path / "x/model.gltf")
+    (tmp_path / "x/a b.bin").write_bytes((tmp_path / "a b.bin").read_bytes())
+    with pytest.raises(HeightFileError, match=r"in another file, '.*', which is not opened"):
+        read(path, ReadOptions())
+
+
+def test_gltf_data_beside_it_are_limited(tmp_path, monkeypatch):
+    with pytest.raises(HeightFileError, match=r"model\.gltf: .*no file .*c\.bin"):
+        read(split_gltf(tmp_path, "c.bin"), ReadOptions())
+    (tmp_path / "c.bin").mkdir()
+    with pytest.raises(HeightFileError, match=r"model\.gltf: .*c\.bin: got a special file"):
+        read(split_gltf(tmp_path, "c.bin"), ReadOptions())
+    path = split_gltf(tmp_path, "a b.bin")
+    size = (tmp_path / "a b.bin").stat().st_size
+    monkeypatch.setattr(source, "MAX_FILE_BYTES", size - 1)
+    with pytest.raises(HeightFileError, match=rf"a b\.bin: got {size} bytes"):
+        mesh_file._embed_buffers(path, path.read_bytes())
 
 
 @pytest.mark.parametrize(

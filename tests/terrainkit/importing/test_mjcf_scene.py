@@ -54,6 +54,46 @@ def test_scene_has_the_heights_of_rays(tmp_path):
     assert np.median(difference) < 1e-6
 
 
+ROBOT = """
+<mujoco>
+  <asset>
+    <material name="red"/>
+    <hfield name="missing" file="missing.png" size="1 1 1 1"/>
+  </asset>
+  <worldbody>
+    <geom name="floor" type="box" size="1 1 1"/>
+    <site name="start" material="red"/>
+    <light mode="targetbody" target="trunk"/>
+    <camera mode="targetbodycom" target="leg"/>
+    <body name="post"><geom size="0.1"/><light mode="targetbodycom" target="leg"/></body>
+    <body name="trunk">
+      <freejoint/><geom name="trunk" size="0.1"/><site name="trunk"/>
+      <body name="leg" pos="1 0 0"><joint name="knee"/><geom type="hfield" hfield="missing"/></body>
+    </body>
+  </worldbody>
+  <custom><tuple name="a"><element objtype="body" objname="trunk"/></tuple></custom>
+  <contact><exclude body1="post" body2="leg"/><pair geom1="floor" geom2="trunk"/></contact>
+  <tendon>
+    <spatial name="a" material="red"><site site="start"/><site site="trunk"/></spatial>
+    <fixed name="b"><joint joint="knee" coef="1"/></fixed>
+  </tendon>
+  <equality>
+    <weld body1="post" body2="leg"/><weld site1="start" site2="trunk"/>
+    <joint joint1="knee"/><tendon tendon1="b"/>
+  </equality>
+  <sensor><framepos objtype="body" objname="trunk"/><gyro site="trunk"/></sensor>
+  <actuator><position joint="knee"/></actuator>
+  <keyframe><key qpos="0 0 0 1 0 0 0 0"/></keyframe>
+</mujoco>
+"""
+
+
+@pytest.mark.filterwarnings("ignore:.*bodies with joints")
+def test_scene_may_refer_to_its_robot(tmp_path):
+    heights = open_source(save(tmp_path, ROBOT), ReadOptions()).heights(np.zeros(1), np.zeros(1))
+    assert heights == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -52,10 +52,26 @@ def test_heights_where_most_is_missing_are_missing():
         (0.025, 0.1, None),
         (0.0249, 0.1, r"got 0\.249 m x 0\.1245 m; --file-cell 2\.49 2\.49 is 100 times larger"),
         (1000.0, 9.0, None),
-        (1010.0, 9.0, r"got 10100 m x 5050 m, .*--cell 1 --patch-size 50 50"),
+        (1010.0, 9.0, r"got 10100 m x 5050 m, .*--cell 1 --origin 4520 2500 0 --patch-size 50 50"),
     ],
 )
 def test_sizes_that_are_not_of_ground_are_warned_of(cell, relief, message):
     values = np.linspace(0, relief, 50).reshape(10, 5)
     with pytest.warns(TerrainkitWarning, match=message) if message else nullcontext():
         make_raster(Path("a.npy"), values, ReadOptions(file_cell=cell))
+
+
+@pytest.mark.parametrize(("top", "is_short"), [(127, True), (191, True), (192, False), (0, False)])
+def test_values_that_do_not_use_their_range_are_warned_of(top, is_short):
+    values = np.linspace(0, top, 24).astype(np.uint8).reshape(4, 6)
+    options = ReadOptions(file_cell=(0.1,), height_range=(1.0, 3.0))
+    message = rf"got values from 0 to {top}; .* --height-range 1 {1 + 2 * 255 / (top or 1):.6g}$"
+    with pytest.warns(TerrainkitWarning, match=message) if is_short else nullcontext():
+        raster = make_raster(Path("a.png"), values, options)
+    assert raster.values.max() == pytest.approx(1 + 2 * top / 255)
+    # The proposed range gives the largest value the upper height.
+    if is_short:
+        proposed = ReadOptions(file_cell=(0.1,), height_range=(1.0, 1 + 2 * 255 / top))
+        with pytest.warns(TerrainkitWarning):
+            raster = make_raster(Path("a.png"), values, proposed)
+        assert raster.values.max() == pytest.approx(3.0)

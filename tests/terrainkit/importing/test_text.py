@@ -31,6 +31,9 @@ def read_text(tmp_path):
         "\ufeff0.5\t1\t2\n\n3\t-4\t5\n",
         "# a comment\n% another\nheights of a hill\nin meters\n0.5 1 2\n3 -4 5\n",
         " 0.5  1   2 \n 3  -4   5 \n",
+        "2 3\n0.5 1 2\n3 -4 5\n",
+        "rows cols\n2 3\n0.5,1,2,\n3,-4,5,\n",
+        "# size\n3,2,0.1,0.1\n\n0,5;1;2\n3;-4;5\n",
     ],
 )
 @pytest.mark.parametrize("name", ["a.csv", "A.TXT"])
@@ -75,7 +78,9 @@ def test_text_of_an_ascii_grid_is_one(tmp_path):
     ("text", "message"),
     [
         ("hello\n" * 9, "got text; expected a table of numbers"),
-        ("1 2 3\n4 5\n", r"columns changed from 3 to 2 at row 2$"),
+        ("1 2 3\n4 5\n", r"columns changed from 3 to 2 at row 2; delete the line '1 2 3' if it is"),
+        ("1 2 3\n4 5 6\n7 8\n", r"columns changed from 3 to 2 at row 3$"),
+        ("n m\n4 3 0.5\n" + "1 2\n" * 3, r"at row 2; delete the line '4 3 0\.5' if it is no row"),
         ("1 2 3\n4 five 6\n", "could not convert string 'five' to float64 at row 1"),
         ("1\n2\n3\n", "got 3 rows of 1 numbers; expected a row of heights per line"),
         ("0.1 0.2 0.3\n" * 50, r"got 50 rows of 3 numbers; .* rename points \(x, y, z\) to \.xyz"),

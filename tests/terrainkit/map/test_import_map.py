@@ -1,4 +1,5 @@
 import hashlib
+import re
 from contextlib import nullcontext
 
 import numpy as np
@@ -9,6 +10,8 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError, MemoryLimitError
 from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
+from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.source import open_source
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.validate import validate
 from tests.meshes import box, save_bridge
@@ -357,6 +360,48 @@ def test_import_reports_what_a_coarser_cell_loses_of_heights(tmp_path):
     assert report.max_error == pytest.approx(0.05 - 0.05 / 12, abs=1e-6)
     assert report.max_error_at == pytest.approx((1.05, 1.15))
     assert import_array(tmp_path, heights).report.max_error_at is None
+
+
+def test_import_reports_what_resampling_to_squares_loses(tmp_path):
+    # One sample of 1 m at (22.5, 15) in cells of 15 m x 10 m; the map has samples at 5, 15, 25 m.
+    heights = np.zeros((8, 12))
+    heights[1, 1] = 1.0
+    np.save(tmp_path / "a.npy", heights)
+    options = {"file_cell": (15.0, 10.0), "spawn_radius": 5.0}
+    report = import_map(tmp_path / "a.npy", ImportOptions(**options)).report
+    # It is between samples with 1/2 and 5/6 of it, in a quarter and three quarters of the cell.
+    assert report.max_error == pytest.approx(1 - (0.25 / 2 + 0.75 * 5 / 6), abs=1e-6)
+    assert report.max_error_at == pytest.approx((22.5, 15.0))
+
+
+def test_import_reports_single_samples_of_a_large_raster(tmp_path, monkeypatch):
+    monkeypatch.setattr("terrainkit.map.import_report.MAX_SAMPLES", 100)
+    heights = np.zeros((40, 40))
+    heights[::4, ::4] = 0.05
+    options = {"cell": 0.4, "slope_threshold": None, "spawn_tolerance": 0.1}
+    report = import_array(tmp_path, heights, **options).report
+    assert 0.03 < report.max_error < 0.05  # the means of 5 x 5 samples are about 0.003
+
+
+@pytest.mark.filterwarnings("ignore:.*they become squares", "ignore:.*flat ground")
+@pytest.mark.parametrize("cell", [(30.0, 30.0), (3.0, 40.0), (900.0, 1.5)])
+def test_import_proposes_a_part_with_heights(tmp_path, cell):
+    heights = np.full((400, 330), 5.0)
+    heights[:30] = heights[:, 300:] = heights[180:230, 100:200] = np.nan
+    (tmp_path / "a.asc").write_text(
+        f"ncols 400\nnrows 330\nxllcorner -7000.3\nyllcorner 500000\ndx {cell[0]}\ndy {cell[1]}\n"
+        + "\n".join(" ".join(map(str, row)) for row in np.nan_to_num(heights.T[::-1], nan=-9999.0))
+    )
+    with pytest.warns(tk.TerrainkitWarning, match="takes a part for a robot") as found:
+        open_source(tmp_path / "a.asc", ReadOptions())
+    text = next(str(each.message) for each in found if "takes a part" in str(each.message))
+    numbers = re.search(r"--cell 1 --origin (\S+) (\S+) 0 --patch-size (\S+) (\S+) ", text).groups()
+    x, y, *size = map(float, numbers)
+    options = ImportOptions(cell=1.0, origin=(x, y, 0), patch_size=size, rows=1, cols=1)
+    with pytest.warns(tk.TerrainkitWarning):
+        report = import_map(tmp_path / "a.asc", options).report
+    assert size == [50, 50]
+    assert report.num_missing == 0
 
 
 def test_import_of_a_cloud_has_its_cells(tmp_path):

@@ -191,6 +191,34 @@ def test_validate_finds_solid_above_the_origin():
         assert issues == [("spawn", text)] * messages
 
 
+def large_map(tmp_path, heights, cell):
+    """Return the map of heights, whose corners single precision does not represent."""
+    np.save(tmp_path / "a.npy", heights.astype(np.float32))
+    return tk.import_map(tmp_path / "a.npy", tk.ImportOptions(file_cell=cell, rows=2)).terrain_map
+
+
+@pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
+@pytest.mark.parametrize("cell", [599.7131, 4321.987])
+def test_validate_accepts_the_rounding_of_large_maps(tmp_path, cell):
+    along, across = np.indices((140, 90)) * cell
+    rough = np.random.default_rng(0).normal(0, cell, along.shape)
+    for heights in (np.sin(along / cell), 0.5 * along - 0.3 * across, rough):
+        terrain_map = large_map(tmp_path, heights, cell)
+        assert found(terrain_map) == []
+        assert found(terrain_map, terrain_map.mesh(merged=False)) == []
+
+
+@pytest.mark.filterwarnings("ignore::terrainkit.TerrainkitWarning")
+def test_validate_finds_small_errors_in_large_maps(tmp_path):
+    terrain_map = large_map(tmp_path, np.zeros((140, 90)), 599.7131)
+    for dx, dz, message in ((0.02, 0.0, "edges have only one face"), (0.0, 0.002, "0.002 m")):
+        mesh = terrain_map.mesh(merged=False)
+        moved = mesh.vertices - np.array([dx, 0.0, dz])
+        vertices = np.where(mesh.vertices[:, :1] > 83e3, moved, mesh.vertices).astype(np.float32)
+        issues = found(terrain_map, TriMesh(vertices=vertices, triangles=mesh.triangles))
+        assert any(message in text for _, text in issues)
+
+
 def hole(mesh):
     return replace(mesh, triangles=mesh.triangles[100:])
 

@@ -8,10 +8,12 @@ import terrainkit as tk
 from terrainkit.errors import ExportError
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.views.preview import (
+    LEVELS,
     LIGHT,
     Route,
     color_levels,
     height_colors,
+    map_levels,
     render_preview,
     shaded_relief,
     write_preview,
@@ -106,6 +108,34 @@ def test_height_colors_are_linear_between_stops():
     found = height_colors(np.array([-20.0, -0.2, 0.0, 0.95, 9.0]))
     expected = [(38, 32, 44), (168, 179.5, 188), (224, 221, 208), (189, 141, 95), (116, 66, 46)]
     np.testing.assert_allclose(found, expected)
+
+
+def test_color_scale_is_centered_where_the_heights_are():
+    near = np.r_[-2.0, np.zeros(98), 0.5]
+    assert (map_levels(near) == LEVELS).all()
+    assert (map_levels(np.full(9, 0.3)) == LEVELS).all()
+    # Between 2 % and 98 %: 502 m to 598 m, 48 m around the median, where the colors end at 4 m.
+    hill = map_levels(np.arange(500.0, 601.0))
+    np.testing.assert_allclose(hill, [430, 532, 545.2, 550, 554.8, 568, 598])
+    levels = [500, 532, 545.2, 550, 554.8, 568, 598, 600]
+    assert color_levels(500, 600, hill) == pytest.approx(levels)
+    # 0 m remains the center of ground that begins there, such as a coast: 98 m at 98 %.
+    np.testing.assert_allclose(map_levels(np.arange(101.0)), 24.5 * LEVELS)
+    np.testing.assert_allclose(map_levels(-np.arange(101.0)), 9.8 * LEVELS)
+
+
+def test_preview_of_ground_far_from_0_has_several_colors():
+    flat = map_of(FLAT)
+    wave = 5 * np.sin(np.arange(80) / 12)[:, None] * np.ones(80)
+    bars, ground = [], []
+    for height in (500.0, -70.0):
+        raised = dataclasses.replace(flat, heights=(height + wave).astype(np.float32))
+        picture = render_preview(raised, 320)
+        bars.append(color_bar(picture)[2:-2, 5])
+        ground.append(picture[ABOVE + 40, LEFT + 10 : LEFT + 310].astype(int))
+    assert np.ptp(ground[0], axis=0).min() > 80
+    assert np.abs(ground[0] - ground[1]).max() <= 1
+    assert np.ptp(bars[0], axis=0).min() > 80
 
 
 def test_shaded_relief_is_brighter_toward_the_light():
