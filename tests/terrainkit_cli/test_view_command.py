@@ -12,6 +12,8 @@ import viser
 from websockets.sync.client import connect
 
 import terrainkit as tk
+from terrainkit.errors import ConfigError
+from terrainkit_cli.view_command import View
 from terrainkit_robots.description import bundled
 
 DISPLAYS = "BROWSER", "DISPLAY", "WAYLAND_DISPLAY"
@@ -119,6 +121,11 @@ def test_view_rejects_invalid_input(rejected, tmp_path, words, message):
     (tmp_path / "empty").mkdir()
     (tmp_path / "no_robot.urdf").write_text("<sdf/>")
     assert message in rejected(f"view {words}")
+
+
+def test_view_needs_an_address_of_this_machine():
+    with pytest.raises(ConfigError, match=r"got 192\.0\.2\.1, which is not an address of this"):
+        View(host="192.0.2.1").check_address()  # an address for documentation
 
 
 @pytest.mark.usefixtures("map_file")

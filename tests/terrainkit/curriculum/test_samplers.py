@@ -176,6 +176,8 @@ def test_learning_progress_counts_forgetting():
     sampler = LearningProgressSampler(4, 1, 4)
     sampler.fast[2], sampler.slow[2] = 0.4, 0.9
     assert sampler.probs().argmax() == 2
+    sampler.fast[0] = sampler.slow[0] = 1.0  # always solved
+    assert sampler.probs().argmax() == 2
 
 
 def test_prioritized_replay_ranks_scores_and_age():

@@ -132,7 +132,10 @@ def test_mjcf_level_border_is_boxes_around_the_heightfield():
 def test_mjcf_narrow_or_uneven_border_belongs_to_the_heightfield(border, sample, number):
     heights = np.zeros(np.round([4 + 20 * border, 3 + 20 * border]).astype(int))
     heights[sample or (2, 2)] = 0.01 if sample else 0.0
-    assert len(written(plot(heights, border)).findall("worldbody/geom")) == number
+    root = written(plot(heights, border))
+    assert len(root.findall("worldbody/geom")) == number
+    hfield, (nx, ny) = root.find("asset/hfield"), heights.shape if sample else (4, 3)
+    assert (hfield.get("ncol"), hfield.get("nrow")) == (f"{nx + 4}", f"{ny + 4}")
 
 
 def test_mjcf_has_a_geom_per_solid_and_a_site_per_goal(solid_map):

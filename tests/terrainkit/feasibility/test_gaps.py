@@ -92,6 +92,29 @@ def test_easiest_gaps_are_kept_for_each_combination_of_keys():
     assert sorted(gaps_module._best_pairs(graph, pairs, 2, first).tolist()) == [1, 2, 4, 5]
 
 
+@pytest.mark.parametrize(
+    ("wall", "one_each", "ends"),
+    [
+        (0, False, [3, 4, 5, 6, 13, 12, 11, 10]),  # the four easiest
+        (0, True, [3]),
+        (5, False, [13, 12, 11, 10]),  # the others lead through the wall
+        (5, True, [8, 9, 10, 11]),  # up to 16 are searched
+    ],
+)
+def test_easiest_gaps_from_a_node_to_a_component_are_tried(monkeypatch, wall, one_each, ends):
+    """From two stones to a beam, in a batch each, with a wall of some columns in between."""
+    monkeypatch.setattr(gaps_module, "_MAX_PAIRS", 1)
+    heights = np.full((12, 14), -1.0)
+    heights[4, [3, 13]] = heights[8, 3:] = 0.0
+    heights[6, :wall] = 1.0
+    graph = FootholdGraph.build(columns_of(heights), NARROW)
+    component = np.zeros(heights.shape, int)
+    component[4, [3, 13]], component[8, 3:] = 1, 2
+    masks = (component.reshape(-1) == each for each in (1, 2))
+    found = gap_edges(graph, component.reshape(-1), *masks, 2.5, one_each=one_each)
+    assert found.end.tolist() == [8 * 14 + j for j in ends]
+
+
 def test_batches_have_at_least_the_number_of_pairs(monkeypatch):
     monkeypatch.setattr(gaps_module, "_MAX_PAIRS", 5)
     parts = [edges_of(np.full(n, n)) for n in (3, 2, 6, 1, 3)]

@@ -43,6 +43,11 @@ def test_rectangle_decomposition_spans_are_first_index_first():
     assert decompose_rectangles(mask(".... .###"), mask(".... .###")) == [(1, 2, 1, 4)]
 
 
+def test_rectangle_decomposition_prefers_the_largest_of_a_tie():
+    """All three maximal rectangles cover the required cell: 1 x 3, 3 x 1 and 2 x 2 cells."""
+    assert decompose_rectangles(mask("... ... .#."), mask("##. .## ###")) == [(1, 3, 1, 3)]
+
+
 @pytest.mark.parametrize(
     ("required", "allowed", "rectangles"),
     [

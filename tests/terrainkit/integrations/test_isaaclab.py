@@ -102,10 +102,12 @@ def test_importer_rejects_what_a_mesh_cannot_represent(isaaclab, solid_map, park
         isaaclab.terrain_importer_cfg(parkour_path, heightfield=True)
 
 
-@pytest.mark.parametrize("heightfield", [True, False])
+@pytest.mark.parametrize("heightfield", [True, False, None])
 def test_generator_provides_the_map_around_its_center(isaaclab, stairs, tmp_path, heightfield):
     path = stairs.save(tmp_path / "map.npz")
     cfg = isaaclab.terrain_importer_cfg(path, heightfield=heightfield).terrain_generator
+    if heightfield is None:  # a heightfield is of all columns
+        cfg.sub_terrains["stairs"].convert_to_heightfield = False
     cfg.num_rows = cfg.num_cols = 5  # as in play mode
     generator = isaaclab.MapGenerator(cfg)
     assert (generator.cfg, cfg.num_rows, cfg.num_cols) == (cfg, 2, 2)

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from terrainkit.features.noise import ValueNoise
 from terrainkit.geometry.solids import make_boxes
 from terrainkit.overlays.noise import Noise
 
@@ -13,13 +14,22 @@ def heights_of(noise, patch):
 
 @pytest.mark.parametrize("pattern", ["uniform", "perlin"])
 def test_noise_fills_its_amplitude_and_scales_with_the_difficulty(geometry, pattern):
-    noise = Noise(amplitude=(0.0, 0.2), pattern=pattern)
+    noise = Noise(amplitude=(0.0, 0.2), pattern=pattern, spacing=0.4)
     none, half, full = (heights_of(noise.at(d), geometry()) for d in (0.0, 0.5, 1.0))
     assert full.dtype == np.float32
     assert 0.15 < np.abs(full).max() <= 0.2
     assert full.min() < -0.1 < 0.1 < full.max()
     assert 2 * half == pytest.approx(full, abs=1e-7)
     assert not none.any()
+    # Within 0.4 m, uniform noise is linear, and hills are not.
+    assert (np.abs(np.diff(full[0, :4], n=2)).max() < 1e-6) == (pattern == "uniform")
+
+
+def test_noise_is_added_to_the_ground(geometry):
+    patch = geometry(heights=np.ones((40, 40), np.float32))
+    added = ValueNoise(amplitude=0.2, step=0.0, spacing=0.2)
+    expected = 1.0 + added.heights(patch.grid, np.random.default_rng(1))
+    assert heights_of(Noise(amplitude=0.2), patch)[0] == pytest.approx(expected[0])
 
 
 @pytest.mark.parametrize(

@@ -36,5 +36,10 @@ def test_heat_map_has_the_colors_of_success():
     # Two digits in the middle of the second cell.
     text = np.argwhere((picture[TOP + 1 : TOP + 27, LEFT + 57 : LEFT + 111] == WHITE).all(axis=2))
     assert text.mean(axis=0) == pytest.approx([15, 27], abs=3)
+    # The digits of the levels, above the middle of each cell.
+    dark = (picture[40:TOP, LEFT:222] < 128).all(axis=2)
+    digits = np.split(dark, [WIDTH, 2 * WIDTH], axis=1)
+    for digit in digits:
+        assert np.argwhere(digit).mean(axis=0) == pytest.approx([14, 27], abs=3)
     assert len(draw("title")) == len(picture)
     assert (draw("title")[12:40] != picture[12:40]).any()

@@ -16,6 +16,7 @@ from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.smoke_test import checks as module
 from terrainkit_robots.smoke_test.short_training import TrainingRecord
 from terrainkit_robots.spec.robot import Robot
+from tests.robots import QUADRUPED
 
 RECORD = TrainingRecord(
     losses=[{"value": 0.1}],
@@ -329,6 +330,19 @@ def test_smoke_test_of_a_folder_uses_its_spec(tmp_path):
     (check,) = module.smoke_test(str(folder)).checks
     assert not check.passed
     assert check.measured.startswith("FL_foot 31.0 cm")
+
+
+@pytest.mark.parametrize("name", ["quadruped", str(QUADRUPED)], ids=["task", "file"])
+def test_smoke_test_trains_with_the_samples_and_reports_progress(monkeypatch, name):
+    fractions = []
+
+    def run_checks(robot, _, samples, progress):
+        progress(samples)
+        return module.SmokeTestResult(robot.spec.name, ())
+
+    monkeypatch.setattr(module, "run_checks", run_checks)
+    module.smoke_test(name, samples=7, progress=fractions.append)
+    assert fractions == [7]
 
 
 def test_smoke_test_rejects_unknown_names():

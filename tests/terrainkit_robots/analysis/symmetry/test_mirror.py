@@ -50,7 +50,7 @@ def pairs(robot):
         ("l_knee", "r_knee"), ("knee_l", "knee_r"), ("L_hip", "R_hip"), ("FLHip", "FRHip"),
         ("leg_left_6_link", "leg_right_6_link"), ("LLeg_knee", "RLeg_knee"), ("fl1", "fr1"),
         ("left/hip", "right/hip"), ("bl_a", "br_a"), ("lb_a", "rb_a"), ("lm_a", "rm_a"),
-        ("ml_a", "mr_a"), ("LArm", "RArm"),
+        ("ml_a", "mr_a"), ("LArm", "RArm"), ("larm_1", "rarm_1"), ("lleg.knee", "rleg.knee"),
     ],
 )  # fmt: skip
 def test_swap_sides_exchanges_left_and_right(name, other):

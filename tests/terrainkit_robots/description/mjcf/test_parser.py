@@ -52,6 +52,24 @@ def test_defects_have_codes(refused):
     assert "\n" not in problem.message
 
 
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        ("mass density armature margin frictionloss springref kp kv", "a number"),
+        ("damping stiffness", "a number"),
+        ("range solref", "2 numbers"),
+        ("pos euler size scale friction", "3 numbers"),
+        ("quat rgba", "4 numbers"),
+        ("solimp", "5 numbers"),
+        ("fromto gear", "6 numbers"),
+    ],
+)
+def test_attributes_that_are_no_numbers_are_reported_with_their_count(names, expected):
+    for name in names.split():
+        (problem,) = read(body(f'<geom type="capsule" {name}="nan"/>')).problems
+        assert problem.message.startswith(f"{name} of <geom>: got 'nan'; expected {expected}")
+
+
 @pytest.mark.parametrize("name", ["attribute", "element", "class", "geom", "key", "pos", "where"])
 def test_mujoco_refuses_it_too(name):
     with pytest.raises(ValueError, match="Error"):

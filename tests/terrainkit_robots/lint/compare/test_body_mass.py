@@ -34,6 +34,10 @@ def test_difference_of_one_body_is_measured(robot_of):
     assert found["FL_thigh"].mass == pytest.approx(0.1)
     assert found["FL_thigh"].center == pytest.approx(0.01)
     assert found["FL_calf"].mass == pytest.approx(0.0)
+    cases = ("3 3 3", "3 3 4", 0.25), ("4 3 3", "3 3 3", 0.25), ("0 0 0", "0 0 0", 0.0)
+    for one, other, inertia in cases:
+        robots = (facts(link("a", inertia=f"{each} 0 0 0")) for each in (one, other))
+        assert gaps(*robots)["a"].inertia == pytest.approx(inertia)
 
 
 def test_trunks_are_compared_in_the_same_link():
