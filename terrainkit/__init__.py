@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from terrainkit.importing.options import ImportOptions
     from terrainkit.map.config import MapConfig
     from terrainkit.map.generation import generate
-    from terrainkit.map.import_curriculum import ImportedCurriculum, import_curriculum
+    from terrainkit.map.import_curriculum import import_curriculum
     from terrainkit.map.import_map import ImportedMap, import_map
     from terrainkit.map.import_report import ImportReport
     from terrainkit.map.patch import Patch, make_patch
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 __all__ = [
     "ImportOptions",
     "ImportReport",
-    "ImportedCurriculum",
     "ImportedMap",
     "MapConfig",
     "Overlay",
@@ -70,7 +69,7 @@ _NAMES = {
     "importing.options": ("ImportOptions",),
     "map.config": ("MapConfig",),
     "map.generation": ("generate",),
-    "map.import_curriculum": ("ImportedCurriculum", "import_curriculum"),
+    "map.import_curriculum": ("import_curriculum",),
     "map.import_map": ("ImportedMap", "import_map"),
     "map.import_report": ("ImportReport",),
     "map.patch": ("Patch", "make_patch"),

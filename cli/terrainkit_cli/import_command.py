@@ -36,7 +36,7 @@ class Import(ConfigCommand):
 
     files: Annotated[tuple[Path, ...], positional("FILE...")]
     """Image (.png with 16 bits, .tif), array (.npy, .npz), table (.txt, .csv), ASCII grid (.asc),
-    geodata (.hgt, .dem), mesh (.obj, .stl, .ply, .glb, .gltf, .dae), point cloud (.ply, .xyz, .pcd,
+    geodata (.hgt, .dem), mesh (.obj, .stl, .ply, .glb, .dae), point cloud (.ply, .xyz, .pcd,
     .las, .laz) or MuJoCo scene (.xml); or a folder of such files."""
 
     output: OutputPath
@@ -48,9 +48,6 @@ class Import(ConfigCommand):
     blend: NonNegative = 1.0
     """Several files: distance over which the heights fade to 0 at the edges of a patch [m]; 0 to
     keep them."""
-
-    skip_invalid: bool = False
-    """Several files: skip files and patches that cannot be used, with a warning."""
 
     @classmethod
     def default_config(cls) -> ImportOptions:
@@ -64,32 +61,27 @@ class Import(ConfigCommand):
         options: ImportOptions = self.changed_config()
         export.check_export(self.output, 0, overwrite=self.overwrite)
         if len(self.files) == 1 and not self.files[0].is_dir():
-            if self.skip_invalid or self.blend != Import.blend:
-                raise ConfigError("--blend, --skip-invalid: got one file; expected several files")
-            imported = import_map(self.files[0], options)
-            terrain_map, reports = imported.terrain_map, {"": imported.report}
+            if self.blend != Import.blend:
+                raise ConfigError("--blend: got one file; expected several files")
+            terrain_map, names = import_map(self.files[0], options).terrain_map, [""]
         else:
-            curriculum = import_curriculum(
-                self.files,
-                options,
-                blend=self.blend,
-                skip_invalid=self.skip_invalid,
-                progress=partial(render.progress, of="files"),
+            progress = partial(render.progress, of="files")
+            terrain_map = import_curriculum(
+                self.files, options, blend=self.blend, progress=progress
             )
-            terrain_map, reports = curriculum.terrain_map, {}
-            for (row, col), report in np.ndenumerate(curriculum.reports):
-                reports[f"patch ({row}, {col}), {terrain_map.patch_names[row, col]}: "] = report
+            patches = np.ndenumerate(terrain_map.patch_names)
+            names = [f"patch {index}, {name}: " for index, name in patches]
         files = export.export_files(terrain_map, self.output, overwrite=self.overwrite)
         render.result(written(terrain_map, *files))
         lines = [
-            f"{patch}{line}"
-            for patch, report in reports.items()
+            f"{name}{line}"
+            for name, report in zip(names, terrain_map.import_reports, strict=True)
             for line in _report_lines(report, has_solids=options.solids)
         ]
         for line in lines[:_MAX_LINES]:
             render.result(line)
         if len(lines) > _MAX_LINES:
-            render.result(f"and {len(lines) - _MAX_LINES} more; import_curriculum returns all")
+            render.result(f"and {len(lines) - _MAX_LINES} more, in import_reports")
         if is_map(self.output):
             path = quote(str(self.output))
             render.result(f"next: terrainkit preview {path} -o preview.png  (render it)")
@@ -97,6 +89,8 @@ class Import(ConfigCommand):
 
 
 def _report_lines(report: "ImportReport", *, has_solids: bool) -> Iterator[str]:
+    if report.num_missing:
+        yield f"filled missing heights: {report.num_missing}"
     if report.num_thin_bodies:
         yield f"closed bodies narrower than a cell, now solids: {report.num_thin_bodies}"
     if report.lost_at:

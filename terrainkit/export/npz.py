@@ -91,9 +91,9 @@ def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
         "friction": np.array([config.static_friction, config.dynamic_friction]),
         "restitution": np.float64(config.restitution),
     }
-    if terrain_map.import_report:
-        text = msgspec.json.encode(terrain_map.import_report).decode()
-        arrays["import_report"] = np.array(text)
+    if terrain_map.import_reports:
+        text = msgspec.json.encode(terrain_map.import_reports).decode()
+        arrays["import_reports"] = np.array(text)
     write_arrays(path, arrays)
 
 
@@ -150,7 +150,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
             parameters=_read_parameters(archive, config, terrain_types),
             solids=_read_solids(archive, size),
             goals=_read_poses(archive, "goals", size, MAX_GOALS),
-            import_report=_read_import_report(archive),
+            import_reports=_read_import_reports(archive, config.rows * config.cols),
         )
 
 
@@ -289,14 +289,14 @@ def _read_poses(
     return poses
 
 
-def _read_import_report(archive: Archive) -> ImportReport | None:
-    if "import_report" not in archive.names():
-        return None
-    text = archive.text("import_report", limit=MAX_PATCH_RECORD_BYTES)
+def _read_import_reports(archive: Archive, number: int) -> tuple[ImportReport, ...]:
+    if "import_reports" not in archive.names():
+        return ()
+    text = archive.text("import_reports", limit=number * MAX_PATCH_RECORD_BYTES)
     try:
-        return msgspec.json.decode(text, type=ImportReport)
+        return msgspec.json.decode(text, type=tuple[ImportReport, ...])
     except msgspec.DecodeError as error:
-        raise MapFileError(f"{archive.path}: import_report cannot be read: {error}") from error
+        raise MapFileError(f"{archive.path}: import_reports cannot be read: {error}") from error
 
 
 def _read_parameters(

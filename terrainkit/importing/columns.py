@@ -39,6 +39,10 @@ class Columns:
     """Height of the surface above the lowest free space [m], shape (nx, ny); NaN where nothing
     hangs over the ground."""
 
+    def lowered(self, z: float) -> "Columns":
+        """Return the columns of the mesh moved down by `z` [m]."""
+        return Columns(top=self.top - z, floor=self.floor - z, ceiling=self.ceiling - z)
+
 
 def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) -> Columns:
     """Return the columns of a mesh.

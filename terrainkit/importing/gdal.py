@@ -1,6 +1,5 @@
 """Read rasters of geodata with GDAL, through the package rasterio: the extra `geo`."""
 
-import importlib.util
 import warnings
 from pathlib import Path
 from typing import Any
@@ -8,13 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import HeightFileError, install_command
 from terrainkit.importing import asc
 from terrainkit.importing.georeference import Georeference
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.pixels import MAX_PIXELS, pixels_raster
 from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import decode
+from terrainkit.importing.source import decode, require
 
 _DRIVERS = {".hgt": "SRTMHGT", ".dem": "USGSDEM", ".bil": "EHdr", ".img": "HFA"}
 _DRIVERS |= dict.fromkeys((".dt0", ".dt1", ".dt2"), "DTED")
@@ -22,11 +20,6 @@ SUFFIXES = tuple(_DRIVERS)
 
 _WEB_MERCATOR = 3857
 _UNITS = {"ft": 0.3048, "foot": 0.3048, "feet": 0.3048, "us survey foot": 1200 / 3937}
-
-
-def is_gdal_installed() -> bool:
-    """Return whether rasterio is installed."""
-    return importlib.util.find_spec("rasterio") is not None
 
 
 def read(path: Path, options: ReadOptions) -> Raster:
@@ -42,10 +35,7 @@ def read(path: Path, options: ReadOptions) -> Raster:
     """
     if asc.is_grid(path):
         return asc.read(path, options)
-    if not is_gdal_installed():
-        raise HeightFileError(
-            f"{path}: {path.suffix} files need rasterio; run: {install_command('geo')}"
-        )
+    require(path, "rasterio", "geo")
     pixels, reference = read_gdal(path)
     return pixels_raster(path, pixels, reference, options)
 
@@ -66,9 +56,9 @@ def read_gdal(path: Path) -> tuple[NDArray[np.generic], Georeference]:
     # One driver only: others, such as VRT, may name further files.
     driver = "GTiff" if is_tiff else _DRIVERS.get(path.suffix.lower(), "GTiff")
     found = decode(_read_gdal, path, driver)
-    xx, xy, x, yx, yy, y, unit, height_unit, is_web_mercator = found["reference"].tolist()
+    unit, height_unit, is_web_mercator = found["units"].tolist()
     return np.ma.masked_array(found["pixels"], found["mask"]), Georeference(
-        transform=None if np.isnan(xx) else (xx, xy, x, yx, yy, y),
+        transform=tuple(found["transform"].tolist()) or None,
         unit=unit or None,
         height_unit=height_unit,
         is_web_mercator=bool(is_web_mercator),
@@ -90,15 +80,12 @@ def _read_gdal(path: Path, driver: str) -> dict[str, Any]:
         pixels = np.moveaxis(file.read(bands, masked=True), 0, 2)
         if file.scales[0] != 1 or file.offsets[0] != 0:
             pixels = pixels * file.scales[0] + file.offsets[0]
-        crs, transform = file.crs, [np.nan] * 6
-        if not file.transform.is_identity:
-            transform = list(file.transform)[:6]
-        is_geographic = crs is not None and crs.is_geographic
-        unit = 0.0 if is_geographic else 1.0 if crs is None else crs.units_factor[1]
+        crs = file.crs
+        unit = 1.0 if crs is None else 0.0 if crs.is_geographic else crs.units_factor[1]
         height_unit = _UNITS.get((file.units[0] or "").lower(), 1.0)
-        is_web_mercator = crs is not None and crs.to_epsg() == _WEB_MERCATOR
         return {
             "pixels": pixels.data,
             "mask": np.ma.getmaskarray(pixels),
-            "reference": [*transform, unit, height_unit, is_web_mercator],
+            "transform": [] if file.transform.is_identity else list(file.transform)[:6],
+            "units": [unit, height_unit, crs is not None and crs.to_epsg() == _WEB_MERCATOR],
         }

@@ -20,7 +20,7 @@ _SAME = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Georeference:
-    """What a file states about its cells."""
+    """What a file, or a .json file beside it, states about its cells and heights."""
 
     transform: Transform | None = None
     """Coefficients of the positions; None if the file states no cells."""
@@ -32,7 +32,13 @@ class Georeference:
     """Whether lengths are stretched by 1 / cos(latitude), as in web maps (EPSG:3857)."""
 
     height_unit: float = 1.0
-    """Meters per unit of the heights."""
+    """Meters per unit of heights that are decimal or signed numbers."""
+
+    scale: float | None = None
+    """Meters per unit of any heights; None if the file does not state it."""
+
+    offset: float = 0.0
+    """Height of the value 0 [m]."""
 
     nodata: float | None = None
     """Value that marks missing heights."""
@@ -48,8 +54,8 @@ class Georeference:
 
     def cells(
         self, path: Path, shape: tuple[int, ...]
-    ) -> tuple[tuple[float, float], tuple[float, float]] | None:
-        """Return the sides of a cell and the lower corner along x and y [m]; None without cells.
+    ) -> tuple[tuple[float, float] | None, tuple[float, float]]:
+        """Return the sides of a cell, None if not stated, and the lower corner along x and y [m].
 
         The corner of a raster that is in degrees, stretched or turned is (0, 0).
 
@@ -64,7 +70,7 @@ class Georeference:
             HeightFileError: if the cells have no size, or are beyond a pole.
         """
         if self.transform is None:
-            return None
+            return None, (0.0, 0.0)
         xx, xy, x, yx, yy, y = self.transform
         dx, dy = math.hypot(xx, yx), math.hypot(xy, yy)
         y_center = y + yy * shape[0] / 2 + yx * shape[1] / 2

@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError, install_command
-from terrainkit.importing.gdal import is_gdal_installed, read_gdal
+from terrainkit.importing.gdal import read_gdal
 from terrainkit.importing.georeference import Georeference
 from terrainkit.importing.geotiff import read_geo_tags
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.pixels import MAX_PIXELS, pixels_raster
 from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import decode
+from terrainkit.importing.source import decode, is_installed
 from terrainkit.settings.toml_text import read_text
 
 _TIFF_SUFFIXES = (".tif", ".tiff")
@@ -40,7 +41,7 @@ def read(path: Path, options: ReadOptions) -> Raster:
         ConfigError: if an option is missing.
     """
     pixels, reference = read_image(path)
-    return pixels_raster(path, pixels, reference, options, _read_json(path.with_suffix(".json")))
+    return pixels_raster(path, pixels, _with_json(path, reference, len(pixels)), options)
 
 
 def read_image(path: Path) -> tuple[NDArray[np.generic], Georeference]:
@@ -54,7 +55,7 @@ def read_image(path: Path) -> tuple[NDArray[np.generic], Georeference]:
     """
     if path.suffix.lower() not in _TIFF_SUFFIXES:
         return _pixels(path), Georeference()
-    return read_gdal(path) if is_gdal_installed() else _read_tiff(path)
+    return read_gdal(path) if is_installed("rasterio") else _read_tiff(path)
 
 
 def _read_tiff(path: Path) -> tuple[NDArray[np.generic], Georeference]:
@@ -95,16 +96,20 @@ def _read_pixels(path: Path) -> dict[str, Any]:
     return {"pixels": pixels}
 
 
-def _read_json(path: Path) -> dict[str, Any]:
-    """Return the numbers that the .json file of an image states."""
-    if not path.is_file():
-        return {}
+def _with_json(path: Path, reference: Georeference, rows: int) -> Georeference:
+    """Return a reference with what the .json file of an image of so many rows states."""
+    beside = path.with_suffix(".json")
+    if not beside.is_file():
+        return reference
     try:
-        table = dict(json.loads(read_text(path)))
-        found = {key: float(table[key]) for key in ("scale", "offset", "cell") if key in table}
-        if "first_sample" in table:
-            x, y = map(float, table["first_sample"])
-            return {**found, "first_sample": (x, y)}
-        return found
+        table = dict(json.loads(read_text(beside)))
+        keys = ("scale", "offset", "cell")
+        stated: dict[str, Any] = {key: float(table[key]) for key in keys if key in table}
+        if cell := stated.pop("cell", None):
+            x, y = map(float, table.get("first_sample", (cell / 2, cell / 2)))
+            corner = x - cell / 2, y + (rows - 0.5) * cell
+            transform = (cell, 0.0, corner[0], 0.0, -cell, corner[1])
+            reference = replace(reference, transform=transform, unit=1.0)
     except (ValueError, TypeError, RecursionError) as error:
-        raise HeightFileError(f"{path}: got {error}; expected numbers as in an export") from error
+        raise HeightFileError(f"{beside}: got {error}; expected numbers as in an export") from error
+    return replace(reference, **stated)

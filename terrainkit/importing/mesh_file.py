@@ -4,7 +4,6 @@ import json
 import re
 from base64 import b64encode
 from dataclasses import dataclass
-from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,18 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
 from terrainkit.importing.columns import Columns, make_columns
-from terrainkit.importing.mesh_extent import warn_about_up
 from terrainkit.importing.options import MAX_POSITION, ReadOptions
 from terrainkit.importing.point_cloud import make_point_source
-from terrainkit.importing.source import Array, Source, check_file, cover_positions, decode
+from terrainkit.importing.source import (
+    Array,
+    Source,
+    VertexSource,
+    check_file,
+    cover_positions,
+    decode,
+    warn,
+    with_z_up,
+)
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb", ".gltf", ".dae")
 
@@ -28,31 +35,11 @@ often a rounding error apart, and a sample there would be on the ground between 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MeshSource:
+class MeshSource(VertexSource):
     """A mesh whose highest surface is the ground."""
-
-    vertices: Array
-    """Vertices [m], z up, shape (nv, 3)."""
 
     faces: NDArray[np.int64]
     """Triangles, counterclockwise seen from outside, shape (nf, 3)."""
-
-    cell: float | None = None
-
-    is_metric: bool = True
-    """Whether the file or an option states the unit, so that the vertices are surely in meters."""
-
-    @cached_property
-    def lower(self) -> tuple[float, float]:
-        """Corner with the smallest x and y [m]."""
-        x, y, _ = self.vertices.min(axis=0).tolist()
-        return x, y
-
-    @cached_property
-    def upper(self) -> tuple[float, float]:
-        """Corner with the largest x and y [m]."""
-        x, y, _ = self.vertices.max(axis=0).tolist()
-        return x, y
 
     def heights(self, x: Array, y: Array) -> Array:
         """Return the height of the highest surface at a grid of positions.
@@ -119,13 +106,27 @@ def make_mesh_source(
     if not (np.abs(vertices) <= MAX_POSITION).all():
         raise HeightFileError(f"{path}: got vertices that are not finite")
     up = str(arrays.get("up", "z")) if options.up == "auto" else options.up
-    if up == "y":
-        vertices = vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
+    vertices = with_z_up(vertices, up)
     is_metric = options.scale is not None or "unit" in arrays
     source = MeshSource(vertices=vertices, faces=index.reshape(faces.shape), is_metric=is_metric)
     if options.up == "auto":
-        warn_about_up(path, source, up)
+        _warn_about_up(path, source, up)
     return source
+
+
+def _warn_about_up(path: Path, source: MeshSource, up: str) -> None:
+    """Warn if a mesh seems to lie on its side, if `up` is the vertical axis of the file.
+
+    Ground lies flat: it is longer than high, and more of its area faces up than sideways.
+    """
+    _, length, height = np.ptp(source.vertices, axis=0)
+    a, b, c = np.moveaxis(source.vertices[source.faces], 1, 0)
+    _, along_y, along_z = np.abs(np.cross(b - a, c - a)).sum(axis=0)
+    if height >= 2 * length and along_y > 2 * along_z:
+        warn(
+            f"{path} is {height:.4g} m high and {length:.4g} m wide, and most of its area is "
+            f"vertical: lying on its side? --up {'z' if up == 'y' else 'y'}"
+        )
 
 
 def _read_mesh(path: Path) -> dict[str, Any]:

@@ -3,25 +3,21 @@
 Unlike MuJoCo's rays, faces have every surface below each other, and closed bodies for solids.
 """
 
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from terrainkit.errors import HeightFileError, TerrainkitWarning, listing
+from terrainkit.errors import HeightFileError, listing
 from terrainkit.importing.mesh_file import MeshSource, make_mesh_source
 from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.source import Array, decode
+from terrainkit.importing.source import Array, decode, warn
 
 SUFFIXES = (".xml",)
 
 PLANE_MARGIN = 2.0
 """Width of an infinite plane around the other geoms [m]."""
-
-_MAX_VERTICES = 5_000_000
-"""Most vertices of all geoms: a sphere has 2562."""
 
 _UNUSED = (
     *("keys", "sensors", "actuators", "equalities", "tendons", "pairs", "excludes", "tuples"),
@@ -56,16 +52,13 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
         )
     moving = [str(name) or "one without name" for name in arrays["moving"]]
     if moving:
-        warnings.warn(
-            f"{path}: bodies with joints are left out: {listing(moving)}",
-            TerrainkitWarning,
-            stacklevel=2,
-        )
+        warn(f"{path}: bodies with joints are left out: {listing(moving)}")
     return make_mesh_source(path, arrays, options)
 
 
 def _read_scene(path: Path) -> dict[str, Any]:
     import mujoco
+    import trimesh
 
     mujoco.set_mju_user_warning(lambda _: None)  # it would write MUJOCO_LOG.TXT
     spec = mujoco.MjSpec.from_file(str(path))
@@ -74,7 +67,6 @@ def _read_scene(path: Path) -> dict[str, Any]:
         for body in spec.worldbody.bodies
         if any(each.joints for each in (body, *body.find_all("body")))
     ]
-    names = [body.name for body in moving]
     geoms = [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]
     for each in (*moving, *geoms):
         spec.delete(each)
@@ -91,19 +83,10 @@ def _read_scene(path: Path) -> dict[str, Any]:
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    points, triangles, count = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
-    for vertices, faces in _geom_meshes(model, data):
-        points.append(vertices)
-        triangles.append(faces + count)
-        count += len(vertices)
-        if count > _MAX_VERTICES:
-            raise ValueError(f"got more than {_MAX_VERTICES} vertices; expected fewer round geoms")
-    return {
-        "vertices": np.concatenate(points),
-        "faces": np.concatenate(triangles),
-        "moving": np.array(names, dtype=str),
-        "unit": 1.0,
-    }
+    meshes = [(np.empty((0, 3)), np.empty((0, 3), np.int64)), *_geom_meshes(model, data)]
+    vertices, faces = trimesh.util.append_faces(*zip(*meshes, strict=True))
+    moving_names = np.array([body.name for body in moving], dtype=str)
+    return {"vertices": vertices, "faces": faces, "moving": moving_names, "unit": 1.0}
 
 
 def _geom_meshes(model: Any, data: Any) -> Iterator[tuple[Array, Any]]:

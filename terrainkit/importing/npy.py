@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from terrainkit.errors import HeightFileError
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
 from terrainkit.importing.source import decode
@@ -23,24 +22,19 @@ def read(path: Path, options: ReadOptions) -> Raster:
     Raises:
         HeightFileError: if the file has another format, is truncated, or has several arrays.
     """
-    if path.suffix.lower() == ".npz":
-        return make_raster(path, decode(_read_npz, path, options.key)["values"], options)
-    try:
-        # Mapped: a file that claims a larger array than it holds is an error, not an allocation.
-        values = np.load(path, mmap_mode="r", allow_pickle=False)
-    except Exception as error:  # numpy's parser of headers raises various errors
-        reason = " ".join(str(error).split())
-        raise HeightFileError(f"{path}: not an .npy file, or truncated: {reason}") from error
-    return make_raster(path, values, options)
+    return make_raster(path, decode(_read_array, path, options.key)["values"], options)
 
 
-def _read_npz(path: Path, key: str) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as arrays:
-        grids = [name for name in arrays.files if arrays[name].ndim == 2]
-        keys = [name for name in grids if name == key or not key]
-        if len(keys) != 1:
-            raise ValueError(
-                f"got key {key!r} and the grids {', '.join(grids) or 'none'}; --key "
-                f"{(grids or ['NAME'])[0]} selects one"
-            )
-        return {"values": arrays[keys[0]]}
+def _read_array(path: Path, key: str) -> dict[str, Any]:
+    # Mapped: a file that claims a larger array than it holds is an error, not an allocation.
+    arrays = np.load(path, mmap_mode="r", allow_pickle=False)
+    if isinstance(arrays, np.ndarray):
+        return {"values": arrays}
+    grids = [name for name in arrays.files if arrays[name].ndim == 2]
+    keys = [name for name in grids if name == key or not key]
+    if len(keys) != 1:
+        raise ValueError(
+            f"got key {key!r} and the grids {', '.join(grids) or 'none'}; --key "
+            f"{(grids or ['NAME'])[0]} selects one"
+        )
+    return {"values": arrays[keys[0]]}

@@ -2,9 +2,8 @@
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,38 +44,43 @@ _MAX_THIN_FACES = 10_000
 """Most faces of a body that is examined for being thin: the outline of more takes minutes."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Bodies:
-    """The connected parts of a mesh, in the frame of the file."""
+class Bodies(NamedTuple):
+    """The connected parts of a mesh, in the frame of the map."""
 
-    thin: tuple[Any, ...] = ()
+    thin: list[Any]
     """Closed bodies narrower than a cell, as manifolds."""
 
-    thin_faces: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
-    """Indices of their faces."""
-
-    others: tuple[Any, ...] = ()
+    others: list[Any]
     """The other closed bodies, as manifolds."""
 
-    num_open: int = 0
+    thin_faces: NDArray[np.bool_]
+    """Whether each face of the mesh belongs to a thin body."""
+
+    num_open: int
     """Number of bodies that are not closed."""
 
 
-def find_bodies(mesh: MeshSource, cell: float) -> Bodies:
-    """Return the connected parts of a mesh, with faces that point outward.
+def find_bodies(mesh: MeshSource, grid: Grid, origin: NDArray[np.float64]) -> Bodies:
+    """Return the connected parts of a mesh within a map, with faces that point outward.
+
+    A body is thin if no disk whose diameter is a cell fits in its outline seen from above: samples
+    miss it or make it wider.
 
     Args:
         mesh: The mesh.
-        cell: Distance between two samples of the map [m]. A body is thin if no disk of this
-            diameter fits in its outline seen from above: samples miss it or make it wider.
+        grid: Grid of the map; bodies end at its edges.
+        origin: Point of the file that is at (0, 0, 0) in the map, shape (3,) [m].
     """
     import manifold3d
     import trimesh
 
-    whole = trimesh.Trimesh(vertices=mesh.vertices, faces=mesh.faces, process=True)
-    nodes = np.arange(len(whole.faces))
+    whole = trimesh.Trimesh(vertices=mesh.vertices - origin, faces=mesh.faces, process=True)
+    nodes, (low, high) = np.arange(len(whole.faces)), whole.bounds
+    window = manifold3d.Manifold.cube((*grid.size, high[2] - low[2] + 2.0))
+    window = window.translate((*grid.lower, low[2] - 1.0))
     groups = trimesh.graph.connected_components(whole.face_adjacency, min_len=1, nodes=nodes)
-    thin, thin_faces, others = [], [np.empty(0, np.int64)], []
+    bodies = Bodies([], [], np.zeros(len(nodes), dtype=bool), 0)
+    num_closed = 0
     for faces, body in zip(groups, whole.submesh(groups, append=False), strict=True):
         if not body.is_watertight:
             continue
@@ -85,26 +89,20 @@ def find_bodies(mesh: MeshSource, cell: float) -> Bodies:
         solid = manifold(np.asarray(body.vertices), np.asarray(body.faces))
         if solid.status() != manifold3d.Error.NoError:
             continue
-        if len(faces) <= _MAX_THIN_FACES and solid.project().offset(-_THIN * cell).is_empty():
-            thin.append(solid)
-            thin_faces.append(faces)
-        else:
-            others.append(solid)
-    return Bodies(
-        thin=tuple(thin),
-        thin_faces=np.concatenate(thin_faces),
-        others=tuple(others),
-        num_open=len(groups) - len(thin) - len(others),
-    )
+        num_closed += 1
+        outline = solid.project() if len(faces) <= _MAX_THIN_FACES else None
+        is_thin = outline is not None and outline.offset(-_THIN * grid.cell).is_empty()
+        bodies.thin_faces[faces] |= is_thin
+        (x0, y0), (x1, y1) = body.bounds[:, :2]
+        if not (np.less_equal(grid.lower, (x0, y0)) & np.less_equal((x1, y1), grid.upper)).all():
+            solid ^= window
+        if solid.volume() >= MIN_VOLUME:
+            (bodies.thin if is_thin else bodies.others).append(solid)
+    return bodies._replace(num_open=len(groups) - num_closed)
 
 
 def overhang_solids(
-    path: Path,
-    bodies: Bodies,
-    origin: NDArray[np.float64],
-    columns: Columns,
-    grid: Grid,
-    threshold: float,
+    path: Path, bodies: Bodies, columns: Columns, grid: Grid, threshold: float
 ) -> Solids:
     """Return thin bodies, and the parts of others above the lowest free space, as solids.
 
@@ -114,7 +112,6 @@ def overhang_solids(
     Args:
         path: The file, for errors.
         bodies: The parts of the mesh.
-        origin: Point of the file that is at (0, 0, 0) in the map, shape (3,) [m].
         columns: The columns of the mesh on the samples of `grid`, in the frame of the map, without
             the thin bodies.
         grid: Grid of the map.
@@ -123,13 +120,13 @@ def overhang_solids(
     Raises:
         HeightFileError: if no body is closed, or one cannot be decomposed.
     """
-    parts = [body.translate(-origin) for body in bodies.thin]
+    parts = list(bodies.thin)
     if not np.isnan(columns.ceiling).all():
         if not bodies.others:
             raise HeightFileError(f"{path}: solids: got a mesh without closed bodies that overhang")
         cut = _cut(columns)
         for body in _united(bodies.others):
-            parts += _above(body.translate(-origin), cut, grid, threshold)
+            parts += _above(body, cut, grid, threshold)
     solids: list[Solids] = []
     for part in parts:
         if part.volume() < MIN_VOLUME:
@@ -144,7 +141,7 @@ def _is_convex(body: Any) -> bool:
     return bool(body.volume() > _CONVEX * hull.volume() and hull.num_vert() <= MAX_HULL_VERTICES)
 
 
-def _united(bodies: tuple[Any, ...]) -> Iterator[Any]:
+def _united(bodies: list[Any]) -> Iterator[Any]:
     """Yield the convex bodies, whose parts are convex as well, and the union of the others."""
     import manifold3d
 

@@ -5,13 +5,16 @@ Positions are in the file's frame: x to the right and y up for images, east and 
 
 import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import HeightFileError, TerrainkitWarning
+from terrainkit.errors import HeightFileError, TerrainkitWarning, install_command
 from terrainkit.files.child_process import ProcessError, run_in_process
 from terrainkit.files.suffix import find_module
 from terrainkit.importing.options import Missing, ReadOptions
@@ -37,6 +40,10 @@ class Source(Protocol):
     def upper(self) -> tuple[float, float]:
         """Corner with the largest x and y [m]."""
 
+    @property
+    def is_metric(self) -> bool:
+        """Whether lengths are surely in meters."""
+
     def heights(self, x: Array, y: Array) -> Array:
         """Return the heights at a grid of positions.
 
@@ -49,6 +56,36 @@ class Source(Protocol):
         Returns:
             Heights [m], shape (nx, ny), NaN where they are missing.
         """
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VertexSource:
+    """Points in space."""
+
+    vertices: Array
+    """Points [m], z up, shape (n, 3)."""
+
+    cell: float | None = None
+
+    is_metric: bool = True
+    """Whether the file or an option states the unit, so that the points are surely in meters."""
+
+    @cached_property
+    def lower(self) -> tuple[float, float]:
+        """Corner with the smallest x and y [m]."""
+        x, y, _ = self.vertices.min(axis=0).tolist()
+        return x, y
+
+    @cached_property
+    def upper(self) -> tuple[float, float]:
+        """Corner with the largest x and y [m]."""
+        x, y, _ = self.vertices.max(axis=0).tolist()
+        return x, y
+
+
+def with_z_up(vertices: Array, up: str) -> Array:
+    """Return points with z up, shape (n, 3), of a file whose axis `up` points up."""
+    return vertices[:, [0, 2, 1]] * [1.0, -1.0, 1.0] if up == "y" else vertices
 
 
 def open_source(path: Path, options: ReadOptions) -> Source:
@@ -104,6 +141,23 @@ def decode(
         return run_in_process(function, path, *arguments)
     except ProcessError as error:
         raise HeightFileError(f"{path}: cannot be read: {error}") from None
+
+
+def is_installed(module: str) -> bool:
+    """Return whether an optional module is installed."""
+    return find_spec(module) is not None
+
+
+def require(path: Path, module: str, extra: str) -> None:
+    """Check that the module that reads a file is installed.
+
+    Raises:
+        HeightFileError: if it is not; the message names the extra.
+    """
+    if not is_installed(module):
+        raise HeightFileError(
+            f"{path}: {path.suffix} files need {module}; run: {install_command(extra)}"
+        )
 
 
 def warn(message: str) -> None:

@@ -54,7 +54,7 @@ def _read_table(path: Path) -> dict[str, Any]:
     if not delimiter:
         raise ValueError("got text; expected a table of numbers")
     end = delimiter if lines[start].endswith(delimiter) else ""
-    rows = [_with_points(line, delimiter).removesuffix(end) for line in lines[start:]]
+    rows = [line.removesuffix(end) for line in lines[start:]]
     separator = None if delimiter == " " else delimiter
     try:
         table = np.loadtxt(
@@ -82,7 +82,7 @@ def _read_table(path: Path) -> dict[str, Any]:
 def _delimiters(line: str) -> Iterator[str]:
     """Yield the delimiters with which a line is a row of numbers."""
     for delimiter in _DELIMITERS:
-        cells = _with_points(line, delimiter).split(None if delimiter == " " else delimiter)
+        cells = line.split(None if delimiter == " " else delimiter)
         with suppress(ValueError):
             if not np.isnan([_float_or_nan(each) for each in cells]).all():
                 yield delimiter
@@ -97,14 +97,9 @@ def _is_size(lines: list[str]) -> bool:
 def _cells(line: str) -> list[float]:
     """Return the numbers of a row; none if it is text."""
     delimiter = next(_delimiters(line), None)
-    text = _with_points(line, delimiter or "").strip().removesuffix(delimiter or "")
+    text = line.strip().removesuffix(delimiter or "")
     cells = text.split(None if delimiter == " " else delimiter) if delimiter else ()
     return [_float_or_nan(each) for each in cells]
-
-
-def _with_points(line: str, delimiter: str) -> str:
-    """Return a line with decimal points: unless it is the delimiter, a comma is one."""
-    return line if delimiter == "," else line.replace(",", ".")
 
 
 def _float_or_nan(text: str) -> float:

@@ -3,7 +3,7 @@
 import itertools
 import warnings
 from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING
@@ -84,11 +84,8 @@ class _MapBuilder:
     """A map whose patches are added one by one, so that they are in memory once."""
 
     def __init__(self, config: MapConfig) -> None:
-        self.deviations: Counter[str] = Counter()
-        """Number of patches on which a parameter differs from the request, by parameter."""
-
-        self.examples: dict[str, str] = {}
-        """The realized and the requested value on the last of these patches, by parameter."""
+        self.deviations: dict[str, list[str]] = {}
+        """The realized and the requested value on each patch where they differ, by parameter."""
 
         self.moved_spawns: Counter[str] = Counter()
         """Number of patches whose spawn origin was moved, by sub-terrain."""
@@ -123,9 +120,9 @@ class _MapBuilder:
         self._solids.append(patch.solids)
         deviating = patch.parameters.deviating(sub_terrain.declarations, config.cell)
         for name in deviating:
-            self.deviations[key := f"{patch.terrain}.{name}"] += 1
             values = patch.parameters.realized[name], patch.parameters.requested[name]
-            self.examples[key] = " instead of ".join(map(format_value, values))
+            text = " instead of ".join(map(format_value, values))
+            self.deviations.setdefault(f"{patch.terrain}.{name}", []).append(text)
         if patch.spawn_offset > config.cell:
             self.moved_spawns[sub_terrain.name] += 1
 
@@ -192,16 +189,21 @@ def _warnings(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
     """Yield the warnings about a generated map."""
     config = terrain_map.config
     if builder.deviations:
+        texts = (
+            f"{name} on {len(found)} patches, such as {found[-1]}"
+            for name, found in builder.deviations.items()
+        )
         yield (
             f"cells of {config.cell:g} m, height steps or patches are too coarse or too small for "
-            f"the requested parameters: {_counts_text(builder.deviations, builder.examples)}; "
+            f"the requested parameters: {listing(texts)}; "
             "reduce them, the cells or the platform, or increase patch_size; the map records the "
             "realized values"
         )
     if builder.moved_spawns:
+        moved = (f"{name} on {count} patches" for name, count in builder.moved_spawns.items())
         yield (
             f"no flat disk of radius {config.spawn_radius:g} m at the preferred spawn position: "
-            f"{_counts_text(builder.moved_spawns)}; the nearest flat disk is used; increase the "
+            f"{listing(moved)}; the nearest flat disk is used; increase the "
             "platform or reduce spawn_radius"
         )
     for text in repeated_levels(terrain_map):
@@ -209,10 +211,3 @@ def _warnings(builder: _MapBuilder, terrain_map: TerrainMap) -> Iterator[str]:
     if cliffs := PatchEdges(terrain_map=terrain_map).cliffs():
         text = cliffs_text(cliffs, terrain_map.patch_names)
         yield f"cliffs between patches: {text}; a robot cannot climb them"
-
-
-def _counts_text(counts: Counter[str], examples: Mapping[str, str] | None = None) -> str:
-    return listing(
-        f"{name} on {count} patches" + (f", such as {examples[name]}" if examples else "")
-        for name, count in counts.items()
-    )

@@ -2,9 +2,10 @@
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from terrainkit.features.gradient_noise import edge_weights
 from terrainkit.files.memory import check_memory
 from terrainkit.files.suffix import modules_by_suffix
 from terrainkit.geometry.solids import Solids
+from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.options import ImportOptions
 from terrainkit.importing.source import Source, open_source
 from terrainkit.map import import_map
@@ -39,18 +41,12 @@ FileProgress = Callable[[Iterable[Path], int], Iterable[Path]]
 _BYTES_PER_SAMPLE = 60
 
 # The spawn positions are placed later, after the edges of the patch have been blended.
-_ANYWHERE: dict[str, Any] = {"spawns_per_patch": 1, "spawn_radius": 1e-4, "spawn_headroom": 0.0}
-
-
-@dataclass(frozen=True, kw_only=True)
-class ImportedCurriculum:
-    """A map of several files, and the differences from the files."""
-
-    terrain_map: TerrainMap
-    """The map, of mode custom. Each file is one of its sub-terrains, which records the SHA-256."""
-
-    reports: NDArray[np.object_]
-    """:class:`ImportReport` of each patch, in the frame of the patch, shape (rows, cols)."""
+_ANYWHERE: dict[str, Any] = {
+    "spawns_per_patch": 1,
+    "spawn_radius": 1e-4,
+    "spawn_headroom": 0.0,
+    "spawn_tolerance": MAX_VALUE,
+}
 
 
 class _Patch(NamedTuple):
@@ -65,9 +61,8 @@ def import_curriculum(
     options: ImportOptions | None = None,
     *,
     blend: float = 1.0,
-    skip_invalid: bool = False,
     progress: FileProgress | None = None,
-) -> ImportedCurriculum:
+) -> TerrainMap:
     """Return one map of several files, with the easiest patches in the first row.
 
     Each file is one patch, cropped at its center to the size of the smallest file. With
@@ -75,7 +70,8 @@ def import_curriculum(
     :func:`.measured_difficulty`, row by row. The map does not depend on the order of the paths.
 
     A patch is shifted, so that the median height of its outermost samples is 0, and its heights
-    fade to 0 there. The border is flat.
+    fade to 0 there. The border is flat. The mode is custom: each file is a sub-terrain of the map,
+    which records its SHA-256.
 
     Args:
         paths: Files, and folders whose files are used; folders inside them are not.
@@ -83,15 +79,15 @@ def import_curriculum(
             and as many rows as there are patches.
         blend: Distance over which the heights fade to 0 at the edges of a patch [m]; 0 to keep
             them.
-        skip_invalid: Skip files and patches that cannot be read, with a warning.
         progress: Wraps the files, for a progress bar.
 
     Warns:
-        TerrainkitWarning: if files or patches are left out, patches meet at a cliff, or a patch has
-            no flat ground and `spawn_tolerance` is None.
+        TerrainkitWarning: if files or patches are left out, such as those that cannot be read or
+            are smaller than a patch, patches meet at a cliff, or a patch has no flat ground and
+            `spawn_tolerance` is None.
 
     Raises:
-        HeightFileError: if a file cannot be read or is smaller than a patch, or there is none.
+        HeightFileError: if no file can be used.
         ConfigError: if an option is invalid, or a patch has no place to spawn.
         MemoryLimitError: if the map would not fit in memory.
     """
@@ -100,28 +96,30 @@ def import_curriculum(
     files, is_whole = _find_files(paths), options.patch_size is None
     options = _with_common_size(files, options)
     patches: list[_Patch] = []
-    skipped: dict[Path, list[str]] = {}
-
-    def attempt(path: Path, function: Callable[..., list[Any]], *arguments: Any) -> list[Any]:
-        try:
-            return function(path, options, *arguments)
-        except HeightFileError as error:
-            if not skip_invalid:
-                raise HeightFileError(f"{error}; --skip-invalid skips it") from error
-            skipped.setdefault(path, []).append(str(error))
-            return []
-
+    skipped: list[str] = []
     for path in progress(files, len(files)) if progress else files:
-        for source, lower in attempt(path, _places, is_whole):
-            patches += attempt(path, _import_patch, source, lower, blend)
+        try:
+            places = _places(path, options, is_whole)
+        except HeightFileError as error:
+            skipped.append(str(error))
+            continue
+        for source, lower in places:
+            try:
+                patches.append(_import_patch(path, options, source, lower, blend))
+            except HeightFileError as error:
+                skipped.append(str(error))
+    if not patches:
+        raise HeightFileError(f"skipped all files: {listing(skipped)}")
     if skipped:
-        reasons = (
-            f"{first} (and {len(others)} more patches)" if others else first
-            for first, *others in skipped.values()
+        warnings.warn(f"skipped {listing(skipped)}", TerrainkitWarning, stacklevel=2)
+    filled = [each for each in patches if each.report.num_missing]
+    if filled and options.missing == "nearest":
+        warnings.warn(
+            f"{len(filled)} of {len(patches)} patches have missing heights, such as "
+            f"{filled[0].report.num_missing} of {filled[0].path}; they become the nearest heights",
+            TerrainkitWarning,
+            stacklevel=2,
         )
-        if not patches:
-            raise HeightFileError(f"skipped all files: {listing(reasons)}")
-        warnings.warn(f"skipped {listing(reasons)}", TerrainkitWarning, stacklevel=2)
     return _arrange(patches, options)
 
 
@@ -148,11 +146,7 @@ def _find_files(paths: Sequence[str | Path]) -> list[Path]:
             text = f"{path}: ignored what has no reader: {listing(others)}"
             warnings.warn(text, TerrainkitWarning, stacklevel=3)
         files |= {*found} if path.is_dir() else {path}
-    return sorted(files, key=_order)
-
-
-def _order(path: Path) -> tuple[str, Path]:
-    return path.name, path
+    return sorted(files, key=lambda path: (path.name, path))
 
 
 def _with_common_size(files: Sequence[Path], options: ImportOptions) -> ImportOptions:
@@ -178,14 +172,17 @@ def _places(
 ) -> list[tuple[Source, NDArray[np.float64]]]:
     """Return the ground and the lower corner of each patch of a file, centered in the file."""
     source, size = open_source(path, options), np.array(options.patch_size)
+    step = source.cell or import_map.DEFAULT_CELL
+    check_length(path, source, options.cell or step)
     lower, extent = np.array(source.lower), np.subtract(source.upper, source.lower)
     counts = np.floor(extent / size + 1e-6).astype(int)
     if not counts.all():
         text = " x ".join(f"{each:g} m" for each in extent)
         raise HeightFileError(f"{path}: got {text}; expected at least patch_size, {size} m")
     counts = np.ones_like(counts) if is_whole else counts
+    samples = math.prod(counts * size) / (options.cell or step) ** 2
+    check_samples(path, source, options.cell or step, round(samples))
     # Whole cells, so that a map with the cells of the file has its heights.
-    step = source.cell or import_map.DEFAULT_CELL
     lower += np.floor((extent - counts * size) / 2 / step + 1e-6) * step
     return [(source, lower + index * size) for index in np.ndindex(*counts)]
 
@@ -196,28 +193,32 @@ def _import_patch(
     source: Source,
     lower: NDArray[np.float64],
     blend: float,
-) -> list[_Patch]:
+) -> _Patch:
     """Return a patch of a file, whose edges fade to height 0."""
-    x, y = lower.tolist()
-    place = replace(options, origin=(x, y, 0.0), rows=1, cols=1, border=0.0, **_ANYWHERE)
-    imported = import_map.import_source(path, source, replace(place, spawn_tolerance=MAX_VALUE))
-    made = imported.terrain_map
-    grid, heights = made.grid, made.heights
-    level = np.median([*heights[0], *heights[-1], *heights[1:-1, 0], *heights[1:-1, -1]])
+    place = replace(options, origin=(*lower.tolist(), 0.0), rows=1, cols=1, border=0.0)
+    config, origin = import_map.make_config(path, source, place)
+    anywhere, center = replace(config, **_ANYWHERE), np.array([[config.patch_grid(0, 0).center]])
+    types = np.zeros((1, 1), dtype=np.int32)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", ".*heights are missing", TerrainkitWarning)
+        imported = import_map.make_map(path, source, anywhere, origin, place, center, types)
+    made, grid = imported.terrain_map, config.grid
+    edges = np.ones(grid.shape, dtype=bool)
+    edges[1:-1, 1:-1] = False
+    level = float(np.median(made.heights[edges]))
     weights = edge_weights(grid, blend) if blend else 1.0
-    heights = ((heights - level) * weights).astype(np.float32)
+    heights = ((made.heights - level) * weights).astype(np.float32)
     solids = made.solids.transform(np.eye(3), (0.0, 0.0, -level))
-    config = replace(made.config, **import_map.map_settings(options))
     with prefixed_errors(f"{path}: "):
-        placed = place_on_flattest(config, heights, solids, (0, 0), np.array(grid.center))
+        placed = place_on_flattest(config, heights, solids, (0, 0), center[0, 0])
     spawns, tolerance = placed
     config = replace(config, spawn_tolerance=tolerance)
     made = replace(made, config=config, heights=heights, solids=solids, spawns=spawns[None, None])
     difficulty = measured_difficulty(heights, grid.cell, float(spawns[0, 2]))
-    return [_Patch(path, made, round(difficulty, 6), imported.report)]
+    return _Patch(path, made, round(difficulty, 6), imported.report)
 
 
-def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> ImportedCurriculum:
+def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> TerrainMap:
     """Return the map of the patches, sorted by difficulty."""
     cols = options.cols or 1
     rows = options.rows or max(1, len(patches) // cols)
@@ -231,8 +232,11 @@ def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> ImportedCurri
     if len(chosen) < len(ordered):
         text = f"used {len(chosen)} of {len(ordered)} patches, at equal distances in their order"
         warnings.warn(text, TerrainkitWarning, stacklevel=3)
-    used = {each.path: each.patch_map.config.terrains[0] for each in chosen}
-    terrains = {path: replace(used[path], name=path.name) for path in sorted(used, key=_order)}
+    terrains, used, numbers = {}, {each.path for each in chosen}, Counter[str]()
+    for path in dict.fromkeys(each.path for each in patches if each.path in used):
+        numbers[path.name] += 1  # files in several folders may have the same name
+        name = path.name if numbers[path.name] == 1 else f"{path.name} ({numbers[path.name]})"
+        terrains[path] = import_map.sub_terrain(path, name, options)
     config = MapConfig(
         rows=rows,
         cols=cols,
@@ -246,19 +250,19 @@ def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> ImportedCurri
     samples = math.prod(config.grid.shape)
     check_memory(samples * _BYTES_PER_SAMPLE, f"a map of {samples} samples")
     heights, solids = np.zeros(config.grid.shape, dtype=np.float32), []
-    spawns, reports = np.empty((rows, cols), dtype=object), np.empty((rows, cols), dtype=object)
+    spawns = np.empty((rows, cols), dtype=object)
     types, tolerances = np.empty((rows, cols), dtype=np.int32), {}
-    for (path, made, _, report), index in zip(chosen, np.ndindex(rows, cols), strict=True):
+    for (path, made, _, _), index in zip(chosen, np.ndindex(rows, cols), strict=True):
         x, y = config.patch_grid(*index).lower
         heights[config.patch_cells(*index)] = made.heights
         moved = made.solids.transform(np.eye(3), (x, y, 0.0))
         solids.append(replace(moved, patch=np.full((len(moved), 2), index, dtype=np.int32)))
         spawns[index] = made.spawns[0, 0] + np.array([x, y, 0.0, 0.0], dtype=np.float32)
-        types[index], reports[index] = list(terrains).index(path), report
+        types[index] = list(terrains).index(path)
         tolerances[index] = made.config.spawn_tolerance
     config = relaxed_config(config, tolerances, relax=options.spawn_tolerance is None)
     made = import_map.assemble_map(config, heights, Solids.concatenate(solids), spawns, types)
     if cliffs := PatchEdges(terrain_map=made).cliffs():
         text = f"cliffs between patches: {cliffs_text(cliffs, made.patch_names)}"
         warnings.warn(text, TerrainkitWarning, stacklevel=3)
-    return ImportedCurriculum(terrain_map=made, reports=reports)
+    return replace(made, import_reports=tuple(each.report for each in chosen))

@@ -10,15 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
-from terrainkit.files.memory import check_memory
 from terrainkit.geometry.solids import Solids
-from terrainkit.importing.columns import Columns
+from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.friction import read_friction
-from terrainkit.importing.mesh_extent import check_length, check_samples
 from terrainkit.importing.mesh_file import MeshSource
 from terrainkit.importing.options import ImportOptions
-from terrainkit.importing.overhangs import Bodies, find_bodies, overhang_solids
-from terrainkit.importing.raster import Raster
+from terrainkit.importing.overhangs import find_bodies, overhang_solids
 from terrainkit.importing.source import Source, fill_missing, open_source
 from terrainkit.map.config import MapConfig
 from terrainkit.map.edit import assign_solids
@@ -34,8 +31,6 @@ from terrainkit.terrain.sub_terrain import SubTerrain
 
 DEFAULT_CELL = 0.1
 """Distance between two samples of a map that is made from a mesh [m]."""
-
-_BYTES_PER_SAMPLE = 200
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,20 +66,10 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
         MemoryLimitError: if the map would not fit in memory.
     """
     path, options = Path(path), options or ImportOptions()
-    return import_source(path, open_source(path, options), options)
-
-
-def import_source(path: Path, source: Source, options: ImportOptions) -> ImportedMap:
-    """Return the map of a source that has been opened; see :func:`import_map`.
-
-    Args:
-        path: The file of the source.
-        source: The ground.
-        options: How it becomes a map.
-    """
-    if not isinstance(source, Raster):
-        check_length(path, source, options.cell or source.cell or DEFAULT_CELL)
-    config, origin = _make_config(path, source, options)
+    source = open_source(path, options)
+    check_length(path, source, options.cell or source.cell or DEFAULT_CELL)
+    config, origin = make_config(path, source, options)
+    check_samples(path, source, config.cell, math.prod(config.grid.shape))
     size = config.rows, config.cols
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
     types = np.zeros(size, dtype=np.int32)
@@ -100,7 +85,7 @@ def make_map(
     spawn_xy: NDArray[np.float64],
     terrain_types: NDArray[np.int32],
 ) -> ImportedMap:
-    """Return the map of a source.
+    """Return the map of a source whose extent has been checked.
 
     Args:
         path: The file, for errors.
@@ -114,58 +99,39 @@ def make_map(
     Raises:
         HeightFileError: if heights are missing.
         ConfigError: if a patch has no place to spawn.
-        MemoryLimitError: if the map would not fit in memory.
     """
     grid = config.grid
-    samples = math.prod(grid.shape)
-    if isinstance(source, MeshSource):
-        check_samples(path, source, samples, config.cell)
-    elif options.solids:
+    if options.solids and not isinstance(source, MeshSource):
         raise ConfigError(f"solids: got {path}; expected a mesh")
-    check_memory(
-        samples * _BYTES_PER_SAMPLE,
-        f"a map of {samples} samples",
-        hint=lambda share: (
-            f"; --cell {1.05 * grid.cell / share**0.5:.2g} would fit, or a part of the file by "
-            "--origin, --patch-size, --rows and --cols"
-        ),
-    )
     x, y = (grid.axis(k) + origin[k] for k in (0, 1))
-    solids, columns, bodies = Solids.empty(), None, Bodies()
+    solids, columns, counts = Solids.empty(), None, {}
     if isinstance(source, MeshSource):
         ground = source
         if options.solids:
-            bodies = find_bodies(source, config.cell)
-            ground = replace(source, faces=np.delete(source.faces, bodies.thin_faces, axis=0))
-        given, z = ground.columns(x, y), origin[2]
-        columns = Columns(top=given.top - z, floor=given.floor - z, ceiling=given.ceiling - z)
+            bodies = find_bodies(source, grid, origin)
+            counts = {"num_thin_bodies": len(bodies.thin), "num_open_bodies": bodies.num_open}
+            ground = replace(source, faces=source.faces[~bodies.thin_faces])
+        columns = ground.columns(x, y).lowered(origin[2])
         found = columns.floor if options.solids else columns.top
         if options.solids:
-            parts = overhang_solids(path, bodies, origin, columns, grid, config.wall_threshold)
+            parts = overhang_solids(path, bodies, columns, grid, config.wall_threshold)
             solids = assign_solids(config, parts)
     else:
         found = source.heights(x, y) - origin[2]
-    heights = fill_missing(path, found, options.missing, x, y).astype(np.float32)
+    # A sum with 0 makes -0 to 0.
+    heights = fill_missing(path, found, options.missing, x, y).astype(np.float32) + np.float32(0)
     if not (np.abs(heights) <= MAX_VALUE).all():
         raise HeightFileError(f"{path}: got heights beyond {MAX_VALUE:g} m")
     friction = read_friction(options, source, x, y)
-    heights = heights + np.float32(0)
     relax = options.spawn_tolerance is None
     config, spawns = place_spawns(config, heights, solids, spawn_xy, relax=relax)
     terrain_map = assemble_map(config, heights, solids, spawns, terrain_types, friction)
-    report = make_report(
-        terrain_map,
-        source,
-        origin,
-        columns,
-        num_missing=int(np.isnan(found).sum()),
-        num_thin_bodies=len(bodies.thin),
-        num_open_bodies=bodies.num_open,
-    )
-    return ImportedMap(terrain_map=replace(terrain_map, import_report=report), report=report)
+    counts["num_missing"] = int(np.isnan(found).sum())
+    report = make_report(terrain_map, source, origin, columns, **counts)
+    return ImportedMap(terrain_map=replace(terrain_map, import_reports=(report,)), report=report)
 
 
-def _make_config(
+def make_config(
     path: Path, source: Source, options: ImportOptions
 ) -> tuple[MapConfig, NDArray[np.float64]]:
     """Return the configuration of the map, and its origin in the file.
@@ -202,7 +168,7 @@ def _make_config(
         patch_size=(sizes[0], sizes[1]),
         cell=cell,
         border=options.border,
-        terrains=(_sub_terrain(path, options),),
+        terrains=(sub_terrain(path, path.stem, options),),
         mode="custom",
         **map_settings(options),
     )
@@ -217,7 +183,7 @@ def map_settings(options: ImportOptions) -> dict[str, Any]:
     return {**{name: getattr(options, name) for name in names}, "spawn_tolerance": tolerance}
 
 
-def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
+def sub_terrain(path: Path, name: str, options: ImportOptions) -> SubTerrain:
     """Return the terrain that records the file and how it was read."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -225,7 +191,7 @@ def _sub_terrain(path: Path, options: ImportOptions) -> SubTerrain:
     x, y = options.file_spacing or (0.0, 0.0)
     return SubTerrain(
         terrain="imported",
-        name=path.stem,
+        name=name,
         parameters={
             "file": path.name[:MAX_TEXT_LENGTH],
             "sha256": digest,

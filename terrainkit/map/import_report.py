@@ -108,8 +108,8 @@ def make_report(
     worst, _ = _compare(terrain_map, _grid_points(terrain_map, source, origin), only_above=False)
     face, num_lost = [0.0] * 5, 0
     if isinstance(source, MeshSource):
-        blocks = _face_points(terrain_map, source, origin)
-        face, num_lost = _compare(terrain_map, blocks, only_above=True)
+        points = _face_points(terrain_map, source, origin)
+        face, num_lost = _compare(terrain_map, points, only_above=True)
     error, x, y, *_ = max(worst, face)
     lost: dict[str, Any] = {"lost_top": face[3], "map_top": face[4], "lost_at": (face[1], face[2])}
     return ImportReport(

@@ -311,10 +311,10 @@ def find_origin(
         largest = 0.45 * (min(grid.shape) - 1) * grid.cell
         if tolerance is not None:
             expected = f"spawn_tolerance {tolerance:g}, a larger platform or a smaller spawn_radius"
-        elif config.spawn_radius > largest or not len(solids):
-            expected = f"larger patches, or a spawn_radius of at most {largest:.2g} m"
         else:
-            expected = "a smaller spawn_radius or spawn_headroom"
+            expected = (
+                f"larger patches, less spawn_headroom or a spawn_radius below {largest:.2g} m"
+            )
         raise ConfigError(
             f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
             f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "

@@ -10,9 +10,6 @@ from terrainkit.errors import listing
 from terrainkit.map.patch import PatchParameters
 from terrainkit.map.terrain_map import TerrainMap
 
-_FINER = (1, 2, 4, 5, 8, 10)
-"""Parts of a cell that are proposed; each is a short decimal number."""
-
 
 def repeated_levels(terrain_map: TerrainMap) -> Iterator[str]:
     """Yield a text for each sub-terrain whose ranges have equal realized values on two levels.
@@ -36,28 +33,18 @@ def repeated_levels(terrain_map: TerrainMap) -> Iterator[str]:
             for name in same:
                 if here.requested[name] != before.requested[name] or len(same) == len(ranges):
                     repeated[name].append(level)
-        found, number, parts = [], len(levels), 1
+        found, number = [], len(levels)
         for name in ranges:
-            zero: dict[str, Any] = {
-                level: p.requested[name]
-                for level, p in levels
-                if p.realized[name] == 0 != p.requested[name]
-            }
-            texts = {"is 0": [*zero], "is the same as before": repeated[name]}
+            values = [(level, p.realized[name], p.requested[name]) for level, p in levels]
+            zero = [level for level, realized, requested in values if realized == 0 != requested]
+            texts = {"is 0": zero, "is the same as before": repeated[name]}
             said = [f"{text} in {unit} {listing(each)}" for text, each in texts.items() if each]
             if said:
                 found.append(f"{name} {' and '.join(said)}")
-                number = min(number, len({p.realized[name] for _, p in levels}))
-            if said and sub_terrain.declarations[name].snap != "none":
-                step = abs(last[name] - first[name]) / (len(levels) - 1)
-                # Half a cell is rounded to one.
-                step = min([step, *(2 * value for value in zero.values())])
-                parts = max(parts, next((k for k in _FINER if config.cell / k <= step + 1e-9), 1))
+                number = min(number, len({realized for _, realized, _ in values}))
         if found:
-            fewer = [f"at most {number} {unit}"] if 1 < number < len(levels) else []
-            finer = [f"cells of {config.cell / parts:g} m"] if parts > 1 else []
-            remedy = " or ".join([*finer, *fewer, "a larger range"])
-            yield f"{sub_terrain.name}: {listing(found)}; use {remedy}"
+            fewer = f"at most {number} {unit} or " if 1 < number < len(levels) else ""
+            yield f"{sub_terrain.name}: {listing(found)}; use {fewer}smaller cells or larger ranges"
 
 
 def _levels(terrain_map: TerrainMap, terrain_type: int) -> list[tuple[str, PatchParameters]]:

@@ -81,9 +81,7 @@ def flattest_tolerance(
     """
     lows, highs = _height_ranges(config, grid, heights)
     spread = (highs - lows).ravel()
-    # Without solids, the flattest disk is free.
-    is_sorted = len(solids) or not spread.size
-    order = np.argsort(spread, kind="stable") if is_sorted else np.atleast_1d(spread.argmin())
+    order = np.argsort(spread, kind="stable")
     for start in range(0, len(order), _DISKS_PER_BLOCK):
         block = order[start : start + _DISKS_PER_BLOCK]
         disks = _disks(grid, lows, highs, np.unravel_index(block, lows.shape))[1]

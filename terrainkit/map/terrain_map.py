@@ -75,8 +75,9 @@ class TerrainMap:
     """Goals of each patch in their order: x, y, z [m] and heading [rad], shape (rows, cols, k, 4),
     NaN where a patch has fewer than k."""
 
-    import_report: ImportReport | None = None
-    """What an imported map lost of its file; None for generated maps."""
+    import_reports: tuple[ImportReport, ...] = ()
+    """What an imported map lost of its file; of several files, one report for each patch, row by
+    row, in the frame of the patch. Empty for generated maps."""
 
     def __repr__(self) -> str:
         rows, cols = self.difficulty.shape

@@ -1,5 +1,6 @@
 """Import the mesh and the origins that the terrain generator of another framework made."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from terrainkit.errors import ConfigError
+from terrainkit.importing.extent import check_samples
 from terrainkit.importing.mesh_file import MeshSource
 from terrainkit.importing.options import ImportOptions
 from terrainkit.map.config import MapConfig
@@ -87,9 +89,11 @@ def import_terrain_mesh(
                 f"patch, from ({grid.lower[0]:g}, {grid.lower[1]:g}) to "
                 f"({grid.upper[0]:g}, {grid.upper[1]:g})"
             )
+    source = MeshSource(vertices=points, faces=triangles)
+    check_samples(_SUBJECT, source, config.cell, math.prod(config.grid.shape))
     return make_map(
         _SUBJECT,
-        MeshSource(vertices=points, faces=triangles),
+        source,
         config,
         np.zeros(3),
         options,

@@ -1,7 +1,7 @@
 """The layout of the preview: a long map is divided into blocks that fill a screen."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,29 +66,24 @@ def make_blocks(terrain_map: "TerrainMap", width: int) -> tuple[list[Block], int
         terrain_map: The map.
         width: Width of all blocks without the first margin [px]; a tall map is narrower.
     """
-    cell, best = terrain_map.config.cell, (0.0, 0.0, 1, 1)
+    best: tuple[float, float, int, list[Block]] = (0.0, 0.0, 1, [])
     for axis in (1, 0):
         for number in range(1, min(terrain_map.difficulty.shape[axis], _MAX_PARTS) + 1):
-            parts = list(_parts(terrain_map, axis, number))
-            size = cell * np.max([[each.stop - each.start for each in p[1]] for p in parts], axis=0)
-            size[1 - axis] *= len(parts)
+            blocks = list(_parts(terrain_map, axis, number))
+            size = np.max([each.grid.size for each in blocks], axis=0)
+            size[1 - axis] *= len(blocks)
             free = np.array([width, MAX_ASPECT * width])
-            free[1 - axis] -= (len(parts) - 1) * (BELOW, LEFT)[axis]
+            free[1 - axis] -= (len(blocks) - 1) * (BELOW, LEFT)[axis]
             scale = float((free / size).min())
-            whole = _MIN_GAIN if len(parts) == 1 else 1.0
-            best = max(best, (scale * whole, scale, axis, number))
-    _, scale, axis, number = best
-    grid, blocks = terrain_map.grid, []
-    for (rows, cols), (x, y) in _parts(terrain_map, axis, number):
-        own = grid.block((x.start, y.start), (x.stop - x.start, y.stop - y.start))
-        blocks.append(Block(rows=rows, cols=cols, cells=(x, y), grid=own, scale=scale))
-    return blocks, axis
+            gain = scale * (_MIN_GAIN if len(blocks) == 1 else 1.0)
+            found = (gain, scale, axis, blocks)
+            best = max(best, found, key=lambda each: (*each[:3], len(each[3])))
+    _, scale, axis, blocks = best
+    return [replace(each, scale=scale) for each in blocks], axis
 
 
-def _parts(
-    terrain_map: "TerrainMap", axis: int, number: int
-) -> Iterator[tuple[tuple[range, range], tuple[slice, slice]]]:
-    """Yield the patches and the cells of parts of a map.
+def _parts(terrain_map: "TerrainMap", axis: int, number: int) -> Iterator[Block]:
+    """Yield the parts of a map, in a scale of 1.
 
     Args:
         terrain_map: The map.
@@ -107,4 +102,6 @@ def _parts(
             stop = config.border_cells + j * n if j < count else terrain_map.heights.shape[k] - cut
             patches.append(range(i, j))
             cells.append(slice(start, stop))
-        yield (patches[0], patches[1]), (cells[0], cells[1])
+        x, y = cells
+        grid = terrain_map.grid.block((x.start, y.start), (x.stop - x.start, y.stop - y.start))
+        yield Block(rows=patches[0], cols=patches[1], cells=(x, y), grid=grid, scale=1.0)

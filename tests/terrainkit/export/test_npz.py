@@ -335,10 +335,12 @@ def test_npz_invalid_parameters_are_rejected(good, bad, text):
     assert "parameters cannot be read" in refusal(bad)
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"max_error": "far"}', "[" * 2000, '{"lost_at": [1]}'])
+@pytest.mark.parametrize(
+    "text", ["", "{}", '[{"max_error": "far"}]', "[" * 2000, '[{"lost_at": [1]}]']
+)
 def test_npz_invalid_import_report_is_rejected(good, bad, text):
-    repack(good, bad, {"import_report": npy(text)})
-    assert "import_report cannot be read" in refusal(bad)
+    repack(good, bad, {"import_reports": npy(text)})
+    assert "import_reports cannot be read" in refusal(bad)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
-from terrainkit.errors import ConfigError, HeightFileError, TerrainkitWarning
+from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing import image
 from terrainkit.importing.image import read
 from terrainkit.importing.options import ReadOptions
@@ -14,7 +14,7 @@ HEIGHTS = np.array([[1, 2, 3], [4, -9999, 6]], dtype=np.float32)
 SCALE, TIE_POINT = (2.0, 2.0, 0.0), (0.0, 0.0, 0.0, 500000.0, 4649776.0, 0.0)
 UTM = (1, 1, 0, 1, 1024, 0, 1, 1)
 DEGREES = (1, 1, 0, 1, 1024, 0, 1, 2)
-US_FEET = (1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 9003)
+US_FEET = (1, 1, 0, 3, 1024, 0, 1, 1, 3076, 0, 1, 9003, 4099, 0, 1, 9002)
 WEB_MERCATOR = (1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, 3857)
 POINTS = (1, 1, 0, 2, 1024, 0, 1, 1, 1025, 0, 1, 2)
 
@@ -66,16 +66,10 @@ def test_geotiff_states_cell_position_and_nodata(tmp_path, order):
     np.testing.assert_array_equal(raster.values, [[4, 1], [np.nan, 2], [6, 3]])
 
 
-def test_geotiff_of_points_is_half_a_cell_lower(tmp_path):
-    tie_point = (1.0, 1.0, 0.0, 10.0, 20.0, 0.0)  # the center of the second pixel of both axes
-    raster = read(write(tmp_path / "a.tif", keys=POINTS, tie_point=tie_point), ReadOptions())
-    assert raster.lower == (10.0 - 3.0, 20.0 - 1.0)
-
-
 @pytest.fixture(autouse=True)
 def no_gdal(monkeypatch):
     """Read the tags without GDAL, also where rasterio is installed."""
-    monkeypatch.setattr(image, "is_gdal_installed", lambda: False)
+    monkeypatch.setattr(image, "is_installed", lambda _: False)
 
 
 # At latitude 60, a degree is 55.8 km along x and 111.4 km along y.
@@ -87,6 +81,7 @@ MATRIX = (0.0, 2.0, 0.0, 7.0, 1.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 
     ("tags", "spacing", "lower", "warning"),
     [
         ({"scale": (2.0, 2.001, 0.0)}, (2.0, 2.001), (500000.0, 4649776.0 - 4.002), None),
+        ({"keys": POINTS}, (2.0, 2.0), (499999.0, 4649773.0), None),
         (
             {"scale": (2.0, 3.0, 0.0)},
             (2.0, 3.0),
@@ -118,7 +113,7 @@ MATRIX = (0.0, 2.0, 0.0, 7.0, 1.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 
             r"cells of 1 x 2 m along turned axes \(aspect ratio 2\)",
         ),
     ],
-    ids=["almost square", "not square", "feet", "degrees", "web map", "turned"],
+    ids=["almost square", "points", "not square", "feet", "degrees", "web map", "turned"],
 )
 def test_geotiff_cells_become_squares_in_meters(tmp_path, tags, spacing, lower, warning):
     path = write(tmp_path / "a.tif", **tags)
@@ -126,21 +121,9 @@ def test_geotiff_cells_become_squares_in_meters(tmp_path, tags, spacing, lower, 
         raster = read(path, ReadOptions())
     assert raster.spacing == pytest.approx(spacing, rel=1e-4)
     assert raster.lower == pytest.approx(lower)
+    assert raster.values[2, 1] == pytest.approx(3 * (0.3048 if tags.get("keys") == US_FEET else 1))
     raster = read(path, ReadOptions(file_cell=(0.5, 0.75)))
     assert (raster.spacing, raster.lower) == ((0.5, 0.75), (0.0, 0.0))
-
-
-def test_geotiff_without_cells_needs_file_cell(tmp_path):
-    path = write(tmp_path / "a.tif", scale=())
-    with pytest.raises(
-        ConfigError, match=r"a\.tif: got float32 values .*example --file-cell 0\.1 \(.*\), or"
-    ):
-        read(path, ReadOptions())
-
-
-def test_geotiff_heights_in_feet(tmp_path):
-    path = write(tmp_path / "a.tif", keys=(1, 1, 0, 2, 1024, 0, 1, 1, 4099, 0, 1, 9002))
-    assert read(path, ReadOptions()).values[2, 1] == pytest.approx(3 * 0.3048)
 
 
 @pytest.mark.parametrize(

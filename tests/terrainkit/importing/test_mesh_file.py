@@ -1,12 +1,12 @@
-import base64
 import json
 import struct
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 import trimesh
 
-from terrainkit.errors import HeightFileError
+from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing import mesh_file, source
 from terrainkit.importing.mesh_file import read
 from terrainkit.importing.options import ReadOptions
@@ -18,16 +18,6 @@ def wedge():
     mesh = box((4, 2, 3), (2, 1, 1.5))
     mesh.vertices[:, 2] += np.where(mesh.vertices[:, 2] > 1, mesh.vertices[:, 0] / 4, 0)
     return trimesh.util.concatenate([mesh, box((1, 1, 3.9), (0.5, 1.5, 1.95))])
-
-
-def save_gltf(mesh, path):
-    """Write a .gltf that contains its data, as trimesh does not."""
-    files = mesh.export(file_type="gltf")
-    tree = json.loads(files["model.gltf"])
-    for each in tree["buffers"]:
-        data = base64.b64encode(files[each["uri"]]).decode()
-        each["uri"] = f"data:application/octet-stream;base64,{data}"
-    path.write_text(json.dumps(tree))
 
 
 def split_gltf(folder, *uris):
@@ -104,7 +94,6 @@ def test_dae_states_its_unit_and_axis(tmp_path, old, new, scale, axis):
     [
         ("obj", {}),
         ("glb", {}),
-        ("gltf", {}),
         ("dae", {}),
         ("obj", {"up": "y"}),
         ("glb", {"up": "z"}),
@@ -114,13 +103,10 @@ def test_dae_states_its_unit_and_axis(tmp_path, old, new, scale, axis):
 def test_mesh_file_heights_and_axes(tmp_path, suffix, options):
     mesh = wedge()
     # glTF has y up, and so has COLLADA, unless the file states another axis.
-    if options.get("up", "y" if suffix in ("glb", "gltf", "dae") else "z") == "y":
+    if options.get("up", "y" if suffix in ("glb", "dae") else "z") == "y":
         mesh.vertices = mesh.vertices[:, [0, 2, 1]] * [1, 1, -1]  # x stays, z becomes y
     mesh.vertices /= options.get("scale", 1.0)
-    if suffix == "gltf":
-        save_gltf(mesh, tmp_path / "a.gltf")
-    else:
-        mesh.export(tmp_path / f"a.{suffix}")
+    mesh.export(tmp_path / f"a.{suffix}")
     source = read(tmp_path / f"a.{suffix}", ReadOptions(**options))
     assert source.is_metric == (suffix not in ("obj", "stl") or "scale" in options)
     assert [*source.lower, *source.upper] == pytest.approx([0.0, 0.0, 4.0, 2.0], abs=1e-6)
@@ -220,3 +206,16 @@ def test_bodies_that_touch_up_to_rounding_have_no_gap(decoded):
     source = decoded(mesh.vertices, mesh.faces)
     found = source.heights(np.array([0.5, 1.0, 1.5]) + 5e-10, np.array([0.25, 0.75]))
     np.testing.assert_allclose(found, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("size", "is_warned"),
+    [((10, 1, 10), True), ((10, 5.1, 10), False), ((10, 4, 8), False), ((10, 1, 2), False)],
+)
+@pytest.mark.parametrize(("suffix", "other"), [("stl", "y"), ("glb", "z")])
+def test_mesh_that_lies_on_its_side_is_warned_of(tmp_path, size, is_warned, suffix, other):
+    size = size if suffix == "stl" else [size[0], size[2], size[1]]
+    box(size, (0, 0, 0)).export(tmp_path / f"a.{suffix}")
+    message = rf"10 m high and 1 m wide.*--up {other}$"
+    with pytest.warns(TerrainkitWarning, match=message) if is_warned else nullcontext():
+        read(tmp_path / f"a.{suffix}", ReadOptions())

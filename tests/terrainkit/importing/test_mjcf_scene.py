@@ -3,7 +3,6 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
-from terrainkit.importing import mjcf_scene
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.source import open_source
 from tests.rays import cast_rays
@@ -108,19 +107,3 @@ def test_scene_may_refer_to_its_robot(tmp_path):
 def test_scene_without_ground_is_rejected(tmp_path, text, message):
     with pytest.raises(HeightFileError, match=rf"scene\.xml: .*{message}"):
         open_source(save(tmp_path, text), ReadOptions())
-
-
-@pytest.mark.filterwarnings("ignore:.*bodies with joints")
-def test_scene_of_too_many_vertices_is_rejected(tmp_path, monkeypatch):
-    monkeypatch.setattr(mjcf_scene, "_MAX_VERTICES", 9000)
-    with pytest.raises(HeightFileError, match="got more than 9000 vertices"):
-        open_source(save(tmp_path, SCENE.replace('type="box"', 'type="sphere"')), ReadOptions())
-
-
-@pytest.mark.parametrize("suffix", [".sdf", ".world"])
-def test_gazebo_world_names_its_files(tmp_path, suffix):
-    (tmp_path / f"a{suffix}").write_text(
-        "<sdf><uri> model://hill/a.dae</uri><uri>b.png</uri></sdf>"
-    )
-    with pytest.raises(HeightFileError, match=r"refers to model://hill/a\.dae, b\.png$"):
-        open_source(tmp_path / f"a{suffix}", ReadOptions())

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.errors import HeightFileError, TerrainkitError
+from terrainkit.errors import HeightFileError
 from terrainkit.importing.npy import read
 from terrainkit.importing.options import ReadOptions
 
@@ -40,25 +40,12 @@ def test_npy_without_heights_is_rejected(path, array):
         read(path, METER)
 
 
-def test_npy_truncated_is_rejected(path):
-    path.write_bytes(path.read_bytes()[:-1])
-    with pytest.raises(HeightFileError, match=r"not an \.npy file, or truncated"):
-        read(path, METER)
-
-
-@pytest.mark.parametrize("count", [b"9" * 12, b"9" * 30])
-def test_npy_that_claims_huge_size_is_rejected(path, count):
-    header = b"(3, 2), }" + b" " * len(count)
-    path.write_bytes(path.read_bytes().replace(header, b"(%b3, 2), }" % count))
-    with pytest.raises(TerrainkitError):
-        read(path, METER)
-
-
 @pytest.mark.parametrize("old", [b"{'descr", b"'<f4'", b"False", b"(3, 2)", b"}"])
-@pytest.mark.parametrize("new", [b"", b"(", b"'", b"{", b"[" * 200, b"\xff", b"\0", b"1j"])
-def test_npy_with_damaged_header_is_rejected(path, old, new):
-    path.write_bytes(path.read_bytes().replace(old, new, 1))
-    with pytest.raises(HeightFileError, match=r"a\.npy: "):
+@pytest.mark.parametrize("new", [b"", b"(", b"[" * 200, b"\xff", b"1j", b"(9999999999999, 2)"])
+def test_npy_that_is_damaged_is_rejected(path, old, new):
+    data = path.read_bytes()
+    path.write_bytes(data.replace(old, new, 1) if new else data[:-1])
+    with pytest.raises(HeightFileError, match=r"a\.npy: cannot be read: "):
         read(path, METER)
 
 

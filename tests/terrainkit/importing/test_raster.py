@@ -40,28 +40,25 @@ def test_heights_where_most_is_missing_are_missing():
     np.testing.assert_array_equal(found, [[1.0, 1.0], [1.0, np.nan]])
 
 
-@pytest.mark.parametrize(
-    ("cell", "relief", "message"),
-    [
-        (1.0, 100.0, None),
-        (
-            1.0,
-            101.0,
-            r"got 10 m x 5 m with heights over 101 m; .*--scale 0\.01.*--file-cell 111000 111000 ",
-        ),
-        (0.025, 0.1, None),
-        (0.0249, 0.1, r"got 0\.249 m x 0\.1245 m; --file-cell 2\.49 2\.49 is 100 times larger"),
-        (1000.0, 9.0, None),
-        (1010.0, 9.0, r"got 10100 m x 5050 m, .*--cell 1 --origin 4520 2500 0 --patch-size 50 50"),
-    ],
-)
-def test_sizes_that_are_not_of_ground_are_warned_of(cell, relief, message):
+def test_values_of_nodata_are_missing_in_their_unit():
+    values = np.array([[150, -9999, -225]], np.int16)
+    options = ReadOptions(file_cell=1.0, scale=0.01, nodata=-9999, detect_nodata=False)
+    raster = make_raster(Path("a.npy"), values, options)
+    np.testing.assert_allclose(raster.values, [[1.5, np.nan, -2.25]])
+
+
+@pytest.mark.parametrize(("relief", "is_warned"), [(100.0, False), (101.0, True)])
+def test_heights_that_are_not_of_ground_are_warned_of(relief, is_warned):
     values = np.linspace(0, relief, 50).reshape(10, 5)
-    with pytest.warns(TerrainkitWarning, match=message) if message else nullcontext():
-        make_raster(Path("a.npy"), values, ReadOptions(file_cell=cell))
+    message = (
+        r"got 10 m x 5 m with heights over 101 m; .*--scale 0\.01.*--file-cell 111000 111000 is"
+    )
+    with pytest.warns(TerrainkitWarning, match=message) if is_warned else nullcontext():
+        make_raster(Path("a.npy"), values, ReadOptions(file_cell=1.0))
 
 
 @pytest.mark.parametrize(("top", "is_short"), [(127, True), (191, True), (192, False), (0, False)])
+@pytest.mark.filterwarnings("ignore:.*8 bits have terraces")
 def test_values_that_do_not_use_their_range_are_warned_of(top, is_short):
     values = np.linspace(0, top, 24).astype(np.uint8).reshape(4, 6)
     options = ReadOptions(file_cell=(0.1,), height_range=(1.0, 3.0))
@@ -69,9 +66,3 @@ def test_values_that_do_not_use_their_range_are_warned_of(top, is_short):
     with pytest.warns(TerrainkitWarning, match=message) if is_short else nullcontext():
         raster = make_raster(Path("a.png"), values, options)
     assert raster.values.max() == pytest.approx(1 + 2 * top / 255)
-    # The proposed range gives the largest value the upper height.
-    if is_short:
-        proposed = ReadOptions(file_cell=(0.1,), height_range=(1.0, 1 + 2 * 255 / top))
-        with pytest.warns(TerrainkitWarning):
-            raster = make_raster(Path("a.png"), values, proposed)
-        assert raster.values.max() == pytest.approx(3.0)

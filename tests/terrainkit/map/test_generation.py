@@ -149,7 +149,7 @@ def test_generate_with_an_executor_reports_the_first_error_and_cancels_the_rest(
         (
             "stepping_stones",
             {"stone": (0.26, 0.34)},
-            "stone is .* use cells of 0.025 m or a larger r",
+            "stone is .* use smaller cells or larger r",
         ),
         ("pit", {"side": 1.0}, "at the preferred spawn position: pit on 2 patches"),
         ("stairs", {"landing": 1.0, "step_width": 0.7}, "spawn position: stairs on 3 patches"),

@@ -1,4 +1,5 @@
 import hashlib
+import re
 
 import numpy as np
 import pytest
@@ -6,8 +7,9 @@ import trimesh
 
 import terrainkit as tk
 from terrainkit import ImportOptions, import_curriculum
-from terrainkit.errors import ConfigError, HeightFileError
+from terrainkit.errors import ConfigError
 from terrainkit.map.validate import validate
+from tests.meshes import box
 from tests.terrainkit.maps import contents
 
 CELL = 0.1
@@ -27,9 +29,9 @@ def ridges(height, shape=(30, 20)):
 
 
 def curriculum(paths, **options):
-    own = {name: options.pop(name) for name in ("blend", "skip_invalid") if name in options}
+    own = {name: options.pop(name) for name in ("blend",) if name in options}
     given = ImportOptions(**{"file_cell": CELL, "spawn_radius": 0.3, **options})
-    return import_curriculum(paths, given, **own).terrain_map
+    return import_curriculum(paths, given, **own)
 
 
 @pytest.fixture
@@ -107,18 +109,11 @@ def test_import_curriculum_names_files_that_cannot_be_used(scans):
     save(scans, "tiny", ridges(0.2, (10, 10)))
     (scans / "notes.md").touch()
     (scans / "a.json").touch()
-    size = {"patch_size": (3.0, 2.0), "cell": CELL}
-    with (
-        pytest.raises(HeightFileError, match=r"bad\.npy: .*; --skip-invalid skips it"),
-        pytest.warns(tk.TerrainkitWarning, match=r"what has no reader: notes\.md$"),
-    ):
-        curriculum([scans], **size)
-    (scans / "notes.md").unlink()
-    with pytest.warns(
-        tk.TerrainkitWarning,
-        match=r"skipped .*bad\.npy: .*, .*tiny\.npy: got 1 m x 1 m; ",
-    ):
-        terrain_map = curriculum([scans], skip_invalid=True, **size)
+    with pytest.warns(tk.TerrainkitWarning) as caught:
+        terrain_map = curriculum([scans], patch_size=(3.0, 2.0), cell=CELL)
+    ignored, skipped = (str(each.message) for each in caught)
+    assert ignored.endswith("what has no reader: notes.md")
+    assert re.search(r"^skipped .*bad\.npy: .*, .*tiny\.npy: got 1 m x 1 m; ", skipped)
     assert terrain_map.patch_names[:, 0].tolist() == ["b.npy", "d.npy", "a.npy", "c.npy"]
 
 
@@ -130,7 +125,7 @@ def test_import_curriculum_rejects_what_it_cannot_do(scans, tmp_path):
         ([scans], {"solids": True}, "solids: got blend 1; expected 0"),
         (
             [scans / "a.npy"],
-            {"patch_size": (9.0, 9.0), "skip_invalid": True},
+            {"patch_size": (9.0, 9.0)},
             "skipped all files: .*a.npy: got",
         ),
         ([scans], {"spawn_radius": 1.0}, r"a\.npy: patch \(0, 0\): no disk of radius 1 m"),
@@ -154,13 +149,29 @@ def test_import_curriculum_starts_on_the_flattest_disk(tmp_path):
         curriculum(paths, spawn_tolerance=0.01)
 
 
-def test_import_curriculum_keeps_solids(tmp_path):
-    for name, height in (("low", 0.8), ("high", 1.5)):
-        parts = [trimesh.creation.box(size) for size in ((4, 4, 0.2), (1, 1, 0.1))]
-        parts[1].apply_translation([0.5, 0, height])
-        trimesh.util.concatenate(parts).export(tmp_path / f"{name}.stl")
-    terrain_map = curriculum([tmp_path], solids=True, blend=0.0)
-    assert terrain_map.solids.patch.tolist() == [[0, 0], [1, 0]]
+def test_import_curriculum_divides_solids_of_a_file(tmp_path):
+    # Tables, one of them 1.5 m high, and walls of 3 cm.
+    sizes = (8, 4, 0.2), (1, 1, 0.1), (1, 1, 0.1), (0.03, 1, 0.5), (0.03, 1, 0.8)
+    places = (4, 2, -0.1), (2.5, 2, 0.85), (6.5, 2, 1.55), (1, 2, 0.25), (5, 2, 0.4)
+    parts = [box(size, place) for size, place in zip(sizes, places, strict=True)]
+    trimesh.util.concatenate(parts).export(tmp_path / "a.stl")
+    terrain_map = curriculum([tmp_path], solids=True, blend=0.0, patch_size=(4.0, 4.0))
+    assert sorted(terrain_map.solids.patch.tolist()) == [[0, 0], [0, 0], [1, 0], [1, 0]]
+    walls = np.sort(terrain_map.solids.boxes[terrain_map.solids.boxes[:, 2] < 0.5, 0])
+    np.testing.assert_allclose(walls, [1.0, 5.0], atol=1e-5)
     clearance = terrain_map.clearance([[2.5, 2.0], [6.5, 2.0]])
-    assert sorted(clearance) == pytest.approx([0.65, 1.35], abs=1e-3)
+    assert sorted(clearance) == pytest.approx([0.8, 1.5], abs=1e-3)
     assert validate(terrain_map) == []
+
+
+def test_import_curriculum_distinguishes_files_of_one_name(tmp_path):
+    for folder, height in (("x", 0.3), ("y", 0.1)):
+        heights = ridges(height)
+        heights[0, 0] = np.nan
+        save(tmp_path / folder, "a", heights)
+    with pytest.warns(tk.TerrainkitWarning, match="2 of 2 patches have missing heights") as caught:
+        terrain_map = curriculum([tmp_path / "x", tmp_path / "y"])
+    assert len(caught) == 1
+    assert terrain_map.patch_names[:, 0].tolist() == ["a.npy (2)", "a.npy"]
+    loaded = tk.TerrainMap.load(terrain_map.save(tmp_path / "map.npz"))
+    assert [each.num_missing for each in loaded.import_reports] == [1, 1]

@@ -10,8 +10,6 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError, MemoryLimitError
 from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
-from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.source import open_source
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.validate import validate
 from tests.meshes import box, save_bridge
@@ -34,7 +32,7 @@ def steps():
     return heights
 
 
-def test_import_whole_file_is_one_patch(tmp_path):
+def test_import_whole_file_is_one_patch_that_records_it(tmp_path):
     terrain_map = import_array(tmp_path, steps()).terrain_map
     assert terrain_map.config.patch_size == (6.0, 4.0)
     assert terrain_map.config.mode == "custom"
@@ -42,10 +40,6 @@ def test_import_whole_file_is_one_patch(tmp_path):
     assert (terrain_map.friction == 1.0).all()
     np.testing.assert_allclose(terrain_map.heights, steps(), atol=1e-6)
     assert validate(terrain_map) == []
-
-
-def test_import_records_the_file(tmp_path):
-    terrain_map = import_array(tmp_path, steps()).terrain_map
     loaded = tk.TerrainMap.load(terrain_map.save(tmp_path / "map.npz"))
     assert loaded.patch(0, 0).parameters.requested == {
         "file": "a.npy",
@@ -199,10 +193,11 @@ def test_import_without_flat_disk_starts_on_the_flattest(tmp_path):
     loaded = tk.TerrainMap.load(terrain_map.save(tmp_path / "map.npz"))
     raised = loaded.edited(heights=loaded.heights + 1)
     np.testing.assert_allclose(raised.spawns, loaded.spawns + np.array([0, 0, 1, 0]), atol=1e-6)
-    given = import_array(
-        tmp_path, rough_but_for_one_patch(), **options, spawn_tolerance=tolerance
-    ).terrain_map
+    heights = rough_but_for_one_patch()
+    given = import_array(tmp_path, heights, **options, spawn_tolerance=tolerance).terrain_map
     assert validate(given) == []
+    with pytest.raises(ConfigError, match=r"3 of 4 patches: .* 0\.02 m; .*--spawn-tolerance 0\.0"):
+        import_array(tmp_path, heights, **options, spawn_tolerance=0.02)
 
 
 def test_import_with_several_spawn_positions_that_are_as_flat(tmp_path):
@@ -215,18 +210,13 @@ def test_import_with_several_spawn_positions_that_are_as_flat(tmp_path):
     assert validate(terrain_map) == []
 
 
-def test_import_with_spawn_tolerance_demands_it(tmp_path):
-    with pytest.raises(ConfigError, match=r"3 of 4 patches: .* 0\.02 m; .*--spawn-tolerance 0\.0"):
-        import_array(tmp_path, rough_but_for_one_patch(), rows=2, cols=2, spawn_tolerance=0.02)
-
-
 @pytest.mark.parametrize(
     ("number", "radius", "message"),
     [
         (12, 0.5, None),
-        (11, 0.5, r"in a patch of 1\.1 m x 4 m; .* a spawn_radius of at most 0\.45 m"),
+        (11, 0.5, r"in a patch of 1\.1 m x 4 m; .* a spawn_radius below 0\.45 m"),
         (11, 0.45, None),
-        (2, 0.5, "spawn_radius of at most 0.045 m$"),
+        (2, 0.5, "spawn_radius below 0.045 m$"),
     ],
 )
 def test_import_of_tiny_patch(tmp_path, number, radius, message):
@@ -260,7 +250,7 @@ def test_import_mesh_reports_what_a_heightfield_loses(tmp_path):
         max_error_at=imported.report.max_error_at,
     )
     saved = imported.terrain_map.save(tmp_path / "a.npz")
-    assert tk.TerrainMap.load(saved).import_report == imported.report
+    assert tk.TerrainMap.load(saved).import_reports == (imported.report,)
     assert imported.terrain_map.height([3.0, 2.0]) == pytest.approx(1.2)
     assert len(imported.terrain_map.solids) == 0
 
@@ -278,17 +268,20 @@ def test_import_mesh_keeps_overhangs_as_solids(tmp_path):
     assert terrain_map.scan([3.0, 2.0, 5.0]) == pytest.approx(1.2, abs=1e-4)
     assert terrain_map.clearance([2.4, 2.0]) == np.inf
     assert validate(terrain_map) == []
-
-
-def test_import_origin_moves_a_mesh_with_its_solids(tmp_path):
-    options = {"origin": (1.0, 0.5, 0.25), "rows": 1, "cols": 1, "patch_size": (4.0, 3.0)}
-    made = import_map(save_bridge(tmp_path), ImportOptions(solids=True, **options)).terrain_map
+    part = {"origin": (1.0, 0.5, 0.25), "rows": 1, "cols": 1, "patch_size": (4.0, 3.0)}
+    made = import_map(save_bridge(tmp_path), ImportOptions(solids=True, **part)).terrain_map
     at = [2.0, 1.5]
     found = [made.height(at), made.clearance(at), made.scan([*at, 5.0])]
     assert found == pytest.approx([-0.25, 1.0, 0.95], abs=1e-4)
 
 
-def test_import_overhang_of_open_mesh_is_rejected(tmp_path):
+def test_import_of_open_bodies_is_reported_or_rejected(tmp_path):
+    wall = box((0.03, 4, 0.5), (4.0, 2, 0.25))
+    wall.update_faces(np.arange(12) != 3)
+    trimesh.util.concatenate([box((8, 4, 0.1), (4, 2, -0.05)), wall]).export(tmp_path / "a.stl")
+    report = import_map(tmp_path / "a.stl", ImportOptions(solids=True)).report
+    assert (report.num_open_bodies, report.num_thin_bodies) == (1, 0)
+    assert report.num_lost_faces > 0
     mesh = trimesh.load(save_bridge(tmp_path), force="mesh")
     mesh.update_faces(np.arange(len(mesh.faces)) % 12 > 5)  # three sides of each box
     mesh.export(tmp_path / "open.stl")
@@ -355,7 +348,7 @@ def test_import_reports_what_a_coarser_cell_loses_of_heights(tmp_path):
     heights = np.zeros((40, 40))
     heights[10, 11] = 0.05
     report = import_array(tmp_path, heights, cell=0.2, slope_threshold=1.0).report
-    # Means of 3 x 3: 1/9 of the height at (1.1, 1.1), and 1/18 at (0.9, 1.1) and (1.1, 1.3).
+    # Means of 3 x 3 samples: 1/9 of it at (1.1, 1.1), and 1/18 at (0.9, 1.1) and (1.1, 1.3).
     # The point (1.05, 1.15) has a half of the first, and a quarter of each of the others.
     assert report.max_error == pytest.approx(0.05 - 0.05 / 12, abs=1e-6)
     assert report.max_error_at == pytest.approx((1.05, 1.15))
@@ -383,25 +376,18 @@ def test_import_reports_single_samples_of_a_large_raster(tmp_path, monkeypatch):
     assert 0.03 < report.max_error < 0.05  # the means of 5 x 5 samples are about 0.003
 
 
-@pytest.mark.filterwarnings("ignore:.*they become squares", "ignore:.*flat ground")
-@pytest.mark.parametrize("cell", [(30.0, 30.0), (3.0, 40.0), (900.0, 1.5)])
-def test_import_proposes_a_part_with_heights(tmp_path, cell):
-    heights = np.full((400, 330), 5.0)
-    heights[:30] = heights[:, 300:] = heights[180:230, 100:200] = np.nan
-    (tmp_path / "a.asc").write_text(
-        f"ncols 400\nnrows 330\nxllcorner -7000.3\nyllcorner 500000\ndx {cell[0]}\ndy {cell[1]}\n"
-        + "\n".join(" ".join(map(str, row)) for row in np.nan_to_num(heights.T[::-1], nan=-9999.0))
-    )
-    with pytest.warns(tk.TerrainkitWarning, match="takes a part for a robot") as found:
-        open_source(tmp_path / "a.asc", ReadOptions())
-    text = next(str(each.message) for each in found if "takes a part" in str(each.message))
-    numbers = re.search(r"--cell 1 --origin (\S+) (\S+) 0 --patch-size (\S+) (\S+) ", text).groups()
-    x, y, *size = map(float, numbers)
-    options = ImportOptions(cell=1.0, origin=(x, y, 0), patch_size=size, rows=1, cols=1)
-    with pytest.warns(tk.TerrainkitWarning):
-        report = import_map(tmp_path / "a.asc", options).report
-    assert size == [50, 50]
-    assert report.num_missing == 0
+def test_import_proposes_a_part_at_the_center(tmp_path):
+    rows = "\n".join(" ".join(["-9999"] * 40 + ["5"] * 320 + ["-9999"] * 40) for _ in range(330))
+    header = "ncols 400\nnrows 330\nxllcorner -7000.3\nyllcorner 500000\ncellsize 30\n"
+    (tmp_path / "a.asc").write_text(header + rows)
+    with pytest.warns(tk.TerrainkitWarning) as found:
+        import_map(tmp_path / "a.asc")
+    text = next(str(each.message) for each in found if "a part for a robot" in str(each.message))
+    x, y, *size = re.search(r"--origin (\S+) (\S+) 0 --patch-size (\S+) (\S+) ", text).groups()
+    origin, size = (float(x), float(y), 0.0), (float(size[0]), float(size[1]))
+    part = ImportOptions(cell=1.0, origin=origin, patch_size=size, rows=1, cols=1)
+    report = import_map(tmp_path / "a.asc", part).report
+    assert (size, report.num_missing) == ((50, 50), 0)
 
 
 def test_import_of_a_cloud_has_its_cells(tmp_path):
@@ -419,10 +405,15 @@ def test_import_of_a_cloud_has_its_cells(tmp_path):
         import_map(tmp_path / "a.xyz", ImportOptions(solids=True))
 
 
-def test_import_of_open_bodies_is_reported(tmp_path):
-    wall = box((0.03, 4, 0.5), (4.0, 2, 0.25))
-    wall.update_faces(np.arange(12) != 3)
-    trimesh.util.concatenate([box((8, 4, 0.1), (4, 2, -0.05)), wall]).export(tmp_path / "a.stl")
-    report = import_map(tmp_path / "a.stl", ImportOptions(solids=True)).report
-    assert (report.num_open_bodies, report.num_thin_bodies) == (1, 0)
-    assert report.num_lost_faces > 0
+def test_import_of_a_part_has_only_the_solids_in_it(tmp_path):
+    bridge = [box((6, 1, 0.1), (4, 3, 1.0)), *(box((1, 1, 1), (x, 3, 0.5)) for x in (1, 7))]
+    walls = [box((0.03, 1, 0.5), (x, 1, 0.25)) for x in (1, 7)]
+    long = box((6, 0.03, 0.5), (4, 0.5, 0.25))
+    parts = [box((8, 4, 0.1), (4, 2, -0.05)), *bridge, *walls, long]
+    trimesh.util.concatenate(parts).export(tmp_path / "a.stl")
+    options = ImportOptions(solids=True, patch_size=(4.0, 4.0), rows=1, cols=1)
+    imported = import_map(tmp_path / "a.stl", options)
+    lower, upper = imported.terrain_map.solids.bounds()
+    assert sorted(lower[:, 0].round(3).tolist()) == pytest.approx([0.985, 1.0, 1.5], abs=0.1)
+    assert sorted(upper[:, 0].round(3).tolist()) == pytest.approx([1.015, 4.0, 4.0], abs=1e-3)
+    assert imported.report.num_thin_bodies == 2

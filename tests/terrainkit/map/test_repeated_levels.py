@@ -26,15 +26,15 @@ def gap(easy, hard):
         # 0.04, 0.08, 0.12, 0.16, 0.2 and 0.24 m become 0, 1, 1, 2, 2 and 2 cells.
         (
             gap(0.04, 0.24),
-            "gap: width is 0 in rows 0 and is the same as before in rows 2, 4, 5; use cells of "
-            "0.025 m or at most 3 rows or a larger range",
+            "gap: width is 0 in rows 0 and is the same as before in rows 2, 4, 5; use at "
+            "most 3 rows or smaller cells or larger ranges",
         ),
-        (gap(0.03, 0.53), "gap: width is 0 in rows 0; use cells of 0.05 m or a larger range"),
+        (gap(0.03, 0.53), "gap: width is 0 in rows 0; use smaller cells or larger ranges"),
         (gap(0.0, 0.5), None),  # 0 was requested
         (gap(0.3, 0.3), None),  # the same on purpose
         (
             gap(0.31, 0.30999),
-            "gap: width is the same as before in rows 1, 2, 3, 4, 5; use a larger",
+            "gap: width is the same as before in rows 1, 2, 3, 4, 5; use smaller",
         ),
         (
             SubTerrain(terrain="pallets"),
