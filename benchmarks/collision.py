@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 import terrainkit
-from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
@@ -78,7 +78,7 @@ def _standing(terrain: Ground, origins: np.ndarray) -> tuple[mujoco.MjModel, lis
     """Return the training scene, and states in which the robot stands at some of the origins."""
     spec = get_task("quadruped")
     robot = Robot.load(spec.folder)
-    scene = build_scene(robot, terrain, spec.task)
+    scene = Scene(robot, terrain, spec.task)
     states = []
     for k in np.linspace(0, len(origins) - 1, _NUM_PLACES).astype(int):
         data = mujoco.MjData(scene.model)

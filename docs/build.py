@@ -221,7 +221,7 @@ def examples_page() -> str:
     return "\n".join(parts) + "\n"
 
 
-EXAMPLES = """Each example is a program of at most 60 lines. It runs as it is, in any folder, and
+EXAMPLES = """Each example is a program of at most 90 lines. It runs as it is, in any folder, and
 writes its files to that folder. In a clone: `python docs/examples/generate_map.py`.
 The tests run all examples.
 [terrainkit.ipynb](examples/terrainkit.ipynb) is a notebook, in which a map is shown as a picture.

@@ -31,6 +31,9 @@ Device = Annotated[str, option("DEVICE")]
 Checkpoint = Annotated[int, option("ITERATION")]
 """Iteration of a checkpoint."""
 
+TaskFile = Annotated[Path, option("FILE.py")]
+"""A Python file that registers a task."""
+
 OptionalFlag = Annotated[bool, option("")]
 """A flag whose default is None: a settings file may state the value."""
 

@@ -14,6 +14,7 @@ from terrainkit_cli.argument_types import (
     Device,
     OutputPath,
     RobotName,
+    TaskFile,
     TerrainName,
     is_map,
 )
@@ -59,6 +60,9 @@ class PolicyCommand(PluginCommand):
     num_envs: Annotated[int, option("INT")] | None = None
     """Number of simulated robots; the default depends on the terrain."""
 
+    task: TaskFile | None = None
+    """A Python file with a task of your own, which the run was trained with; it is executed."""
+
     checkpoint: Checkpoint | None = None
     """The checkpoint to load; by default, the last one."""
 
@@ -81,7 +85,7 @@ class PolicyCommand(PluginCommand):
         if not self.source and not self.policy:
             expected = "expected a run, a checkpoint, or the name of a robot; or --policy"
             raise ConfigError(f"RUN: missing; {expected}")
-        if self.policy and not self.robot:
+        if self.policy and not self.robot and not self.task:
             raise ConfigError("--robot: missing; expected the robot of --policy")
         if not self.policy and self.robot:
             raise ConfigError("--robot: got a value; expected none without --policy")
@@ -90,11 +94,13 @@ class PolicyCommand(PluginCommand):
         require_training()
         if self.policy:
             from terrainkit_robots.policy.onnx_policy import open_onnx
+            from terrainkit_robots.rl.tasks import load_task_file
 
-            return open_onnx(self.policy, self.robot)
+            own = load_task_file(str(self.task)).name if self.task else ""
+            return open_onnx(self.policy, self.robot or own)
         from terrainkit_robots.rl.run import open_run
 
-        return open_run(self.source, self.checkpoint)
+        return open_run(self.source, self.checkpoint, self.task)
 
     def eval_config(self, seconds: float) -> "EvaluationConfig":
         """Return the settings of the rollout.

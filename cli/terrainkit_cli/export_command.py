@@ -10,7 +10,7 @@ from terrainkit.export import export_files
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import Checkpoint, OutputPath, is_map
+from terrainkit_cli.argument_types import Checkpoint, OutputPath, TaskFile, is_map
 from terrainkit_cli.map_text import written
 from terrainkit_cli.parse import option, positional
 from terrainkit_cli.plugin_command import PluginCommand
@@ -59,6 +59,10 @@ class Export(PluginCommand):
     max_step: Annotated[float, option("M")] | None = None
     """For .yaml: height of the largest step that a robot takes, by default 0.2 [m]; cells at the
     top of higher ones are occupied."""
+
+    task: TaskFile | None = None
+    """For a run: a Python file with a task of your own, which it was
+    trained with; it is executed."""
 
     checkpoint: Checkpoint | None = None
     """For a run: the checkpoint to export; by default, the last one."""
@@ -120,7 +124,7 @@ class Export(PluginCommand):
         from terrainkit_robots.rl.run import open_run
         from terrainkit_robots.rl.tasks import get_task
 
-        run = open_run(self.source, self.checkpoint)
+        run = open_run(self.source, self.checkpoint, self.task)
         default = run.folder / "exported"
         if run.folder.resolve() == get_task(run.info.robot).trained_run.resolve():
             # The folder of a bundled policy is part of an installed package.

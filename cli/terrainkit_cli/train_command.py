@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit_cli import render
-from terrainkit_cli.argument_types import Device, TerrainName
+from terrainkit_cli.argument_types import Device, TaskFile, TerrainName
 from terrainkit_cli.config_options import ConfigCommand
 from terrainkit_cli.parse import is_option, option, positional
 from terrainkit_cli.plugin_command import PluginCommand
@@ -44,6 +44,9 @@ class Train(PluginCommand, ConfigCommand):
     robot: Annotated[str, positional("ROBOT")] = ""
     """Name of a bundled task, or a folder written by terrainkit onboard."""
 
+    task: TaskFile | None = None
+    """In place of ROBOT: a Python file with a task of your own, which is executed."""
+
     config: Annotated[str, option("PATH")] = ""
     """Task file (.toml) whose values override the robot's task; options override both."""
 
@@ -74,14 +77,15 @@ class Train(PluginCommand, ConfigCommand):
     def load_config(cls, argv: Sequence[str]) -> "Task":
         """Return the task before options: the task of the run or the robot, then --config."""
         given, rest = cls.split(argv)
+        from terrainkit_robots.rl.tasks import get_task, load_task_file
+
+        own = load_task_file(path) if (path := given.get("task")) else None
         if resume := given.get("resume"):
             from terrainkit_robots.rl.run import open_run
 
-            task = open_run(resume).task
+            task = open_run(resume).task if own is None else own.task
         else:
-            from terrainkit_robots.rl.tasks import get_task
-
-            task = get_task(_task_word(rest)).task
+            task = get_task(_task_word(rest)).task if own is None else own.task
         path = given.get("config")
         return type(task).load(path, task) if path else task
 
@@ -89,10 +93,14 @@ class Train(PluginCommand, ConfigCommand):
         """Train, and print the next commands."""
         require_training()
         from terrainkit_robots.rl.run import open_run
+        from terrainkit_robots.rl.tasks import load_task_file
         from terrainkit_robots.rl.train import train
 
         run = open_run(self.resume) if self.resume else None
-        robot = self.robot or (run.info.robot if run else "")
+        if self.task and self.robot:
+            raise ConfigError("ROBOT, --task: got both; expected one of them")
+        own = load_task_file(str(self.task)).name if self.task else self.robot
+        robot = own or (run.info.robot if run else "")
         terrain = self.terrain or (run.terrain if run else "plane")
         task = self.changed_config()
         if task.runner.logger == "wandb" and find_spec("wandb") is None:
@@ -111,7 +119,7 @@ class Train(PluginCommand, ConfigCommand):
             )
             completed = runner.current_learning_iteration
             signal_number = stop_signal() if completed < task.runner.max_iterations else 0
-        _print_result(runner, task)
+        _print_result(runner, task, self.task)
         return 128 + signal_number if signal_number else 0
 
 
@@ -148,22 +156,23 @@ def _print_start(runner: "LeggedRunner", terrain: str) -> None:
     render.note(f"training {where}: {parallel}, in {runner.folder}")
 
 
-def _print_result(runner: "LeggedRunner", task: "Task") -> None:
+def _print_result(runner: "LeggedRunner", task: "Task", task_file: Path | None) -> None:
     """Print the result and the next commands."""
     if runner.folder is None:  # only the first of several processes prints
         return
     from terrainkit_robots.text import count
 
-    run, completed = quote(str(runner.folder)), runner.current_learning_iteration
+    folder, completed = quote(str(runner.folder)), runner.current_learning_iteration
+    run = f"{folder} --task {quote(str(task_file))}" if task_file else folder
     whole = task.runner.max_iterations
     if completed < whole:
-        render.result(f"stopped after {completed} of {whole} iterations: {run}")
+        render.result(f"stopped after {completed} of {whole} iterations: {folder}")
         render.result(f"continue: terrainkit train --resume {run}")
         return
-    render.result(f"trained {count(whole, 'iteration')}: {run}")
+    render.result(f"trained {count(whole, 'iteration')}: {folder}")
     render.result(
         f"next: terrainkit play {run}  (record a video)\n"
         f"      terrainkit evaluate {run}  (measure it)\n"
         f"      terrainkit export {run}  (ONNX, TorchScript)\n"
-        f"      tensorboard --logdir {run}  (learning curves)"
+        f"      tensorboard --logdir {folder}  (learning curves)"
     )

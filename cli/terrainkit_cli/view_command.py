@@ -23,6 +23,7 @@ from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
     Checkpoint,
     Packages,
+    TaskFile,
     TerrainName,
     XacroArguments,
     is_map,
@@ -143,6 +144,10 @@ class View(PluginCommand, ViewerCommand):
     """For a policy: plane, a map (.npz), or a map config (.toml); by default, the terrain of the
     training."""
 
+    task: TaskFile | None = None
+    """For a policy: a Python file with a task of your own, which it was
+    trained with; it is executed."""
+
     checkpoint: Checkpoint | None = None
     """For a policy: the checkpoint to load; by default, the last one."""
 
@@ -197,14 +202,19 @@ class View(PluginCommand, ViewerCommand):
 
     def _open_run(self) -> "Show":
         require_training()
-        return open_policy(self.source, self.checkpoint, self.terrain or None)
+        return open_policy(self.source, self.checkpoint, self.terrain or None, self.task)
 
 
 Show = Callable[["viser.ViserServer"], object]
 """A function that fills the scene. If what it returns has a method `run`, it never returns."""
 
 
-def open_policy(source: str, checkpoint: int | None = None, terrain: str | None = None) -> "Show":
+def open_policy(
+    source: str,
+    checkpoint: int | None = None,
+    terrain: str | None = None,
+    task: Path | None = None,
+) -> "Show":
     """Return the function that shows a policy; see `View` for the arguments.
 
     Raises:
@@ -213,7 +223,7 @@ def open_policy(source: str, checkpoint: int | None = None, terrain: str | None 
     from terrainkit_robots.rl.run import open_run
     from terrainkit_robots.viewer.show_policy import PolicyView
 
-    run = open_run(source, checkpoint)
+    run = open_run(source, checkpoint, task)
     return partial(PolicyView, run=run, terrain=terrain)
 
 

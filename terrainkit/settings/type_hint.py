@@ -107,6 +107,8 @@ def convert(name: str, value: object, hint: Any) -> Any:
     kind, origin, args, constraints, is_optional = parse_hint(hint)
     if value is None and is_optional:
         return None
+    if kind is Any:
+        return value
     if origin is Mapping and isinstance(value, Mapping):
         return {
             convert(f"key of {name}", k, args[0]): convert(f"{name}.{key_text(k)}", item, args[1])

@@ -213,5 +213,5 @@ def test_train_requires_the_package_of_the_logger(train, tmp_path, capsys, monke
 
 
 def test_only_the_first_process_prints_the_result(capsys):
-    train_command._print_result(SimpleNamespace(folder=None), None)
+    train_command._print_result(SimpleNamespace(folder=None), None, None)
     assert capsys.readouterr().out == ""

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import runpy
 import sys
 import time
 from pathlib import Path
@@ -17,8 +18,11 @@ parser.add_argument("--vy", type=float, default=0.0, help="velocity to the left 
 parser.add_argument("--yaw", type=float, default=0.0, help="yaw rate [rad/s]")
 parser.add_argument("--seconds", type=float, default=10.0, help="duration [s]")
 parser.add_argument("--viewer", action="store_true", help="show the robot in a window")
+parser.add_argument("--observations", help="Python file with functions of your own observations")
 args = parser.parse_args()
 
+# A function of the name of the observation takes the data and the rotation of the base.
+own: dict[str, Any] = runpy.run_path(args.observations) if args.observations else {}
 folder = Path(__file__).parent
 config = json.loads((folder / "policy.json").read_text())
 policy = onnxruntime.InferenceSession(folder / config["files"]["onnx"])
@@ -61,8 +65,10 @@ def observe(command: Any, action: Any, rotation: Any, previous: Any = None) -> A
         if part["name"] == "history":  # at first, it repeats the current observation
             past = np.concatenate(values) if previous is None else previous
             terms["history"] = np.resize(past, part["stop"] - part["start"])
+        if part["name"] in own:
+            terms[part["name"]] = np.atleast_1d(own[part["name"]](data, rotation))
         if np.size(terms.get(part["name"], ())) != part["stop"] - part["start"]:
-            sys.exit(f"policy.json: this program cannot compute the observation {part['name']}")
+            sys.exit(f"observation {part['name']}: unknown; define it in a file for --observations")
         value = np.clip(terms[part["name"]] - part["offset"], *part.get("clip", (-np.inf, np.inf)))
         values.append(value * part["scale"])
     return np.concatenate(values, dtype=np.float32)
@@ -75,9 +81,12 @@ if args.viewer:
 command, action = np.array([args.vx, args.vy, args.yaw]), np.zeros(len(controlled))
 rotation, velocity, obs = np.eye(3), np.zeros(3), None
 steps = max(1, round(args.seconds / timing["policy_dt"]))
+memory = config["recurrent"] or {"inputs": []}  # the state of a recurrent network
+state = {name: np.zeros(memory["shape"], np.float32) for name in memory["inputs"]}
 for _ in range(steps):
     obs = observe(command, action, rotation, obs)
-    action = policy.run(None, {"obs": obs[None]})[0][0]
+    (action, *_), *values = policy.run(None, {"obs": obs[None], **state})
+    state = dict(zip(memory["inputs"], values, strict=True))
     target = joints["action_offset"].copy()
     target[controlled] += joints["action_scale"][controlled] * action
     for _ in range(timing["decimation"]):

@@ -61,7 +61,7 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
             ConfigError: If there is no such robot or terrain, or they do not fit together.
         """
         self.render_mode = render_mode
-        self.env = EpisodeEnv(robot, terrain, task, 1, render_mode)
+        self.env = make_episode_env(robot, terrain, task, 1, render_mode)
         self.metadata = self.metadata | {"render_fps": round(1 / self.env.cfg.dt)}
         self.observation_space, self.action_space = spaces(self.env)
 
@@ -117,7 +117,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
     ) -> None:
         """Build the simulations; see :class:`TaskEnv`."""
         self.render_mode, self.num_envs = render_mode, num_envs
-        self.env = EpisodeEnv(robot, terrain, task, num_envs, render_mode)
+        self.env = make_episode_env(robot, terrain, task, num_envs, render_mode)
         self.metadata = self.metadata | {"render_fps": round(1 / self.env.cfg.dt)}
         self.single_observation_space, self.single_action_space = spaces(self.env)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -216,6 +216,19 @@ class EpisodeEnv(LeggedEnv):
         self._compute_observations()
         self._before_reset, self.final_qpos = self.policy_observations(), self.sim.qpos.copy()
         return super()._end_episodes(env_ids, state, unstable)
+
+
+def make_episode_env(
+    robot: str | Path,
+    terrain: str | Path,
+    task: Task | None,
+    num_envs: int,
+    render_mode: str | None,
+) -> EpisodeEnv:
+    """Return the environment of a task, as an :class:`EpisodeEnv`."""
+    own = (task or get_task(robot).task).env_class
+    kind = type(own.__name__, (EpisodeEnv, own), {}) if own else EpisodeEnv
+    return kind(robot, terrain, task, num_envs, render_mode)
 
 
 def spaces(env: LeggedEnv) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:

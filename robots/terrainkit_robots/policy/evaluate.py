@@ -17,7 +17,7 @@ from terrainkit.settings.type_hint import PositiveInt
 from terrainkit_robots.policy import gait
 from terrainkit_robots.policy.load import Policy, load_policy, single_torch_thread
 from terrainkit_robots.rl.config import Commands, Task
-from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.observations import uses_height_scan
 from terrainkit_robots.rl.run import PolicySpec, Run, is_same_terrain
 from terrainkit_robots.rl.runner import resolve_device
@@ -241,7 +241,7 @@ def build_eval_env(
     scan = uses_height_scan(spec.task, is_plane=is_plane(spec))
     task = eval_task(spec.task, num_envs, seconds=config.seconds, seed=config.seed)
     task = replace(task, terrain=replace(task.terrain, measure_heights=scan))
-    return LeggedEnv(task, spec.robot, terrain, device)
+    return make_env(task, spec.robot, terrain, device)
 
 
 def is_plane(spec: PolicySpec, terrain: str | None = None) -> bool:
@@ -327,8 +327,9 @@ def rollout(
             previous = commands
         state = env.state
         with torch.inference_mode():
-            actions = policy(env.get_observations())
-        _, _, dones, extras = env.step(actions)
+            _, _, dones, extras = env.step(policy(env.get_observations()))
+            if reset := getattr(policy, "reset", None):  # of a recurrent network
+                reset(dones)
         yield state.commands, (dones & ~extras["time_outs"]).cpu().numpy()
 
 

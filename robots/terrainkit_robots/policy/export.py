@@ -3,16 +3,15 @@
 import io
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import onnx
-import onnxruntime
 import torch
+from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
 from terrainkit.errors import ExportError
@@ -21,8 +20,9 @@ from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.load import load_actor, single_torch_thread
+from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
+from terrainkit_robots.rl.config import Normalization
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.observations import HEIGHT_SCAN_OFFSET
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.state import CONTACT_FORCE
@@ -33,6 +33,9 @@ ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.jso
 
 FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
 """Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots have."""
+
+RECURRENT_STEPS = 10
+"""Steps for which an exported recurrent network is compared with the live one."""
 
 TOLERANCE = 1e-5
 """Largest difference between exported and live actions; relative for actions beyond 1."""
@@ -93,25 +96,32 @@ def export_policy(
     scan = env.cfg.terrain.measure_heights  # also if the terrain of the training decided
     terrain = replace(run.task.terrain, measure_heights=scan)
     training["task"] = asdict(replace(run.task, terrain=terrain))
-    text = json.dumps(describe_policy(env) | training, indent=2) + "\n"
-    normalization = run.task.normalization
-    limits = normalization.clip_observations, normalization.clip_actions
-    clip_obs, clip_actions = (torch.nn.Hardtanh(-limit, limit) for limit in limits)
-    policy = torch.nn.Sequential(clip_obs, actor.as_jit(), clip_actions).eval()
+    network = OnnxNetwork(actor, run.task.normalization)
+    description = describe_policy(env) | {"recurrent": network.describe_state()} | training
+    text = json.dumps(description, indent=2) + "\n"
     random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
     obs = torch.cat([env.get_observations()["policy"], random])
+    # A recurrent network depends on the observations before.
+    steps = [obs.roll(k, 0) for k in range(RECURRENT_STEPS if actor.is_recurrent else 1)]
     with warnings.catch_warnings(), torch.no_grad():
         # torch deprecates TorchScript, which C++ controllers load, and its older ONNX exporter.
         warnings.simplefilter("ignore", DeprecationWarning)
         warnings.filterwarnings("ignore", message=r"`torch\.jit\.\w+` is (deprecated|not supp)")
-        onnx_data, script_file = export_onnx(policy, obs, text), io.BytesIO()
-        torch.jit.save(torch.jit.script(policy), script_file)
-        actions = clip_actions(actor(TensorDict({"policy": clip_obs(obs)}, [len(obs)]))).numpy()
-        script_actions = torch.jit.load(io.BytesIO(script_file.getvalue()))(obs).numpy()
-    session = onnxruntime.InferenceSession(onnx_data, providers=["CPUExecutionProvider"])
-    onnx_actions = np.asarray(session.run(["actions"], {"obs": obs.numpy()})[0])
-    onnx_error = verify_actions(onnx_actions, actions, ONNX_FILE)
-    errors = onnx_error, verify_actions(script_actions, actions, TORCHSCRIPT_FILE)
+        # Recurrent networks check the shapes of their inputs.
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)
+        warnings.filterwarnings("ignore", message="Exporting a model to ONNX with a batch_size")
+        onnx_data, script_file = export_onnx(network, obs, text), io.BytesIO()
+        torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
+        script = torch.jit.load(io.BytesIO(script_file.getvalue()))
+        live = [network.clipped(actor, each).numpy() for each in steps]
+        # TorchScript of rsl-rl keeps the state of one robot.
+        rows = slice(1) if actor.is_recurrent else slice(None)
+        script_actions = [script(each[rows]).numpy() for each in steps]
+    onnx_actions = run_onnx(onnx_data, [each.numpy() for each in steps])
+    errors = (
+        verify_actions(np.stack(onnx_actions), np.stack(live), ONNX_FILE),
+        verify_actions(np.stack(script_actions), np.stack(live)[:, rows], TORCHSCRIPT_FILE),
+    )
     contents = {JSON_FILE: text.encode(), ONNX_FILE: onnx_data, **other_files}
     contents[TORCHSCRIPT_FILE] = script_file.getvalue()
     if folder.is_dir():  # it may have other files
@@ -129,19 +139,85 @@ def _write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
         (folder / name).write_bytes(data)
 
 
-def export_onnx(policy: torch.nn.Module, obs: torch.Tensor, metadata: str) -> bytes:
+class OnnxNetwork(torch.nn.Module):
+    """An actor with clipped observations and actions, whose state is an input and an output.
+
+    Args:
+        actor: The network.
+        normalization: Limits of observations and actions.
+    """
+
+    def __init__(self, actor: MLPModel, normalization: Normalization) -> None:
+        super().__init__()
+        limits = normalization.clip_observations, normalization.clip_actions
+        self.clip_obs, self.clip_actions = (torch.nn.Hardtanh(-limit, limit) for limit in limits)
+        self.model: Any = actor.as_onnx(verbose=False).eval()
+
+    def forward(self, obs: torch.Tensor, *state: torch.Tensor) -> tuple[torch.Tensor, ...]:
+        """Return the actions, and the state of the next step."""
+        result = self.model(self.clip_obs(obs), *state)
+        actions, *new = result if state else (result,)
+        return self.clip_actions(actions), *new[: len(state)]
+
+    def clipped(self, actor: MLPModel, obs: torch.Tensor) -> torch.Tensor:
+        """Return the actions of the live actor, which keeps its own state."""
+        return self.clip_actions(actor(TensorDict({"policy": self.clip_obs(obs)}, [len(obs)])))
+
+    def describe_state(self) -> dict[str, Any] | None:
+        """Return names and shape of the state, which is zero at first; None without a state."""
+        _, *states = self.model.get_dummy_inputs()
+        if not states:
+            return None
+        names = {"inputs": self.model.input_names[1:], "outputs": self.model.output_names[1:]}
+        return names | {"shape": list(states[0].shape)}
+
+
+class ScriptNetwork(torch.nn.Module):
+    """An actor with clipped observations and actions, which keeps its state; see `OnnxNetwork`."""
+
+    def __init__(self, actor: MLPModel, network: OnnxNetwork) -> None:
+        super().__init__()
+        self.clip_obs, self.clip_actions = network.clip_obs, network.clip_actions
+        self.model = actor.as_jit().eval()
+
+    def forward(self, obs: torch.Tensor) -> torch.Tensor:
+        """Return the actions."""
+        return self.clip_actions(self.model(self.clip_obs(obs)))
+
+    @torch.jit.export  # type: ignore[untyped-decorator]
+    def reset(self) -> None:
+        """Forget the state."""
+        self.model.reset()
+
+
+def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
+    """Return the actions of an ONNX file for the observations (n, k) of each step."""
+    session, results = make_session(data), []
+    shapes = [each.shape for each in session.get_inputs()[1:]]
+    state = make_state([(layers, width) for layers, _, width in shapes], len(steps[0]))
+    for obs in steps:
+        actions, *state = call_model(session, obs, state)
+        results.append(actions)
+    return results
+
+
+def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: str) -> bytes:
     """Return a policy as an ONNX file.
 
     Args:
-        policy: The network.
+        network: The network.
         obs: Observations to trace it with, shape (n, k).
         metadata: Text of the metadata `METADATA_KEY`.
     """
-    file, axes = io.BytesIO(), {"obs": {0: "batch"}, "actions": {0: "batch"}}
-    names: dict[str, Any] = {"input_names": ["obs"], "output_names": ["actions"]}
+    file, model = io.BytesIO(), network.model
+    names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
+    _, *states = model.get_dummy_inputs()
+    inputs = obs, *(each.repeat(1, len(obs), 1) for each in states)
+    axes = {name: {1: "batch"} for name in (*model.input_names, *model.output_names)}
+    axes |= {"obs": {0: "batch"}, "actions": {0: "batch"}}
     # With `dynamo`, the export takes 5 s instead of 0.1 s.
     torch.onnx.export(
-        policy, (obs,), file, **names, dynamic_axes=axes, opset_version=ONNX_OPSET, dynamo=False
+        network, inputs, file, **names, dynamic_axes=axes, opset_version=ONNX_OPSET, dynamo=False
     )
     model = onnx.load_model_from_string(file.getvalue())
     model.metadata_props.add(key=METADATA_KEY, value=metadata)
@@ -178,9 +254,6 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     from terrainkit import __version__
 
     task, robot, model = env.cfg, env.robot, env.scene.model
-    slide = mujoco.mjtJoint.mjJNT_SLIDE
-    types = [model.joint(name).type[0] for name in robot.spec.joint_order]
-    units = ["m" if each == slide else "rad" for each in types]
     stiffness, damping = -model.actuator_biasprm[:, 1], -model.actuator_biasprm[:, 2]
     drive = np.where(stiffness > 0, "position", "velocity")
     if task.control.control_type == "T":
@@ -220,7 +293,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "formulas": _FORMULAS,
         "timing": {"physics_dt": dt, "decimation": decimation, "policy_dt": task.dt},
         "observation": {
-            "parts": _observation_parts(env, units),
+            "parts": _observation_parts(env),
             "size": env.get_observations()["policy"].shape[1],
             "clip": task.normalization.clip_observations,
             "history_length": task.observations.history_length,
@@ -233,7 +306,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "control_type": task.control.control_type,
         "joints": {
             "name": list(robot.spec.joint_order),
-            "position_unit": units,
+            "position_unit": list(env.joint_units),
             "drive": drive.tolist(),
             **{name: _to_list(values) for name, values in joints.items()},
         },
@@ -244,24 +317,17 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     }
 
 
-def _observation_parts(env: LeggedEnv, joint_units: list[str]) -> list[dict[str, Any]]:
+def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
     """Return slice, unit, offset, scale and clip of each observation term."""
-    offsets: dict[str, Any] = {"dof_pos": env.robot.default_pose, "height_scan": HEIGHT_SCAN_OFFSET}
-    units: dict[str, Any] = {
-        "dof_pos": joint_units,
-        "dof_vel": [f"{unit}/s" for unit in joint_units],
-    }
-    units |= {"commands": ["m/s", "m/s", "rad/s"], "base_ang_vel": "rad/s", "height_scan": "m"}
-    units["base_lin_vel"] = "m/s"
     parts, start = [], 0
-    for term in env.obs_terms["policy"]:
-        size = term.function(env.state).shape[1]
-        part: dict[str, Any] = {"name": term.name, "start": start, "stop": start + size}
-        part["unit"] = units.get(term.name, "1")
-        part["offset"] = _to_list(np.broadcast_to(offsets.get(term.name, 0.0), size))
+    for name, term in env.obs_terms["policy"].items():
+        size = term.function(env).shape[1]
+        part: dict[str, Any] = {"name": name, "start": start, "stop": start + size}
+        part["unit"] = term.unit if isinstance(term.unit, str) else list(term.unit)
+        part["offset"] = _to_list(np.broadcast_to(term.offset, size))
         part["scale"] = _to_list(np.broadcast_to(term.scale, size))
-        if term.name == "height_scan":
-            part["clip"] = [-1.0, 1.0]
+        if term.clip is not None:
+            part["clip"] = list(term.clip)
         parts.append(part)
         start += size
     return parts

@@ -3,16 +3,19 @@
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import torch
 from rsl_rl.models import MLPModel
+from rsl_rl.utils import resolve_class
 from tensordict import TensorDict
 
-from terrainkit.errors import ConfigError, TerrainkitWarning
+from terrainkit.errors import ConfigError, TerrainkitError, TerrainkitWarning, plugin_errors
 from terrainkit_robots.checkpoint import check_state, open_checkpoint
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec, Run, changed_robot_files, last_checkpoint
-from terrainkit_robots.rl.runner import OBS_GROUPS, runner_config
+from terrainkit_robots.rl.runner import runner_config
 from terrainkit_robots.spec.robot import SPEC_FILE
 
 Policy = Callable[[TensorDict], torch.Tensor]
@@ -29,10 +32,20 @@ def load_policy(spec: PolicySpec, env: LeggedEnv) -> Policy:
         ConfigError: If the spec has no policy, or its policy is for another robot or task.
     """
     if (policy := spec.policy) is not None:
-        return lambda obs: torch.as_tensor(policy(obs["policy"]))
+        return _Function(policy)
     if not isinstance(spec, Run):
         raise ConfigError("policy: got none; expected a run, or a function of the observations")
     return load_actor(spec, env)
+
+
+class _Function:
+    """A function of the policy's observations, as a policy."""
+
+    def __init__(self, function: Callable[[Any], Any]) -> None:
+        self.function, self.reset = function, getattr(function, "reset", None)
+
+    def __call__(self, obs: TensorDict) -> torch.Tensor:
+        return torch.as_tensor(self.function(obs["policy"]))
 
 
 def load_actor(run: Run, env: LeggedEnv) -> MLPModel:
@@ -50,12 +63,20 @@ def load_actor(run: Run, env: LeggedEnv) -> MLPModel:
         warnings.warn(message, TerrainkitWarning, stacklevel=2)
     obs_sizes = {"policy": env.obs_sizes["policy"]}  # the critic's do not matter
     with open_checkpoint(last_checkpoint(run), env.robot.spec.joint_order, obs_sizes) as state:
-        config = runner_config(run.task)["actor"]
-        config.pop("class_name")
-        actor = MLPModel(env.get_observations(), OBS_GROUPS, "actor", env.num_actions, **config)
+        actor = make_actor(run.task, env)
         check_state("actor_state_dict", state["actor_state_dict"], actor.state_dict())
         actor.load_state_dict(state["actor_state_dict"])
     return actor.to(env.device).eval()
+
+
+def make_actor(task: Task, env: LeggedEnv) -> MLPModel:
+    """Return a new network that acts: the actor, or the student of a distillation."""
+    with plugin_errors("runner.rsl_rl" if task.runner.rsl_rl else None, TerrainkitError):
+        runner = runner_config(task)
+        name = "student" if "student" in runner else "actor"
+        kind, config = resolve_class(runner[name])
+        groups = runner["obs_groups"]
+        return kind(env.get_observations(), groups, name, env.num_actions, **config)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 It imports neither torch nor mujoco, since a child process calls `load_model` first.
 """
 
+from collections.abc import Sequence
 from contextlib import chdir
 from functools import cache
 from pathlib import Path
@@ -38,10 +39,11 @@ def load_model(
 
     Returns:
         `model`, the file with its external data inside; `text`, in UTF-8, empty if there is none;
-        and `sizes`, the numbers of observations and actions.
+        `sizes`, the numbers of observations and actions; and `state`, number of layers and width
+        of each input with the state of a recurrent network, shape (k, 2).
 
     Raises:
-        ConfigError: If it is not a policy without memory.
+        ConfigError: If it is not a policy.
     """
     try:
         parsed = onnx.load_model_from_string(data)
@@ -53,18 +55,28 @@ def load_model(
             session = make_session(model)
     except Exception as error:  # errors of onnx and onnxruntime have no common class
         raise ConfigError(f"not an ONNX file that can be loaded: {error}") from error
-    num_obs = _num_observations(session)
+    num_obs, sizes = _input_sizes(session)
     outputs = [each.type for each in session.get_outputs()]
-    if not outputs or outputs[0] not in _FLOATS:
-        raise ConfigError(f"got the outputs {listing(outputs)}; expected actions of tensor(float)")
-    actions = call_model(session, np.zeros((2, num_obs), np.float32))
+    if len(outputs) <= len(sizes) or outputs[0] not in _FLOATS:
+        expected = f"expected actions of tensor(float), and {len(sizes)} states"
+        raise ConfigError(f"got the outputs {listing(outputs)}; {expected}")
+    state = make_state(sizes, 2)
+    actions, *new = call_model(session, np.zeros((2, num_obs), np.float32), state)
     if len(actions) != 2 or actions.ndim != 2:
         raise ConfigError(f"got actions of shape {actions.shape}; expected (2, a) for two rows")
+    if (got := [each.shape for each in new]) != [each.shape for each in state]:
+        raise ConfigError(f"got states of the shapes {got}; expected the shapes of the inputs")
     text = session.get_modelmeta().custom_metadata_map.get(metadata_key, "")
     arrays = {"model": model, "text": text.encode()}
     return {name: np.frombuffer(value, np.uint8) for name, value in arrays.items()} | {
-        "sizes": np.array([num_obs, actions.shape[1]])
+        "sizes": np.array([num_obs, actions.shape[1]]),
+        "state": np.array(sizes, np.int64).reshape(-1, 2),
     }
+
+
+def make_state(sizes: Sequence[Sequence[int]], count: int) -> list[NDArray[np.float32]]:
+    """Return the state of `count` robots at the start: zeros, shape (layers, count, width)."""
+    return [np.zeros((layers, count, width), np.float32) for layers, width in sizes]
 
 
 def make_session(model: bytes) -> onnxruntime.InferenceSession:
@@ -76,25 +88,37 @@ def make_session(model: bytes) -> onnxruntime.InferenceSession:
     return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
 
 
-def call_model(session: onnxruntime.InferenceSession, obs: Any, options: Any = None) -> Any:
-    """Return the first output of a model.
+def call_model(
+    session: onnxruntime.InferenceSession,
+    obs: Any,
+    state: Sequence[NDArray[np.float32]] = (),
+    options: Any = None,
+) -> list[Any]:
+    """Return the actions of a model, and its new state.
 
     Args:
         session: The loaded model.
         obs: Observations, shape (n, k). They are passed row by row if the model takes a batch of 1.
+        state: State of a recurrent network, each part of shape (layers, n, width).
         options: onnxruntime's `RunOptions`; None for the defaults.
 
     Returns:
-        Actions, shape (n, a).
+        Actions, shape (n, a), and the parts of the state.
 
     Raises:
         ConfigError: If the model fails, or needs too much memory.
     """
-    (given,), output = session.get_inputs(), session.get_outputs()[0]
-    parts = np.split(obs, len(obs)) if given.shape[0] == 1 else [obs]
+    names = [each.name for each in session.get_inputs()]
+    outputs = [each.name for each in session.get_outputs()[: len(names)]]
+    count = len(obs) if session.get_inputs()[0].shape[0] == 1 else 1
+    rows = [np.split(obs, count), *(np.split(part, count, axis=1) for part in state)]
     try:
-        results = [session.run([output.name], {given.name: part}, options)[0] for part in parts]
-        return np.concatenate(results)
+        results = [
+            session.run(outputs, dict(zip(names, row, strict=True)), options)
+            for row in zip(*rows, strict=True)
+        ]
+        actions, *new = zip(*results, strict=True)
+        return [np.concatenate(actions), *(np.concatenate(part, axis=1) for part in new)]
     except Exception as error:  # errors of onnxruntime have no common class
         reason = f"fails: {error}"
         if "BFCArena" in reason:
@@ -102,15 +126,25 @@ def call_model(session: onnxruntime.InferenceSession, obs: Any, options: Any = N
         raise ConfigError(reason) from error
 
 
-def _num_observations(session: onnxruntime.InferenceSession) -> int:
-    """Return k of the only input, of shape (n, k) or (1, k); raise ConfigError for others."""
-    inputs = [f"{each.name} {each.type} {each.shape}" for each in session.get_inputs()]
-    shapes = [each.shape for each in session.get_inputs()]
-    if len(shapes) == 1 and len(shapes[0]) == 2:
-        batch, num_obs = shapes[0]
-        if isinstance(num_obs, int) and (batch == 1 or not isinstance(batch, int)):
-            return num_obs
-    raise ConfigError(f"got the inputs {listing(inputs)}; expected one of shape (n, k) or (1, k)")
+def _input_sizes(session: onnxruntime.InferenceSession) -> tuple[int, list[tuple[int, int]]]:
+    """Return the number of observations, and layers and width of each state.
+
+    The first input has the shape (n, k) or (1, k), the states have (layers, n, width).
+    """
+    first, *others = [each.shape for each in session.get_inputs()] or [()]
+    is_valid = len(first) == 2 and isinstance(first[1], int) and _is_batch(first[0])
+    for shape in others:
+        is_valid &= len(shape) == 3 and _is_batch(shape[1])
+        is_valid = is_valid and isinstance(shape[0], int) and isinstance(shape[2], int)
+    if not is_valid:
+        inputs = [f"{each.name} {each.type} {each.shape}" for each in session.get_inputs()]
+        expected = "expected one of shape (n, k) or (1, k), and states of shape (layers, n, width)"
+        raise ConfigError(f"got the inputs {listing(inputs)}; {expected}")
+    return first[1], [(shape[0], shape[2]) for shape in others]
+
+
+def _is_batch(size: Any) -> bool:
+    return size == 1 or not isinstance(size, int)
 
 
 @cache

@@ -17,7 +17,13 @@ from terrainkit.files.child_process import ProcessError, run_in_process
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.export import JSON_FILE, METADATA_KEY, describe_policy
-from terrainkit_robots.policy.onnx_model import LIMITS, call_model, load_model, make_session
+from terrainkit_robots.policy.onnx_model import (
+    LIMITS,
+    call_model,
+    load_model,
+    make_session,
+    make_state,
+)
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
@@ -47,7 +53,10 @@ class _Description(msgspec.Struct):
 
 
 class OnnxPolicy:
-    """A policy without memory in an ONNX file, from observations (n, k) to actions (n, a)."""
+    """A policy in an ONNX file, from observations (n, k) to actions (n, a).
+
+    It keeps the state of a recurrent network; `reset` clears it for robots whose episodes ended.
+    """
 
     def __init__(self, path: Path) -> None:
         """Load a file, and call it once.
@@ -68,6 +77,7 @@ class OnnxPolicy:
         self.num_obs, self.num_actions = loaded["sizes"].tolist()
         self.description = loaded["text"].tobytes()
         self._session = make_session(loaded["model"].tobytes())
+        self._sizes, self._state = loaded["state"].tolist(), make_state((), 0)
 
     def __call__(self, obs: torch.Tensor) -> FloatArray:
         """Return actions (n, a) for observations (n, k).
@@ -75,15 +85,18 @@ class OnnxPolicy:
         Raises:
             ConfigError: If the model fails, or exceeds the limits of :mod:`.onnx_model`.
         """
-        result: Future[FloatArray] = Future()
+        if self._sizes and (not self._state or self._state[0].shape[1] != len(obs)):
+            self._state = make_state(self._sizes, len(obs))
+        result: Future[list[FloatArray]] = Future()
         options = onnxruntime.RunOptions()
         options.log_severity_level = 4
         # A signal interrupts waiting for a thread, but not a call of native code. The process does
         # not wait for a daemon thread when it ends.
-        arguments = result, self._session, obs.numpy(force=True), options
+        arguments = result, self._session, obs.numpy(force=True), self._state, options
         Thread(target=_set_result, args=arguments, daemon=True).start()
         try:
-            return result.result(LIMITS.seconds)
+            actions, *self._state = result.result(LIMITS.seconds)
+            return actions
         except TimeoutError:
             raise ConfigError(f"{self.__name__} takes more than {LIMITS.seconds:g} s") from None
         except ConfigError as error:
@@ -91,8 +104,13 @@ class OnnxPolicy:
         finally:
             options.terminate = True  # ends the call if it is still running
 
+    def reset(self, dones: torch.Tensor) -> None:
+        """Clear the state of robots, a mask of shape (n,)."""
+        for part in self._state:
+            part[:, dones.numpy(force=True)] = 0
 
-def _set_result(result: Future[FloatArray], *arguments: Any) -> None:
+
+def _set_result(result: Future[list[FloatArray]], *arguments: Any) -> None:
     try:
         result.set_result(call_model(*arguments))
     except Exception as error:

@@ -46,6 +46,7 @@ def play(
     *,
     video: bool = True,
     robots: int = DEFAULT_ROBOTS,
+    height_points: bool = False,
     size: tuple[int, int] = DEFAULT_SIZE,
     progress: Progress = lambda _: None,
 ) -> PlayResult:
@@ -60,6 +61,7 @@ def play(
         video: Whether to record a video. Without one, the rollout stops once every
             robot has fallen or crossed half a patch.
         robots: Number of robots that the video follows on a map.
+        height_points: Whether the video shows the points of the height scan.
         size: Width and height of the video [pixels].
         progress: Called after each step with the completed fraction, 0 to 1.
 
@@ -80,7 +82,7 @@ def play(
 
     evaluation, policy = EvaluationRollout(env), load_policy(spec, env)
     evaluation.run(policy, config.seconds, commands, update, stop_early=not video)
-    recorded = recorder.make_video(robots, size) if video else None
+    recorded = recorder.make_video(robots, size, scan=height_points) if video else None
     return PlayResult(evaluation=summarize(spec, config, evaluation), video=recorded)
 
 
@@ -173,27 +175,32 @@ class PoseRecorder:
             self.commands.append(self.env.commands.copy())
         self.num_steps += 1
 
-    def make_video(self, robots: int, size: tuple[int, int]) -> VideoSpec:
+    def make_video(self, robots: int, size: tuple[int, int], *, scan: bool = False) -> VideoSpec:
         """Return a video of the formation on a plane, or of some robots in turn on a map.
 
-        A robot on a map is shown until it falls.
+        A robot on a map is shown until it falls. `scan` shows the points of the height scan.
         """
         env, terrain, poses, shots = self.env, self.env.terrain, np.stack(self.poses), []
         frames, n = poses.shape[:2]
+
+        def points(robot: int) -> FloatArray | None:
+            pos, quat = poses[:, robot, :3], poses[:, robot, 3:7]
+            return np.stack(env.sensors.scan_points(pos, quat), -1) if scan else None
+
         if terrain.is_plane:
             side = int(np.ceil(np.sqrt(n)))
             row, col = np.divmod(np.arange(n), side)
             spacing = 2.4 * max(0.5, env.robot.base_height_target)
             poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
-            shots.append(Shot(robot=n // 2, captions=captions))
+            shots.append(Shot(robot=n // 2, captions=captions, points=points(n // 2)))
         tracked, rows = select_tracked_robots(env, robots), len(terrain.env_origins)
         for robot in tracked if not terrain.is_plane else ():
             level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
             caption = str(terrain.terrain_names[level, column])
             caption += f", level {level} of {rows - 1}" if rows > 1 else ""
             stop = int(np.clip(self.first_fall[robot], 1, max(1, frames // len(tracked))))
-            shots.append(Shot(robot=robot, captions=(caption,) * stop))
+            shots.append(Shot(robot=robot, captions=(caption,) * stop, points=points(robot)))
         fps = 1 / (env.cfg.dt * self.stride)
         return VideoSpec(model=env.scene.model, poses=poses, shots=tuple(shots), fps=fps, size=size)
 

@@ -1,9 +1,10 @@
 """Velocity commands: sampling, resampling, heading control, waypoints, and the gait."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
@@ -18,9 +19,14 @@ GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
 """Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m, and 0.8 s
 for two legs of 0.7 m, as in unitree_rl_gym."""
 
+# legged_gym's.
+CURRICULUM_STEP, CURRICULUM_TRACKING = 0.5, 0.8
+"""Extension of the range of forward velocities [m/s], and the share of the tracking reward from
+which it is extended."""
+
 
 def sample_commands(
-    rng: np.random.Generator, count: int, cfg: Commands
+    rng: np.random.Generator, count: int, cfg: Commands, lin_vel_x: ArrayLike | None = None
 ) -> tuple[FloatArray, FloatArray]:
     """Sample velocity commands and headings.
 
@@ -28,12 +34,14 @@ def sample_commands(
         rng: Generator of the random numbers.
         count: Number of commands.
         cfg: Ranges of the commands.
+        lin_vel_x: Range of the forward velocity [m/s]; None for the range of `cfg`.
 
     Returns:
         Commands, forward and left [m/s] and yaw rate [rad/s], shape (count, 3), and headings [rad],
         shape (count,). The heading of a command to stand is NaN.
     """
-    low, high = np.array([cfg.lin_vel_x, cfg.lin_vel_y, cfg.ang_vel_yaw], np.float32).T
+    forward = cfg.lin_vel_x if lin_vel_x is None else lin_vel_x
+    low, high = np.array([forward, cfg.lin_vel_y, cfg.ang_vel_yaw], np.float32).T
     commands = low + (high - low) * rng.random((count, 3), dtype=np.float32)
     # As in legged_gym, small commands are commands to stand.
     commands[np.hypot(commands[:, 0], commands[:, 1]) < cfg.min_norm, :2] = 0
@@ -47,20 +55,61 @@ def sample_commands(
     return commands, heading
 
 
-class VelocityCommand:
-    """The current commands of n robots."""
+Sample = Callable[[np.random.Generator, int], NDArray[Any]]
+"""Returns the values of some robots, shape (count, width), from a generator and their number."""
+
+
+class CommandTerm:
+    """Values that n robots are to follow, sampled at each reset and at intervals.
+
+    Args:
+        sample: Function that samples values.
+        num_envs: Number of robots.
+        resampling_time: Time after which new values are sampled [s].
+        dt: Time of a step [s].
+    """
+
+    def __init__(self, sample: Sample, num_envs: int, resampling_time: float, dt: float) -> None:
+        self.values = np.zeros_like(sample(np.random.default_rng(), num_envs), np.float32)
+        self._sample, self._interval = sample, max(1, round(resampling_time / dt))
+
+    def resample(self, rng: np.random.Generator, env_ids: Ids) -> None:
+        """Sample new values for some environments.
+
+        Args:
+            rng: Generator of the random numbers.
+            env_ids: Environments, shape (k,).
+        """
+        self.values[env_ids] = self._sample(rng, len(env_ids))
+
+    def resample_due(self, rng: np.random.Generator, steps: NDArray[np.int64]) -> None:
+        """Sample new values where the resampling time has passed.
+
+        Args:
+            rng: Generator of the random numbers.
+            steps: Steps of each environment since its reset, shape (n,).
+        """
+        self.resample(rng, np.flatnonzero((steps % self._interval == 0) & (steps > 0)))
+
+
+class VelocityCommand(CommandTerm):
+    """Commanded forward and left velocity [m/s] and yaw rate [rad/s]."""
 
     def __init__(self, cfg: Commands, num_envs: int, dt: float, *, heading_command: bool) -> None:
-        # Forward and left velocity [m/s] and yaw rate [rad/s], and the heading to turn to [rad],
-        # NaN for none. With a heading command, the yaw rate is computed from the heading.
-        self.commands = np.zeros((num_envs, 3), np.float32)
+        def sample(rng: np.random.Generator, count: int) -> FloatArray:
+            return sample_commands(rng, count, cfg)[0]
+
+        super().__init__(sample, num_envs, cfg.resampling_time, dt)
+        # The heading to turn to [rad], NaN for none. With a heading command, the yaw rate is
+        # computed from the heading.
         self.heading = np.zeros(num_envs, np.float32)
         self.heading_command = heading_command
         self.speed = np.zeros(num_envs, np.float32)  # toward the waypoints [m/s], NaN to stand
         self.waypoints: Waypoints | None = None  # override the commands of robots with goals
         self.fixed: FloatArray | None = None  # overrides the sampled commands, shape (n, 3)
+        self.lin_vel_x = np.array(cfg.lin_vel_x)  # range, which the curriculum extends [m/s]
+        self.tracked = np.zeros(2)  # sum of the tracking of episodes, 0 to 1, and their number
         self._cfg = cfg
-        self._interval = max(1, round(cfg.resampling_time / dt))
 
     def resample(self, rng: np.random.Generator, env_ids: Ids) -> None:
         """Sample new commands for some environments.
@@ -69,19 +118,24 @@ class VelocityCommand:
             rng: Generator of the random numbers.
             env_ids: Environments, shape (k,).
         """
-        sample = sample_commands(rng, len(env_ids), self._cfg)
-        self.commands[env_ids], self.heading[env_ids] = sample
-        forward = np.abs(self.commands[env_ids, 0])
+        sample = sample_commands(rng, len(env_ids), self._cfg, self.lin_vel_x)
+        self.values[env_ids], self.heading[env_ids] = sample
+        forward = np.abs(self.values[env_ids, 0])
         self.speed[env_ids] = np.where(np.isnan(self.heading[env_ids]), np.nan, forward)
 
-    def resample_due(self, rng: np.random.Generator, steps: NDArray[np.int64]) -> None:
-        """Sample new commands where the resampling time has passed.
+    def end_episodes(self, tracking: FloatArray) -> None:
+        """Extend the range of the forward velocity where it is tracked well, as in legged_gym.
 
         Args:
-            rng: Generator of the random numbers.
-            steps: Steps of each environment since its reset, shape (n,).
+            tracking: Share of the tracking reward that each ended episode earned, shape (k,).
         """
-        self.resample(rng, np.flatnonzero((steps % self._interval == 0) & (steps > 0)))
+        self.tracked += tracking.sum(), len(tracking)
+        if self._cfg.curriculum and self.tracked[1] >= len(self.values):
+            if self.tracked[0] > CURRICULUM_TRACKING * self.tracked[1]:
+                limit, (low, high) = self._cfg.max_curriculum, self.lin_vel_x
+                self.lin_vel_x[0] = min(low, max(low - CURRICULUM_STEP, -limit))
+                self.lin_vel_x[1] = max(high, min(high + CURRICULUM_STEP, limit))
+            self.tracked[:] = 0
 
     def yaw_rate(self, yaw: FloatArray) -> FloatArray:
         """Return the commanded yaw rates.
@@ -93,7 +147,7 @@ class VelocityCommand:
             Yaw rates [rad/s], shape (n,), toward the commanded heading if there is one.
         """
         if self.fixed is not None or not self.heading_command:
-            return self.commands[:, 2]
+            return self.values[:, 2]
         rate = np.float32(self._cfg.heading_stiffness) * wrap_to_pi(self.heading - yaw)
         return np.nan_to_num(np.clip(rate, *self._cfg.ang_vel_yaw), nan=0.0)
 
@@ -105,13 +159,13 @@ class VelocityCommand:
             position: Position of each robot, x and y [m], shape (n, 2).
         """
         if self.fixed is not None:
-            self.commands[:] = self.fixed
+            self.values[:] = self.fixed
             return
-        self.commands[:, 2] = self.yaw_rate(yaw)
+        self.values[:, 2] = self.yaw_rate(yaw)
         if self.waypoints:
             stiffness, limits = self._cfg.heading_stiffness, self._cfg.ang_vel_yaw
             toward = self.waypoints.commands(position, yaw, self.speed, stiffness, limits)
-            np.copyto(self.commands, toward, where=~np.isnan(toward))
+            np.copyto(self.values, toward, where=~np.isnan(toward))
 
 
 class Gait:

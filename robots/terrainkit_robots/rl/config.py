@@ -5,8 +5,9 @@ Subclass `Task`, or one of its sections, for a task of your own; see docs/adding
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from msgspec import Meta
 
@@ -138,6 +139,11 @@ class Commands(Config):
     # legged_gym's ranges, except for half of its lateral velocity.
     lin_vel_x: Velocities = (-1.0, 1.0)
     """Forward velocity [m/s]."""
+    curriculum: bool = False
+    """Whether the range of the forward velocity grows by 0.5 m/s to both sides whenever the robots
+    earn 80 % of the tracking reward."""
+    max_curriculum: NonNegativeFloat = 1.0
+    """Limit of that range to both sides [m/s]."""
     lin_vel_y: Velocities = (-0.5, 0.5)
     """Velocity to the left [m/s]."""
     ang_vel_yaw: Velocities = (-1.0, 1.0)
@@ -255,6 +261,19 @@ class Rewards(Config):
     """Horizontal velocity of feet in contact, squared."""
     stand_still: float = -2.4
     """Deviation from the default pose at zero command."""
+    # Terms of legged_gym and LeggedGym-Ex that the gait replaces, or that the terms above contain.
+    orientation: float = 0.0
+    """Tilt of the base, squared."""
+    dof_vel: float = 0.0
+    """Joint velocities, squared."""
+    dof_power: float = 0.0
+    """Mechanical power of the motors."""
+    action_smoothness: float = 0.0
+    """Change of the change of the action, squared."""
+    feet_air_time: float = 0.0
+    """Duration of swings above 0.5 s, when the foot lands."""
+    foot_clearance: float = 0.0
+    """Feet that move at the swing height."""
     # legged_gym has a constant width of 0.25 m2/s2, with which standing still earned 64 % of the
     # tracking rewards for the biped's commands.
     tracking_sigma: PositiveFloat = 0.06
@@ -397,7 +416,7 @@ class Algorithm(Config):
     # a mirror loss. They double the cost of an update.
     symmetry: bool | None = None
     """Whether mirrored samples are added to each batch; none: if left and right of the robot are
-    mirror images."""
+    mirror images, and the networks are not recurrent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -415,11 +434,18 @@ class Runner(Config):
     """Seed of all random numbers."""
     logger: Literal["tensorboard", "wandb"] = "tensorboard"
     """Where metrics are logged."""
+    rsl_rl: Mapping[str, Any] = field(default_factory=dict)
+    """Tables of rsl-rl's configuration whose values replace those that terrainkit derives, such as
+    the class of a network: actor, critic, student, teacher, algorithm, obs_groups. They are set in
+    a task file only."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task(Config):
     """Configuration of training. SI units and radians."""
+
+    env_class: ClassVar[type | None] = None
+    """Class of the environment; `LeggedEnv` unless a task of your own has another one."""
 
     env: Env = field(default_factory=Env)
     terrain: Terrain = field(default_factory=Terrain)

@@ -1,9 +1,11 @@
 """The vectorized environment: legged robots that track velocity commands on a terrain."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
+import mujoco
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -11,67 +13,81 @@ from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
 from terrainkit.curriculum.waypoints import Waypoints
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, TerrainkitError, is_built_in, plugin_errors
 from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl import observations
-from terrainkit_robots.rl.commands import Gait, VelocityCommand
+from terrainkit_robots.rl.commands import CommandTerm, Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
-from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
-from terrainkit_robots.rl.rewards import active_rewards, is_moving
-from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.events import EVENTS, EventTerm, RandomizedParams, apply_params
+from terrainkit_robots.rl.observations import ObservationTerm
+from terrainkit_robots.rl.own_terms import checked
+from terrainkit_robots.rl.rewards import REWARDS, Reward, is_moving, reward_scales
+from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
 from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
-from terrainkit_robots.rl.terminations import terrain_out_of_bounds
+from terrainkit_robots.rl.terminations import TERMINATIONS, terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 
 
+def make_env(task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> "LeggedEnv":
+    """Return the environment of a task: of its `env_class`, or of :class:`LeggedEnv`.
+
+    Raises:
+        ConfigError: If task, robot and terrain do not fit together.
+        PluginError: If an environment of another package fails.
+    """
+    kind = task.env_class or LeggedEnv
+    plugin = None if is_built_in(kind) else f"{kind.__module__}:{kind.__qualname__}"
+    with plugin_errors(plugin, TerrainkitError):
+        return kind(task, robot, terrain, device)
+
+
 class LeggedEnv(VecEnv):
-    """An rsl-rl `VecEnv` of legged robots. Later steps do not modify returned tensors."""
+    """An rsl-rl `VecEnv` of legged robots. Later steps do not modify returned tensors.
+
+    The `env_class` of a task of your own is a subclass with other terms: functions of the
+    environment by name.
+    """
+
+    params: RandomizedParams
+    """Physical parameters of the robots; the event `params` samples them."""
+
+    state: State
+    """State after the last step, with the current commands."""
+
+    obs_history: FloatArray
+    """Previous observations of the policy, the newest first, shape (n, h)."""
+
+    _observations: TensorDict
 
     def __init__(self, task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> None:
         """Build the simulations and reset every environment."""
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
         self.num_envs = n = task.env.num_envs
-        self.max_episode_length = task.max_episode_length
-        self.scene = build_scene(robot, terrain, task)
-        scan = observations.uses_height_scan(task, is_plane=terrain.is_plane)
-        check_env_memory(task, robot, scan=scan, ngeom=self.scene.model.ngeom)
+        self.max_episode_length, self.step_dt = task.max_episode_length, task.dt
+        self.scene = Scene(robot, terrain, task)
+        self.has_height_scan = observations.uses_height_scan(task, is_plane=terrain.is_plane)
+        check_env_memory(task, robot, scan=self.has_height_scan, ngeom=self.scene.model.ngeom)
         self.sim = Simulation(self.scene, n, task.env.num_threads)
+        self.mass = float(self.scene.model.body_subtreemass[self.scene.base])
         self.rng = np.random.default_rng(task.runner.seed)
-        heading = task.commands.heading_command
-        heading = not terrain.is_plane if heading is None else heading
-        self.velocity_command = VelocityCommand(task.commands, n, task.dt, heading_command=heading)
-        self.waypoints = None
-        if task.commands.waypoints:
-            if np.isnan(terrain.goals).all():
-                got = "got a terrain without goals"
-                expected = "expected a map with terrains such as course, and not collision plane"
-                raise ConfigError(f"commands.waypoints: {got}; {expected}")
-            num_goals, radius = terrain.goals.shape[2], task.commands.waypoint_radius
-            self.waypoints = Waypoints.make(n, num_goals, radius)
-        self.velocity_command.waypoints = self.waypoints
-        self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
-        self.sensors = Sensors(self.sim, terrain, task, self.gait.averaging_time, scan=scan)
-        self.pushes = Pushes(task.domain_rand, n, task.dt)
-        mass = float(self.scene.model.body_subtreemass[self.scene.base])
-        self.obs_terms = {
-            "policy": observations.policy_group(robot, task, scan=scan),
-            "privileged": observations.privileged_group(robot, task, scan=scan, weight=9.81 * mass),
-        }
-        self.params = sample_params(self.rng, n, self.sim, task.domain_rand)
-        apply_params(self.sim, self.params)
         self.curriculum = TerrainCurriculum(terrain, n, task.terrain, task.runner.seed)
+        self.buffers: dict[str, NDArray[Any]] = {}
+        """Arrays that own terms keep between steps, which a checkpoint has."""
+        self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
+        self.sensors = Sensors(
+            self.sim, terrain, task, self.gait.averaging_time, scan=self.has_height_scan
+        )
+        self.push_vel = np.zeros((n, 3), np.float32)  # of this step, world frame [m/s]
+        self.steps_until_push = np.zeros(n, np.int64)
         self.episode_length_buf = torch.zeros(n, dtype=torch.int64)
         # rsl-rl starts the first episodes at random lengths; this counts the real steps.
         self.steps_since_reset = np.zeros(n, np.int64)
         self.path_length = np.zeros(n)  # since the last reset [m]
-        self.reward_terms = active_rewards(task.rewards, mass, robot.leg_length)
-        self.episode_sums = {name: np.zeros(n, np.float32) for name in self.reward_terms}
-        self.commands = self.velocity_command.commands  # a view of the current commands
 
         # A motor receives offset + scale * action; without a scale, there is no action.
         kind, scale = task.control.control_type, task.control.action_scale
@@ -82,19 +98,74 @@ class LeggedEnv(VecEnv):
         self.num_actions = len(self.action_joints)
         if not self.num_actions:
             raise ConfigError(f"action_scale of {robot.spec.name}: got 0 for every joint")
-        self.action_history = np.zeros((2, n, self.num_actions), np.float32)  # the newest first
+        self.action_history = np.zeros((3, n, self.num_actions), np.float32)  # the newest first
         self.joint_offset = np.zeros((n, len(robot.default_pose)), np.float32)
-        width = observations.history_width(robot, task, self.num_actions)
-        self.obs_history = np.zeros((n, width), np.float32)
         self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
         self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
+
+        self.active_commands = self.command_terms()
+        self.velocity_command = cast("VelocityCommand", self.active_commands["velocity"])
+        self.commands = self.velocity_command.values  # a view of the current commands
+        self.velocity_command.waypoints = self.waypoints = self._make_waypoints()
+        self.obs_terms = {
+            group: {
+                name: replace(each, function=checked("observation", name, each.function, (n, None)))
+                for name, each in terms.items()
+            }
+            for group, terms in self.observation_terms().items()
+        }
+        self.active_rewards = self._scaled_rewards()
+        self.episode_sums = {name: np.zeros(n, np.float32) for name in self.active_rewards}
+        self.active_terminations = [
+            checked("termination", *each, (n,)) for each in self.termination_terms().items()
+        ]
+        self.active_events = self.event_terms()
+        self._call_events("startup")
         self.reset()
+
+    def command_terms(self) -> dict[str, CommandTerm]:
+        """Return the commands by name: `velocity`, and your own ones."""
+        cfg, is_map = self.cfg.commands, not self.terrain.is_plane
+        heading = is_map if cfg.heading_command is None else cfg.heading_command
+        return {
+            "velocity": VelocityCommand(cfg, self.num_envs, self.cfg.dt, heading_command=heading)
+        }
+
+    def observation_terms(self) -> dict[str, dict[str, ObservationTerm]]:
+        """Return the terms of each observation group: `policy`, with noise, and `privileged`."""
+        return {
+            "policy": observations.policy_terms(self),
+            "privileged": observations.privileged_terms(self),
+        }
+
+    def reward_terms(self) -> dict[str, Reward]:
+        """Return the reward terms, whose scales are the fields of these names in the task."""
+        return dict(REWARDS)
+
+    def termination_terms(self) -> dict[str, Callable[["LeggedEnv"], BoolArray]]:
+        """Return the conditions that end an episode as a fall."""
+        return dict(TERMINATIONS)
+
+    def event_terms(self) -> dict[str, EventTerm]:
+        """Return the events, in the order in which they happen."""
+        return dict(EVENTS)
+
+    @property
+    def joint_units(self) -> tuple[str, ...]:
+        """Unit of each joint's position."""
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        types = (self.scene.model.joint(name).type[0] for name in self.robot.spec.joint_order)
+        return tuple("m" if each == slide else "rad" for each in types)
+
+    @property
+    def unwrapped(self) -> "LeggedEnv":
+        """Return the environment itself, whose `step_dt` rsl-rl's RND reads."""
+        return self
 
     @cached_property
     def mirror_maps(self) -> MirrorMaps:
         """Left-right symmetry of observations and actions."""
-        robot, scene, scale = self.robot, self.scene, self.action_scale
-        return mirror_maps(robot, scene, scale, self.obs_terms, self.state, self.cfg.terrain)
+        return mirror_maps(self)
 
     @property
     def obs_sizes(self) -> dict[str, int]:
@@ -116,13 +187,16 @@ class LeggedEnv(VecEnv):
         self._apply_actions(actions)
         if size := self.obs_history.shape[1]:  # the newest observation comes first
             self.obs_history = self.get_observations()["policy"].numpy(force=True)[:, :size]
-        self.pushes.apply(self.rng, self.sim.qvel)
+        self._call_events("step")
         unstable = self.sim.step(self.cfg.control.decimation)
         self.episode_length_buf += 1
         self.steps_since_reset += 1
-        self.sensors.last_dof_vel[unstable] = 0  # MuJoCo reset the state: no acceleration
-        self.state = state = self._compute_state(np.arange(self.num_envs), unstable)
-        rewards = self._compute_rewards(state, unstable)
+        self.state = state = self._compute_state(slice(None), self.state)
+        state.dof_acc[unstable] = 0  # MuJoCo reset the state
+        state.fallen[:] = unstable
+        for termination in self.active_terminations:
+            state.fallen[:] |= termination(self)
+        rewards = self._compute_rewards(unstable)
         self.path_length += np.hypot(*state.base_lin_vel[:, :2].T) * self.cfg.dt
         time_out = self.episode_length_buf.numpy() >= self.max_episode_length
         if self.waypoints and self.velocity_command.fixed is None:
@@ -136,21 +210,20 @@ class LeggedEnv(VecEnv):
         if len(env_ids):
             extras["log"] = self._end_episodes(env_ids, state, unstable)
             self._reset_idx(env_ids)
-        self.velocity_command.resample_due(self.rng, self.steps_since_reset)
-        self._update_velocity_command()
-        if len(env_ids):
-            state.update(env_ids, self._compute_state(env_ids, after_reset=True))
-        self._update_command_state()
+            state.update(env_ids, self._compute_state(env_ids))
+        for command in self.active_commands.values():
+            command.resample_due(self.rng, self.steps_since_reset)
+        self._update_commands()
         self._compute_observations()
         rewards_tensor = torch.from_numpy(rewards).to(self.device)
         return self._observations, rewards_tensor, torch.from_numpy(done).to(self.device), extras
 
     def reset(self) -> None:
         """Reset every environment."""
-        env_ids = np.arange(self.num_envs)
-        self._reset_idx(env_ids)
-        self._update_velocity_command()
-        self.state = self._compute_state(env_ids, after_reset=True)
+        self._reset_idx(np.arange(self.num_envs))
+        self.state = self._compute_state(slice(None))
+        self._reset_history()
+        self._update_commands()
         self._compute_observations()
 
     def set_commands(self, commands: FloatArray | None) -> None:
@@ -165,8 +238,7 @@ class LeggedEnv(VecEnv):
         self.velocity_command.fixed = commands
         if commands is None:
             self.velocity_command.resample(self.rng, np.arange(self.num_envs))
-        self._update_velocity_command()
-        self._update_command_state()
+        self._update_commands()
         self._compute_observations()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
@@ -196,26 +268,12 @@ class LeggedEnv(VecEnv):
         np.clip(array, -clip, clip, out=self.action_history[0])
         self.sim.ctrl[:] = self.to_ctrl(self.action_history[0])
 
-    def _compute_state(
-        self, env_ids: Ids, unstable: BoolArray | None = None, *, after_reset: bool = False
-    ) -> State:
-        """Return the state of the given environments; after a reset, there are no contacts."""
-        rows: Any = slice(None) if len(env_ids) == self.num_envs else env_ids
-        measured = self.sensors.read(rows, after_reset=after_reset)
-        if unstable is not None:
-            measured["fallen"] |= unstable
-        return State(
-            **measured,
-            actions=self.action_history[0, rows].copy(),
-            last_actions=self.action_history[1, rows].copy(),
-            **self._command_state(rows),
-            push_vel=self.pushes.velocity[rows].copy(),
-            friction=self.params.friction[rows].copy(),
-            added_mass=self.params.added_mass[rows].copy(),
-            com_shift=self.params.com_shift[rows].copy(),
-            joint_offset=self.joint_offset[rows].copy(),
-            history=self.obs_history[rows].copy(),
-        )
+    def _compute_state(self, rows: Any, last: State | None = None) -> State:
+        """Return the state of some environments; without the `last` one, after a reset."""
+        history = self.action_history[:, rows].copy()
+        names = "actions", "last_actions", "last_last_actions"
+        actions: dict[str, Any] = dict(zip(names, history, strict=True))
+        return State(**self.sensors.read(rows, last), **actions, **self._command_state(rows))
 
     def _command_state(self, rows: Any) -> dict[str, Any]:
         """Return the fields of `State` that depend on the commands."""
@@ -223,22 +281,24 @@ class LeggedEnv(VecEnv):
         gait_phase, swing_phase = self.gait.phases(time, is_moving(commands))
         return {"commands": commands, "gait_phase": gait_phase, "swing_phase": swing_phase}
 
-    def _update_command_state(self) -> None:
-        """Write the current commands into the state."""
+    def _update_commands(self) -> None:
+        """Let commands follow headings and waypoints, and write them into the state."""
+        position = self.sim.qpos[:, :2].astype(np.float32)
+        self.velocity_command.update(self._yaw(), position)
         for name, values in self._command_state(slice(None)).items():
             np.copyto(getattr(self.state, name), values)
 
-    def _compute_rewards(self, state: State, unstable: BoolArray) -> FloatArray:
+    def _compute_rewards(self, unstable: BoolArray) -> FloatArray:
         """Return the rewards of a step, shape (n,), and add them to the episode sums.
 
         MuJoCo reset the unstable simulations, so only their termination reward counts.
         """
-        settings, dt = self.cfg.rewards, np.float32(self.cfg.dt)
+        dt = np.float32(self.cfg.dt)
         total = np.zeros(self.num_envs, np.float32)
         termination = np.zeros_like(total)
-        for name, (function, scale) in self.reward_terms.items():
+        for name, (function, scale) in self.active_rewards.items():
             # Scales are per second, so that they do not depend on the control frequency.
-            term = function(state, self.robot, settings) * np.float32(scale) * dt
+            term = function(self) * np.float32(scale) * dt
             if name == "termination":
                 termination += term
             else:
@@ -247,11 +307,42 @@ class LeggedEnv(VecEnv):
             self.episode_sums[name] += term
         return total + termination
 
+    def _scaled_rewards(self) -> dict[str, tuple[Reward, float]]:
+        """Return each reward term with a scale other than 0, and that scale in SI units."""
+        terms, own = self.reward_terms(), type(self.cfg.rewards).__name__
+        for name in terms.keys() - vars(self.cfg.rewards).keys():
+            raise ConfigError(f"reward {name}: {own} has no field {name}; expected its scale")
+        scales = reward_scales(self.cfg.rewards, self.mass, self.robot.leg_length)
+        return {
+            name: (checked("reward", name, function, (self.num_envs,)), scales[name])
+            for name, function in terms.items()
+            if name in scales
+        }
+
+    def _reset_history(self) -> None:
+        """Make the history of the policy: the previous observations of the terms before it."""
+        terms = self.obs_terms["policy"]
+        names = [*terms][: [*terms].index("history")] if "history" in terms else []
+        width = sum(terms[name].function(self).shape[1] for name in names)
+        past = self.cfg.observations.history_length - 1
+        self.obs_history = np.zeros((self.num_envs, past * width), np.float32)
+
+    def _make_waypoints(self) -> Waypoints | None:
+        """Return the goals of the robots, if they are commanded to walk to them."""
+        cfg, goals = self.cfg.commands, self.terrain.goals
+        if cfg.waypoints and np.isnan(goals).all():
+            raise ConfigError(
+                "commands.waypoints: got a terrain without goals; expected a map with terrains "
+                "such as course, and not collision plane"
+            )
+        number = goals.shape[2]
+        return Waypoints.make(self.num_envs, number, cfg.waypoint_radius) if cfg.waypoints else None
+
     def _compute_observations(self) -> None:
-        clip, groups = self.cfg.normalization.clip_observations, {}
+        groups = {}
         for name, terms in self.obs_terms.items():
             rng = self.rng if name == "policy" else None  # noise for the policy only
-            values = observations.compute_observations(terms, self.state, clip, rng)
+            values = observations.compute_observations(self, terms, rng)
             groups[name] = torch.from_numpy(values)
         if past := self.cfg.observations.history_length - 1:
             # The history of a new episode repeats its first observation.
@@ -267,11 +358,16 @@ class LeggedEnv(VecEnv):
         rate = self.velocity_command.yaw_rate(progress.yaw.astype(np.float32))
         progress.update(pos, quat_to_yaw(state.base_quat), self.commands, rate, self.cfg.dt)
 
+    def _call_events(self, when: str, *arguments: Any) -> None:
+        """Call the functions of all events for `startup`, `reset` or `step`."""
+        for name, event in self.active_events.items():
+            if function := getattr(event, when):
+                is_own = not is_built_in(function)
+                with plugin_errors(f"event {name} ({function.__module__})" if is_own else None):
+                    function(self, *arguments)
+
     def _yaw(self) -> FloatArray:
         return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
-
-    def _update_velocity_command(self) -> None:
-        self.velocity_command.update(self._yaw(), self.sim.qpos[:, :2].astype(np.float32))
 
     def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
         """Update the curriculum at the end of episodes, and return the values to log."""
@@ -284,7 +380,7 @@ class LeggedEnv(VecEnv):
         log["Episode/speed"] = float((self.path_length[env_ids] / seconds).mean())
         # rsl-rl cuts the first episodes to random lengths, so their progress is not meaningful.
         complete = (self.episode_length_buf.numpy() == self.steps_since_reset)[env_ids]
-        left_map = terrain_out_of_bounds(state.base_pos, self.terrain) & ~unstable
+        left_map = terrain_out_of_bounds(self) & ~unstable
         progress = self.curriculum.progress.of_episodes(
             env_ids, fallen, self.terrain.patch_length / 2, left_map=left_map[env_ids]
         )
@@ -296,40 +392,27 @@ class LeggedEnv(VecEnv):
             progress = np.where(np.isnan(reached), progress, to_goals)
             if not np.isnan(reached).all():
                 log["Episode/goals_reached"] = float(np.nanmean(reached))
+        if "tracking_lin_vel" in self.active_rewards:
+            most = self.cfg.env.episode_length_s * self.active_rewards["tracking_lin_vel"][1]
+            tracking = self.episode_sums["tracking_lin_vel"][env_ids] / most
+            self.velocity_command.end_episodes(tracking)
         returns = np.sum([total[env_ids] for total in self.episode_sums.values()], axis=0)
         self.curriculum.sampler.update(env_ids[complete], progress[complete], returns[complete])
         return log if self.terrain.is_plane else log | self.curriculum.log()
 
     def _reset_idx(self, env_ids: Ids) -> None:
         """Start new episodes."""
-        origins, cfg = self.curriculum.env_origins[env_ids], self.cfg.init_state
-        qpos, qvel = sample_reset_state(
-            self.rng, origins, self.scene, self.robot, self.terrain, cfg
-        )
-        self.sim.reset(env_ids, qpos, qvel)
-        # Random joint positions may put a foot below the ground: raise the base.
-        x, y, z = np.moveaxis(self.sim.sensor("foot_position", env_ids), 2, 0)
-        depth = (self.terrain.height(x, y, z) + self.scene.sole_depth - z).max(axis=1)
-        if (depth > 0).any():
-            self.sim.qpos[env_ids, 2] += np.maximum(depth, 0)
-            self.sim.forward(env_ids)
-        self.curriculum.progress.reset(env_ids, qpos, self._yaw()[env_ids])
+        self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
+        self.path_length[env_ids] = self.action_history[:, env_ids] = 0
+        for total in self.episode_sums.values():
+            total[env_ids] = 0
+        self._call_events("reset", env_ids)
+        self.curriculum.progress.reset(env_ids, self.sim.qpos[env_ids], self._yaw()[env_ids])
         if self.waypoints:
             level, column = self.curriculum.levels[env_ids], self.curriculum.columns[env_ids]
             self.waypoints.reset(env_ids, self.terrain.goals[level, column, :, :2])
-        self.episode_length_buf[env_ids] = self.steps_since_reset[env_ids] = 0
-        self.path_length[env_ids] = self.action_history[:, env_ids] = 0
-        self.pushes.reset(self.rng, env_ids)
-        self.sensors.reset(env_ids)
-        limit, shape = self.cfg.domain_rand.joint_offset, (len(env_ids), self.joint_offset.shape[1])
-        self.joint_offset[env_ids] = self.rng.uniform(-limit, limit, shape)
-        if limits := self.cfg.domain_rand.action_delay:
-            delay = self.rng.uniform(*limits, len(env_ids))
-            ctrl = self.to_ctrl(self.action_history[0])[env_ids]
-            self.sim.reset_action_delay(env_ids, delay, ctrl)
-        for total in self.episode_sums.values():
-            total[env_ids] = 0
-        self.velocity_command.resample(self.rng, env_ids)
+        for command in self.active_commands.values():
+            command.resample(self.rng, env_ids)
 
     def state_dict(self) -> dict[str, Any]:
         """Return all mutable state, for an exact resume."""
@@ -359,7 +442,7 @@ class LeggedEnv(VecEnv):
             array[...] = saved[name].numpy()
         if self.waypoints and (self.waypoints.index > self.waypoints.numbers).any():
             largest = self.waypoints.index.max()
-            raise ConfigError(f"next_goal: got {largest}; expected no more than the robot has")
+            raise ConfigError(f"next goal: got {largest}; expected no more than the robot has")
         apply_params(self.sim, self.params)
         self.rng.bit_generator.state = state["rng"]
         groups = {name: state["observations"][name] for name in parts["observations"]}
@@ -368,26 +451,22 @@ class LeggedEnv(VecEnv):
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""
         # Names are checkpoint keys; renaming a field breaks resume.
-        names = "commands joint_offset steps_since_reset path_length"
+        names = "action_history joint_offset steps_since_reset path_length push_vel"
         arrays = {name: getattr(self, name) for name in names.split()} | {
-            "actions": self.action_history,
             "physics": self.sim.batch.state,
             "episode_length": self.episode_length_buf.numpy(),
-            "heading": self.velocity_command.heading,
-            "last_dof_vel": self.sensors.last_dof_vel,
-            "mean_vel": self.sensors.mean_vel,
-            "push_vel": self.pushes.velocity,
-            "steps_until_push": self.pushes.steps_until_push,
+            "steps_until_push": self.steps_until_push,
         }
-        arrays |= {f"progress_{k}": array for k, array in vars(self.curriculum.progress).items()}
-        sums = {f"rew_{name}": total for name, total in self.episode_sums.items()}
-        # Computing the state again would draw noise.
-        state = {f"state_{name}": array for name, array in vars(self.state).items()}
-        if not self.obs_history.size:
-            del state["state_history"]
-        if self.waypoints:
-            arrays |= {"goals": self.waypoints.goals, "next_goal": self.waypoints.index}
-            arrays["speed"] = self.velocity_command.speed
         if self.cfg.domain_rand.action_delay:
             arrays["action_delay"] = self.sim.batch.expand("actuator_delay")
-        return arrays | sums | state | vars(self.params)
+        # The state has means, accelerations and forces, which cannot be computed from the physics.
+        owners = {"state": self.state, "params": self.params, "waypoints": self.waypoints}
+        owners |= {"progress": self.curriculum.progress, **self.active_commands}
+        tables = {name: vars(owner) for name, owner in owners.items() if owner}
+        tables |= {"rewards": self.episode_sums, "buffers": self.buffers}
+        return arrays | {
+            f"{table}.{name}": each
+            for table, values in tables.items()
+            for name, each in values.items()
+            if isinstance(each, np.ndarray)
+        }

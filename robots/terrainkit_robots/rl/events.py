@@ -1,21 +1,35 @@
 """Events: reset states, pushes, and the parameters that differ between simulated robots."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.rl.config import DomainRand, InitState
-from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Ids, Simulation
-from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.env import LeggedEnv
 
 MAX_RESET_RELIEF = 0.06
 """Height range of the ground under a robot that is not reset exactly at its origin [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EventTerm:
+    """What happens to the robots besides their actions. Functions take the environment."""
+
+    startup: Callable[["LeggedEnv"], object] | None = None
+    """Called once, before the first episodes."""
+
+    reset: Callable[["LeggedEnv", Ids], object] | None = None
+    """Called with the environments whose episodes start, sorted, shape (k,)."""
+
+    step: Callable[["LeggedEnv"], object] | None = None
+    """Called before each step of the policy."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,11 +45,10 @@ class RandomizedParams:
     strength: FloatArray  # factor on all torques, shape (n, 1)
 
 
-def sample_params(
-    rng: np.random.Generator, num_envs: int, sim: Simulation, cfg: DomainRand
-) -> RandomizedParams:
-    """Sample the physical parameters of `num_envs` robots."""
-    joints, scene = sim.scene.model.nu, sim.scene
+def sample_params(env: "LeggedEnv") -> RandomizedParams:
+    """Sample the physical parameters of all robots."""
+    cfg, scene, num_envs, rng = env.cfg.domain_rand, env.scene, env.num_envs, env.rng
+    joints = scene.model.nu
     nominal = scene.model.geom_friction[scene.geoms, 0].astype(np.float32)
     mass = scene.model.body_subtreemass[scene.base].astype(np.float32)
 
@@ -91,78 +104,29 @@ def apply_params(sim: Simulation, params: RandomizedParams) -> None:
         batch.set_const()
 
 
-class Pushes:
-    """Velocity pushes at regular intervals; each robot has its own phase."""
-
-    def __init__(self, cfg: DomainRand, num_envs: int, dt: float) -> None:
-        self.velocity = np.zeros((num_envs, 3), np.float32)  # of this step, world frame [m/s]
-        self.steps_until_push = np.zeros(num_envs, np.int64)
-        self._interval = max(1, round(cfg.push_interval_s / dt))
-        self._max_vel = cfg.max_push_vel_xy if cfg.push_interval_s else 0.0
-
-    def reset(self, rng: np.random.Generator, env_ids: Ids) -> None:
-        """Sample when the first push of new episodes happens.
-
-        Args:
-            rng: Generator of the random numbers.
-            env_ids: Environments, shape (k,).
-        """
-        self.velocity[env_ids] = 0
-        if self._max_vel:
-            # Random phases, so that not all robots are pushed in the same step.
-            self.steps_until_push[env_ids] = rng.integers(1, self._interval + 1, len(env_ids))
-
-    def apply(self, rng: np.random.Generator, qvel: NDArray[np.float64]) -> None:
-        """Push the robots that are due.
-
-        Args:
-            rng: Generator of the random numbers.
-            qvel: Velocities of all robots, shape (n, nv), to which the pushes are added.
-        """
-        self.velocity[:] = 0
-        if not self._max_vel:
-            return
-        self.steps_until_push -= 1
-        env_ids = np.flatnonzero(self.steps_until_push <= 0)
-        self.steps_until_push[env_ids] = self._interval
-        self.velocity[env_ids, :2] = rng.uniform(-self._max_vel, self._max_vel, (len(env_ids), 2))
-        qvel[:, :2] += self.velocity[:, :2]
+def randomize_params(env: "LeggedEnv") -> None:
+    """Sample the physical parameters of all robots."""
+    env.params = sample_params(env)
+    apply_params(env.sim, env.params)
 
 
-def sample_reset_state(
-    rng: np.random.Generator,
-    env_origins: FloatArray,
-    scene: Scene,
-    robot: Robot,
-    terrain: Ground,
-    cfg: InitState,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sample the state of robots at a reset.
+def reset_state(env: "LeggedEnv", env_ids: Ids) -> None:
+    """Put robots at their spawn origins, in a random state with the feet above the ground.
 
     Where the ground beside an origin is uneven, the sampled offset is halved, and then dropped.
-
-    Args:
-        rng: Generator of the random numbers.
-        env_origins: Spawn origin of each robot [m], shape (k, 3).
-        scene: The scene.
-        robot: The robot.
-        terrain: The ground.
-        cfg: Ranges of the state.
-
-    Returns:
-        Positions `qpos`, shape (k, nq), and velocities `qvel`, shape (k, nv).
     """
-    count, limit = len(env_origins), cfg.position
-    qpos = np.tile(scene.default_qpos, (count, 1))
-    offset = rng.uniform(-limit, limit, (count, 2)).astype(np.float32)
+    cfg, scene, robot, rng, count = env.cfg.init_state, env.scene, env.robot, env.rng, len(env_ids)
+    origins = env.curriculum.env_origins[env_ids]
+    qpos, qvel = np.tile(scene.default_qpos, (count, 1)), np.zeros((count, scene.model.nv))
+    offset = rng.uniform(-cfg.position, cfg.position, (count, 2)).astype(np.float32)
     # Points that cover the area of the feet at any heading.
     radius = 0.5 * max(robot.leg_length, robot.spec.stance_width or 0.2)
     circle = np.exp(0.25j * np.pi * np.arange(8))
     rings = radius * np.concatenate([[0], circle / 2, circle])
     ring_x, ring_y = rings.real.astype(np.float32), rings.imag.astype(np.float32)
     for factor in (0.5, 0.0, 1.0):  # the last pass only measures the origin
-        x, y = (env_origins[:, :2] + offset).T
-        height = terrain.height(x[:, None] + ring_x, y[:, None] + ring_y, env_origins[:, 2:])
+        x, y = (origins[:, :2] + offset).T
+        height = env.terrain.height(x[:, None] + ring_x, y[:, None] + ring_y, origins[:, 2:])
         highest = height.max(axis=1)
         uneven = highest - height.min(axis=1) > MAX_RESET_RELIEF
         if not uneven.any():
@@ -170,7 +134,7 @@ def sample_reset_state(
         # Half of the offset first, then none, so that robots start near the origin only where they
         # have to.
         offset[uneven] *= factor
-    qpos[:, :2] = env_origins[:, :2] + offset
+    qpos[:, :2] = origins[:, :2] + offset
     qpos[:, 2] = highest + robot.spawn_height
     yaw = rng.uniform(-cfg.yaw, cfg.yaw, count)
     # The quaternion of a rotation about z.
@@ -178,7 +142,62 @@ def sample_reset_state(
     low, high = cfg.reset_range or robot.spec.reset_range
     factors = rng.uniform(low, high, (count, len(robot.default_pose)))
     qpos[:, scene.joint_qpos] = np.clip(robot.default_pose * factors, robot.lower, robot.upper)
-    qvel = np.zeros((count, scene.model.nv))
     qvel[:, :3] = rng.uniform(-cfg.lin_vel, cfg.lin_vel, (count, 3))
     qvel[:, 3:6] = rng.uniform(-cfg.ang_vel, cfg.ang_vel, (count, 3))
-    return qpos, qvel
+    env.sim.reset(env_ids, qpos, qvel)
+    # Random joint positions may put a foot below the ground: raise the base.
+    x, y, z = np.moveaxis(env.sim.sensor("foot_position", env_ids), 2, 0)
+    depth = (env.terrain.height(x, y, z) + scene.sole_depth - z).max(axis=1)
+    if (depth > 0).any():
+        env.sim.qpos[env_ids, 2] += np.maximum(depth, 0)
+        env.sim.forward(env_ids)
+
+
+def reset_push(env: "LeggedEnv", env_ids: Ids) -> None:
+    """Sample when the first push of new episodes happens."""
+    env.push_vel[env_ids] = 0
+    # Random phases, so that not all robots are pushed in the same step.
+    if interval := push_interval(env):
+        env.steps_until_push[env_ids] = env.rng.integers(1, interval + 1, len(env_ids))
+
+
+def push(env: "LeggedEnv") -> None:
+    """Add a velocity to the robots that are due, at regular intervals."""
+    env.push_vel[:] = 0
+    if interval := push_interval(env):
+        limit = env.cfg.domain_rand.max_push_vel_xy
+        env.steps_until_push -= 1
+        env_ids = np.flatnonzero(env.steps_until_push <= 0)
+        env.steps_until_push[env_ids] = interval
+        env.push_vel[env_ids, :2] = env.rng.uniform(-limit, limit, (len(env_ids), 2))
+        env.sim.qvel[:, :2] += env.push_vel[:, :2]
+
+
+def push_interval(env: "LeggedEnv") -> int:
+    """Return the steps between two pushes; 0 for no pushes."""
+    cfg = env.cfg.domain_rand
+    is_pushed = cfg.push_interval_s and cfg.max_push_vel_xy
+    return max(1, round(cfg.push_interval_s / env.cfg.dt)) if is_pushed else 0
+
+
+def reset_joint_offset(env: "LeggedEnv", env_ids: Ids) -> None:
+    """Sample the zero offset of each joint."""
+    limit, shape = env.cfg.domain_rand.joint_offset, env.joint_offset[env_ids].shape
+    env.joint_offset[env_ids] = env.rng.uniform(-limit, limit, shape)
+
+
+def reset_action_delay(env: "LeggedEnv", env_ids: Ids) -> None:
+    """Sample the delay of the actions."""
+    if limits := env.cfg.domain_rand.action_delay:
+        delay = env.rng.uniform(*limits, len(env_ids))
+        env.sim.reset_action_delay(env_ids, delay, env.to_ctrl(env.action_history[0])[env_ids])
+
+
+EVENTS = {
+    "params": EventTerm(startup=randomize_params),
+    "state": EventTerm(reset=reset_state),
+    "push": EventTerm(reset=reset_push, step=push),
+    "joint_offset": EventTerm(reset=reset_joint_offset),
+    "action_delay": EventTerm(reset=reset_action_delay),
+}
+"""Every event of a task by name, in the order in which they happen."""

@@ -4,49 +4,75 @@ The policy group is what a real robot can measure, with noise. The privileged gr
 terms without noise, and terms that only a simulation has. Exported policies use this order.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.state import State
-from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray, quat_rotate_inverse
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.env import LeggedEnv
 
 HEIGHT_SCAN_OFFSET = 0.5
 """Base height above the ground that is observed as 0 [m], as in legged_gym."""
 
-
-Symmetry = Literal[
-    "scalar",
-    "vector",
-    "axial",
-    "command",
-    "joints",
-    "actions",
-    "feet",
-    "contacts",
-    "scan",
-    "phase",
-    "history",
-]
+Symmetry = (
+    Literal["scalar", "vector", "axial", "command", "joints", "actions", "feet", "contacts"]
+    | Literal["scan", "phase", "history"]
+)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class SignedPermutation:
+    """Maps w numbers: number k of the result is `sign[k]` times number `index[k]`."""
+
+    index: NDArray[np.int64]
+    sign: FloatArray
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Return the mirrored values, shape (n, w)."""
+        return values[:, self.index] * self.sign
+
+
+@dataclass(frozen=True, eq=False)
 class ObservationTerm:
-    """One term of an observation group."""
+    """One term of an observation group: (clip(value - offset, *clip) + noise) * scale."""
 
-    name: str  # in logs and exports
-    function: Callable[[State], FloatArray]  # computes the term, shape (n, width)
-    symmetry: Symmetry = "scalar"  # how it transforms when left and right are swapped
-    scale: tuple[float, ...] | float = 1.0  # scale factor, or one per number
-    noise: float = 0.0  # half range of the uniform noise, added before scaling
+    function: Callable[["LeggedEnv"], FloatArray]
+    """Returns the value of each environment, shape (n, width)."""
+
+    symmetry: Symmetry | SignedPermutation = "scalar"
+    """How the value transforms when left and right are swapped: as a quantity of that kind, or by
+    a permutation and signs of its numbers."""
+
+    scale: tuple[float, ...] | float = 1.0
+    """Scale factor, or one per number."""
+
+    noise: float = 0.0
+    """Half range of the uniform noise on the policy's group, before scaling; `noise.noise_level` of
+    the task is a factor on it."""
+
+    offset: FloatArray | float = 0.0
+    """Value that is observed as 0."""
+
+    clip: tuple[float, float] | None = None
+    """Limits of the value minus the offset."""
+
+    unit: str | tuple[str, ...] = "1"
+    """Unit of the value, or of each number, for the description of exported policies."""
+
+    def value(self, env: "LeggedEnv") -> FloatArray:
+        """Return the values minus the offset, clipped, shape (n, width)."""
+        value = self.function(env) - self.offset
+        return value if self.clip is None else np.clip(value, *self.clip)
 
 
-ObsTerms = Mapping[str, Sequence[ObservationTerm]]
-"""The terms of each observation group by its name."""
+ObsTerms = Mapping[str, Mapping[str, ObservationTerm]]
+"""The terms of each observation group by name."""
 
 
 def uses_height_scan(task: Task, *, is_plane: bool) -> bool:
@@ -55,107 +81,111 @@ def uses_height_scan(task: Task, *, is_plane: bool) -> bool:
     return not is_plane if setting is None else setting
 
 
-def observes_lin_vel(robot: Robot, task: Task) -> bool:
-    """Return whether the policy observes its linear velocity; the default is True on two legs."""
-    setting = task.observations.base_lin_vel
-    return len(robot.spec.feet) == 2 if setting is None else setting
-
-
-def policy_group(robot: Robot, task: Task, *, scan: bool) -> tuple[ObservationTerm, ...]:
+def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     """Return the policy's terms: 47 numbers for a quadruped; a height scan adds 187."""
-    term, scales = ObservationTerm, task.normalization.obs_scales
-    noise = {key: task.noise.noise_level * value for key, value in vars(task.noise).items()}
+    robot, options, term = env.robot, env.cfg.observations, ObservationTerm
+    scales, noise, units = env.cfg.normalization.obs_scales, env.cfg.noise, env.joint_units
     command_scale = (scales.lin_vel, scales.lin_vel, scales.ang_vel)
     # The angle of a wheel grows without bound and carries no information.
     dof_pos_scale = tuple(np.where(robot.wheels, 0.0, scales.dof_pos).tolist())
+    dof_vel_unit = tuple(f"{unit}/s" for unit in units)
+    terms = {
+        "commands": term(
+            lambda env: env.state.commands, "command", command_scale, unit=("m/s", "m/s", "rad/s")
+        ),
+        "projected_gravity": term(
+            lambda env: env.state.projected_gravity, "vector", noise=noise.gravity
+        ),
+        "base_ang_vel": term(
+            lambda env: env.state.base_ang_vel, "axial", scales.ang_vel, noise.ang_vel, unit="rad/s"
+        ),
+        "dof_pos": term(
+            lambda env: env.state.dof_pos + env.joint_offset,
+            "joints",
+            dof_pos_scale,
+            noise.dof_pos,
+            offset=robot.default_pose,
+            unit=units,
+        ),
+        "dof_vel": term(
+            lambda env: env.state.dof_vel,
+            "joints",
+            scales.dof_vel,
+            noise.dof_vel,
+            unit=dof_vel_unit,
+        ),
+        "actions": term(lambda env: env.state.actions, "actions"),
+    }
+    if env.cfg.commands.gait_period != 0:
+        terms["gait_phase"] = term(lambda env: env.state.gait_phase, "phase")
+    has_lin_vel = options.base_lin_vel
+    if len(robot.spec.feet) == 2 if has_lin_vel is None else has_lin_vel:
+        terms["base_lin_vel"] = term(
+            lambda env: env.state.base_lin_vel, "vector", scales.lin_vel, noise.lin_vel, unit="m/s"
+        )
+    if options.foot_contact:
+        terms["foot_contact"] = term(lambda env: env.state.foot_contact.astype("f4"), "contacts")
+    if options.history_length > 1:
+        terms["history"] = term(lambda env: env.obs_history, "history")
+    if env.has_height_scan:
+        terms["height_scan"] = term(
+            lambda env: env.state.height_scan,
+            "scan",
+            scales.height_measurements,
+            noise.height_measurements,
+            offset=HEIGHT_SCAN_OFFSET,
+            clip=(-1.0, 1.0),  # as in legged_gym
+            unit="m",
+        )
+    return terms
 
-    def dof_pos(state: State) -> FloatArray:
-        return state.dof_pos + state.joint_offset - robot.default_pose
 
-    def height_scan(state: State) -> FloatArray:
-        # Clipped at 1 m, as in legged_gym.
-        return np.clip(state.height_scan - np.float32(HEIGHT_SCAN_OFFSET), -1, 1)
-
-    group: tuple[ObservationTerm, ...] = (
-        term("commands", lambda s: s.commands, "command", command_scale),
-        term("projected_gravity", lambda s: s.projected_gravity, "vector", 1.0, noise["gravity"]),
-        term("base_ang_vel", lambda s: s.base_ang_vel, "axial", scales.ang_vel, noise["ang_vel"]),
-        term("dof_pos", dof_pos, "joints", dof_pos_scale, noise["dof_pos"]),
-        term("dof_vel", lambda s: s.dof_vel, "joints", scales.dof_vel, noise["dof_vel"]),
-        term("actions", lambda s: s.actions, "actions"),
-    )
-    if task.commands.gait_period != 0:
-        group += (term("gait_phase", lambda s: s.gait_phase, "phase"),)
-    if observes_lin_vel(robot, task):
-        scale, uniform = scales.lin_vel, noise["lin_vel"]
-        group += (term("base_lin_vel", lambda s: s.base_lin_vel, "vector", scale, uniform),)
-    if task.observations.foot_contact:
-        group += (term("foot_contact", lambda s: s.foot_contact.astype("f4"), "contacts"),)
-    if task.observations.history_length > 1:
-        group += (term("history", lambda s: s.history, "history"),)
-    scan_scale, scan_noise = scales.height_measurements, noise["height_measurements"]
-    scan_term = term("height_scan", height_scan, "scan", scan_scale, scan_noise)
-    return (*group, scan_term) if scan else group
+def privileged_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
+    """Return the critic's terms; contact forces are in units of the robot's weight."""
+    term, scale = ObservationTerm, env.cfg.normalization.obs_scales.lin_vel
+    # Of the policy's terms, the linear velocity comes last.
+    known = {k: v for k, v in policy_terms(env).items() if k not in ("base_lin_vel", "history")}
+    return known | {
+        "base_lin_vel": term(lambda env: env.state.base_lin_vel, "vector", scale),
+        "mean_vel": term(lambda env: env.state.mean_vel, "command"),
+        "friction": term(lambda env: env.params.friction),
+        "added_mass": term(lambda env: env.params.added_mass),
+        "com_shift": term(lambda env: env.params.com_shift, "vector", 10),
+        "joint_offset": term(lambda env: env.joint_offset, "joints"),
+        "push_vel": term(_push_vel, "vector"),
+        "foot_force": term(_foot_force, "feet", 1 / (9.81 * env.mass)),
+    }
 
 
-def history_width(robot: Robot, task: Task, num_actions: int) -> int:
-    """Return the size of the history: the previous observations, without the height scan."""
-    widths = {"command": 3, "vector": 3, "axial": 3, "phase": 2, "actions": num_actions}
-    widths |= {"joints": len(robot.default_pose), "contacts": len(robot.spec.feet), "history": 0}
-    total = sum(widths[term.symmetry] for term in policy_group(robot, task, scan=False))
-    return (task.observations.history_length - 1) * total
+def _push_vel(env: "LeggedEnv") -> FloatArray:
+    return quat_rotate_inverse(env.state.base_quat, env.push_vel)
 
 
-def privileged_group(
-    robot: Robot, task: Task, *, scan: bool, weight: float
-) -> tuple[ObservationTerm, ...]:
-    """Return the critic's terms; contact forces are in units of the robot's `weight` [N]."""
-
-    def push_vel(state: State) -> FloatArray:
-        return quat_rotate_inverse(state.base_quat, state.push_vel)
-
-    def foot_force(state: State) -> FloatArray:
-        n, feet, _ = state.foot_force.shape
-        quat = np.repeat(state.base_quat, feet, axis=0)
-        return quat_rotate_inverse(quat, state.foot_force.reshape(-1, 3)).reshape(n, -1)
-
-    term, lin_vel_scale = ObservationTerm, task.normalization.obs_scales.lin_vel
-    of_policy = policy_group(robot, task, scan=scan)
-    known = "base_lin_vel", "history"  # the former is below
-    return (
-        *(replace(each, noise=0.0) for each in of_policy if each.name not in known),
-        term("base_lin_vel", lambda s: s.base_lin_vel, "vector", lin_vel_scale),
-        term("mean_vel", lambda s: s.mean_vel, "command"),
-        term("friction", lambda s: s.friction),
-        term("added_mass", lambda s: s.added_mass),
-        term("com_shift", lambda s: s.com_shift, "vector", 10),
-        term("joint_offset", lambda s: s.joint_offset, "joints"),
-        term("push_vel", push_vel, "vector"),
-        term("foot_force", foot_force, "feet", 1 / weight),
-    )
+def _foot_force(env: "LeggedEnv") -> FloatArray:
+    n, feet, _ = env.state.foot_force.shape
+    quat = np.repeat(env.state.base_quat, feet, axis=0)
+    return quat_rotate_inverse(quat, env.state.foot_force.reshape(-1, 3)).reshape(n, -1)
 
 
 def compute_observations(
-    group: Sequence[ObservationTerm],
-    state: State,
-    clip: float,
-    rng: np.random.Generator | None = None,
+    env: "LeggedEnv", terms: Mapping[str, ObservationTerm], rng: np.random.Generator | None = None
 ) -> FloatArray:
     """Return the observations of a group.
 
     Args:
-        group: Terms of the group.
-        state: State of n robots.
-        clip: Largest magnitude of an observation.
+        env: The environment.
+        terms: Terms of the group by name.
         rng: Generator of the noise; None for no noise.
 
     Returns:
         Observations, shape (n, width).
     """
-    values = [term.function(state) for term in group]
+    group, clip = terms.values(), env.cfg.normalization.clip_observations
+    values = [term.value(env) for term in group]
     widths = [value.shape[1] for value in values]
     observations = np.concatenate(values, axis=1, dtype=np.float32)
-    noise = np.repeat([term.noise for term in group], widths).astype(np.float32)
+    level = env.cfg.noise.noise_level
+    noise = np.repeat([level * term.noise for term in group], widths).astype(np.float32)
     if rng is not None and noise.any():
         noisy = np.flatnonzero(noise)
         start, stop = noisy[0], noisy[-1] + 1  # one block is faster than single columns

@@ -1,22 +1,24 @@
 """Reward terms of legged_gym (Rudin et al., Learning to Walk in Minutes, 2021), and of a gait.
 
-Each takes the state of n robots and returns n numbers, before the scale and the time step. Scales
-are dimensionless: they fit robots of any size, since a term is divided by its unit in `UNITS`. The
-gait follows Siekmann et al., Sim-to-Real Learning of All Common Bipedal Gaits via Periodic Reward
-Composition, 2021: each foot has a phase, in which it should be in the air or on the ground.
+Each takes the environment and returns a number per robot, before the scale and the time step. Its
+scale is the field of the same name in the task's `rewards`. Scales are dimensionless: they fit
+robots of any size, since a term is divided by its unit in `UNITS`. The gait follows Siekmann et
+al., Sim-to-Real Learning of All Common Bipedal Gaits via Periodic Reward Composition, 2021: each
+foot has a phase, in which it should be in the air or on the ground.
 """
 
 from collections.abc import Callable
-from functools import partial
+from dataclasses import fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, is_built_in, plugin_errors
 from terrainkit_robots.rl.config import Rewards
-from terrainkit_robots.rl.state import State
-from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.env import LeggedEnv
 
 MIN_YAW_RATE = 0.1
 """Yaw rate from which a command counts as moving [rad/s]: heading control never reaches 0."""
@@ -36,6 +38,12 @@ MAX_SWING_HEIGHT = 0.09
 LEVEL_SIN2 = 0.01
 """Squared sine of the tilt at which `upright` is exp(-1)."""
 
+MIN_AIR_TIME = 0.5
+"""Duration of a swing that `feet_air_time` neither rewards nor penalizes [s], as in legged_gym."""
+
+CLEARANCE_SIGMA = 0.01
+"""Squared error times velocity at which `foot_clearance` is exp(-1) [m3/s]; of LeggedGym-Ex."""
+
 UNITS = {
     "base_height": (0, 2, 0),
     "lin_vel_z": (0, 2, -2),
@@ -43,52 +51,27 @@ UNITS = {
     "foot_slip": (0, 2, -2),
     "torques": (2, 4, -4),
     "dof_acc": (0, 0, -4),
+    "dof_vel": (0, 0, -2),
+    "dof_power": (1, 2, -3),
+    "feet_air_time": (0, 0, 1),
 }
 """Powers of the robot's mass, its leg length, and sqrt(leg length / g), by term."""
 
-Reward = Callable[[State, Robot, Rewards], FloatArray]
-
-REWARDS: dict[str, Reward] = {}
-"""Every reward term by name."""
+Reward = Callable[["LeggedEnv"], FloatArray]
 
 
-def reward(function: Reward) -> Reward:
-    """Register a reward term; its scale is the field of the same name in the task's `rewards`."""
-    REWARDS[function.__name__] = function
-    return function
-
-
-def active_rewards(cfg: Rewards, mass: float, leg_length: float) -> dict[str, tuple[Reward, float]]:
-    """Return each term with a scale other than 0, and that scale in SI units.
+def reward_scales(rewards: Rewards, mass: float, leg_length: float) -> dict[str, float]:
+    """Return the scale in SI units of each term whose scale is not 0.
 
     Args:
-        cfg: Scales and parameters of the rewards.
+        rewards: Scales and parameters of the rewards.
         mass: Mass of the robot [kg].
         leg_length: Length of a leg [m].
-
-    Raises:
-        PluginError: if the scale of a term of another package is not a number.
     """
     # Froude scaling: robots of different sizes that move alike have equal rewards in these units.
     time = np.sqrt(leg_length / 9.81)
     units = {k: mass**a * leg_length**b * time**c for k, (a, b, c) in UNITS.items()}
-    terms = {}
-    for name, function in REWARDS.items():
-        plugin = None if is_built_in(function) else f"reward {name} ({function.__module__})"
-        with plugin_errors(plugin):
-            scale = float(getattr(cfg, name, 0.0)) / units.get(name, 1.0)
-        if scale:
-            terms[name] = partial(_checked, plugin, function) if plugin else function, scale
-    return terms
-
-
-def _checked(plugin: str, function: Reward, state: State, robot: Robot, cfg: Rewards) -> FloatArray:
-    """Return the values of a term of another package, after checking their type and shape."""
-    with plugin_errors(plugin):
-        values = np.asarray(function(state, robot, cfg)).astype(np.float32, casting="same_kind")
-        if values.shape != (shape := (len(state.commands),)):
-            raise ConfigError(f"got shape {values.shape}; expected {shape}")
-        return values
+    return {k: scale / units.get(k, 1.0) for k, scale in vars(rewards).items() if scale}
 
 
 def _sum_squares(values: FloatArray) -> FloatArray:
@@ -107,7 +90,7 @@ def is_moving(commands: FloatArray) -> NDArray[np.bool_]:
     return (commands[:, :2] != 0).any(axis=1) | (np.abs(commands[:, 2]) >= MIN_YAW_RATE)
 
 
-def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
+def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     """Return how well linear and yaw velocity are tracked, 0 to 1.
 
     On two legs, velocities are averaged over the gait: the sway is larger than small commands.
@@ -115,14 +98,14 @@ def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     commanded, the reward of the other one is multiplied by the tracking of the commanded velocity,
     so that standing still does not earn it.
     """
-    commands = state.commands
-    squared = np.square(commands - state.mean_vel)
+    commands = env.state.commands
+    squared = np.square(commands - env.state.mean_vel)
     errors = squared[:, :2].sum(axis=1), squared[:, 2]
     squares = _sum_squares(commands[:, :2]), np.square(commands[:, 2])
     # A robot that stands still has the squared error s, the squared command. With a width of
     # -s / log(0.25), its reward exp(-s / width) is 0.25 for any command.
     log_standing = np.float32(np.log(STANDING_TRACKING))
-    width_at_rest = np.float32(cfg.tracking_sigma)
+    width_at_rest = np.float32(env.cfg.rewards.tracking_sigma)
     widths = (np.where(s > 0, -s / log_standing, width_at_rest) for s in squares)
     lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
     moving = is_moving(commands)
@@ -130,115 +113,148 @@ def _tracking(state: State, cfg: Rewards) -> tuple[FloatArray, FloatArray]:
     return lin * np.where(only_yaw, yaw, 1), yaw * np.where(only_lin, lin, 1)
 
 
-@reward
-def tracking_lin_vel(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def tracking_lin_vel(env: "LeggedEnv") -> FloatArray:
     """Reward tracking of the linear velocity command, 0 to 1."""
-    return _tracking(state, cfg)[0]
+    return _tracking(env)[0]
 
 
-@reward
-def tracking_ang_vel(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def tracking_ang_vel(env: "LeggedEnv") -> FloatArray:
     """Reward tracking of the yaw rate command, 0 to 1."""
-    return _tracking(state, cfg)[1]
+    return _tracking(env)[1]
 
 
-@reward
-def progress(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def progress(env: "LeggedEnv") -> FloatArray:
     """Reward velocity along the command, as a fraction of it, -1 to 1; the mean of both parts."""
-    products = state.mean_vel * state.commands, np.square(state.commands)
+    products = env.state.mean_vel * env.state.commands, np.square(env.state.commands)
     along, squares = (np.array([p[:, :2].sum(axis=1), p[:, 2]]) for p in products)
     fractions = along / np.where(squares > 0, squares, np.inf)
     total = np.clip(fractions, -1, 1).sum(axis=0) / np.maximum((squares > 0).sum(axis=0), 1)
     return total.astype(np.float32)
 
 
-@reward
-def upright(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def upright(env: "LeggedEnv") -> FloatArray:
     """Reward a level base, 0 to 1."""
-    return np.exp(-_sum_squares(state.projected_gravity[:, :2]) / np.float32(LEVEL_SIN2))
+    return np.exp(-_sum_squares(env.state.projected_gravity[:, :2]) / np.float32(LEVEL_SIN2))
 
 
-@reward
-def lin_vel_z(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def lin_vel_z(env: "LeggedEnv") -> FloatArray:
     """Penalize vertical velocity, squared [m2/s2]."""
-    return np.square(state.base_lin_vel[:, 2])
+    return np.square(env.state.base_lin_vel[:, 2])
 
 
-@reward
-def ang_vel_xy(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def ang_vel_xy(env: "LeggedEnv") -> FloatArray:
     """Penalize roll and pitch rates, squared [rad2/s2]."""
-    return _sum_squares(state.base_ang_vel[:, :2])
+    return _sum_squares(env.state.base_ang_vel[:, :2])
 
 
-@reward
-def base_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def base_height(env: "LeggedEnv") -> FloatArray:
     """Penalize a base off its target height, squared; bounded over a pit [m2]."""
-    target = np.float32(robot.base_height_target)
+    target = np.float32(env.robot.base_height_target)
     # Over a deep hole, an unbounded penalty outweighed all rewards of the episode.
-    return np.square(np.minimum(state.base_height, 2 * target) - target)
+    return np.square(np.minimum(env.state.base_height, 2 * target) - target)
 
 
-@reward
-def torques(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def torques(env: "LeggedEnv") -> FloatArray:
     """Penalize torques, squared [N2 m2]."""
-    return _sum_squares(state.torques)
+    return _sum_squares(env.state.torques)
 
 
-@reward
-def dof_acc(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def dof_acc(env: "LeggedEnv") -> FloatArray:
     """Penalize joint accelerations, mean square [rad2/s4]."""
-    return np.square(state.dof_acc).mean(axis=1)
+    return np.square(env.state.dof_acc).mean(axis=1)
 
 
-@reward
-def action_rate(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def action_rate(env: "LeggedEnv") -> FloatArray:
     """Penalize changes of the action, mean square."""
-    return np.square(state.actions - state.last_actions).mean(axis=1)
+    return np.square(env.state.actions - env.state.last_actions).mean(axis=1)
 
 
-@reward
-def collision(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def collision(env: "LeggedEnv") -> FloatArray:
     """Count penalized bodies that touch something."""
-    return (state.penalized_force > np.float32(0.1)).sum(axis=1, dtype=np.float32)
+    return (env.state.penalized_force > np.float32(0.1)).sum(axis=1, dtype=np.float32)
 
 
-@reward
-def termination(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def termination(env: "LeggedEnv") -> FloatArray:
     """Penalize a fall."""
-    return state.fallen.astype(np.float32)
+    return env.state.fallen.astype(np.float32)
 
 
-@reward
-def dof_pos_limits(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def dof_pos_limits(env: "LeggedEnv") -> FloatArray:
     """Penalize joint positions beyond their soft limits [rad]."""
-    return np.abs(state.dof_pos - np.clip(state.dof_pos, robot.lower, robot.upper)).sum(axis=1)
+    return np.abs(
+        env.state.dof_pos - np.clip(env.state.dof_pos, env.robot.lower, env.robot.upper)
+    ).sum(axis=1)
 
 
-@reward
-def feet_gait(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def feet_gait(env: "LeggedEnv") -> FloatArray:
     """Reward the fraction of feet that are in contact exactly when the gait says so."""
-    return (state.foot_contact == (state.swing_phase == 0)).mean(axis=1, dtype=np.float32)
+    return (env.state.foot_contact == (env.state.swing_phase == 0)).mean(axis=1, dtype=np.float32)
 
 
-@reward
-def foot_swing_height(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def _swing_height(env: "LeggedEnv") -> np.float32:
+    """Return the height of a swinging foot above the ground [m]."""
+    setting, feet = env.cfg.rewards.swing_height, env.state.foot_height.shape[1]
+    target = (setting or SWING_HEIGHT) * env.robot.leg_length
+    return np.float32(min(target, MAX_SWING_HEIGHT) if setting is None and feet == 4 else target)
+
+
+def foot_swing_height(env: "LeggedEnv") -> FloatArray:
     """Penalize feet off the arc that they should swing in, mean square, relative to its height."""
-    target = (cfg.swing_height or SWING_HEIGHT) * robot.leg_length
-    if cfg.swing_height is None and state.foot_height.shape[1] == 4:
-        target = min(target, MAX_SWING_HEIGHT)
-    arc, height = np.sin(np.pi * state.swing_phase), state.foot_height / np.float32(target)
+    phase, height = env.state.swing_phase, env.state.foot_height / _swing_height(env)
     # Clipped for the same reason as the base height: the foot may be above a deep hole.
-    return (np.square(np.clip(height, 0, 2) - arc) * (state.swing_phase > 0)).mean(axis=1)
+    return (np.square(np.clip(height, 0, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
 
 
-@reward
-def foot_slip(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def foot_slip(env: "LeggedEnv") -> FloatArray:
     """Penalize the horizontal velocity of feet in contact, mean square [m2/s2]."""
-    return (np.square(state.foot_vel[..., :2]).sum(axis=2) * state.foot_contact).mean(axis=1)
+    return (np.square(env.state.foot_vel[..., :2]).sum(axis=2) * env.state.foot_contact).mean(
+        axis=1
+    )
 
 
-@reward
-def stand_still(state: State, robot: Robot, cfg: Rewards) -> FloatArray:
+def stand_still(env: "LeggedEnv") -> FloatArray:
     """Penalize leaving the default pose when commanded to stand, except for wheels [rad]."""
-    error = np.abs(state.dof_pos - robot.default_pose) * ~robot.wheels
-    return error.mean(axis=1) * ~is_moving(state.commands)
+    error = np.abs(env.state.dof_pos - env.robot.default_pose) * ~env.robot.wheels
+    return error.mean(axis=1) * ~is_moving(env.state.commands)
+
+
+def orientation(env: "LeggedEnv") -> FloatArray:
+    """Penalize a tilted base: squared sine of the tilt."""
+    return _sum_squares(env.state.projected_gravity[:, :2])
+
+
+def dof_vel(env: "LeggedEnv") -> FloatArray:
+    """Penalize joint velocities, squared [rad2/s2]."""
+    return _sum_squares(env.state.dof_vel)
+
+
+def dof_power(env: "LeggedEnv") -> FloatArray:
+    """Penalize the mechanical power of the motors, also while they brake [W]."""
+    return np.abs(env.state.torques * env.state.dof_vel).sum(axis=1)
+
+
+def action_smoothness(env: "LeggedEnv") -> FloatArray:
+    """Penalize changes of the change of the action, squared."""
+    state = env.state
+    return _sum_squares(state.actions - 2 * state.last_actions + state.last_last_actions)
+
+
+def feet_air_time(env: "LeggedEnv") -> FloatArray:
+    """Reward long swings, when the foot touches the ground after them [s]."""
+    state = env.state
+    landed = state.foot_contact & (state.foot_air_time > 0)
+    excess = ((state.foot_air_time - np.float32(MIN_AIR_TIME)) * landed).sum(axis=1)
+    return excess * (state.commands[:, :2] != 0).any(axis=1)
+
+
+def foot_clearance(env: "LeggedEnv") -> FloatArray:
+    """Reward feet that move at the swing height, 0 to 1, as in LeggedGym-Ex."""
+    error = np.square(env.state.foot_height - _swing_height(env))
+    speed = np.linalg.norm(env.state.foot_vel[..., :2], axis=2)
+    return np.exp(-(error * speed).sum(axis=1) / np.float32(CLEARANCE_SIGMA))
+
+
+REWARDS: dict[str, Reward] = {
+    name: each for name, each in globals().items() if name in {one.name for one in fields(Rewards)}
+}
+"""Every reward term of this module by name."""

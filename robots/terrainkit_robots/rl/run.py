@@ -140,22 +140,33 @@ def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:
             (new / name).write_bytes(data)
 
 
-def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
+def open_run(
+    name: str | Path, checkpoint: int | None = None, task_file: str | Path | None = None
+) -> Run:
     """Open a run.
 
     Args:
         name: Its folder, one of its checkpoints, or a robot with a shipped policy.
         checkpoint: Iteration of the checkpoint to select; by default the checkpoint `name`, or the
             last one.
+        task_file: Python file with the task of the run, which is executed. A run names its task,
+            but executes nothing by itself.
 
     Raises:
-        ConfigError: If there is no such run or checkpoint, or its robot is missing.
+        ConfigError: If there is no such run or checkpoint, or its task or robot is missing.
+        PluginError: If the task file fails.
     """
+    if task_file is not None:
+        tasks.load_task_file(str(task_file))
     folder, selected = _resolve_run(name)
     if not (folder / RUN_FILE).is_file():
         raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
     info = RunInfo.load(folder / RUN_FILE)
-    terrain, found = info.terrain, tasks.get_task(info.robot)
+    try:
+        terrain, found = info.terrain, tasks.get_task(info.robot)
+    except ConfigError as error:
+        hint = "if it is a task of your own, give its Python file with --task"
+        raise ConfigError(f"the task of {folder} is missing: {error}; {hint}") from error
     robot = Robot.from_spec(RobotSpec.load(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
         raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
@@ -168,8 +179,7 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
     if checkpoint is not None and checkpoint not in saved:
         expected = f"expected one of: {listing(map(str, saved))}"
         raise ConfigError(f"{folder}: got checkpoint {checkpoint}; {expected}")
-    if checkpoint is None and selected is None and saved:
-        checkpoint = max(saved)
+    last = saved[max(saved)] if saved else None
     return Run(
         folder=folder,
         info=info,
@@ -178,7 +188,7 @@ def open_run(name: str | Path, checkpoint: int | None = None) -> Run:
         task=Task.load(folder / TASK_FILE, found.task.with_defaults()),
         robot=robot,
         terrain=terrain,
-        checkpoint=selected if checkpoint is None else saved[checkpoint],
+        checkpoint=selected or last if checkpoint is None else saved[checkpoint],
     )
 
 

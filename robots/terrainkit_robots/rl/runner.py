@@ -5,11 +5,12 @@ import statistics
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext, redirect_stdout, suppress
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")  # rsl-rl imports git, which may be missing
 
@@ -18,7 +19,7 @@ import torch
 from rsl_rl.runners import OnPolicyRunner
 from rsl_rl.utils.logger import Logger
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, TerrainkitError, listing, plugin_errors
 from terrainkit_robots.checkpoint import (
     TRAINING_KEYS,
     check_state,
@@ -29,8 +30,11 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.symmetry import has_symmetry
 
-OBS_GROUPS = {"actor": ["policy"], "critic": ["privileged"]}
-"""Observation groups of each network."""
+_NETWORKS = "actor", "critic", "student", "teacher", "rnd"
+"""Names of networks that an algorithm of rsl-rl may have."""
+
+_TABLES = "actor", "critic", "student", "teacher", "algorithm", "obs_groups"
+"""Tables of rsl-rl's configuration that `runner.rsl_rl` may change; settings have the others."""
 
 
 class TrainingProgress(NamedTuple):
@@ -70,16 +74,12 @@ class MetricsLogger(Logger):
 
     def init_logging_writer(self) -> None:
         """Open the log files."""
-        if self._runner.env.cfg.runner.logger == "tensorboard":
+        is_wandb = self._runner.env.cfg.runner.logger == "wandb"
+        if not is_wandb:
             # TensorBoard drops what an interrupted run logged after its last checkpoint.
             self.cfg["logger"]["purge_step"] = self._runner.current_learning_iteration
+        with redirect_stdout(None), plugin_errors("wandb does not start" if is_wandb else None):
             super().init_logging_writer()
-            return
-        try:
-            with redirect_stdout(None):
-                super().init_logging_writer()
-        except Exception as error:
-            raise ConfigError(f"wandb does not start: {' '.join(str(error).split())}") from error
 
     def stop_logging_writer(self) -> None:
         """Close the log files, if they are open."""
@@ -110,26 +110,27 @@ class MetricsLogger(Logger):
 
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        names = ("tot_timesteps", "cur_reward_sum", "cur_episode_length")
-        means = {"rewbuffer": list(self.rewbuffer), "lenbuffer": list(self.lenbuffer)}
-        own = {name: getattr(self, name) for name in names}
-        return own | means | {"tot_time": float(self.tot_time)}
+        deques = {name: list(each) for name, each in vars(self).items() if isinstance(each, deque)}
+        sums = {name: each for name, each in vars(self).items() if name.startswith("cur_")}
+        times = {"tot_timesteps": self.tot_timesteps, "tot_time": float(self.tot_time)}
+        return deques | sums | times
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; buffers per environment only if their number is the same."""
-        expected = self.state_dict() | {"rewbuffer": [0.0], "lenbuffer": [0.0]}
-        sums = ("cur_reward_sum", "cur_episode_length")
+        own = self.state_dict()
+        deques = [name for name, each in own.items() if isinstance(each, list)]
+        sums = [name for name in own if name.startswith("cur_")]
         is_same = any(np.shape(state.get(name, 0)) == (self.num_envs,) for name in sums)
+        expected = own | {name: [0.0] for name in deques}
         check_state("logger", state, expected | ({} if is_same else dict.fromkeys(sums, ...)))
-        rewards, lengths = (len(state[name]) for name in ("rewbuffer", "lenbuffer"))
-        if rewards != lengths:
-            raise ConfigError(f"logger.rewbuffer: got {rewards} numbers; expected {lengths}")
-        self.rewbuffer.extend(state["rewbuffer"])
-        self.lenbuffer.extend(state["lenbuffer"])
+        count = len(state["lenbuffer"])
+        for name in deques:
+            if (got := len(state[name])) != count:
+                raise ConfigError(f"logger.{name}: got {got} numbers; expected {count}")
+            getattr(self, name).extend(state[name])
+        for name in sums if is_same else ():
+            getattr(self, name).copy_(state[name])
         self.tot_timesteps, self.tot_time = state["tot_timesteps"], state["tot_time"]
-        if is_same:
-            self.cur_reward_sum.copy_(state["cur_reward_sum"])
-            self.cur_episode_length.copy_(state["cur_episode_length"])
 
     def _store_code_state(self) -> list[str]:
         return []  # a run.toml records the versions; the user's git repository is not touched
@@ -144,6 +145,10 @@ class LeggedRunner(OnPolicyRunner):
 
     env: LeggedEnv
     logger: MetricsLogger
+    is_distributed: bool
+    gpu_global_rank: int
+    gpu_world_size: int
+    current_learning_iteration: int
 
     def __init__(
         self,
@@ -158,9 +163,9 @@ class LeggedRunner(OnPolicyRunner):
 
         `should_stop` is called before each iteration: True stops training with a checkpoint.
         """
-        self.folder = folder
+        self.env, self.folder = env, folder
         self._progress_callback, self._should_stop = progress_callback, should_stop
-        with redirect_stdout(None):
+        with redirect_stdout(None), self._rsl_rl_errors():
             super().__init__(env, runner_config(env.cfg, has_symmetry(env)), None, device)
         self.is_main_process = self.gpu_global_rank == 0
         self.logger = MetricsLogger(self)
@@ -180,15 +185,23 @@ class LeggedRunner(OnPolicyRunner):
             None if issubclass(args.exc_type, OSError) else hook(args)
         )
         try:
-            with redirect_stdout(None) if self.is_distributed else nullcontext(), suppress(_Stop):
+            quiet = redirect_stdout(None) if self.is_distributed else nullcontext()
+            with quiet, suppress(_Stop), self._rsl_rl_errors():
                 super().learn(num_learning_iterations, init_at_random_ep_len)
-        except RuntimeError:  # torch cannot sample from weights that are not finite
+        except RuntimeError as error:  # torch cannot sample from weights that are not finite
             self.check_weights()
-            raise
+            if not self.is_distributed:
+                raise
+            self._continue_alone(error)
         finally:
             with suppress(OSError):  # on a full disk, the first error says so
                 self.logger.stop_logging_writer()
             threading.excepthook = hook
+
+    def _rsl_rl_errors(self) -> AbstractContextManager[None]:
+        """Replace errors of the classes and settings in `runner.rsl_rl` by a PluginError."""
+        plugin = "runner.rsl_rl" if self.env.cfg.runner.rsl_rl else None
+        return plugin_errors(plugin, TerrainkitError, OSError, RuntimeError, _Stop)
 
     def finish_iteration(self, iteration: int, collect_time: float, learn_time: float) -> None:
         """Report the progress, write a checkpoint if one is due, and stop if requested."""
@@ -200,6 +213,21 @@ class LeggedRunner(OnPolicyRunner):
             self.save()
         if stop:
             raise _Stop
+
+    def _continue_alone(self, error: RuntimeError) -> None:
+        """Save a checkpoint after another process of torchrun has ended, and stop.
+
+        Raises:
+            ConfigError: In the main process.
+        """
+        if not self.is_main_process:
+            raise SystemExit(1) from error
+        self.is_distributed, self.current_learning_iteration = False, self._completed
+        self.save()
+        raise ConfigError(
+            f"another process of torchrun ended after iteration {self._completed}; continue with "
+            f"--resume {self.folder}"
+        ) from error
 
     def save(self, path: str | Path | None = None, infos: dict[str, Any] | None = None) -> None:
         """Write a checkpoint, by default to the folder; every process must call this."""
@@ -224,12 +252,16 @@ class LeggedRunner(OnPolicyRunner):
         networks.
         `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
         """
-        parts = load_cfg or {"actor": True, "critic": True, "optimizer": True}
+        own = self._algorithm_state()
+        if "teacher_state_dict" in own and load_cfg is not None:
+            self._load_teacher(Path(path))
+            return {}
+        parts = load_cfg or {name.removesuffix("_state_dict"): True for name in own}
         joints = self.env.robot.spec.joint_order
         with open_checkpoint(Path(path), joints, self.env.obs_sizes) as state:
-            networks = self.alg.save()
-            for name in (f"{part}_state_dict" for part in ("actor", "critic") if parts.get(part)):
-                check_state(name, state[name], networks[name])
+            state["student_state_dict"] = state["actor_state_dict"]
+            for name in own.keys() & {f"{part}_state_dict" for part in _NETWORKS if part in parts}:
+                check_state(name, state[name], own[name])
             if not TRAINING_KEYS & state.keys():
                 self.alg.load(state, {**parts, "optimizer": False}, strict)
                 return {}
@@ -240,7 +272,11 @@ class LeggedRunner(OnPolicyRunner):
             if not state["processes"]:
                 raise ConfigError("state.processes: got none; expected one or more")
             optimizer = self._optimizer_state(state) if parts.get("optimizer") else {}
-            self.alg.load(state | {"optimizer_state_dict": optimizer}, parts, strict)
+            self.alg.load(
+                state | {"optimizer_state_dict": optimizer},
+                {**parts, "student": parts.get("actor")},
+                strict,
+            )
             processes = state["processes"]  # additional processes use the last state
             process = processes[min(self.gpu_global_rank, len(processes) - 1)]
             if load_cfg is not None:
@@ -260,6 +296,15 @@ class LeggedRunner(OnPolicyRunner):
                     torch.cuda.set_rng_state(process["random"]["cuda"], self.device)
         return {}
 
+    def _load_teacher(self, path: Path) -> None:
+        """Load the actor of a checkpoint as the teacher of a distillation."""
+        groups, algorithm = self.cfg["obs_groups"]["teacher"], cast("Any", self.alg)
+        sizes = {"policy": sum(self.env.obs_sizes[name] for name in groups)}
+        with open_checkpoint(path, self.env.robot.spec.joint_order, sizes) as state:
+            weights = state["actor_state_dict"]
+            check_state("actor_state_dict", weights, algorithm.teacher.state_dict())
+            algorithm.load({"teacher_state_dict": weights}, {"teacher": True}, strict=True)
+
     def state_dict(self) -> dict[str, Any]:
         """Return everything for an exact resume; of all processes, in the main process."""
         process = {"env": self.env.state_dict(), "random": {"cpu": torch.get_rng_state()}}
@@ -275,10 +320,17 @@ class LeggedRunner(OnPolicyRunner):
             "robot": self.env.robot.spec.name,
             "joints": list(self.env.robot.spec.joint_order),
             "observed": self.env.obs_sizes,
-            **self.alg.save(),
+            **self._algorithm_state(),
             "processes": processes,
             "logger": self.logger.state_dict(),
         }
+
+    def _algorithm_state(self) -> dict[str, Any]:
+        """Return the state of the algorithm, in which a student is the actor."""
+        state = self.alg.save()
+        if "student_state_dict" in state:
+            state |= {"actor_state_dict": state.pop("student_state_dict"), "critic_state_dict": {}}
+        return state
 
     def _optimizer_state(self, state: Mapping[str, Any]) -> dict[str, Any]:
         """Return what the optimizer loads from a checkpoint: the moments and the learning rate.
@@ -304,7 +356,8 @@ class LeggedRunner(OnPolicyRunner):
 
     def check_weights(self) -> None:
         """Raise ConfigError if a weight of the networks is not finite."""
-        weights = [*self.alg.actor.parameters(), *self.alg.critic.parameters()]
+        networks = (getattr(self.alg, name, None) for name in _NETWORKS)
+        weights = (each for network in networks if network for each in network.parameters())
         if not all(torch.isfinite(each).all() for each in weights):
             raise ConfigError(
                 f"iteration {self._completed + 1}: the networks have diverged, their weights are "
@@ -353,35 +406,70 @@ class LeggedRunner(OnPolicyRunner):
 
 
 def runner_config(task: Task, is_symmetric: bool = True) -> dict[str, Any]:
-    """Return the configuration of rsl-rl's runner."""
+    """Return the configuration of rsl-rl's runner.
+
+    Raises:
+        ConfigError: If `runner.rsl_rl` names a class outside of rsl-rl and the task's module.
+    """
     policy, runner, algorithm = task.policy, task.runner, dict(vars(task.algorithm))
-    symmetry, augment = algorithm.pop("symmetry"), "terrainkit_robots.rl.symmetry:augment"
-    symmetry_cfg = {"data_augmentation_func": augment, "use_data_augmentation": True}
-    is_augmented = is_symmetric if symmetry is None else symmetry
-    distribution = {"class_name": "GaussianDistribution", "init_std": policy.init_noise_std}
-    network: dict[str, Any] = {"class_name": "MLPModel", "activation": policy.activation}
-    network |= {"obs_normalization": policy.obs_normalization}
-    actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
+    changes, symmetry = runner.rsl_rl, algorithm.pop("symmetry")
+    if unknown := [name for name in changes if name not in _TABLES]:
+        raise ConfigError(f"runner.rsl_rl: got {unknown[0]}; expected one of: {listing(_TABLES)}")
+    _check_names(changes, type(task).__module__)
+    if symmetry is None:  # rsl-rl rejects it for distillation and recurrent networks
+        networks = (changes.get(name, {}) for name in ("actor", "critic"))
+        is_recurrent = any("rnn_type" in network for network in networks)
+        symmetry = is_symmetric and "student" not in changes and not is_recurrent
+    augmentation = {
+        "data_augmentation_func": "terrainkit_robots.rl.symmetry:augment",
+        "use_data_augmentation": True,
+    }
     loggers = {
         "tensorboard": {"class_name": "torch.utils.tensorboard:SummaryWriter", "flush_secs": 10},
         "wandb": {"class_name": "WandbLogWriter", "project_name": "terrainkit"},
     }
-    return {
+    network: dict[str, Any] = {"class_name": "MLPModel", "activation": policy.activation}
+    network |= {"obs_normalization": policy.obs_normalization}
+    distribution = {"class_name": "GaussianDistribution", "init_std": policy.init_noise_std}
+    actor = {"hidden_dims": list(policy.actor_hidden_dims), "distribution_cfg": distribution}
+    config = {
         "num_steps_per_env": runner.num_steps_per_env,
         "save_interval": sys.maxsize,  # `LeggedRunner.finish_iteration` saves, in all processes
         "seed": runner.seed,
         "logger": loggers[runner.logger],
         "check_for_nan": False,  # `MetricsLogger` names the rewards that are not finite
-        "obs_groups": OBS_GROUPS,
+        "obs_groups": {"actor": ["policy"], "critic": ["privileged"]},
         "actor": network | actor,
         "critic": network | {"hidden_dims": list(policy.critic_hidden_dims)},
-        "algorithm": {
-            "class_name": "PPO",
-            **algorithm,
-            "rnd_cfg": None,
-            "symmetry_cfg": symmetry_cfg if is_augmented else None,
-        },
+        "algorithm": {"class_name": "PPO", **algorithm, "rnd_cfg": None}
+        | {"symmetry_cfg": augmentation if symmetry else None},
     }
+    if "student" in changes:
+        config |= {"student": network | actor, "teacher": network | actor}
+    return _merged(config, changes)
+
+
+def _merged(config: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return nested tables with other values."""
+    tables = {name: value for name, value in changes.items() if isinstance(value, Mapping)}
+    merged = {name: _merged(config.get(name) or {}, table) for name, table in tables.items()}
+    return {**config, **changes, **merged}
+
+
+def _check_names(value: Any, module: str, key: str = "runner.rsl_rl") -> None:
+    """Check that the classes in a table belong to rsl-rl or to the module of the task.
+
+    rsl-rl imports a name with a module, and calls what it finds. A run may be from a stranger.
+
+    Raises:
+        ConfigError: if a name belongs to another module.
+    """
+    if isinstance(value, Mapping):
+        for name, item in value.items():
+            _check_names(item, module, f"{key}.{name}")
+    elif isinstance(value, str) and not value.removeprefix(f"{module}:").isidentifier():
+        expected = f"a class of rsl-rl, such as RNNModel, or {module}:CLASS"
+        raise ConfigError(f"{key}: got {value!r}; expected {expected}")
 
 
 def resolve_device(name: str) -> str:

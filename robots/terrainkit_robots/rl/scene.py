@@ -4,7 +4,6 @@ Actuators and sensors of the robot's own file are ignored: its spec defines them
 bundled and hand-written robots are trained alike.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import mujoco
@@ -29,7 +28,6 @@ ALL_BITS = 0x7FFFFFFF
 """A `conaffinity` that matches every `contype`."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
     """A compiled model, and indices into it. In qpos and qvel, the base comes first.
 
@@ -37,47 +35,35 @@ class Scene:
     `termination_force`, with three numbers per body. Forces act on what the robot touches [N].
     """
 
-    model: Any  # the `mujoco.MjModel`
-    joint_qpos: Any  # qpos index of each joint, in the robot's order, shape (j,)
-    joint_qvel: Any  # qvel index of each joint, shape (j,)
-    base: int  # body id of the base
-    geoms: Any  # ids of the robot's colliding geoms, shape (g,)
-    default_qpos: Any  # qpos of the default pose with the base at height 0, shape (nq,)
-    foot_pos: Any  # position of each foot's site at `default_qpos` [m], shape (f, 3)
-    sole_depth: Any  # distance from each foot's site down to its lowest point [m], shape (f,)
-    sensors: dict[str, slice]  # range of each kind in sensordata
+    def __init__(self, robot: Robot, terrain: Ground, task: Task) -> None:
+        """Build the scene of a task.
 
-
-def build_scene(robot: Robot, terrain: Ground, task: Task) -> Scene:
-    """Build the scene of a task; raise ConfigError if MuJoCo rejects it, or the spec differs."""
-    with quiet_mujoco():
-        mjspec = _attach(robot, terrain, task)
-        _set_joints_and_collisions(robot, _checked_base(robot, mjspec), task)
-        _add_actuators(robot, mjspec, task)
-        sensors = _add_sensors(robot, mjspec)
-        set_appearance(mjspec)  # for videos and the viewer
-        try:
-            model = mjspec.compile()
-        except ValueError as error:
-            raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
-    joints = [model.joint(name).id for name in robot.spec.joint_order]
-    default_qpos = model.qpos0.copy()
-    default_qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
-    default_qpos[model.jnt_qposadr[joints]] = robot.default_pose
-    foot_pos, sole_depth = _measure_feet(robot, model, default_qpos)
-    base_id = model.body(robot.spec.base).id
-    of_robot = model.body_rootid[model.geom_bodyid] == model.body_rootid[base_id]
-    return Scene(
-        model=model,
-        joint_qpos=model.jnt_qposadr[joints],
-        joint_qvel=model.jnt_dofadr[joints],
-        base=base_id,
-        geoms=np.flatnonzero(collides(model) & of_robot),
-        default_qpos=default_qpos,
-        foot_pos=foot_pos,
-        sole_depth=sole_depth,
-        sensors=sensors,
-    )
+        Raises:
+            ConfigError: If MuJoCo rejects the robot, or its spec differs from its model.
+        """
+        with quiet_mujoco():
+            mjspec = _attach(robot, terrain, task)
+            _set_joints_and_collisions(robot, _checked_base(robot, mjspec), task)
+            _add_actuators(robot, mjspec, task)
+            self.sensors = _add_sensors(robot, mjspec)  # range of each kind in sensordata
+            set_appearance(mjspec)  # for videos and the viewer
+            try:
+                self.model: Any = mjspec.compile()
+            except ValueError as error:
+                raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
+        model = self.model
+        joints = [model.joint(name).id for name in robot.spec.joint_order]
+        self.joint_qpos = model.jnt_qposadr[joints]  # indices of the joints, in the robot's order
+        self.joint_qvel = model.jnt_dofadr[joints]
+        self.default_qpos = model.qpos0.copy()  # the default pose with the base at height 0
+        self.default_qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+        self.default_qpos[self.joint_qpos] = robot.default_pose
+        self.base: int = model.body(robot.spec.base).id
+        of_robot = model.body_rootid[model.geom_bodyid] == model.body_rootid[self.base]
+        self.geoms = np.flatnonzero(collides(model) & of_robot)  # the robot's colliding geoms
+        # At `default_qpos`, the position of each foot's site, and the distance from it down to the
+        # lowest point of the foot [m], shapes (f, 3) and (f,).
+        self.foot_pos, self.sole_depth = _measure_feet(robot, model, self.default_qpos)
 
 
 def _attach(robot: Robot, terrain: Ground, task: Task) -> Any:

@@ -7,37 +7,26 @@ Symmetric Robot Policies, 2024.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import torch
 from numpy.typing import ArrayLike, NDArray
 from tensordict import TensorDict
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, PluginError, listing
 from terrainkit_robots.rl.config import Terrain
-from terrainkit_robots.rl.observations import ObsTerms
+from terrainkit_robots.rl.observations import SignedPermutation
 from terrainkit_robots.rl.scene import Scene
-from terrainkit_robots.rl.state import State
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.env import LeggedEnv
 
 TOLERANCE = 1e-3
 """Allowed difference between left and right: default pose [rad], scan points [m], and action
 scale, gains and effort, relative."""
-
-
-@dataclass(frozen=True, eq=False)
-class SignedPermutation:
-    """Maps w numbers: number k of the result is `sign[k]` times number `index[k]`."""
-
-    index: NDArray[np.int64]
-    sign: FloatArray
-
-    def __call__(self, values: FloatArray) -> FloatArray:
-        """Return the mirrored values, shape (n, w)."""
-        return values[:, self.index] * self.sign
 
 
 class MirrorMaps(NamedTuple):
@@ -48,30 +37,13 @@ class MirrorMaps(NamedTuple):
     actions: SignedPermutation
 
 
-class MirroredEnv(Protocol):
-    """An environment with mirror maps."""
-
-    @property
-    def mirror_maps(self) -> MirrorMaps:
-        """Left-right symmetry of observations and actions."""
-
-
-def mirror_maps(
-    robot: Robot, scene: Scene, scale: FloatArray, groups: ObsTerms, state: State, cfg: Terrain
-) -> MirrorMaps:
+def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     """Return the mirror maps of an environment.
-
-    Args:
-        robot: The robot, whose spec pairs its joints.
-        scene: The scene, with the gains of the motors and the positions of the feet.
-        scale: Scale of each joint's action, shape (j,); a joint with 0 has no action.
-        groups: Terms of each observation group.
-        state: Any state of the robots, from which the width of each term is computed.
-        cfg: The points of the height scan.
 
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
     """
+    robot, scene, scale = env.robot, env.scene, env.action_scale
     names, pairs = robot.spec.joint_order, robot.spec.mirror_joints()
     joints = _map([names.index(each.joint) for each in pairs], [each.sign for each in pairs])
     _check_sides(robot, scene, scale, joints)
@@ -88,35 +60,45 @@ def mirror_maps(
         **_foot_maps(robot, scene),
     }
     group_maps = {}
-    for name, group in groups.items():
+    for name, group in env.obs_terms.items():
         index, sign = np.zeros(0, np.int64), np.zeros(0, np.float32)
-        for term in group:
-            width, start = term.function(state).shape[1], len(index)
+        for term_name, term in group.items():
+            width, start = term.function(env).shape[1], len(index)
             maps["scalar"] = _map(range(width), np.ones(width))
             if term.symmetry == "scan":
-                maps["scan"] = _scan_map(cfg)
+                maps["scan"] = _scan_map(env.cfg.terrain)
             if term.symmetry == "history":  # repeats the terms before it
                 repeated = index + np.arange(0, width, start)[:, None]
                 maps["history"] = _map(repeated.ravel(), np.tile(sign, len(repeated)))
-            part = maps[term.symmetry]
+            given = term.symmetry
+            part = given if isinstance(given, SignedPermutation) else maps.get(given)
+            if part is None:
+                got = f"observation {term_name}: got the symmetry {given!r}"
+                raise PluginError(f"{got}; expected one of: {listing(maps)}")
             if len(part.index) != width:
-                expected = f"the symmetry {term.symmetry!r} expects {len(part.index)}"
-                raise ConfigError(f"observation {term.name}: got {width} numbers; {expected}")
+                expected = f"expected {len(part.index)}, as in its symmetry"
+                raise PluginError(f"observation {term_name}: got {width} numbers; {expected}")
             index, sign = np.append(index, part.index + start), np.append(sign, part.sign)
         group_maps[name] = SignedPermutation(index, sign)
     return MirrorMaps(group_maps, joints, maps["actions"])
 
 
-def has_symmetry(env: MirroredEnv) -> bool:
-    """Return whether left and right of the robot and its height scan are mirror images."""
+def has_symmetry(env: "LeggedEnv") -> bool:
+    """Return whether left and right of the robot and its height scan are mirror images.
+
+    Raises:
+        PluginError: If the symmetry of a term does not exist, or has another width.
+    """
     try:
         return bool(env.mirror_maps)
+    except PluginError:
+        raise
     except (ConfigError, ValueError):
         return False
 
 
 def augment(
-    env: MirroredEnv, obs: TensorDict | None, actions: torch.Tensor | None
+    env: "LeggedEnv", obs: TensorDict | None, actions: torch.Tensor | None
 ) -> tuple[TensorDict | None, torch.Tensor | None]:
     """Return observations and actions followed by their mirror images.
 

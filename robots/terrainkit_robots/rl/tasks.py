@@ -5,14 +5,18 @@ A task is registered with one line::
     register_task("rover", Path(__file__).parent / "rover", RoverTask())
 
 In an installed package, an entry point of the group `terrainkit.tasks` with the name of the task
-points to the module with that line, which is imported when the task is used. The tasks of the
-bundled robots are TOML files beside them. The folder of an onboarded robot needs no registration.
+points to the module with that line, which is imported when the task is used. `load_task_file`
+executes a single file. The tasks of the bundled robots are TOML files beside them. The folder of an
+onboarded robot needs no registration.
 """
 
+import sys
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
-from os.path import isdir
+from os.path import isdir, isfile
 from pathlib import Path
+from types import ModuleType
 
 from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.settings.text import expected_names, truncate
@@ -61,6 +65,30 @@ def register_task(name: str, folder: str | Path, task: Task | None = None) -> Re
         raise ConfigError(f"task {name}: registered with {other.folder}; expected a new name")
     _registered[name] = new
     return new
+
+
+@cache
+def load_task_file(path: str | Path) -> RegisteredTask:
+    """Execute a Python file that registers a task, once, and return the task.
+
+    Args:
+        path: The file, which calls :func:`register_task` once.
+
+    Raises:
+        ConfigError: if there is no such file, or it registers no task or several.
+        PluginError: if it fails.
+    """
+    path, before = Path(path), dict(_registered)
+    if path.suffix != ".py" or not isfile(path):  # noqa: PTH113 - see `get_task`
+        raise ConfigError(f"task: got {path}; expected a Python file that calls register_task")
+    module = sys.modules[path.stem] = ModuleType(path.stem)  # dataclasses look there
+    module.__file__ = str(path)
+    with plugin_errors(f"task {path}"):
+        exec(compile(path.read_bytes(), path, "exec"), vars(module))
+    new = [task for name, task in _registered.items() if before.get(name) is not task]
+    if len(new) != 1:
+        raise ConfigError(f"{path}: got {len(new)} tasks; expected one call of register_task")
+    return new[0]
 
 
 def task_names() -> tuple[str, ...]:

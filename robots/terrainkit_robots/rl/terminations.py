@@ -1,40 +1,37 @@
-"""Terminations: conditions that end an episode as a fall."""
+"""Terminations: conditions that end an episode as a fall.
+
+Each takes the environment and returns which robots have fallen, shape (n,).
+"""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from terrainkit_robots.rl.config import Termination
-from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.transforms import FloatArray
+from terrainkit_robots.transforms import BoolArray
 
-
-def illegal_contact(force: FloatArray, cfg: Termination) -> NDArray[np.bool_]:
-    """Return which robots touch something with a termination body.
-
-    Args:
-        force: Contact force on each of the t termination bodies [N], shape (n, t, 3).
-        cfg: The limits.
-    """
-    return (np.einsum("nti,nti->nt", force, force) > cfg.contact_force**2).any(axis=1)
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.env import LeggedEnv
 
 
-def bad_orientation(projected_gravity: FloatArray, cfg: Termination) -> NDArray[np.bool_]:
-    """Return which robots are tilted beyond the limit.
+def illegal_contact(env: "LeggedEnv") -> BoolArray:
+    """Return which robots touch something with a termination body."""
+    force = env.sim.sensor("termination_force")
+    return (np.einsum("nti,nti->nt", force, force) > env.cfg.termination.contact_force**2).any(1)
 
-    Args:
-        projected_gravity: Unit vector of gravity in the frame of the base, shape (n, 3).
-        cfg: The limits.
-    """
+
+def bad_orientation(env: "LeggedEnv") -> BoolArray:
+    """Return which robots are tilted beyond the limit."""
     # The z component of gravity in the base frame is minus the cosine of the tilt.
-    return -projected_gravity[:, 2] < np.cos(cfg.tilt)
+    return -env.state.projected_gravity[:, 2] < np.cos(env.cfg.termination.tilt)
 
 
-def terrain_out_of_bounds(base_pos: FloatArray, terrain: Ground) -> NDArray[np.bool_]:
-    """Return which robots have left the map.
+def terrain_out_of_bounds(env: "LeggedEnv") -> BoolArray:
+    """Return which robots have left the map."""
+    xy, terrain = env.state.base_pos[:, :2], env.terrain
+    return np.asarray(((xy < terrain.lower) | (xy > terrain.upper)).any(axis=1))
 
-    Args:
-        base_pos: Positions of the bases [m], shape (n, 3).
-        terrain: The ground.
-    """
-    outside = (base_pos[:, :2] < terrain.lower) | (base_pos[:, :2] > terrain.upper)
-    return np.asarray(outside.any(axis=1))
+
+TERMINATIONS = {
+    each.__name__: each for each in (illegal_contact, bad_orientation, terrain_out_of_bounds)
+}
+"""Every termination of this module by name."""

@@ -35,9 +35,10 @@ def train(
         folder: Folder of the run; by default, `logs/<robot>/<date-time>`.
         resume: A run to continue. If robot, terrain and task are the same, the run continues. The
             continuation is exact if `env.num_envs` and the number of processes are also the same;
-            otherwise, new episodes start. If the robot, terrain or task differs, a new run starts
-            with the networks of the run. It also starts with the optimizer state if the learning
-            rate and its schedule are the same, and with the terrain levels if the map is the same.
+            otherwise, new episodes start. The state of recurrent networks starts at zero. If the
+            robot, terrain or task differs, a new run starts with the networks of the run. It also
+            starts with the optimizer state if the learning rate and its schedule are the same, and
+            with the terrain levels if the map is the same.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
         start_callback: Called before the first iteration.
         progress_callback: Called after each iteration.
@@ -55,7 +56,7 @@ def train(
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is imported
     import torch
 
-    from terrainkit_robots.rl.env import LeggedEnv
+    from terrainkit_robots.rl.env import make_env
     from terrainkit_robots.rl.runner import LeggedRunner, process_share, resolve_device
     from terrainkit_robots.rl.terrain import load_terrain
 
@@ -73,13 +74,12 @@ def train(
     loaded_robot = continued.robot if continued else Robot.load(tasks.get_task(robot).folder)
     torch.set_num_threads(process_task.env.num_threads)
     torch.manual_seed(process_task.runner.seed)
-    env = LeggedEnv(process_task, loaded_robot, ground, device)
+    env = make_env(process_task, loaded_robot, ground, device)
     runner = LeggedRunner(
         env, device=device, progress_callback=progress_callback, should_stop=should_stop
     )
     try:
-        if resume is not None:
-            runner.load(run.last_checkpoint(resume), parts)
+        _load(runner, resume, parts)
         completed, total = runner.current_learning_iteration, task.runner.max_iterations
         if completed >= total:
             expected = f"expected more than the {completed} iterations that are completed"
@@ -104,3 +104,11 @@ def train(
         if torch.distributed.is_available() and torch.distributed.is_initialized():
             torch.distributed.destroy_process_group()
     return runner
+
+
+def _load(runner: "LeggedRunner", resume: run.Run | None, parts: dict[str, bool] | None) -> None:
+    """Load the run to continue, if there is one; a distillation needs one, of its teacher."""
+    if resume is not None:
+        runner.load(run.last_checkpoint(resume), parts)
+    elif not getattr(runner.alg, "teacher_loaded", True):
+        raise ConfigError("runner.rsl_rl: got no teacher; expected --resume RUN of the teacher")

@@ -18,7 +18,7 @@ from terrainkit_robots.policy.load import single_torch_thread
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.rewards import is_moving
 from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task
@@ -115,8 +115,8 @@ def run_checks(
     algorithm = replace(task.algorithm, num_mini_batches=1)  # a few robots allow no more
     env_cfg = replace(task.env, num_envs=NUM_ENVS, num_threads=1)
     try:
-        env = LeggedEnv(replace(task, env=env_cfg, algorithm=algorithm), robot, Plane())
-        still_env = LeggedEnv(eval_task(task, NUM_ENVS), robot, Plane())
+        env = make_env(replace(task, env=env_cfg, algorithm=algorithm), robot, Plane())
+        still_env = make_env(eval_task(task, NUM_ENVS), robot, Plane())
     except TerrainkitError as error:
         return SmokeTestResult(robot.spec.name, (Check(name, False, str(error), expected),))
     record = train_briefly(robot, task, samples, progress) if samples else None
@@ -185,10 +185,10 @@ def check_standing(env: LeggedEnv) -> Check:
     env.reset()
     walking = replace(env.cfg.commands, standing=0.0)
     env.set_commands(sample_commands(env.rng, env.num_envs, walking)[0])
-    terms = [each for name, each in env.reward_terms.items() if name.startswith("tracking_")]
+    terms = [each for name, each in env.active_rewards.items() if name.startswith("tracking_")]
     earned = np.zeros(env.num_envs)
     for function, scale in terms:
-        earned += scale * function(env.state, env.robot, env.cfg.rewards)
+        earned += scale * function(env)
     most = sum(scale for _, scale in terms) or 1.0
     share = float(np.max(earned[is_moving(env.commands)], initial=0)) / most
     expected = f"at most {MAX_STANDING:.0%} of the tracking rewards at any command"
@@ -214,21 +214,21 @@ def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Chec
     commands = env.commands.copy()
     commands[::4] = 0  # for the rewards of standing robots
     env.set_commands(commands)
-    values: dict[str, list[Any]] = {name: [] for name in env.reward_terms}
+    values: dict[str, list[Any]] = {name: [] for name in env.active_rewards}
     generator = torch.Generator().manual_seed(env.cfg.runner.seed)
     for _ in range(RANDOM_STEPS):
         env.step(torch.randn(env.num_envs, env.num_actions, generator=generator))
-        for name, (reward, _) in env.reward_terms.items():
-            values[name].append(reward(env.state, env.robot, env.cfg.rewards))
+        for name, (reward, _) in env.active_rewards.items():
+            values[name].append(reward(env))
     env.set_commands(None)
-    state = random_state(env.state, env.cfg.runner.seed)
-    for name, (reward, _) in env.reward_terms.items():
+    env.state = random_state(env.state, env.cfg.runner.seed)
+    for name, (reward, _) in env.active_rewards.items():
         low, high = np.min(values[name]), np.max(values[name])
         passed, measured = bool(np.isfinite([low, high]).all()), f"{low:.3g} to {high:.3g}"
         if not passed:
             measured = "not finite"
         elif low == 0 == high:
-            passed = bool(reward(state, env.robot, env.cfg.rewards).any())
+            passed = bool(reward(env).any())
             measured = "0: the rewarded event did not happen" if passed else "0 in every state"
         expected = f"finite, and not 0 in every state; rewards.{name} 0 disables it"
         if name in trained:

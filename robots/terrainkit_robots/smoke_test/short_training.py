@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import torch
@@ -10,9 +9,8 @@ import torch
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.policy.evaluate import Progress
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray
@@ -38,19 +36,20 @@ class TrainingRecord:
     error: str
 
 
-class RecordingEnv(LeggedEnv):
-    """An environment that records the falls and the mean of each reward at every step [1/s]."""
+def record_rewards(env: LeggedEnv) -> list[list[float]]:
+    """Record the falls and the mean of each reward at every step from now on [1/s]."""
+    recorded: list[list[float]] = []
+    compute = env._compute_rewards
 
-    def __init__(self, *args: Any) -> None:
-        self.recorded: list[list[float]] = []
-        super().__init__(*args)
-
-    def _compute_rewards(self, state: State, unstable: BoolArray) -> FloatArray:
-        before = [total.copy() for total in self.episode_sums.values()]
-        rewards, after = super()._compute_rewards(state, unstable), self.episode_sums.values()
+    def record(unstable: BoolArray) -> FloatArray:
+        before = [total.copy() for total in env.episode_sums.values()]
+        rewards, after = compute(unstable), env.episode_sums.values()
         terms = [each - last for each, last in zip(after, before, strict=True)]
-        self.recorded.append([float(each.mean()) / self.cfg.dt for each in (state.fallen, *terms)])
+        recorded.append([float(each.mean()) / env.cfg.dt for each in (env.state.fallen, *terms)])
         return rewards
+
+    env._compute_rewards = record  # type: ignore[method-assign]
+    return recorded
 
 
 def train_briefly(robot: Robot, task: Task, samples: int, progress: Progress) -> TrainingRecord:
@@ -59,7 +58,8 @@ def train_briefly(robot: Robot, task: Task, samples: int, progress: Progress) ->
     batches = min(task.algorithm.num_mini_batches, NUM_ENVS * steps)
     algorithm = replace(task.algorithm, num_mini_batches=batches)
     cfg = replace(task.env, num_envs=NUM_ENVS, num_threads=1)
-    env = RecordingEnv(replace(task, env=cfg, algorithm=algorithm), robot, Plane())
+    env = make_env(replace(task, env=cfg, algorithm=algorithm), robot, Plane())
+    recorded = record_rewards(env)
     losses: list[dict[str, float]] = []
     error = ""
     with torch.random.fork_rng(devices=()):
@@ -74,10 +74,10 @@ def train_briefly(robot: Robot, task: Task, samples: int, progress: Progress) ->
         except (TerrainkitError, RuntimeError, ValueError) as failure:  # not finite
             error = " ".join(str(failure).split())
     steps_of_start = round(START_TIME / task.dt)
-    history = np.array(env.recorded[steps_of_start:] or env.recorded or [[np.nan]])
+    history = np.array(recorded[steps_of_start:] or recorded or [[np.nan]])
     quarter = -(-len(history) // 4)
     first, last = (
-        dict(zip(("falls", *env.reward_terms), part.mean(axis=0).tolist(), strict=False))
+        dict(zip(("falls", *env.active_rewards), part.mean(axis=0).tolist(), strict=False))
         for part in (history[:quarter], history[-quarter:])
     )
     return TrainingRecord(

@@ -24,6 +24,8 @@ _MAX_SECONDS = 3600.0
 _FRAME_TIME = 0.04
 """Least time between two poses that are sent to the browser [s]."""
 
+_POINT_COLOR = (255, 200, 0)
+
 _CAMERA_OFFSET = np.array([-1.5, -2.5, 1.5])
 """Position of the camera relative to the robot [m]."""
 
@@ -63,6 +65,9 @@ class PolicyView:
             joint.name: int(model.joint(joint.name).qposadr[0]) for joint in self.robot.facts.joints
         }
         self._add_controls(server.gui)
+        self._points = server.scene.add_point_cloud(
+            "/height_points", np.zeros((1, 3)), _POINT_COLOR, point_size=0.02, visible=False
+        )
         self._anchor = self.env.sim.qpos[0, :3].copy()  # of the robot in the scene, if followed
         self.update_robot()
         server.initial_camera.fov = FIELD_OF_VIEW
@@ -84,6 +89,8 @@ class PolicyView:
         self.paused = gui.add_checkbox("pause", initial_value=False)
         self.follow = gui.add_checkbox("follow the robot", initial_value=True)
         self.follow.on_update(self._move_to_view)
+        has_scan = self.env.has_height_scan
+        self.height_points = gui.add_checkbox("height points", False, visible=has_scan)
         levels, columns = terrain.terrain_names.shape
         self.level = gui.add_slider("level", 0, max(levels - 1, 1), 1, 0, visible=levels > 1)
         options = [f"{k}: {name}" for k, name in enumerate(terrain.terrain_names[0].tolist())]
@@ -151,3 +158,8 @@ class PolicyView:
                 self.ground.position = self._anchor - qpos[:3]
             self.robot.set_base(qpos[:3] + self.ground.position, qpos[3:7].copy())
             self.robot.set_positions({name: qpos[k] for name, k in self._addresses.items()})
+            self._points.visible = self.height_points.value
+            if self.height_points.value:
+                pose = qpos[None].astype(np.float32)
+                points = np.stack(self.env.sensors.scan_points(pose[:, :3], pose[:, 3:7]), -1)[0]
+                self._points.points = points + self.ground.position

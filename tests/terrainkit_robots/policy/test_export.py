@@ -268,7 +268,7 @@ def test_example_rejects_unknown_observations(exported, tmp_path, monkeypatch, c
     config["observation"]["parts"][0] |= changed
     (tmp_path / "policy.json").write_text(json.dumps(config))
     name = changed.get("name", "commands")
-    with pytest.raises(SystemExit, match=f"cannot compute the observation {name}"):
+    with pytest.raises(SystemExit, match=f"observation {name}: unknown; define it in a file"):
         run_example(tmp_path, monkeypatch)
 
 
@@ -323,10 +323,10 @@ def test_export_policy_rejects_other_actions(trained, tmp_path, monkeypatch, own
 
     def export_wrong(policy, *rest):
         with torch.no_grad():
-            policy[1].mlp[-1].bias += 1e-3
+            policy.model.mlp[-1].bias += 1e-3
         result = export(policy, *rest)
         with torch.no_grad():
-            policy[1].mlp[-1].bias -= 1e-3
+            policy.model.mlp[-1].bias -= 1e-3
         return result
 
     monkeypatch.setattr(owner, name, export_wrong)

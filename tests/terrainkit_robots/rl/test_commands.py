@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from terrainkit_robots.rl.commands import Gait, VelocityCommand, sample_commands
-from terrainkit_robots.rl.config import Commands, Rewards
+from terrainkit_robots.rl.config import Commands, Env, Rewards
 from terrainkit_robots.rl.rewards import REWARDS
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import quat_to_yaw
@@ -69,7 +69,7 @@ class TestHeading:
         command = VelocityCommand(cfg, 1, 0.02, heading_command=True)
         command.heading[:] = heading
         command.update(np.float32([yaw]), np.zeros((1, 2), np.float32))
-        assert command.commands[0, 2] == pytest.approx(rate, abs=1e-4)
+        assert command.values[0, 2] == pytest.approx(rate, abs=1e-4)
 
     def test_yaw_rate_of_fixed_commands(self):
         command = VelocityCommand(Commands(), 2, 0.02, heading_command=True)
@@ -90,6 +90,80 @@ class TestHeading:
         yaw = quat_to_yaw(env.state.base_quat) + np.float32(0.5)
         env.velocity_command.update(yaw, env.state.base_pos[:, :2])
         assert (env.commands[:, 2] != before).any() == expected
+
+
+class TestCurriculum:
+    """Four robots; the range grows when as many episodes have ended."""
+
+    @pytest.fixture
+    def make(self):
+        def make(low=-1.0, high=1.0, most=2.0, **options):
+            cfg = Commands(lin_vel_x=(low, high), max_curriculum=most, **options)
+            return VelocityCommand(cfg, 4, 0.02, heading_command=False)
+
+        return make
+
+    @pytest.mark.parametrize(("share", "expected"), [(0.79, [-1, 1]), (0.81, [-1.5, 1.5])])
+    def test_range_grows_above_80_percent(self, make, share, expected):
+        command = make(curriculum=True)
+        command.end_episodes(np.full(3, share, np.float32))
+        assert command.lin_vel_x.tolist() == [-1, 1]  # too few episodes
+        command.end_episodes(np.full(1, share, np.float32))
+        assert command.lin_vel_x.tolist() == expected
+        command.end_episodes(np.full(4, 0.795, np.float32))  # the sums start again
+        assert command.lin_vel_x.tolist() == expected
+
+    def test_mean_of_all_episodes_counts(self, make):
+        command = make(curriculum=True)
+        command.end_episodes(np.float32([1, 1]))
+        command.end_episodes(np.float32([1, 0.25, 0.7]))
+        assert command.lin_vel_x.tolist() == [-1, 1]  # 3.95 / 5
+        command.end_episodes(np.float32([1, 1, 1, 0.25]))
+        assert command.lin_vel_x.tolist() == [-1.5, 1.5]
+
+    def test_range_ends_at_max_curriculum(self, make):
+        command = make(-0.25, 1.75, curriculum=True)
+        for expected in ([-0.75, 2], [-1.25, 2], [-1.75, 2], [-2, 2], [-2, 2]):
+            command.end_episodes(np.ones(4, np.float32))
+            assert command.lin_vel_x.tolist() == expected
+
+    def test_range_beyond_max_curriculum_is_kept(self, make):
+        command = make(-1, 3, curriculum=True)
+        command.end_episodes(np.ones(4, np.float32))
+        assert command.lin_vel_x.tolist() == [-1.5, 3]
+
+    def test_range_is_fixed_without_curriculum(self, make):
+        command = make()
+        command.end_episodes(np.ones(40, np.float32))
+        assert command.lin_vel_x.tolist() == [-1, 1]
+
+    def test_commands_are_sampled_from_the_range(self, make):
+        command, rng = make(curriculum=True, standing=0, min_norm=0), np.random.default_rng(0)
+        seen = []
+        for _ in range(2):
+            drawn = []
+            for _ in range(200):
+                command.resample(rng, np.arange(4))
+                drawn.append(command.values[:, 0].copy())
+            seen.append((np.min(drawn), np.max(drawn)))
+            command.end_episodes(np.ones(4, np.float32))
+        np.testing.assert_allclose(seen, [[-1, 1], [-1.5, 1.5]], atol=0.02)
+
+    def test_episodes_report_their_share_of_the_tracking_reward(self, nominal_env, monkeypatch):
+        """An episode that ends after a quarter of its time earned a quarter at most."""
+        shares = []
+        monkeypatch.setattr(VelocityCommand, "end_episodes", lambda _, each: shares.append(each))
+        only = Rewards(**{**dict.fromkeys(REWARDS, 0.0), "tracking_lin_vel": 2.0})
+        env = nominal_env(
+            env=Env(num_envs=4, num_threads=1, episode_length_s=0.4),
+            rewards=replace(only, tracking_sigma=1e9),
+        )
+        env.set_commands(np.zeros((4, 3), np.float32))
+        run(env, 4)
+        env.sim.qpos[1, 3:7] = (0, 1, 0, 0)
+        run(env, 16)
+        assert [len(each) for each in shares] == [1, 3]
+        assert np.concatenate(shares) == pytest.approx([0.25, 1, 1, 1], abs=0.01)
 
 
 class TestGait:

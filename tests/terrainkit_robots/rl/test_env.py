@@ -6,18 +6,22 @@ import torch
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, PluginError
 from terrainkit_robots.rl.config import (
     Commands,
     Control,
     DomainRand,
     Env,
+    Noise,
     Observations,
     Rewards,
     Runner,
     Terrain,
 )
-from terrainkit_robots.rl.terrain import MapGround
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.observations import ObservationTerm
+from terrainkit_robots.rl.symmetry import has_symmetry
+from terrainkit_robots.rl.terrain import MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
@@ -168,6 +172,53 @@ class TestHistory:
                     source = seen[-1 - min(step, length[k] - 1)]
                     assert torch.equal(seen[-1][k, part], source[k, : self.WIDTH])
         assert (length < 30).all()
+
+    def test_history_has_no_terms_after_it(self, nominal_task, quadruped):
+        class More(LeggedEnv):
+            def observation_terms(self):
+                ones = ObservationTerm(lambda env: env.steps_since_reset[:, None] + np.ones((1, 2)))
+                groups = super().observation_terms()
+                return groups | {"policy": groups["policy"] | {"ones": ones}}
+
+        task = nominal_task(observations=Observations(history_length=3))
+        env = More(task, quadruped, Plane())
+        seen = [env.get_observations()["policy"]]
+        assert seen[0].shape == (4, 3 * 47 + 2)
+        for k in range(3):
+            seen.append(env.step(torch.zeros(4, 12))[0]["policy"])
+            assert torch.equal(seen[-1][:, 47:94], seen[-2][:, :47])
+            assert torch.equal(seen[-1][:, 94:141], seen[max(k - 1, 0)][:, :47])
+            assert (seen[-1][:, 141:] == k + 2).all()
+        half = env.mirror_maps.groups["policy"].index
+        assert (half[47:94] - 47).tolist() == half[:47].tolist()
+
+    def test_noise_level_scales_the_noise_of_own_terms(self, nominal_task, quadruped):
+        class Noisy(LeggedEnv):
+            def observation_terms(self):
+                zero = ObservationTerm(lambda env: np.zeros((env.num_envs, 1)), noise=1.0)
+                return {name: {"zero": zero} for name in super().observation_terms()}
+
+        for level in (0.0, 0.5):
+            env = Noisy(nominal_task(500, noise=Noise(noise_level=level)), quadruped, Plane())
+            seen = env.get_observations()
+            assert seen["policy"].abs().max() == pytest.approx(level, rel=0.05)
+            assert not seen["privileged"].any()
+
+    @pytest.mark.parametrize(
+        ("symmetry", "told"),
+        [
+            ("vectors", "got the symmetry 'vectors'; expected one of: vector, axial,"),
+            ("vector", "got 2 numbers; expected 3, as in its symmetry"),
+        ],
+    )
+    def test_wrong_symmetry_of_own_term_is_named(self, nominal_task, quadruped, symmetry, told):
+        class Odd(LeggedEnv):
+            def observation_terms(self):
+                zero = ObservationTerm(lambda env: np.zeros((env.num_envs, 2)), symmetry)
+                return {name: {"zero": zero} for name in super().observation_terms()}
+
+        with pytest.raises(PluginError, match=f"^observation zero: {told}"):
+            has_symmetry(Odd(nominal_task(), quadruped, Plane()))
 
 
 class TestActionDelay:
@@ -369,7 +420,7 @@ class TestStateDict:
             assert torch.equal(other.get_observations()[name], group), name
         assert record(other, actions[21:]) == expected
 
-    @pytest.mark.parametrize("name", ["steps_until_push", "state_push_vel"])
+    @pytest.mark.parametrize("name", ["steps_until_push", "state.foot_force"])
     def test_load_rejects_other_version(self, random_env, name):
         saved = random_env(3).state_dict()
         del saved["arrays"][name]

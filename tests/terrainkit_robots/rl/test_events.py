@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -6,9 +7,11 @@ import pytest
 import torch
 
 from terrainkit import MapConfig, generate
+from terrainkit.errors import PluginError
 from terrainkit_robots.rl.config import Control, DomainRand, InitState, Task
-from terrainkit_robots.rl.events import Pushes, apply_params, sample_params, sample_reset_state
-from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.events import EventTerm, apply_params, reset_push, sample_params
+from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapGround, Plane
 from terrainkit_robots.transforms import quat_to_yaw
@@ -20,13 +23,14 @@ def physics_of(quadruped):
 
     def make(kind="P", robot=quadruped):
         task = Task(control=Control(control_type=kind))
-        return Simulation(build_scene(robot, Plane(), task), 5, 1)
+        return Simulation(Scene(robot, Plane(), task), 5, 1)
 
     return make
 
 
 def draw(sim, settings, n=5, seed=0):
-    return sample_params(np.random.default_rng(seed), n, sim, settings)
+    cfg, rng = Task(domain_rand=settings), np.random.default_rng(seed)
+    return sample_params(SimpleNamespace(cfg=cfg, scene=sim.scene, num_envs=n, rng=rng))
 
 
 class TestSampleParams:
@@ -75,13 +79,6 @@ class TestApplyParams:
 
 
 class TestInEnvironment:
-    def test_state_has_the_params(self, nominal_env):
-        env = nominal_env(6, domain_rand=DomainRand())
-        for name in ("friction", "added_mass", "com_shift"):
-            assert np.ptp(getattr(env.params, name)) > 0
-            np.testing.assert_array_equal(getattr(env.state, name), getattr(env.params, name))
-        np.testing.assert_array_equal(env.state.joint_offset, env.joint_offset)
-
     def test_joint_offsets_are_resampled_at_reset(self, nominal_env, no_randomization):
         env = nominal_env(6, domain_rand=replace(no_randomization, joint_offset=0.05))
         before = env.joint_offset.copy()
@@ -92,43 +89,36 @@ class TestInEnvironment:
         assert changed.tolist() == [False, True, False, False, False, False]
 
     def test_first_push_time_is_uniform(self):
-        pushes = Pushes(DomainRand(push_interval_s=0.1), 2000, 0.02)
-        pushes.reset(np.random.default_rng(0), np.arange(2000))
-        times, counts = np.unique(pushes.steps_until_push, return_counts=True)
+        env = pushed(2000, DomainRand(push_interval_s=0.1))
+        reset_push(env, np.arange(2000))
+        times, counts = np.unique(env.steps_until_push, return_counts=True)
         assert times.tolist() == [1, 2, 3, 4, 5]
         np.testing.assert_allclose(counts, 400, rtol=0.15)
 
     def test_reset_samples_a_new_push_time(self):
-        pushes = Pushes(DomainRand(push_interval_s=15), 6, 0.02)
-        rng = np.random.default_rng(0)
-        pushes.reset(rng, np.arange(6))
-        before = pushes.steps_until_push.copy()
-        pushes.velocity[:] = 1
-        pushes.reset(rng, np.array([1, 4]))
-        assert np.flatnonzero(pushes.steps_until_push != before).tolist() == [1, 4]
-        assert pushes.velocity[:, 0].tolist() == [1, 0, 1, 1, 0, 1]
+        env = pushed(6, DomainRand(push_interval_s=15))
+        reset_push(env, np.arange(6))
+        before = env.steps_until_push.copy()
+        env.push_vel[:] = 1
+        reset_push(env, np.array([1, 4]))
+        assert np.flatnonzero(env.steps_until_push != before).tolist() == [1, 4]
+        assert env.push_vel[:, 0].tolist() == [1, 0, 1, 1, 0, 1]
+
+
+def pushed(n, settings):
+    """Return what pushes read of an environment of n robots."""
+    return SimpleNamespace(
+        cfg=Task(domain_rand=settings),
+        rng=np.random.default_rng(0),
+        push_vel=np.zeros((n, 3), np.float32),
+        steps_until_push=np.zeros(n, np.int64),
+    )
 
 
 @pytest.fixture(scope="module")
 def default_ground():
     """Return a map with every default terrain at three difficulties."""
     return MapGround(generate(MapConfig(rows=3, seed=5)))
-
-
-@pytest.fixture(scope="module")
-def plane_scene(quadruped, nominal_task):
-    return build_scene(quadruped, Plane(), nominal_task())
-
-
-@pytest.fixture
-def drawn(quadruped, plane_scene):
-    """Return a function that samples states at reset on a plane."""
-
-    def draw(origins, seed=0, **settings):
-        rng, cfg = np.random.default_rng(seed), InitState(**settings)
-        return sample_reset_state(rng, np.float32(origins), plane_scene, quadruped, Plane(), cfg)
-
-    return draw
 
 
 def deepest(env, qpos, down=0.0):
@@ -150,23 +140,42 @@ def on_every_patch(make_env, ground, **options):
     return env
 
 
-class TestSampleResetState:
-    def test_reset_values_fill_their_ranges(self, drawn, quadruped, plane_scene):
+@pytest.mark.parametrize("when", ["startup", "reset", "step"])
+def test_failing_event_of_another_package_is_named(quadruped, nominal_task, when):
+    def gust(env, *env_ids):
+        raise ValueError(f"{env.num_envs} robots, {len(env_ids)} more arguments")
+
+    class Windy(LeggedEnv):
+        def event_terms(self):
+            return super().event_terms() | {"gust": EventTerm(**{when: gust})}
+
+    told = rf"^event gust \(.*test_events\): ValueError: 4 robots, {int(when == 'reset')} more"
+    with pytest.raises(PluginError, match=told):
+        Windy(nominal_task(), quadruped, Plane()).step(torch.zeros(4, 12))
+
+
+class TestResetState:
+    def test_reset_values_fill_their_ranges(self, nominal_env, quadruped):
         ranges = {"position": 0.4, "yaw": 1.0, "lin_vel": 0.3, "ang_vel": 0.6}
-        qpos, qvel = drawn(np.tile([3, -2, 0], (400, 1)), **ranges, reset_range=(0.8, 1.2))
+        ground = Plane()
+        ground.env_origins = np.float32([[[3, -2, 0]]])
+        ground.spawns = np.float32([[[[3, -2, 0, 0]]]])
+        env = nominal_env(400, ground, init_state=InitState(**ranges, reset_range=(0.8, 1.2)))
+        qpos, qvel, joints = env.sim.qpos, env.sim.qvel, env.scene.joint_qpos
         yaw = quat_to_yaw(qpos[:, 3:7].astype(np.float32))
         found = (qpos[:, :2] - [3, -2], yaw, qvel[:, :3], qvel[:, 3:6])
         for values, most in zip(found, ranges.values(), strict=True):
             assert np.abs(values).max() <= most + 1e-6
             assert np.quantile(values / most, [0, 0.5, 1]) == pytest.approx([-1, 0, 1], abs=0.15)
         pose = np.where(quadruped.default_pose == 0, np.nan, quadruped.default_pose)
-        factors = qpos[:, plane_scene.joint_qpos] / pose
+        factors = qpos[:, joints] / pose
         ends = np.nanmin(factors), np.nanmax(factors)
         assert ends == pytest.approx((0.8, 1.2), abs=0.01)
-        assert (qvel[:, plane_scene.joint_qvel] == 0).all()
+        assert (qvel[:, env.scene.joint_qvel] == 0).all()
 
-    def test_joints_respect_soft_limits(self, drawn, quadruped, plane_scene):
-        joints = drawn(np.zeros((50, 3)), reset_range=(0.0, 9.0))[0][:, plane_scene.joint_qpos]
+    def test_joints_respect_soft_limits(self, nominal_env, quadruped):
+        env = nominal_env(50, init_state=InitState(reset_range=(0.0, 9.0)))
+        joints = env.sim.qpos[:, env.scene.joint_qpos]
         assert (joints >= quadruped.lower - 1e-6).all()
         assert (joints <= quadruped.upper + 1e-6).all()
 

@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from terrainkit.errors import PluginError
-from terrainkit_robots.rl import rewards
-from terrainkit_robots.rl.config import Env, Rewards
-from terrainkit_robots.rl.rewards import REWARDS, active_rewards
+from terrainkit_robots.rl.config import Env, Rewards, Task
+from terrainkit_robots.rl.own_terms import checked
+from terrainkit_robots.rl.rewards import REWARDS, reward_scales
 from terrainkit_robots.rl.state import State
 from tests.terrainkit_robots.rl.made_states import FLAGS, made_state, shapes
 
@@ -23,6 +23,12 @@ def state(n=1, **arrays):
     return made_state(_SHAPES, n, **arrays)
 
 
+def rewarded(name, robot, given, **settings):
+    """Return the values of a reward."""
+    cfg = Task(rewards=Rewards(**settings))
+    return REWARDS[name](SimpleNamespace(state=given, robot=robot, cfg=cfg))
+
+
 def random_state(n, seed):
     rng = np.random.default_rng(seed)
     arrays = {}
@@ -30,7 +36,7 @@ def random_state(n, seed):
         arrays[name] = (
             rng.random((n, *shape)) < 0.5 if name in FLAGS else rng.normal(0, 3, (n, *shape))
         )
-    for positive in ("swing_phase", "penalized_force"):
+    for positive in ("swing_phase", "penalized_force", "foot_air_time"):
         arrays[positive] = np.abs(arrays[positive])
     arrays["foot_force"] *= 50
     for some in ("commands", "foot_force"):
@@ -54,7 +60,7 @@ def robot(quadruped):
 
 
 def paid(name, robot, given, **settings):
-    return REWARDS[name](given, robot, Rewards(**settings)).tolist()
+    return rewarded(name, robot, given, **settings).tolist()
 
 
 _BY_HAND = tomllib.loads(Path(__file__).with_name("rewards.toml").read_text())
@@ -78,7 +84,10 @@ def test_every_reward_is_tested_by_hand():
 
 
 _BOUNDED = {"tracking_lin_vel", "tracking_ang_vel", "progress", "feet_gait", "upright"}
-_PENALTIES = sorted({*REWARDS} - _BOUNDED)
+_UNUSED = {"base_height", "orientation", "dof_vel", "dof_power", "action_smoothness"}
+_UNUSED |= {"foot_clearance", "feet_air_time"}  # these two are no penalties
+"""Rewards with the scale 0."""
+_PENALTIES = sorted({*REWARDS} - _BOUNDED - {"feet_air_time", "foot_clearance"})
 
 
 @pytest.mark.parametrize(
@@ -98,34 +107,34 @@ def test_default_swing_height_is_limited_on_four_legs(robot, num_feet, leg_lengt
 class TestEveryReward:
     def test_values_are_finite(self, name, robot):
         for n in (1, 50):
-            values = REWARDS[name](random_state(n, seed=n), robot, Rewards())
+            values = rewarded(name, robot, random_state(n, seed=n))
             assert values.shape == (n,)
             assert np.isfinite(values).all()
             assert values.dtype == np.float32  # or every step pays for conversions
 
     def test_state_is_not_modified(self, name, robot):
         given, twin = random_state(20, seed=2), random_state(20, seed=2)
-        first = REWARDS[name](given, robot, Rewards())
+        first = rewarded(name, robot, given)
         for each in fields(State):
             np.testing.assert_array_equal(getattr(given, each.name), getattr(twin, each.name))
         first += 1  # what is returned is no view of the state either
-        np.testing.assert_array_equal(REWARDS[name](given, robot, Rewards()) + 1, first)
+        np.testing.assert_array_equal(rewarded(name, robot, given) + 1, first)
 
     def test_robots_are_independent(self, name, robot):
         all_of_them = random_state(20, seed=3)
         alone = State(**{f.name: getattr(all_of_them, f.name)[7:8] for f in fields(State)})
-        together = REWARDS[name](all_of_them, robot, Rewards())[7]
-        assert REWARDS[name](alone, robot, Rewards())[0] == pytest.approx(together, rel=1e-5)
+        together = rewarded(name, robot, all_of_them)[7]
+        assert rewarded(name, robot, alone)[0] == pytest.approx(together, rel=1e-5)
 
     def test_penalties_are_positive_and_have_negative_scales(self, name, robot):
-        values = REWARDS[name](random_state(500, seed=4), robot, Rewards(tracking_sigma=5))
+        values = rewarded(name, robot, random_state(500, seed=4), tracking_sigma=5)
         [scale] = [each.default for each in fields(Rewards) if each.name == name]
         assert isinstance(scale, float)
-        assert (scale <= 0) == (name in _PENALTIES)
+        assert np.sign(scale) == (0 if name in _UNUSED else -1 if name in _PENALTIES else 1)
         if name in _PENALTIES:
             assert values.min() >= 0
             assert values.max() > 0
-        elif name not in ("progress", "upright"):
+        elif name in ("tracking_lin_vel", "tracking_ang_vel", "feet_gait"):
             assert values.min() >= 0
             assert 0.5 < values.max() <= 1
 
@@ -135,21 +144,19 @@ def test_every_scale_has_a_reward():
     assert {each.name for each in fields(Rewards)} - settings == {*REWARDS}
 
 
-def test_active_rewards_have_nonzero_scales():
-    nothing = dict.fromkeys(REWARDS, 0.0)
-    assert active_rewards(SimpleNamespace(), 1.0, 1.0) == {}
-    assert active_rewards(Rewards(**nothing), 1.0, 1.0) == {}
-    only = active_rewards(Rewards(**(nothing | {"collision": -0.5})), 3.0, 2.0)
-    assert only == {"collision": (REWARDS["collision"], -0.5)}
+def test_rewards_without_a_scale_are_not_computed(nominal_env):
+    env = nominal_env(rewards=Rewards(**(_NONE | {"collision": -0.5})))
+    assert env.active_rewards == {"collision": (REWARDS["collision"], -0.5)}
 
 
 def test_scales_are_in_units_of_the_robot():
     # 2 kg on legs of 9.81 / 4 m: the unit of time is 0.5 s.
     length = 9.81 / 4
-    scales = {k: v for k, (_, v) in active_rewards(Rewards(), 2.0, length).items()}
+    scales = reward_scales(Rewards(dof_power=-1.0), 2.0, length)
     assert (scales["collision"], scales["ang_vel_xy"]) == (-1, pytest.approx(-1 / 2**2))
     assert scales["torques"] == pytest.approx(-1 / (2 * 9.81 * length) ** 2)
     assert scales["lin_vel_z"] == pytest.approx(-9 / (length / 0.5) ** 2)
+    assert scales["dof_power"] == pytest.approx(-1 / (2 * 9.81 * length / 0.5))
 
 
 _NONE = dict.fromkeys(REWARDS, 0.0)
@@ -213,21 +220,16 @@ def test_episode_sums_of_short_episode(standing):
         (np.zeros((3, 1)), r"got shape \(3, 1\); expected \(3,\)"),
     ],
 )
-def test_failing_reward_of_another_package_is_named(monkeypatch, robot, result, told):
-    def bonus(*_):
+def test_failing_reward_of_another_package_is_named(result, told):
+    def bonus(_):
         if isinstance(result, BaseException):
             raise result
         return result
 
-    monkeypatch.setattr(rewards, "REWARDS", {"bonus": bonus})
     bonus.__module__ = "rover_pack.rewards"
-    cfg = SimpleNamespace(bonus=2.0)
-    function, scale = active_rewards(cfg, 10.0, 0.5)["bonus"]
-    assert scale == 2.0
+    function = checked("reward", "bonus", bonus, (3,))
     with pytest.raises(PluginError, match=rf"^reward bonus \(rover_pack\.rewards\): {told}$"):
-        function(state(3), robot, cfg)
-    with pytest.raises(PluginError, match=r"^reward bonus .*: ValueError: could not convert str"):
-        active_rewards(SimpleNamespace(bonus="high"), 10.0, 0.5)
+        function(None)
 
 
 def test_tiny_tracking_sigma_pays_nothing(robot):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, PluginError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
 from terrainkit_robots.rl.config import Algorithm, Policy, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -136,7 +136,11 @@ OF_ENV = "processes 0 env"
         ("processes", [], "processes: got none; expected one or more"),
         ("processes", DELETED, "state.processes: got nothing"),
         (OF_ENV, 3, "env: got int; expected dict"),
-        (f"{OF_ENV} arrays commands", torch.zeros(3), "env.arrays.commands: got float32 (3,); exp"),
+        (
+            f"{OF_ENV} arrays path_length",
+            torch.zeros(3),
+            "arrays.path_length: got float32 (3,); exp",
+        ),
         (f"{OF_ENV} arrays episode_length", torch.zeros(2).long(), "episode_length: got int64 (2"),
         (f"{OF_ENV} curriculum levels", torch.full((3,), 99), "levels: got 99 to 99; expected 0"),
         (f"{OF_ENV} observations policy", torch.zeros(3), "env.observations.policy: got float32"),
@@ -241,6 +245,96 @@ def test_two_processes_learn_the_same_weights(tmp_path):
     assert [len(each["env"]["observations"]["policy"]) for each in state["processes"]] == [3, 2]
     assert len(list((tmp_path / "run").glob("events.*"))) == 1
     assert open_run(tmp_path / "run").task.env.num_envs == 5
+
+
+def test_curiosity_of_rsl_rl_is_trained_and_resumed(make, task, tmp_path):
+    curiosity = {"weight": 0.5, "num_outputs": 2, "predictor_hidden_dims": [8]}
+    changes = {
+        "algorithm": {"rnd_cfg": curiosity | {"target_hidden_dims": [8]}},
+        "obs_groups": {"rnd_state": ["policy"]},
+    }
+    task = replace(task, runner=replace(task.runner, rsl_rl=changes))
+    runner, resumed = make(task), make(task)
+    runner.learn(2)
+    assert runner.alg.rnd.weight == pytest.approx(0.5 * task.dt)
+    resumed.load(tmp_path / "model_2.pt")
+    assert differences(runner.alg.save(), resumed.alg.save()) == []
+    resumed.learn(1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"actor": 3}, "TypeError: argument of type 'int'"),
+        ({"actor": {"class_name": "Unknown"}}, "ValueError: Could not resolve 'Unknown'"),
+        ({"actor": {"distribution_cfg": 3}}, "AttributeError: 'int' object has no attribute"),
+        ({"algorithm": {"symmetry_cfg": {"data_augmentation_func": "PPO"}}}, "TypeError: PPO"),
+    ],
+)
+def test_invalid_rsl_rl_table_is_named(make, task, changes, told):
+    changed = replace(task, runner=replace(task.runner, rsl_rl=changes))
+    with pytest.raises(PluginError, match=rf"^runner\.rsl_rl: {told}"):
+        make(changed).learn(1)
+
+
+@pytest.fixture(params=[0, 1])
+def alone(request, make, tmp_path, monkeypatch):
+    """Return a runner in a group of one process, which breaks after 0 or 1 updates."""
+    store = torch.distributed.FileStore(str(tmp_path / "store"), 1)
+    torch.distributed.init_process_group("gloo", store=store, rank=0, world_size=1)
+    runner = make(folder=tmp_path / "run")
+    (tmp_path / "run").mkdir()
+    runner.is_distributed, updates, update = True, [], runner.alg.update
+
+    def fail(*_, **__):
+        raise RuntimeError("Connection closed by peer [127.0.0.1]:1234")
+
+    def update_before():
+        if len(updates) < request.param:
+            updates.append(None)
+            return update()
+        for name in ("all_reduce", "gather_object"):
+            monkeypatch.setattr(torch.distributed, name, fail)
+        return fail()
+
+    monkeypatch.setattr(runner.alg, "update", update_before)
+    yield runner, request.param
+    torch.distributed.destroy_process_group()
+
+
+def test_main_process_saves_a_checkpoint_when_another_one_ends(
+    alone, make, tmp_path, capfd, monkeypatch
+):
+    (runner, last), folder = alone, tmp_path / "run"
+    with pytest.raises(ConfigError) as caught:
+        runner.learn(4)
+    told = f"another process of torchrun ended after iteration {last}; continue with --resume"
+    assert str(caught.value) == f"{told} {folder}"
+    assert isinstance(caught.value.__cause__, RuntimeError)
+    assert capfd.readouterr() == ("", "")
+    assert [path.name for path in folder.glob("*.pt")] == [f"model_{last}.pt"]
+    monkeypatch.undo()
+    resumed = make(folder=folder)
+    resumed.load(folder / f"model_{last}.pt")
+    assert resumed.current_learning_iteration == last
+    resumed.learn(1)
+    assert (folder / f"model_{last + 1}.pt").exists()
+
+
+def test_other_processes_exit_without_a_checkpoint(alone, tmp_path):
+    runner, _ = alone
+    runner.is_main_process = False
+    with pytest.raises(SystemExit) as caught:
+        runner.learn(4)
+    assert caught.value.code == 1
+    assert not list((tmp_path / "run").glob("*.pt"))
+
+
+def test_error_of_a_single_process_is_not_hidden(alone):
+    runner, _ = alone
+    runner.is_distributed = False
+    with pytest.raises(RuntimeError, match="Connection closed"):
+        runner.learn(4)
 
 
 def test_resolve_device(monkeypatch):

@@ -7,7 +7,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Asset, Sim
-from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
@@ -17,7 +17,7 @@ from terrainkit_robots.spec.robot_spec import JOINT_TABLES
 @pytest.fixture(scope="module")
 def scene_of(cart, nominal_task):
     """Return a function that builds the scene of a cart on a plane."""
-    return lambda robot=cart, **sections: build_scene(robot, Plane(), nominal_task(**sections))
+    return lambda robot=cart, **sections: Scene(robot, Plane(), nominal_task(**sections))
 
 
 @pytest.fixture(scope="module")
@@ -152,7 +152,7 @@ class TestBuildSceneErrors:
             ),
         ],
     )
-    def test_build_scene_rejects_mismatched_spec(self, scene_of, cart, changes, message):
+    def test_scene_rejects_mismatched_spec(self, scene_of, cart, changes, message):
         other = Robot.from_spec(replace(cart.spec, **changes), cart.mjcf.parent)
         with pytest.raises(ConfigError, match=message) as caught:
             scene_of(other)
@@ -166,7 +166,7 @@ class TestBuildSceneErrors:
         ],
         ids=["other moving body", "malformed"],  # qpos must start with the base
     )
-    def test_build_scene_rejects_mjcf(self, scene_of, cart, tmp_path, first, last, message):
+    def test_scene_rejects_mjcf(self, scene_of, cart, tmp_path, first, last, message):
         text = cart.mjcf.read_text().partition("<keyframe>")[0]
         text = text.replace('<body name="trunk"', f'{first}<body name="trunk"') + last
         (tmp_path / "cart.xml").write_text(text + "</mujoco>")

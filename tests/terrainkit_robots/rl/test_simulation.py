@@ -9,14 +9,14 @@ import pytest
 
 from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit_robots.rl.config import Algorithm, DomainRand, Env, Runner, Task
-from terrainkit_robots.rl.scene import build_scene
+from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation, check_env_memory
 from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
 def sim(cart, nominal_task):
-    scene = build_scene(cart, Plane(), nominal_task())
+    scene = Scene(cart, Plane(), nominal_task())
     sim = Simulation(scene, 3, 1)
     start = np.tile(scene.default_qpos, (3, 1))
     start[:, 2] = [0.3, 0.5, 0.7]

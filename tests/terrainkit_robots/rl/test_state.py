@@ -71,7 +71,7 @@ class TestByHand:
         np.testing.assert_allclose(state.base_height, [0.24] * 2, atol=1e-6)
         np.testing.assert_allclose(state.projected_gravity, [[0, 0, -1]] * 2, atol=1e-7)
         np.testing.assert_allclose(state.dof_pos, [cart.default_pose] * 2, atol=1e-6)
-        zero = "base_lin_vel dof_vel dof_acc actions torques foot_force penalized_force push_vel"
+        zero = "base_lin_vel dof_vel dof_acc actions torques foot_force penalized_force"
         for name in zero.split():
             assert not getattr(state, name).any(), name
         assert not state.fallen.any()
@@ -90,6 +90,33 @@ class TestByHand:
             np.testing.assert_allclose(env.state.last_actions, value - 0.1, atol=1e-6)
             before = env.state.dof_vel.copy()
 
+    def test_foot_air_time_is_counted_until_the_foot_lands(self, nominal_env, cart):
+        env = nominal_env(2, robot=cart)
+        contact = np.zeros((2, env.state.foot_force.shape[1]), bool)
+        measured = env.sim.sensor
+
+        def sensor(name, rows=slice(None)):
+            if name != "foot_force":
+                return measured(name, rows)
+            force = np.zeros((*contact.shape, 3), np.float32)
+            force[..., 2] = np.where(contact, -2 * CONTACT_FORCE, 0)  # on the ground
+            return force[rows]
+
+        env.sim.sensor = sensor
+        assert not env.state.foot_air_time.any()
+        # A foot that stands after a reset has not landed. Then it swings for three steps.
+        for touching, steps in zip("1100011", (0, 0, 1, 2, 3, 4, 0), strict=True):
+            contact[0, 0] = touching == "1"
+            env.step(torch.zeros(2, 3))
+            assert env.state.foot_air_time[0, 0] == pytest.approx(steps * env.cfg.dt)
+        assert env.state.foot_air_time[1, 0] == pytest.approx(7 * env.cfg.dt)
+        env.sim.qpos[1, 3:7] = (0, 1, 0, 0)  # a fall
+        *_, dones, _ = env.step(torch.zeros(2, 3))
+        assert dones.tolist() == [False, True]
+        assert not env.state.foot_air_time[1].any()
+        env.step(torch.zeros(2, 3))
+        assert env.state.foot_air_time[1, 0] == pytest.approx(env.cfg.dt)
+
     def test_push_adds_to_world_velocity(self, nominal_env, cart, no_randomization):
         pushed = replace(no_randomization, push_interval_s=0.04, max_push_vel_xy=0.8)
         env = nominal_env(64, robot=cart, domain_rand=pushed)
@@ -99,10 +126,10 @@ class TestByHand:
             before = env.sim.qvel[:, :2].copy()
             env.step(torch.zeros(64, 3))
             added = env.sim.qvel[:, :2] - before
-            np.testing.assert_allclose(added, env.state.push_vel[:, :2], atol=0.05)
-            assert (env.state.push_vel[:, 2] == 0).all()
-            assert 0.7 < np.abs(env.state.push_vel).max() <= 0.8
-            seen.append((env.state.push_vel != 0).any(axis=1))
+            np.testing.assert_allclose(added, env.push_vel[:, :2], atol=0.05)
+            assert (env.push_vel[:, 2] == 0).all()
+            assert 0.7 < np.abs(env.push_vel).max() <= 0.8
+            seen.append((env.push_vel != 0).any(axis=1))
         # Each robot every 0.04 s; the state has only the push of the step.
         np.testing.assert_array_equal(seen[0], ~seen[1])
         np.testing.assert_array_equal(seen[2:], seen[:2])
@@ -114,7 +141,7 @@ class TestStateCopies:
         env = random_env(3)
         env.step(torch.zeros(3, 12))
         own = [env.sim.batch.state, *vars(env.params).values(), env.commands]
-        own += [env.joint_offset, env.pushes.velocity, env.action_history]
+        own += [env.joint_offset, env.push_vel, env.action_history]
         for name, value in vars(env.state).items():
             assert not any(np.shares_memory(value, other) for other in own), name
 

@@ -86,10 +86,10 @@ def mirror_memory(env, mirror):
     env.velocity_command.fixed[b] = env.velocity_command.fixed[a] * np.array([1, -1, -1])
     env.action_history[:, a] = rng.uniform(-0.2, 0.2, env.action_history[:, a].shape)
     env.action_history[:, b] = [mirror.actions(each) for each in env.action_history[:, a]]
-    env.pushes.velocity[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
-    env.pushes.velocity[b] = env.pushes.velocity[a] * np.array([1, -1, 1])
+    env.push_vel[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
+    env.push_vel[b] = env.push_vel[a] * np.array([1, -1, 1])
     env.joint_offset[b] = mirror.joints(env.joint_offset[a])
-    env.sensors.mean_vel[b] = env.sensors.mean_vel[a] * np.array([1, -1, -1])
+    env.state.mean_vel[b] = env.state.mean_vel[a] * np.array([1, -1, -1])
     env.steps_since_reset[a], env.steps_since_reset[b] = 3, 13  # half a period later
     d = env.params
     for same in (d.friction, d.geom_friction, d.added_mass, d.strength):
@@ -105,11 +105,11 @@ def assert_images(env, mirror, tolerance):
         values = env.get_observations()[name].numpy()
         one, other = values[:_PAIRS], values[_PAIRS:]
         width = 0
-        for each in env.obs_terms[name]:
-            here = slice(width, width + each.function(env.state).shape[1])
+        for term, each in env.obs_terms[name].items():
+            here = slice(width, width + each.function(env).shape[1])
             width = here.stop
             np.testing.assert_allclose(
-                image(one)[:, here], other[:, here], atol=tolerance, err_msg=each.name
+                image(one)[:, here], other[:, here], atol=tolerance, err_msg=term
             )
         assert width == values.shape[1]
 
@@ -139,7 +139,7 @@ class TestRobot:
         image = env.sim.qpos[:_PAIRS].copy()
         image[:, [1, 4, 6]] *= -1
         np.testing.assert_allclose(image[:, :7], env.sim.qpos[_PAIRS:, :7], atol=1e-4)
-        rewards = env._compute_rewards(env.state, np.zeros(env.num_envs, bool))
+        rewards = env._compute_rewards(np.zeros(env.num_envs, bool))
         np.testing.assert_allclose(rewards[:_PAIRS], rewards[_PAIRS:], atol=1e-4)
 
 
@@ -202,7 +202,7 @@ class TestErrors:
     def test_feet_without_pairs_are_rejected(self, env):
         position = env.scene.foot_pos.copy()
         position[0] = position[2]  # two feet have the same mirror image
-        env.scene = replace(env.scene, foot_pos=position)
+        env.scene.foot_pos = position
         with pytest.raises(ConfigError, match=f"symmetry: the foot {env.robot.spec.feet[2]} is"):
             _ = env.mirror_maps
 
@@ -213,7 +213,7 @@ class TestErrors:
             _ = leaning.mirror_maps
 
     def test_wrong_term_width_is_rejected(self, env):
-        first, *others = env.obs_terms["policy"]
-        env.obs_terms["policy"] = (replace(first, symmetry="joints"), *others)
-        with pytest.raises(ConfigError, match="commands: got 3 numbers; the symmetry 'joints'"):
+        terms = env.obs_terms["policy"]
+        terms["commands"] = replace(terms["commands"], symmetry="joints")
+        with pytest.raises(ConfigError, match="commands: got 3 numbers; expected 12, as in its"):
             _ = env.mirror_maps

@@ -2,7 +2,6 @@ import dataclasses
 import importlib.metadata
 import re
 import sys
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,8 +11,8 @@ from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import flatten
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl import rewards, scene, tasks
-from terrainkit_robots.rl.config import Env, Task
+from terrainkit_robots.rl import scene, tasks
+from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.tasks import get_task, register_task, task_names
 
 MINE = replace(Task(), env=Env(num_envs=7))
@@ -141,54 +140,92 @@ GUIDE = Path(__file__).parents[3] / "docs" / "adding_a_robot.md"
 
 
 @pytest.fixture
-def guide(tmp_path, monkeypatch, plugin):
-    """Import the code of the guide as the module my_package.trot, as its entry point would."""
-    code = re.findall(r"```python\n(.*?)```", GUIDE.read_text(), re.DOTALL)
-    point = tomllib.loads(re.findall(r"```toml\n(.*?)```", GUIDE.read_text(), re.DOTALL)[0])
-    (name, module), *more = point["project"]["entry-points"][tasks.ENTRY_POINTS].items()
-    assert len(code) == 1
-    assert not more
-    path = tmp_path / Path(*module.split(".")).with_suffix(".py")
-    path.parent.mkdir()
-    path.write_text(code[0])
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(rewards, "REWARDS", dict(rewards.REWARDS))
-    plugin(module, name)
-    yield get_task(name)
-    for loaded in (module, module.partition(".")[0]):
-        sys.modules.pop(loaded, None)
+def guide(tmp_path):
+    """Return the task in the code of the guide."""
+    [code] = re.findall(r"```python\n(.*?)```", GUIDE.read_text(), re.DOTALL)
+    assert len(code.splitlines()) < 70
+    path = tmp_path / "crouch.py"
+    path.write_text(code)
+    yield tasks.load_task_file(str(path))
+    sys.modules.pop("crouch")
 
 
-def test_task_of_the_guide_can_be_trained(guide):
+def test_task_of_the_guide_has_its_terms(guide):
     import numpy as np
     import torch
 
-    from terrainkit_robots.rl.env import LeggedEnv
+    from terrainkit_robots.rl.env import make_env
     from terrainkit_robots.rl.terrain import Plane
 
-    assert (guide.name, guide.folder) == ("trotter", QUADRUPED)
-    assert guide.task.rewards.trot == 0.5
+    assert (guide.name, guide.folder) == ("crouch", QUADRUPED)
     text = guide.task.to_toml()
-    assert "# One diagonal pair of feet is on the ground" in text
-    assert Task.from_toml(text.replace("trot = 0.5", "trot = 2.0"), guide.task).rewards.trot == 2.0
+    assert "# Error of the height of the base" in text
+    assert "rnn_type" in text
+    changed = Task.from_toml(text.replace("height = -20.0", "height = -2.0"), guide.task)
+    assert changed.rewards.height == -2.0
     task = replace(guide.task, env=Env(num_envs=4, num_threads=1))
-    env = LeggedEnv(task, scene.Robot.load(guide.folder), Plane())
-    function, scale = env.reward_terms["trot"]
-    assert scale == 0.5
-    env.state.foot_force[..., 2] = [[9, 0, 0, 9], [9, 9, 9, 9], [0, 6, 6, 0], [0, 4, 4, 0]]
-    got = function(env.state, env.robot, task.rewards)
-    np.testing.assert_array_equal(got, [1, 0, 1, 0])
-    paid = env.step(torch.zeros(4, env.num_actions))[1]
-    assert torch.isfinite(paid).all()
+    env = make_env(task, scene.Robot.load(guide.folder), Plane())
+    assert [*env.obs_terms["policy"]][-2:] == ["height_command", "front_feet"]
+    assert env.mirror_maps.groups["policy"].index[-2:].tolist() == [49, 48]
+    height = env.active_commands["height"].values
+    assert 0.2 <= height.min() < height.max() <= 0.35
+    assert env.state_dict()["arrays"]["height.values"].tolist() == height.tolist()
+    env.state.base_height[:] = height[:, 0] + np.float32([0, 0.5, -1, 2])
+    function, scale = env.active_rewards["height"]
+    assert (function(env).round(4).tolist(), scale) == ([0, 0.25, 1, 4], -20)
+    before = env.sim.qvel[:, 1].copy()
+    env.active_events["gust"].step(env)
+    assert (env.sim.qvel[:, 1] != before).all()
+    env.sim.qpos[1, 2], env.sim.qpos[1, env.scene.joint_qpos] = 0.08, [0, 1.5, -2.5] * 4
+    *_, dones, _ = env.step(torch.zeros(4, env.num_actions))
+    assert dones.tolist() == [False, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("", "got 0 tasks; expected one call of register_task"),
+        ("1 / 0", "ZeroDivisionError: division by zero"),
+        ("def f(:", "SyntaxError: invalid syntax"),
+        ("raise SystemExit(3)", "SystemExit: 3"),
+    ],
+)
+def test_invalid_task_file_is_named(tmp_path, code, told):
+    path = tmp_path / "mine.py"
+    path.write_text(code)
+    with pytest.raises(ConfigError, match=rf"mine\.py: .*{re.escape(told)}"):
+        tasks.load_task_file(str(path))
+    with pytest.raises(ConfigError, match=r"got .*other\.py; expected a Python file"):
+        tasks.load_task_file(str(tmp_path / "other.py"))
+
+
+@pytest.mark.parametrize(
+    "name", ["os:system", "torch.nn.Linear", "terrainkit_robots.rl.env:LeggedEnv"]
+)
+def test_run_cannot_name_functions_of_other_modules(name):
+    from terrainkit_robots.rl.runner import runner_config
+
+    task = Task(runner=Runner(rsl_rl={"actor": {"class_name": name}}))
+    expected = r"runner\.rsl_rl\.actor\.class_name: got .*; expected a class of rsl-rl"
+    with pytest.raises(ConfigError, match=expected):
+        runner_config(task)
+
+
+@pytest.mark.parametrize("name", ["logger", "seed", "num_steps_per_env"])
+def test_rsl_rl_table_replaces_no_other_settings(name):
+    from terrainkit_robots.rl.runner import runner_config
+
+    with pytest.raises(ConfigError, match=f"runner.rsl_rl: got {name}; expected one of: actor,"):
+        runner_config(Task(runner=Runner(rsl_rl={name: 3})))
 
 
 def test_guide_is_short_and_current():
     text = GUIDE.read_text()
-    assert len(text.splitlines()) < 150
+    assert len(text.splitlines()) < 190
     for section in dataclasses.fields(Task):
         assert f"`{section.name}`" in text
     options = {f"--{name.replace('_', '-')}" for name, _ in flatten(Task())}
     for option in re.findall(r"--[a-z-]+\.[a-z-]+", text):
-        assert option in options or option == "--rewards.trot"
+        assert option in options or option == "--rewards.height"
     for command in set(re.findall(r"terrainkit ([a-z]+(?:-[a-z]+)*) ", text)):
         assert command in COMMANDS

@@ -1,8 +1,10 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.rl.config import Env, Termination
+from terrainkit_robots.rl.config import Env, Task, Termination
 from terrainkit_robots.rl.terminations import (
     bad_orientation,
     illegal_contact,
@@ -18,6 +20,16 @@ class Field(Plane):
     lower, upper = (-5.0, -1.0), (5.0, 3.0)
 
 
+def robots(force=None, gravity=None, base_pos=None, terrain=None, **limits):
+    """Return what terminations read of an environment."""
+    return SimpleNamespace(
+        cfg=Task(termination=Termination(**limits)),
+        sim=SimpleNamespace(sensor={"termination_force": force}.get),
+        state=SimpleNamespace(projected_gravity=gravity, base_pos=base_pos),
+        terrain=terrain,
+    )
+
+
 class TestIllegalContact:
     def test_by_hand(self):
         force = np.zeros((5, 2, 3), np.float32)
@@ -25,13 +37,13 @@ class TestIllegalContact:
         force[2, 1] = (0, -0.7, 0.75)  # just over
         force[3, 0], force[3, 1] = (0.9, 0, 0), (0, 0.9, 0)  # each for itself
         force[4, 1] = (0, 0, -300)
-        assert illegal_contact(force, Termination()).tolist() == [False, False, True, False, True]
-        harder = illegal_contact(force, Termination(contact_force=300.5))
+        assert illegal_contact(robots(force)).tolist() == [False, False, True, False, True]
+        harder = illegal_contact(robots(force, contact_force=300.5))
         assert harder.tolist() == [False] * 5
 
     def test_no_termination_bodies(self):
         none = np.zeros((3, 0, 3), np.float32)
-        assert illegal_contact(none, Termination()).tolist() == [False] * 3
+        assert illegal_contact(robots(none)).tolist() == [False] * 3
 
 
 class TestBadOrientation:
@@ -41,19 +53,21 @@ class TestBadOrientation:
         angles = np.array([0, 0.5, 1.29, 1.31, 2, np.pi, -1.29, -1.31], np.float32)
         quat = np.zeros((len(angles), 4), np.float32)
         quat[:, 0], quat[:, around] = np.cos(angles / 2), np.sin(angles / 2)
-        found = bad_orientation(projected_gravity(quat), Termination())
+        gravity = projected_gravity(quat)
+        found = bad_orientation(robots(gravity=gravity))
         assert found.tolist() == [False, False, False, True, True, True, False, True]
-        less = bad_orientation(projected_gravity(quat), Termination(tilt=0.4))
+        less = bad_orientation(robots(gravity=gravity, tilt=0.4))
         assert less.tolist() == [False] + [True] * 7
 
 
 class TestTerrainOutOfBounds:
     def test_by_hand(self):
         places = [[0, 0, 9], [4.9, 2.9, 0], [5.1, 0, 0], [-5.1, 0, 0], [0, 3.1, 0], [0, -1.1, 0]]
-        found = terrain_out_of_bounds(np.array(places, np.float32), Field())
+        found = terrain_out_of_bounds(robots(base_pos=np.array(places), terrain=Field()))
         assert found.tolist() == [False, False, True, True, True, True]
         # A plane is unbounded.
-        assert not terrain_out_of_bounds(np.array([[1e6, -1e6, 0]], np.float32), Plane()).any()
+        far = robots(base_pos=np.array([[1e6, -1e6, 0]]), terrain=Plane())
+        assert not terrain_out_of_bounds(far).any()
 
 
 @pytest.fixture

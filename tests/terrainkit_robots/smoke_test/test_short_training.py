@@ -7,23 +7,25 @@ import torch
 
 from terrainkit_robots.rl import config
 from terrainkit_robots.rl.config import Env, Task
+from terrainkit_robots.rl.env import make_env
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.smoke_test import short_training as module
-from terrainkit_robots.smoke_test.short_training import RecordingEnv, train_briefly
+from terrainkit_robots.smoke_test.short_training import record_rewards, train_briefly
 
 TASK = Task(env=Env(num_envs=8, num_threads=1))
 
 
-def test_recording_env_adds_up_to_the_rewards(quadruped):
-    env = RecordingEnv(TASK, quadruped, Plane())
+def test_recorded_rewards_add_up(quadruped):
+    env = make_env(TASK, quadruped, Plane())
+    recorded = record_rewards(env)
     falls, generator = [], torch.Generator().manual_seed(0)
     for _ in range(60):
         actions = 8 * torch.randn(8, 12, generator=generator)
         _, rewards, dones, extras = env.step(actions)
         falls.append(float((dones & ~extras["time_outs"]).float().mean()) / TASK.dt)
-        total = sum(env.recorded[-1][1:])
+        total = sum(recorded[-1][1:])
         assert total == pytest.approx(float(rewards.mean()) / TASK.dt, abs=1e-3)
-    assert [step[0] for step in env.recorded] == pytest.approx(falls)
+    assert [step[0] for step in recorded] == pytest.approx(falls)
     assert sum(falls) > 0
 
 
@@ -43,7 +45,7 @@ def test_train_briefly_keeps_the_random_state(quadruped):
 
 def test_record_compares_the_first_and_the_last_quarter(quadruped, monkeypatch):
     """The first second is not recorded: 50 steps at 50 Hz."""
-    learned = []
+    learned, recorded = [], []
 
     class Runner:
         def __init__(self, env, **_):
@@ -52,10 +54,11 @@ def test_record_compares_the_first_and_the_last_quarter(quadruped, monkeypatch):
 
         def learn(self, iterations, *, init_at_random_ep_len):
             learned.append((iterations, init_at_random_ep_len, torch.initial_seed()))
-            self.env.recorded[:] = [[k, 2 * k] for k in range(60)]
+            recorded[:] = [[k, 2 * k] for k in range(60)]
             raise ValueError("two\nlines")
 
     monkeypatch.setattr(module, "LeggedRunner", Runner)
+    monkeypatch.setattr(module, "record_rewards", lambda _: recorded)
     task = replace(TASK, runner=config.Runner(num_steps_per_env=4, seed=3))
     record = train_briefly(quadruped, task, 3 * 128 * 4 - 1, None)
     assert learned == [(2, True, 3)]
