@@ -57,7 +57,7 @@ class Feasibility(PluginCommand):
     """Name of a bundled robot, or a folder written by terrainkit onboard."""
 
     limit: Limits = ()
-    """Limits that replace those of the robot, such as `step_up=0.2 gap=0.4`. Without --robot, the
+    """Limits that replace the robot's, such as `step_up=0.2 gap=0.4`. Without --robot, the
     limits that are not given come from the bundled quadruped."""
 
     output: OutputPath | None = None

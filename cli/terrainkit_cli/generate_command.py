@@ -59,7 +59,7 @@ class Generate(PluginCommand, ConfigCommand):
     ground, 1 the limit of the robot; see terrainkit feasibility."""
 
     limit: Limits = ()
-    """Limits that replace those of the robot, such as `step_up=0.2 gap=0.4`. Without --robot, the
+    """Limits that replace the robot's, such as `step_up=0.2 gap=0.4`. Without --robot, the
     limits that are not given come from the bundled quadruped."""
 
     jobs: Jobs = 1

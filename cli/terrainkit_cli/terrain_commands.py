@@ -269,7 +269,7 @@ class CheckMap(PluginCommand):
     written by terrainkit onboard."""
 
     limit: Limits = ()
-    """Limits that replace those of the robot, or describe one without --robot; see terrainkit
+    """Limits that replace the robot's, or describe one without --robot; see terrainkit
     feasibility."""
 
     def run(self) -> int:

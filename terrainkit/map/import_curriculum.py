@@ -34,6 +34,7 @@ from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import MAX_VALUE
+from terrainkit.terrain.sub_terrain import SubTerrain
 
 FileProgress = Callable[[Iterable[Path], int], Iterable[Path]]
 """Wraps the files, given their number, to show a progress bar."""
@@ -196,7 +197,8 @@ def _import_patch(
 ) -> _Patch:
     """Return a patch of a file, whose edges fade to height 0."""
     place = replace(options, origin=(*lower.tolist(), 0.0), rows=1, cols=1, border=0.0)
-    config, origin = import_map.make_config(path, source, place)
+    # The whole map records the files, once each.
+    config, origin = import_map.make_config(path, source, place, SubTerrain(terrain="imported"))
     anywhere, center = replace(config, **_ANYWHERE), np.array([[config.patch_grid(0, 0).center]])
     types = np.zeros((1, 1), dtype=np.int32)
     with warnings.catch_warnings():

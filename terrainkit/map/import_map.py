@@ -68,7 +68,8 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
     path, options = Path(path), options or ImportOptions()
     source = open_source(path, options)
     check_length(path, source, options.cell or source.cell or DEFAULT_CELL)
-    config, origin = make_config(path, source, options)
+    terrain = sub_terrain(path, path.stem, options)
+    config, origin = make_config(path, source, options, terrain)
     check_samples(path, source, config.cell, math.prod(config.grid.shape))
     size = config.rows, config.cols
     centers = np.array([config.patch_grid(*k).center for k in np.ndindex(size)])
@@ -92,7 +93,7 @@ def make_map(
         source: The ground.
         config: Configuration of the map.
         origin: Point of the source that becomes (0, 0, 0), shape (3,) [m].
-        options: `missing`, `solids` and those of friction are used.
+        options: `missing`, `solids` and the options of friction are used.
         spawn_xy: Preferred spawn position of each patch in the map, shape (rows, cols, 2) [m].
         terrain_types: Sub-terrain of each patch, shape (rows, cols).
 
@@ -132,9 +133,15 @@ def make_map(
 
 
 def make_config(
-    path: Path, source: Source, options: ImportOptions
+    path: Path, source: Source, options: ImportOptions, terrain: SubTerrain
 ) -> tuple[MapConfig, NDArray[np.float64]]:
     """Return the configuration of the map, and its origin in the file.
+
+    Args:
+        path: The file, for errors.
+        source: The ground.
+        options: How the file becomes a map.
+        terrain: The terrain of all patches.
 
     Raises:
         ConfigError: if the patches do not fit in the file.
@@ -168,7 +175,7 @@ def make_config(
         patch_size=(sizes[0], sizes[1]),
         cell=cell,
         border=options.border,
-        terrains=(sub_terrain(path, path.stem, options),),
+        terrains=(terrain,),
         mode="custom",
         **map_settings(options),
     )

@@ -80,11 +80,12 @@ def place_on_flattest(
     ground = patch_ground(config, heights, solids, *patch)
     # In single precision as in a map, so that an edit keeps the position.
     x, y = spawn_xy.astype(np.float32).tolist()
-    if find_spawn(config, *ground, (x, y)) is None:
+    origin = find_spawn(config, *ground, (x, y))
+    if origin is None:
         tolerance = flattest_tolerance(config, *ground, (x, y))
         if tolerance is not None:
             config = replace(config, spawn_tolerance=tolerance)
-    origin = find_origin(config, f"patch {patch}", *ground, (x, y))
+        origin = find_origin(config, f"patch {patch}", *ground, (x, y))
     rng = partial(np.random.default_rng, [config.seed, *patch])
     spawns = sample_spawns(config, *ground, origin, rng)
     return with_heading(spawns, _NO_GOALS), config.spawn_tolerance

@@ -228,7 +228,7 @@ def shaded_colors(colors: NDArray[np.floating], shade: NDArray[np.floating]) -> 
 def map_levels(heights: NDArray[np.floating]) -> Levels:
     """Return the heights of the colors of a map [m], ascending.
 
-    They are those of generated maps, unless this ground would have the colors of one end only.
+    They are the levels of generated maps, unless this ground would have the colors of one end only.
 
     Args:
         heights: Heights of the map [m].

@@ -37,8 +37,8 @@ class State:
     foot_height: FloatArray  # height of the feet above the ground under them [m], shape (n, f)
     foot_vel: FloatArray  # velocity of the feet, world frame [m/s], shape (n, f, 3)
     foot_force: FloatArray  # contact force on the feet, world frame [N], shape (n, f, 3)
-    foot_air_time: FloatArray  # time since each foot was last in contact [s], shape (n, f); still
-    # that of the swing when the foot lands, then 0
+    foot_air_time: FloatArray  # time since each foot was last in contact [s], shape (n, f); the
+    # whole swing when the foot lands, then 0
     penalized_force: FloatArray  # magnitude of the force on each penalized body [N], shape (n, p)
     height_scan: FloatArray  # height of the base above each scan point [m], shape (n, k)
     fallen: NDArray[np.bool_]  # robots whose episode ends with a fall, shape (n,)
