@@ -189,26 +189,47 @@ def try_change(
     tree: Tree, planted: Planted, source: bytes, change: Change, stages: tuple[str, ...]
 ) -> Planted:
     """Run the tests on a change, stage by stage, until one fails."""
-    files = _tests(tree, Path(planted.path))
-    seen = {file for stage in STAGES[: STAGES.index(stages[0])] for file in files[stage]}
+    path = Path(planted.path)
+    files = _tests(tree, path)
+    seen = [file for stage in STAGES[: STAGES.index(stages[0])] for file in files[stage]]
     noticed = stage = ""
     for stage in stages:
         new = [file for file in files[stage] if file not in seen]
-        seen.update(new)
-        failures = _failures(tree, new, planted, change.apply(source), change.lines, stage)
+        # A statement that no test executes may run in other processes or as a copy, which coverage
+        # does not see.
+        unseen: list[Path] = []
+        if stage == STAGES[1]:
+            unseen = [*seen, *new]
+        elif stage == STAGES[2]:
+            unseen = [file for file in new if path.name in (tree.folder / file).read_text()]
+        if _is_covered(tree, seen, path, change.lines):
+            unseen = []
+        seen += new
+        failures = _failures(tree, new, unseen, planted, change.apply(source), change.lines)
         noticed = next(failures, "")
         if noticed:
             break
     return replace(planted, noticed_by=noticed, stage=stage)
 
 
+def _is_covered(tree: Tree, files: list[Path], path: Path, lines: range) -> bool:
+    """Return whether a test executes one of the lines."""
+    return any(
+        only is None or only for file in files for only in [tree.covering(file, path, lines)]
+    )
+
+
 def _failures(
-    tree: Tree, files: list[Path], planted: Planted, changed: bytes, lines: range, stage: str
+    tree: Tree,
+    files: list[Path],
+    unseen: list[Path],
+    planted: Planted,
+    changed: bytes,
+    lines: range,
 ) -> Iterator[str]:
     """Yield what notices a change.
 
-    If no test of the package executes the statement, it may run in other processes or as a copy,
-    which coverage does not see; then all tests of the package run.
+    If no test of the files executes the statement, all tests of `unseen` run.
     """
     path = Path(planted.path)
 
@@ -223,8 +244,8 @@ def _failures(
         if only is None or only:
             is_covered = True
             yield from filter(None, [run(file, only)])
-    if not is_covered and stage == STAGES[1]:
-        yield from filter(None, (run(file, None) for file in files))
+    if not is_covered:
+        yield from filter(None, (run(file, None) for file in unseen))
 
 
 def _tests(tree: Tree, path: Path) -> dict[str, list[Path]]:

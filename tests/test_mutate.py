@@ -2,6 +2,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -60,6 +61,35 @@ def test_lines_of_changes_are_those_of_the_statement():
         (6, "constant"): range(5, 8),
         (8, "return"): range(8, 9),
     }
+
+
+@pytest.mark.parametrize(
+    ("covered", "runs"),
+    [
+        ("test_files", [("test_files", {"test"})]),
+        ("test_policy", [("test_files", None), ("test_wide", None), ("test_policy", {"test"})]),
+        ("", [("test_files", None), ("test_wide", None), ("test_policy", None)]),
+    ],
+)
+def test_statement_that_coverage_does_not_see_is_tested_by_its_package(tmp_path, covered, runs):
+    """Beyond the package, only `test_policy` names the file."""
+    import mutate
+
+    tests = tmp_path / "tests/terrainkit_robots"
+    for name in ("export/test_files", "export/wide/test_wide", "policy/test_policy", "rl/test_rl"):
+        (tests / name).parent.mkdir(parents=True, exist_ok=True)
+        (tests / f"{name}.py").write_text("COPY = 'program.py'" * ("policy" in name))
+    tree = MagicMock(folder=tmp_path)
+    tree.test_files = lambda folder: [
+        file.relative_to(tmp_path) for file in (tmp_path / folder).rglob("*.py")
+    ]
+    tree.covering = lambda file, *_: {"test"} if file.stem == covered else set()
+    tree.run.return_value.noticed = ""
+    path = "robots/terrainkit_robots/export/program.py"
+    planted = mutate.Planted(path=path, line=1, kind="", before="", after="", digest="")
+    found = mutate.try_change(tree, planted, b"", MagicMock(), mutate.STAGES)
+    assert (found.noticed_by, found.stage) == ("", "suite")
+    assert [(call.args[0].stem, call.args[1]) for call in tree.run.call_args_list] == runs
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="Linux only")

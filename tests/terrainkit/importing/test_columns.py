@@ -68,10 +68,11 @@ def test_columns_beside_the_mesh_are_nan():
     np.testing.assert_array_equal(np.isnan(found.top), [[True, True], [False, True]])
 
 
-def test_columns_in_small_blocks_are_the_same(monkeypatch):
+@pytest.mark.parametrize("cells", [8, 3])  # two rows of 4, and less than one
+def test_columns_in_small_blocks_are_the_same(monkeypatch, cells):
     mesh = trimesh.util.concatenate([FLOOR, DECK, trimesh.creation.icosphere(2, 1.5)])
     expected = columns_of(mesh, X, Y)
-    monkeypatch.setattr(columns_module, "_CELLS_PER_STRIP", 8)
+    monkeypatch.setattr(columns_module, "_CELLS_PER_STRIP", cells)
     monkeypatch.setattr(columns_module, "_PAIRS_PER_BLOCK", 5)
     found = columns_of(mesh, X, Y)
     np.testing.assert_array_equal(found.ceiling, expected.ceiling)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
-from terrainkit.importing import image
+from terrainkit.importing import geotiff, image
 from terrainkit.importing.image import read
 from terrainkit.importing.options import ReadOptions
 
@@ -146,6 +146,15 @@ def test_geotiff_whose_bands_opencv_drops_is_rejected(tmp_path, monkeypatch):
     path = write(tmp_path / "a.tif", bands=4)
     monkeypatch.setattr(image, "decode", lambda *_: {"pixels": HEIGHTS})
     with pytest.raises(HeightFileError, match=r"got 1 of 4 bands; expected all; .* pip install"):
+        read(path, ReadOptions())
+
+
+def test_geotiff_tags_of_many_values_are_not_read(tmp_path, monkeypatch):
+    path = write(tmp_path / "a.tif")
+    monkeypatch.setattr(geotiff, "_MAX_VALUES", 8)
+    assert read(path, ReadOptions()).cell == 2.0  # the keys are 8 numbers
+    monkeypatch.setattr(geotiff, "_MAX_VALUES", 7)
+    with pytest.raises(HeightFileError, match="tag 34735 has 8 values of type 3"):
         read(path, ReadOptions())
 
 

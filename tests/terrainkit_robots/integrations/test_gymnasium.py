@@ -12,6 +12,7 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError
 from terrainkit_robots.integrations.gymnasium import TaskEnv, TaskVectorEnv
 from terrainkit_robots.rendering.child_process import RenderError
+from terrainkit_robots.rendering.pose_renderer import PoseRenderer
 from terrainkit_robots.rl.tasks import get_task
 
 MODULE = "terrainkit_robots.integrations.gymnasium"
@@ -144,6 +145,15 @@ def test_env_renders_last_pose_of_episode(short_task):
     assert one.shape == other.shape == (360, 640, 3)
     assert (one != other).any()
     vector.close()
+
+
+@pytest.mark.parametrize(("make", "options"), [(TaskEnv, {}), (TaskVectorEnv, {"num_envs": 1})])
+def test_closing_ends_the_process_that_renders(monkeypatch, make, options):
+    closed = []
+    monkeypatch.setattr(PoseRenderer, "close", lambda renderer: closed.append(renderer))
+    env = make("quadruped", render_mode="rgb_array", **options)
+    env.close()
+    assert closed == [env.env._renderer]
 
 
 def test_spaces_have_the_limits_of_the_task(short_task):

@@ -17,9 +17,9 @@ from terrainkit_robots.lint.rule import FAMILIES
 from tests.terrainkit_robots.lint.test_every_rule import (
     ALL_CASES,
     Case,
-    bundled,
     lint_case,
     text_of,
+    text_of_robot,
 )
 
 FINDINGS = Path(__file__).with_name("all_findings.json")
@@ -51,7 +51,7 @@ def scaled(pattern, factor, *, count):
         start, end = (place - match.start() for place in match.span(1))
         return f"{match[0][:start]}{float(match[1]) * factor:.6g}{match[0][end:]}"
 
-    return re.sub(pattern, scale, bundled("quadruped.urdf"), count=count, flags=re.DOTALL)
+    return re.sub(pattern, scale, text_of_robot("quadruped.urdf"), count=count, flags=re.DOTALL)
 
 
 def findings(title, robot, folder, text=text_of):

@@ -78,7 +78,7 @@ class Case:
         return self._edited(self.against_of, self.against_replace)
 
     def _edited(self, of, replace):
-        text = bundled(of)
+        text = text_of_robot(of)
         for old, new in replace:
             assert old in text, f"{self}: {old!r} is not in {of}"
             text = text.replace(old, new, 1)
@@ -119,8 +119,10 @@ def suffix_of(text):
 
 
 @cache
-def bundled(name):
-    return (BUNDLED / Path(name).stem / name).read_text(encoding="utf-8")
+def text_of_robot(name):
+    """Return the text of a robot of the cases, or of a bundled one."""
+    file = CASES / name
+    return (file if file.exists() else BUNDLED / file.stem / name).read_text(encoding="utf-8")
 
 
 # Files beside the robot.

@@ -47,8 +47,9 @@ def test_scale_is_applied_to_vertices(mesh):
 def test_large_coordinates_are_rejected(mesh, factor):
     use = mesh(scale=(factor, 1, 1))
     assert not Meshes().is_readable(use)
-    with pytest.raises(MeshError, match="coordinates beyond 1,000,000 m"):
-        Meshes().vertices(use)
+    for ask in (Meshes().vertices, Meshes().solid_volume, Meshes().hull_volume):
+        with pytest.raises(MeshError, match="coordinates beyond 1,000,000 m"):
+            ask(use)
     Meshes().partial_diagonal(use)  # nor does it warn
     assert Meshes().is_readable(mesh(scale=(1.999e6, 1, 1)))  # the box has half a meter
 

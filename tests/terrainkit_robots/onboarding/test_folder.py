@@ -92,6 +92,15 @@ def test_new_folder_keeps_old_folder_after_error(tmp_path, robot, monkeypatch):
     assert contents(tmp_path) == NEW
 
 
+def test_new_folder_keeps_files_that_appear_meanwhile(robot):
+    with (
+        pytest.raises(ExportError, match=r"also contains notes\.txt"),
+        new_folder(robot, overwrite=True),
+    ):
+        (robot / "notes.txt").write_text("mine")
+    assert contents(robot).keys() == {"robot.toml", "meshes/a.stl", "notes.txt"}
+
+
 @pytest.mark.parametrize(
     ("target", "message"),
     [

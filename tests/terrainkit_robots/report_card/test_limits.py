@@ -142,3 +142,4 @@ def test_map_of_limits_has_a_patch_for_each_test():
     assert parameters[0]["depth"] == pytest.approx(0.02)
     assert parameters[1] == {"platform": 2.0, "step_width": 1.0, "step_height": pytest.approx(0.5)}
     assert parameters[2]["step_height"] == pytest.approx(0.04)  # level 1 of 19: 0.02 + 0.38 / 19
+    assert parameters[3] == {"platform": 2.0, "width": pytest.approx(0.12)}  # 0.04 + 2 * 0.04

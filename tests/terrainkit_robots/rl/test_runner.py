@@ -3,10 +3,12 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 import torch
+from rsl_rl.utils import WandbLogWriter
 
 from terrainkit.errors import ConfigError, PluginError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
@@ -91,6 +93,14 @@ def test_checkpoints_at_intervals_and_at_end(make, task, tmp_path, capfd):
     names = {path.name for path in tmp_path.glob("*.pt")}
     assert names == {"model_2.pt", "model_4.pt", "model_5.pt"}
     assert len(list(tmp_path.glob("events.out.tfevents.*"))) == 1
+
+
+def test_writer_of_the_log_is_closed_and_stopped(make):
+    logger = make().logger
+    logger.writer = writer = Mock(spec=WandbLogWriter)
+    logger.stop_logging_writer()
+    assert [call[0] for call in writer.method_calls] == ["close", "stop"]
+    assert logger.writer is None
 
 
 def test_progress_callback_gets_every_iteration(make, task, map_ground):
@@ -306,6 +316,7 @@ def test_main_process_saves_a_checkpoint_when_another_one_ends(
     alone, make, tmp_path, capfd, monkeypatch
 ):
     (runner, last), folder = alone, tmp_path / "run"
+    assert len(runner.state_dict()["processes"]) == 1  # gathered
     with pytest.raises(ConfigError) as caught:
         runner.learn(4)
     told = f"another process of torchrun ended after iteration {last}; continue with --resume"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.rl.config import Commands
+from terrainkit_robots.rl.config import Commands, Terrain
 from terrainkit_robots.rl.state import CONTACT_FORCE
 
 
@@ -78,6 +78,15 @@ class TestByHand:
         # The wheel hangs on a leg of 0.2 m that is rotated by -0.2 rad.
         wheel = 0.24 - 0.2 * np.cos(0.2) - 0.03
         np.testing.assert_allclose(state.foot_height[:, 0], wheel, atol=1e-5)
+
+    def test_scan_turns_with_the_yaw(self, nominal_env, map_ground):
+        points = Terrain(measured_points_x=(0.3,), measured_points_y=(-0.2, 0.1))
+        env = nominal_env(1, map_ground, terrain=points)
+        half = np.sqrt(0.5)
+        turned = np.array([[half, 0, 0, half], [0, 0, 0, 1]], np.float32)  # by 90 and 180 degrees
+        x, y, _ = env.sensors.scan_points(np.float32([[1, 2, 0.5]] * 2), turned)
+        np.testing.assert_allclose(x, [[1.2, 0.9], [0.7, 0.7]], atol=1e-6)
+        np.testing.assert_allclose(y, [[2.3, 2.3], [2.2, 1.9]], atol=1e-6)
 
     def test_steps_are_compared_with_the_previous_one(self, nominal_env, cart):
         env = nominal_env(2, robot=cart)

@@ -7,7 +7,7 @@ from terrainkit_robots.simulation.pd_gains import suggest_gains, suggest_trainin
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import max_stable_time_step
 from tests.robots import BUNDLED, PENDULUM
-from tests.small_robots import facts, joint, link, shape
+from tests.small_robots import chain, facts, joint, link, shape
 
 CAR = (
     link("body", mass=5)
@@ -28,6 +28,7 @@ SLIDER = (
 ARM_BESIDE = link("arm", mass=4, center="0.1 0 0", inertia="0.01 0.01 0.01 0 0 0") + joint(
     "frame", "arm", "0 1 0", limits=(-1, 1)
 )
+SIDES = {"left": 0.1, "right": -0.1}
 
 
 @pytest.mark.parametrize(
@@ -112,6 +113,16 @@ def test_gains_of_slides_and_hinges_are_damped_separately():
     assert slide.damping == suggest_gains(facts(SLIDER))["slider_joint"].damping > hinge.damping
 
 
+def test_gains_of_a_slide_below_the_knee_are_not_of_the_ankle():
+    """The joints of each leg are hip, knee, slide and ankle."""
+    legs = [chain(f"{side}_leg", f"0 {y} 0", (0.3, 0.2, 0.1, 0.05)) for side, y in SIDES.items()]
+    text = "".join(legs).replace('leg2_joint" type="revolute', 'leg2_joint" type="prismatic')
+    gains = suggest_gains(facts(link("trunk", mass=10), text))
+    stiffness = [gains[f"left_leg{k}_joint"].stiffness for k in range(4)]
+    # 88.7 = 1.5 x 18 kg x 9.81 m/s2 x 0.67 m / 2 legs; the slide sinks by 9 % of the length.
+    assert stiffness == [80, 80, 1500, 80]
+
+
 @pytest.mark.parametrize(
     ("limit", "damping"), [('<limit effort="5" velocity="10"/>', 0.5), ("", 0.02 / 0.05)]
 )
@@ -133,10 +144,10 @@ def test_gains_without_joints_are_empty(robot):
 def test_mirrored_arms_have_equal_gains(bundled, tmp_path):
     """The weaker motor of the right arm limits both."""
     arms = ""
-    for name, y, effort in (("left", 0.2, 5), ("right", -0.2, 1)):
+    for (name, y), effort in zip(SIDES.items(), (5, 1), strict=True):
         limit = f'<limit lower="-1" upper="1" effort="{effort}" velocity="9"/>'
         arms += link(name, center="0.2 0 0", inertia="0.01 0.01 0.01 0 0 0")
-        arms += joint("base", name, f"0 {y} 0.1", more=limit)
+        arms += joint("base", name, f"0 {2 * y} 0.1", more=limit)
     robot = bundled("quadruped.urdf", ("</robot>", arms + "</robot>"), tmp_path=tmp_path)
     gains = suggest_gains(robot)
     assert gains["left_joint"] == gains["right_joint"]

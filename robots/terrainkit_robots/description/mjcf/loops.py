@@ -11,11 +11,12 @@ def coupled_joints(spec: "mujoco.MjSpec") -> set[str]:
     import mujoco
 
     kinds = mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD
-    bodies = {body.name: body for body in spec.bodies}
-    bodies |= {site.name: site.parent for site in spec.sites if site.name not in bodies}
+    bodies = {body.name: body for body in spec.bodies if body.name}
+    sites = {site.name: site.parent for site in spec.sites}
     found: list[Any] = []
     for each in spec.equalities:
-        chains = [_ancestors(bodies.get(name)) for name in (each.name1, each.name2)]
+        held = sites if each.objtype == mujoco.mjtObj.mjOBJ_SITE else bodies
+        chains = [_ancestors(held.get(name)) for name in (each.name1, each.name2)]
         # A body that is held by the world or by a mocap body closes no loop.
         if each.type in kinds and each.active and chains[0][-1:] == chains[1][-1:] != []:
             for chain, other in (chains, chains[::-1]):

@@ -1,6 +1,8 @@
 """Xacro is expanded without ROS; what fails is told with its place, and nothing else is done."""
 
 import os
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -142,6 +144,17 @@ def test_broken_file_is_not_expanded(tmp_path):
 def test_time_limit(value, tmp_path):
     error = failure(write(tmp_path, f'<link name="{value}"/>'), timeout=0.6, max_memory=2**40)
     assert "longer than 0.6 s" in str(error)
+
+
+def test_time_limit_without_process_groups(tmp_path, monkeypatch):
+    waiting = tmp_path / "python"
+    waiting.write_text("#!/bin/sh\nexec sleep 20")
+    waiting.chmod(0o700)
+    monkeypatch.setattr(sys, "executable", str(waiting))
+    monkeypatch.delattr(os, "killpg")  # as on Windows
+    begin = time.monotonic()
+    assert "longer than 0.1 s" in str(failure(write(tmp_path, ""), timeout=0.1))
+    assert time.monotonic() < begin + 10
 
 
 @pytest.mark.parametrize("value", ["${len('a' * 10**9)}", "${'a' * 10**11}"])

@@ -8,6 +8,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.report.facts_json import facts_json, number
 from tests.robots import QUADRUPED
+from tests.small_robots import facts, joint, link
 
 
 def record(path):
@@ -78,6 +79,15 @@ def test_facts_json_extreme_mass_is_none_or_finite(tmp_path, mass):
     file.write_text(f'<robot name="r"><link name="a">{inertial}</link></robot>')
     total = record(file)["total_mass"]
     assert total is None or math.isfinite(total)
+
+
+@pytest.mark.parametrize(("kind", "signs"), [("revolute", [1]), ("planar", [])])
+def test_mirrored_joints_have_one_degree_of_freedom(kind, signs):
+    sides = {"left": "0 0.2 0", "right": "0 -0.2 0"}
+    parts = [link(side) + joint("trunk", side, at, kind=kind) for side, at in sides.items()]
+    robot = facts(link("trunk"), *parts)
+    assert len(robot.mirror.pairs) == 1
+    assert [each["sign"] for each in facts_json(robot)["mirrored_joints"]] == signs
 
 
 def test_number_keeps_six_digits():

@@ -21,13 +21,17 @@ def links(*names):
     return "".join(link(name, mass=None) for name in names)
 
 
-@pytest.mark.parametrize(("most", "is_compared"), [(3, True), (2, False)])
-def test_unknown_link_suggests_nearest_name_of_small_robots(monkeypatch, most, is_compared):
+@pytest.mark.parametrize(("most", "hints"), [(3, ["FL_foot", "FL_calf", ""]), (2, ["", "", ""])])
+def test_unknown_link_suggests_nearest_name_of_small_robots(monkeypatch, most, hints):
+    """Names are compared for two unknown links."""
     monkeypatch.setattr(connections, "_MAX_COMPARED", most)
-    parts = links("base", "FL_foot", "FL_calf", "FR_calf"), joint("j", "base", "fl_foot")
-    (finding,) = report("TRE002", *parts).findings
-    assert "link fl_foot: does not exist, but is the child of joint j" in finding.message
-    assert finding.hint.startswith("Did you mean FL_foot?") == is_compared
+    monkeypatch.setattr(connections, "_MAX_SUGGESTIONS", 2)
+    unknown = [joint(f"j{k}", "base", f"{name}_x") for k, name in enumerate(("FL_foot", "FL_calf"))]
+    parts = links("base", "FL_foot", "FL_calf", "FR_calf"), *unknown, joint("j", "base", "fr_calf")
+    found = report("TRE002", *parts).findings
+    assert "link FL_foot_x: does not exist, but is the child of joint j0" in found[0].message
+    for each, name in zip(found, hints, strict=True):
+        assert each.hint.startswith(f"Did you mean {name}?" if name else "Correct the name")
 
 
 def test_long_cycle_is_cut():

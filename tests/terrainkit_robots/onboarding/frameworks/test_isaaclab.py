@@ -101,6 +101,14 @@ def test_isaaclab_actuators_of_biped(load, modules, robots):
     assert set(joints) - set(legs) == {"l_ankle", "r_ankle", "torso"}
 
 
+def test_isaaclab_motors_are_named_after_words_or_numbered(load, modules, robots):
+    joints = ("joint_1", "knee", "k" * 20, "k" * 21)
+    feet = tuple(f"foot_{k}" for k in range(4))
+    spec = robots.plain(joints, velocity=dict.fromkeys(joints, 20.0), feet=feet)
+    actuators = load("isaaclab", spec, modules).ARM_CFG.actuators
+    assert list(actuators) == ["legs_1", "knee", "k" * 20, "legs_4"]
+
+
 def test_isaaclab_velocity_task(load, modules, robots):
     spec = robots.quadruped()
     loaded = load("isaaclab", spec, modules, bodies=robots.bodies)

@@ -127,7 +127,9 @@ def test_mjlab_tasks_of_quadruped(load, modules, robots, registered):
     assert all(re.fullmatch(geoms[0], f"FL_foot_collision{end}") for end in ("", "1", "12"))
     assert not re.fullmatch(geoms[0], "FL_foot_collision_mesh")
     pose = rough.rewards["pose"].params
-    assert robots.resolved(pose["std_walking"], spec.joint_order)["FL_hip_joint"] == 0.15
+    for name, roll, other in (("std_walking", 0.15, 0.15), ("std_running", 0.2, 0.3)):
+        std = robots.resolved(pose[name], spec.joint_order)
+        assert std == dict.fromkeys(spec.joint_order, other) | {"FL_hip_joint": roll}
     assert rough.rewards["foot_clearance"].params["target_height"] == 0.05
     assert rough.terminations["illegal_contact"].params == {"sensor_name": "illegal_contact"}
     assert flat.scene.terrain.terrain_type == "plane"

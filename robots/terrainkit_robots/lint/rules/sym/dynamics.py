@@ -72,7 +72,7 @@ def gear_asymmetry(robot: Facts) -> Violations:
     Source:
         MuJoCo's XML reference, actuator: gear scales the force on the joint.
     """
-    gears = {actuator.joint: actuator for actuator in robot.model.actuators if actuator.joint}
+    gears = {actuator.joint: actuator for actuator in robot.model.actuators}
     products = {
         pair: gears[a].gear * gears[b].gear
         for pair in robot.mirror_pairs
