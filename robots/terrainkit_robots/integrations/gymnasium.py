@@ -173,7 +173,7 @@ class EpisodeEnv(LeggedEnv):
         super().__init__(task, Robot.load(registered.folder), ground)
         self.final = self._before_reset = self.policy_observations()
         self.final_qpos = self.sim.qpos
-        self._renderer = PoseRenderer(self.scene.model) if render_mode else None
+        self._renderer = PoseRenderer(self.drawn_model) if render_mode else None
 
     def start(self, rng: np.random.Generator, seed: int | None) -> FloatArray:
         """Reset every environment, with new random numbers if there is a seed, and observe."""

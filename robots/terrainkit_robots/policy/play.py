@@ -100,7 +100,7 @@ def view(spec: PolicySpec, config: EvaluationConfig | None = None) -> None:
 
     config = replace(config or EvaluationConfig(), num_envs=1)
     env, commands = make_play_env(spec, config)
-    model, data = env.scene.model, mujoco.MjData(env.scene.model)
+    model, data = env.drawn_model, mujoco.MjData(env.drawn_model)
     schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
     steps = rollout(env, load_policy(spec, env), cycle(schedule))
     try:
@@ -202,7 +202,7 @@ class PoseRecorder:
             stop = int(np.clip(self.first_fall[robot], 1, max(1, frames // len(tracked))))
             shots.append(Shot(robot=robot, captions=(caption,) * stop, points=points(robot)))
         fps = 1 / (env.cfg.dt * self.stride)
-        return VideoSpec(model=env.scene.model, poses=poses, shots=tuple(shots), fps=fps, size=size)
+        return VideoSpec(model=env.drawn_model, poses=poses, shots=tuple(shots), fps=fps, size=size)
 
 
 def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:

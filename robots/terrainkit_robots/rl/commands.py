@@ -200,6 +200,6 @@ class Gait:
         angle, foot_phase = 2 * np.pi * phase, (phase + self.offset) % 1
         walks = moving[:, None] & (self.period > 0)
         swings = walks & (foot_phase < self._swing_fraction)
-        gait_phase = np.hstack([np.sin(angle), np.cos(angle)]) * walks
+        gait_phase = np.where(walks, np.hstack([np.sin(angle), np.cos(angle)]), 0)  # no -0
         swing_phase = np.where(swings, foot_phase / (self._swing_fraction or 1.0), 0)
         return gait_phase.astype(np.float32), swing_phase.astype(np.float32)

@@ -100,6 +100,7 @@ class LeggedEnv(VecEnv):
             raise ConfigError(f"action_scale of {robot.spec.name}: got 0 for every joint")
         self.action_history = np.zeros((3, n, self.num_actions), np.float32)  # the newest first
         self.joint_offset = np.zeros((n, len(robot.default_pose)), np.float32)
+        self.lin_vel_bias = np.zeros((n, 3), np.float32)
         self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
         self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
 
@@ -161,6 +162,14 @@ class LeggedEnv(VecEnv):
     def unwrapped(self) -> "LeggedEnv":
         """Return the environment itself, whose `step_dt` rsl-rl's RND reads."""
         return self
+
+    @cached_property
+    def drawn_model(self) -> Any:
+        """The model with all geoms of the terrain, for pictures."""
+        whole = self.scene
+        if whole.near_terrain:
+            whole = Scene(self.robot, self.terrain, self.cfg, all_geoms=True)
+        return whole.model
 
     @cached_property
     def mirror_maps(self) -> MirrorMaps:
@@ -451,7 +460,7 @@ class LeggedEnv(VecEnv):
     def _arrays(self) -> dict[str, NDArray[Any]]:
         """Return views of the arrays to save, by name."""
         # Names are checkpoint keys; renaming a field breaks resume.
-        names = "action_history joint_offset steps_since_reset path_length push_vel"
+        names = "action_history joint_offset lin_vel_bias steps_since_reset path_length push_vel"
         arrays = {name: getattr(self, name) for name in names.split()} | {
             "physics": self.sim.batch.state,
             "episode_length": self.episode_length_buf.numpy(),

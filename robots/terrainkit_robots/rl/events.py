@@ -186,6 +186,12 @@ def reset_joint_offset(env: "LeggedEnv", env_ids: Ids) -> None:
     env.joint_offset[env_ids] = env.rng.uniform(-limit, limit, shape)
 
 
+def reset_lin_vel_bias(env: "LeggedEnv", env_ids: Ids) -> None:
+    """Sample the constant error of the observed base linear velocity."""
+    limit = env.cfg.noise.noise_level * env.cfg.noise.lin_vel_bias
+    env.lin_vel_bias[env_ids] = env.rng.uniform(-limit, limit, (len(env_ids), 3))
+
+
 def reset_action_delay(env: "LeggedEnv", env_ids: Ids) -> None:
     """Sample the delay of the actions."""
     if limits := env.cfg.domain_rand.action_delay:
@@ -198,6 +204,7 @@ EVENTS = {
     "state": EventTerm(reset=reset_state),
     "push": EventTerm(reset=reset_push, step=push),
     "joint_offset": EventTerm(reset=reset_joint_offset),
+    "lin_vel_bias": EventTerm(reset=reset_lin_vel_bias),
     "action_delay": EventTerm(reset=reset_action_delay),
 }
 """Every event of a task by name, in the order in which they happen."""

@@ -121,7 +121,11 @@ def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     has_lin_vel = options.base_lin_vel
     if len(robot.spec.feet) == 2 if has_lin_vel is None else has_lin_vel:
         terms["base_lin_vel"] = term(
-            lambda env: env.state.base_lin_vel, "vector", scales.lin_vel, noise.lin_vel, unit="m/s"
+            lambda env: env.state.base_lin_vel + env.lin_vel_bias,
+            "vector",
+            scales.lin_vel,
+            noise.lin_vel,
+            unit="m/s",
         )
     if options.foot_contact:
         terms["foot_contact"] = term(lambda env: env.state.foot_contact.astype("f4"), "contacts")
@@ -134,10 +138,16 @@ def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
             scales.height_measurements,
             noise.height_measurements,
             offset=HEIGHT_SCAN_OFFSET,
-            clip=(-1.0, 1.0),  # as in legged_gym
+            clip=(-1.0, _deepest(env)),
             unit="m",
         )
     return terms
+
+
+def _deepest(env: "LeggedEnv") -> float:
+    """Return the upper limit of the height scan [m]: legged_gym's, or at the task's depth."""
+    depth, feet = env.cfg.terrain.scan_depth, env.robot.base_height_target - HEIGHT_SCAN_OFFSET
+    return 1.0 if depth is None else min(1.0, feet + depth)
 
 
 def privileged_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:

@@ -186,6 +186,12 @@ def dof_pos_limits(env: "LeggedEnv") -> FloatArray:
     ).sum(axis=1)
 
 
+def dof_vel_limits(env: "LeggedEnv") -> FloatArray:
+    """Penalize joint velocities beyond their limits, at most 1 rad/s of each joint."""
+    excess = np.abs(env.state.dof_vel) - env.robot.velocity
+    return np.clip(excess, 0, 1).sum(axis=1)
+
+
 def feet_gait(env: "LeggedEnv") -> FloatArray:
     """Reward the fraction of feet that are in contact exactly when the gait says so."""
     return (env.state.foot_contact == (env.state.swing_phase == 0)).mean(axis=1, dtype=np.float32)

@@ -169,6 +169,10 @@ class LeggedRunner(OnPolicyRunner):
             super().__init__(env, runner_config(env.cfg, has_symmetry(env)), None, device)
         self.is_main_process = self.gpu_global_rank == 0
         self.logger = MetricsLogger(self)
+        symmetry = getattr(self.alg, "symmetry", None)
+        if symmetry and not symmetry.use_mirror_loss:
+            # rsl-rl runs the actor once more in each mini-batch, only to log this loss.
+            symmetry.compute_loss = lambda *_: torch.zeros(())
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
         """Train for some iterations, with the first episodes cut to random lengths if requested."""

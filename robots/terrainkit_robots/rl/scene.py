@@ -13,6 +13,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.near_terrain import add_near_boxes, find_near_terrain
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.simulation.geoms import collides, lowest_point
 from terrainkit_robots.spec.robot import Robot
@@ -35,8 +36,17 @@ class Scene:
     `termination_force`, with three numbers per body. Forces act on what the robot touches [N].
     """
 
-    def __init__(self, robot: Robot, terrain: Ground, task: Task) -> None:
+    def __init__(
+        self, robot: Robot, terrain: Ground, task: Task, *, all_geoms: bool = False
+    ) -> None:
         """Build the scene of a task.
+
+        Args:
+            robot: The robot.
+            terrain: The terrain under it.
+            task: The task.
+            all_geoms: Whether the model has all geoms of the terrain, to draw it; otherwise, only
+                those near a robot may be in it, since steps are then faster.
 
         Raises:
             ConfigError: If MuJoCo rejects the robot, or its spec differs from its model.
@@ -51,6 +61,13 @@ class Scene:
                 self.model: Any = mjspec.compile()
             except ValueError as error:
                 raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
+            base, surface = self.model.body(robot.spec.base).id, terrain.surface
+            self.near_terrain = None  # of which the model has the geoms, if it lacks some
+            if surface is not None and not all_geoms:
+                self.near_terrain = find_near_terrain(self.model, base, surface, task.dt)
+            if self.near_terrain:
+                add_near_boxes(mjspec, self.near_terrain)
+                self.model = mjspec.compile()
         model = self.model
         joints = [model.joint(name).id for name in robot.spec.joint_order]
         self.joint_qpos = model.jnt_qposadr[joints]  # indices of the joints, in the robot's order

@@ -67,7 +67,7 @@ def course_ground() -> Ground:
 
 @pytest.fixture(scope="session")
 def no_randomization() -> DomainRand:
-    nominal = dict.fromkeys(("friction", "added_mass", "gains", "motor_strength"))
+    nominal = dict.fromkeys(("friction", "added_mass", "gains", "motor_strength", "action_delay"))
     return DomainRand(**nominal, com_shift=0.0, joint_offset=0.0, push_interval_s=0.0)
 
 

@@ -46,6 +46,7 @@ def made_env(
     """
     joints = of_one["dof_pos"]
     widths = {"joint_offset": joints, "push_vel": (3,), "obs_history": (0,)}
+    widths["lin_vel_bias"] = (3,)
     params = {"friction": (1,), "added_mass": (1,), "com_shift": (3,)}
     made = {}
     for name, shape in (widths | params).items():

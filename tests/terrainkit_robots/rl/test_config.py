@@ -82,7 +82,8 @@ def test_action_delay_has_at_least_one_simulation_step():
             Task(domain_rand=DomainRand(action_delay=odd))
     for end, steps in {0.003: 1, 0.005: 1, 0.02: 4, 1: 200}.items():
         assert Task(domain_rand=DomainRand(action_delay=(0, end))).max_delay_steps == steps
-    assert Task().max_delay_steps == 0
+    assert Task().max_delay_steps == 8
+    assert Task(domain_rand=DomainRand(action_delay=None)).max_delay_steps == 0
 
 
 def test_toml_round_trip():

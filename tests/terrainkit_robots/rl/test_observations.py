@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from terrainkit_robots.rl.config import (
     Commands,
@@ -12,6 +13,7 @@ from terrainkit_robots.rl.config import (
     Observations,
     ObsScales,
     Task,
+    Terrain,
 )
 from terrainkit_robots.rl.observations import (
     compute_observations,
@@ -114,6 +116,21 @@ class TestGroups:
         assert compute(policy, env).shape == (2, 234)
         env.has_height_scan = False
         assert [*policy] == [*policy_terms(env), "height_scan"]
+
+    @pytest.mark.parametrize(("depth", "seen"), [(None, 1.0), (0.3, 0.134), (5.0, 1.0)])
+    def test_height_scan_is_clipped_below_the_feet(self, make, depth, seen):
+        scan = policy_terms(make(task=Task(terrain=Terrain(scan_depth=depth))))["height_scan"]
+        # The base stands 0.334 m high, and 0.5 m are observed as 0.
+        assert scan.clip == (-1.0, pytest.approx(seen))
+
+    def test_observed_velocity_has_a_constant_error(self, nominal_env):
+        noise = Noise(lin_vel=0.0, lin_vel_bias=0.4)
+        env = nominal_env(400, observations=Observations(base_lin_vel=True), noise=noise)
+        for _ in range(2):  # steps of the same episode
+            error = env.obs_terms["policy"]["base_lin_vel"].value(env) - env.state.base_lin_vel
+            np.testing.assert_allclose(error, env.lin_vel_bias, atol=1e-6)
+            env.step(torch.zeros(400, env.num_actions))
+        assert 0.39 < np.abs(env.lin_vel_bias).max() <= 0.4
 
     def test_additional_terms_of_the_policy(self, make):
         options = Observations(base_lin_vel=True, foot_contact=True, history_length=3)

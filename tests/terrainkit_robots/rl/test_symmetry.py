@@ -41,7 +41,7 @@ def make_env(request, nominal_env):
             robot,
             observations=Observations(**options),
             commands=Commands(gait_period=0.4),
-            domain_rand=DomainRand(push_interval_s=0.0),
+            domain_rand=DomainRand(push_interval_s=0.0, action_delay=None),
             sim=Sim(iterations=100, ls_iterations=50),  # so that both sides converge to the same
         )
 
@@ -89,6 +89,7 @@ def mirror_memory(env, mirror):
     env.push_vel[a] = rng.uniform(-1, 1, (_PAIRS, 3)) * [1, 1, 0]
     env.push_vel[b] = env.push_vel[a] * np.array([1, -1, 1])
     env.joint_offset[b] = mirror.joints(env.joint_offset[a])
+    env.lin_vel_bias[b] = env.lin_vel_bias[a] * np.array([1, -1, 1])
     env.state.mean_vel[b] = env.state.mean_vel[a] * np.array([1, -1, -1])
     env.steps_since_reset[a], env.steps_since_reset[b] = 3, 13  # half a period later
     d = env.params

@@ -1,0 +1,208 @@
+"""The geoms of a map near each robot, in place of all its geoms.
+
+The time of a MuJoCo step grows with the number of boxes of a map. Here, all simulations have the
+same few boxes, which stand where the boxes near their robot are. Other geoms of the map are far
+below the robots that are not near them.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.geometry.surface import HeightfieldSurface
+from terrainkit_robots.simulation.geoms import collides
+from terrainkit_robots.transforms import FloatArray
+
+WINDOW = 0.5
+"""Side of the squares in which all positions of a base have the same geoms [m]."""
+
+MAX_SPEED = 10.0
+"""Speed that a robot does not exceed within a policy step [m/s]."""
+
+MAX_GEOMS = 64
+"""Largest number of geoms near a robot. Each one takes time in every step, since MuJoCo's bounding
+volume hierarchy is computed for geoms that do not move."""
+
+FAR = -1e3
+"""Height of the geoms that are not near a robot [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NearTerrain:
+    """The geoms of a map, and which of them are near each square: n geoms and m squares."""
+
+    pos: FloatArray  # position of each geom [m], shape (n, 3)
+    quat: FloatArray  # orientation of each geom (w, x, y, z), shape (n, 4)
+    size: FloatArray  # half sizes of a box [m], shape (n, 3)
+    is_box: NDArray[np.bool_]  # shape (n,)
+    lower: FloatArray  # lower corner of the squares, x and y [m]
+    shape: tuple[int, int]  # number of squares along x and y
+    starts: NDArray[np.int64]  # first entry of each square in `near`, shape (m + 1,)
+    near: NDArray[np.int64]  # geoms near each square, in order
+
+    def squares(self, position: FloatArray) -> NDArray[np.int64]:
+        """Return the square of each position, the nearest one outside of the map.
+
+        Args:
+            position: x and y [m], shape (k, 2).
+        """
+        index = np.floor((position - self.lower) / WINDOW).astype(np.int64)
+        i, j = np.clip(index, 0, np.subtract(self.shape, 1)).T
+        square: NDArray[np.int64] = i * self.shape[1] + j
+        return square
+
+    @property
+    def num_boxes(self) -> int:
+        """The largest number of boxes near a square."""
+        before = np.append(0, np.cumsum(self.is_box[self.near]))
+        return int(np.diff(before[self.starts]).max())
+
+
+def find_near_terrain(
+    model: Any, base: int, surface: HeightfieldSurface, policy_dt: float
+) -> NearTerrain | None:
+    """Return the geoms of a map near each square, or None if all geoms are as fast.
+
+    Args:
+        model: Model of a robot on the map.
+        base: Body of the robot's base.
+        surface: Surface of the map.
+        policy_dt: Time in which a robot moves between two choices of geoms [s].
+    """
+    world = np.flatnonzero(collides(model) & (model.geom_bodyid == 0))
+    is_box = model.geom_type[world] == mujoco.mjtGeom.mjGEOM_BOX
+    boxes = world[is_box]
+    fields = model.geom_friction, model.geom_priority, model.geom_solref, model.geom_solimp
+    is_alike = all(len(np.unique(each[boxes], axis=0)) == 1 for each in fields)
+    if len(world) <= MAX_GEOMS or (~is_box).sum() > MAX_GEOMS or not is_alike:
+        return None
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    rotation = data.geom_xmat[world].reshape(-1, 3, 3)
+    center = data.geom_xpos[world] + np.einsum("nij,nj->ni", rotation, model.geom_aabb[world, :3])
+    half = np.einsum("nij,nj->ni", np.abs(rotation), model.geom_aabb[world, 3:])
+    distance = _reach(model, base) + MAX_SPEED * policy_dt
+    first, last = (center - half)[:, :2] - distance, (center + half)[:, :2] + distance
+    lowest, lower = _lowest_ground(surface, distance)
+    limit = lowest.shape
+    start = np.clip(np.floor((first - lower) / WINDOW).astype(int), 0, limit)
+    stop = np.clip(np.ceil((last - lower) / WINDOW).astype(int), 0, limit)
+    top = (center + half)[:, 2] + 1e-4  # of rounding
+    squares = []
+    for number, (i0, j0), (i1, j1) in zip(range(len(world)), start, stop, strict=True):
+        # A geom below all ground near a square is out of reach.
+        i, j = np.nonzero(top[number] >= lowest[i0:i1, j0:j1])
+        squares.append((i + i0) * limit[1] + j + j0)
+    geoms = np.repeat(np.arange(len(world)), [len(each) for each in squares])
+    every = np.concatenate(squares)
+    order = np.argsort(every, kind="stable")
+    starts = np.searchsorted(every[order], np.arange(lowest.size + 1))
+    near = NearTerrain(
+        pos=model.geom_pos[world].copy(),
+        quat=model.geom_quat[world].copy(),
+        size=model.geom_size[world].copy(),
+        is_box=is_box,
+        lower=lower,
+        shape=limit,
+        starts=starts,
+        near=geoms[order],
+    )
+    return near if near.num_boxes <= MAX_GEOMS else None
+
+
+def _reach(model: Any, base: int) -> float:
+    """Return an upper bound of the distance from the base to any point of the robot [m]."""
+    distance = np.zeros(model.nbody)
+    bodies = np.flatnonzero(model.body_rootid == base)
+    for body in bodies[bodies != base]:  # parents come first
+        joints = np.flatnonzero(model.jnt_bodyid == body)
+        slides = model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
+        # A rotation about an anchor moves a body by at most twice the distance of the anchor.
+        moved = np.abs(model.jnt_range[joints]).max(axis=1, initial=0) * slides
+        moved = moved + 2 * np.linalg.norm(model.jnt_pos[joints], axis=1)
+        own = np.linalg.norm(model.body_pos[body]) + moved.sum()
+        distance[body] = distance[model.body_parentid[body]] + own
+    geoms = np.flatnonzero(collides(model) & (model.body_rootid[model.geom_bodyid] == base))
+    extents = np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]
+    return float((distance[model.geom_bodyid[geoms]] + extents).max(initial=0))
+
+
+def _lowest_ground(
+    surface: HeightfieldSurface, distance: float
+) -> tuple[NDArray[np.float32], FloatArray]:
+    """Return the lowest ground within a distance of each square [m], and their lower corner."""
+    heights, cell = surface.heights, surface.cell
+    if surface.box_top is not None:  # the heights below boxes do not count
+        heights = np.where(np.isfinite(surface.box_top), surface.box_top, heights)
+    size = 2 * int(np.ceil((WINDOW / 2 + distance) / cell)) + 3
+    lowest = cv2.erode(np.ascontiguousarray(heights), np.ones((size, size), np.uint8))
+    lower = np.subtract(surface.first_sample, cell / 2)
+    shape = np.ceil(np.multiply(heights.shape, cell) / WINDOW).astype(int)
+    at = [
+        np.minimum(((np.arange(n) + 0.5) * WINDOW / cell).astype(int), limit - 1)
+        for n, limit in zip(shape, heights.shape, strict=True)
+    ]
+    return lowest[np.ix_(*at)], lower
+
+
+def add_near_boxes(mjspec: Any, terrain: NearTerrain) -> None:
+    """Replace the boxes of a map by as many as are near a robot.
+
+    Args:
+        mjspec: Model of a robot on the map.
+        terrain: The geoms of the map.
+    """
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    boxes = [geom for geom in mjspec.worldbody.find_all("geom") if geom.type == box]
+    boxes = [geom for geom in boxes if geom.parent.name == "world"]
+    example = next(geom for geom in boxes if geom.contype or geom.conaffinity)
+    names = "contype conaffinity condim priority friction solmix solref solimp margin gap"
+    attributes = {name: getattr(example, name) for name in names.split()}
+    for geom in boxes:
+        mjspec.delete(geom)
+    for number in range(terrain.num_boxes):
+        # MuJoCo ignores the orientation of a geom that is compiled without one.
+        pose = {"pos": [0, 0, FAR], "quat": [0.8, 0.6, 0, 0], "size": [0.1, 0.1, 0.1]}
+        name = f"near_{number}"
+        mjspec.worldbody.add_geom(name=name, type=box, **pose, **attributes)
+    # The geoms move, which the bounding volume hierarchy does not know.
+    mjspec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
+
+
+class NearGeoms:
+    """Moves the geoms of a map to where they are near the robots of a batch of simulations."""
+
+    def __init__(self, batch: Any, model: Any, terrain: NearTerrain, num_envs: int) -> None:
+        geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == 0))
+        is_box = model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_BOX
+        self._boxes, self._others = geoms[is_box], geoms[~is_box]
+        names = "geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aabb"
+        fields = (batch.expand(name) for name in names)
+        self._pos, self._quat, self._size, self._rbound, aabb = fields
+        self._aabb = aabb.reshape(num_envs, -1, 6)
+        self._terrain, self._squares = terrain, np.full(num_envs, -1)
+        self._number = np.cumsum(~terrain.is_box) - 1  # of each geom that is not a box
+
+    def update(self, position: FloatArray) -> None:
+        """Move the geoms of the robots that reached another square.
+
+        Args:
+            position: Position of each robot, x and y [m], shape (n, 2).
+        """
+        terrain, squares = self._terrain, self._terrain.squares(position)
+        for env in np.flatnonzero(squares != self._squares).tolist():
+            near = terrain.near[slice(*terrain.starts[squares[env] : squares[env] + 2])]
+            is_box = terrain.is_box[near]
+            boxes, others = near[is_box], near[~is_box]
+            self._pos[env, self._boxes[len(boxes) :], 2] = FAR
+            slots = self._boxes[: len(boxes)]
+            self._pos[env, slots], self._quat[env, slots] = terrain.pos[boxes], terrain.quat[boxes]
+            self._size[env, slots] = self._aabb[env, slots, 3:] = terrain.size[boxes]
+            self._rbound[env, slots] = np.linalg.norm(terrain.size[boxes], axis=1)
+            self._pos[env, self._others, 2] = FAR
+            self._pos[env, self._others[self._number[others]]] = terrain.pos[others]
+        self._squares = squares

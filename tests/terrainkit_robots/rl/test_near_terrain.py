@@ -1,0 +1,84 @@
+import mujoco
+import numpy as np
+import pytest
+
+from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit_robots.rl.near_terrain import FAR, MAX_GEOMS, _reach
+from terrainkit_robots.rl.scene import Scene
+from terrainkit_robots.rl.simulation import Simulation
+from terrainkit_robots.rl.terrain import MapGround
+
+_NUM = 12
+
+
+@pytest.fixture(scope="module")
+def stairs():
+    """Return 12 patches of stairs and of slopes, with more boxes than are near a robot."""
+    kinds = tuple(SubTerrain(terrain=name) for name in ("pyramid_stairs", "pit", "pyramid_slope"))
+    config = MapConfig(rows=6, cols=4, patch_size=(6.0, 6.0), border=1.0, terrains=kinds)
+    return MapGround(generate(config), "boxes")
+
+
+@pytest.fixture(scope="module")
+def scenes(quadruped, nominal_task, stairs):
+    return [Scene(quadruped, stairs, nominal_task(_NUM), all_geoms=each) for each in (True, False)]
+
+
+def walked(scene, stairs, robot):
+    """Return the positions of robots that slide over the patches."""
+    sim, found = Simulation(scene, _NUM, 1), []
+    qpos = np.tile(scene.default_qpos, (_NUM, 1))
+    qpos[:, :3] = stairs.env_origins.reshape(-1, 3)[:_NUM]
+    qpos[:, 2] += robot.spawn_height
+    sim.reset(np.arange(_NUM), qpos, np.zeros((_NUM, scene.model.nv)))
+    for _ in range(60):
+        sim.qvel[:, 0] = 1.5
+        sim.step(4)
+        found.append(sim.qpos.copy())
+    return np.array(found)
+
+
+def test_robots_move_as_on_all_geoms(scenes, stairs, quadruped):
+    whole, near = scenes
+    assert whole.near_terrain is None
+    assert near.model.ngeom < whole.model.ngeom - 40
+    one, other = (walked(each, stairs, quadruped) for each in scenes)
+    assert np.ptp(one[:, :, 0], axis=0).min() > 1  # they reached other squares
+    differ = np.abs(one - other).max(axis=2)
+    # The order of contacts may differ, and with it the last bits.
+    first = differ[(differ > 0).argmax(axis=0), np.arange(_NUM)]
+    assert first.max() < 1e-12
+
+
+def test_geoms_that_are_not_near_are_far_below(scenes, stairs):
+    scene = scenes[1]
+    terrain, sim = scene.near_terrain, Simulation(scene, 2, 1)
+    sim.qpos[:, :2] = stairs.env_origins[[0, 5], [0, 0], :2]
+    sim.step(1)
+    pos = sim.batch.expand("geom_pos")
+    boxes = [k for k in range(scene.model.ngeom) if "near_" in scene.model.geom(k).name]
+    assert len(boxes) == terrain.num_boxes <= MAX_GEOMS
+    for env, square in enumerate(terrain.squares(sim.qpos[:, :2])):
+        near = terrain.near[terrain.starts[square] : terrain.starts[square + 1]]
+        expected = terrain.pos[near[terrain.is_box[near]]]
+        placed = pos[env, boxes]
+        np.testing.assert_array_equal(placed[placed[:, 2] != FAR], expected)
+
+
+def test_few_geoms_stay(quadruped, nominal_task):
+    config = MapConfig(rows=1, cols=2, terrains=(SubTerrain(terrain="pit"),), border=1.0)
+    scene = Scene(quadruped, MapGround(generate(config), "boxes"), nominal_task(2))
+    assert scene.near_terrain is None
+
+
+def test_reach_bounds_the_robot_in_any_pose(scenes, quadruped):
+    model, rng = scenes[0].model, np.random.default_rng(0)
+    data, farthest = mujoco.MjData(model), 0.0
+    for _ in range(50):
+        data.qpos[:] = scenes[0].default_qpos
+        data.qpos[scenes[0].joint_qpos] = rng.uniform(-np.pi, np.pi, len(quadruped.default_pose))
+        mujoco.mj_kinematics(model, data)
+        geoms = scenes[0].geoms
+        distance = np.linalg.norm(data.geom_xpos[geoms] - data.qpos[:3], axis=1)
+        farthest = max(farthest, float((distance + model.geom_rbound[geoms]).max()))
+    assert 0.5 * _reach(model, scenes[0].base) < farthest <= _reach(model, scenes[0].base)
