@@ -22,11 +22,8 @@ from terrainkit_cli.parse import option, positional
 from terrainkit_cli.plugin_command import PluginCommand
 
 if TYPE_CHECKING:
-    from terrainkit_robots.policy.evaluate import (
-        EvaluationConfig,
-        EvaluationResult,
-        RolloutMetrics,
-    )
+    from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult
+    from terrainkit_robots.policy.metrics import RolloutMetrics
     from terrainkit_robots.rl.run import PolicySpec
 
 DEFAULT_REPETITIONS, MAX_REPETITIONS = 10, 100
@@ -146,8 +143,13 @@ class Evaluate(PolicyCommand):
     """Measure the highest step, widest gap, steepest slope and narrowest passage that all robots
     cross."""
 
-    repetitions: Annotated[int, Meta(ge=1, le=MAX_REPETITIONS), option("N")] = DEFAULT_REPETITIONS
-    """With --suite or --limits: robots on each patch."""
+    margins: bool = False
+    """Measure on a plane what the policy bears of latency, pushes, low friction, and errors of
+    masses, motors, gains and sensors. With --suite, the report card has the margins as well."""
+
+    repetitions: Annotated[int, Meta(ge=1, le=MAX_REPETITIONS), option("N")] | None = None
+    """With --suite or --limits: robots on each patch, by default 10. With --margins: robots with
+    each command and disturbance, by default 3."""
 
     output: OutputPath | None = None
     """Write the result to this file, as JSON. With --suite also as Markdown and as a picture, to
@@ -163,10 +165,11 @@ class Evaluate(PolicyCommand):
         """Evaluate the policy, and print or write the result."""
         from terrainkit.files.atomic_write import atomic_write, check_target
 
-        if self.suite or self.limits:
+        if self.suite or self.limits or self.margins:
             return self._report_card()
-        if self.repetitions != DEFAULT_REPETITIONS:
-            raise ConfigError("--repetitions: got a value; expected none without --suite, --limits")
+        if self.repetitions is not None:
+            expected = "expected none without --suite, --limits or --margins"
+            raise ConfigError(f"--repetitions: got a value; {expected}")
         for target in filter(None, (self.output, self.diagram)):
             check_target(target, overwrite=self.overwrite)  # before the rollout
         spec = self.load_spec()
@@ -183,6 +186,7 @@ class Evaluate(PolicyCommand):
         else:
             render.result("\n".join([summary_line(result), *gait_lines(result)]))
             render.table(result_rows(result))
+            render.table(dimension_rows(result))
         if self.output is not None:
             with atomic_write(self.output, overwrite=self.overwrite) as path:
                 path.write_text(result.as_json(), encoding="utf-8")
@@ -197,28 +201,35 @@ class Evaluate(PolicyCommand):
         return 0
 
     def _report_card(self) -> int:
-        """Measure the policy on a suite or up to its limits, and print and write the result."""
+        """Measure the policy on a suite or up to its limits; print and write the result."""
         from terrainkit.files.atomic_write import check_target
         from terrainkit.suites import get_suite
         from terrainkit_cli import report_card
 
-        if self.suite and self.limits:
-            raise ConfigError("--suite, --limits: got both; expected one of them")
-        unused = "terrain command random_commands num_envs seconds format diagram"
-        for name in unused.split():
+        if self.limits and (self.suite or self.margins):
+            other = "--suite" if self.suite else "--margins"
+            raise ConfigError(f"{other}, --limits: got both; expected one of them")
+        unused = "terrain command random_commands num_envs format diagram"
+        for name in unused.split() if self.margins else [*unused.split(), "seconds"]:
             if getattr(self, name) != getattr(type(self), name):
                 option = f"--{name}".replace("_", "-")
-                raise ConfigError(f"{option}: got a value; expected none with --suite or --limits")
+                expected = "expected none with --suite, --limits or --margins"
+                raise ConfigError(f"{option}: got a value; {expected}")
         targets = report_card.targets(self.output, is_card=bool(self.suite)) if self.output else []
         for target in targets:
             check_target(target, overwrite=self.overwrite)
         if self.suite and not is_map(self.suite):
             get_suite(self.suite)  # an unknown name is reported before the run is loaded
         spec, config = self.load_spec(), self.eval_config(self.seconds)
+        repetitions, margins = self.repetitions or DEFAULT_REPETITIONS, None
+        if self.margins:
+            margins = report_card.report_margins(spec, config, self.repetitions)
         if self.suite:
-            contents = report_card.report_suite(spec, self.suite, config, self.repetitions)
+            contents = report_card.report_suite(spec, self.suite, config, repetitions, margins)
+        elif margins:
+            contents = [report_card.to_json(margins.as_json())]
         else:
-            contents = report_card.report_limits(spec, config, self.repetitions)
+            contents = report_card.report_limits(spec, config, repetitions)
         if targets:
             report_card.write_files(targets, contents)
         return 0
@@ -229,6 +240,8 @@ def summary_line(result: "EvaluationResult") -> str:
     from terrainkit_robots.text import count, display_path
 
     metrics, terrain = result.metrics, display_path(result.config.terrain or "plane")
+    if result.collision != "plane":
+        terrain += f" (collision: {result.collision})"
     success = "" if metrics.success is None else f", {_percent(metrics.success)} success"
     error = "; ".join(format_errors(metrics))
     if metrics.lin_vel_error is None:
@@ -250,6 +263,8 @@ def gait_lines(result: "EvaluationResult") -> list[str]:
     """Return the gait of the robots that are commanded to move, and a contact diagram, as lines."""
     metrics, feet = result.metrics, list(result.contacts)
     lines = [] if metrics.followed is None else [f"commands followed: {metrics.followed:.0%}"]
+    if metrics.lin_vel_error is None:
+        lines = ["commands followed: not measured"]
     if metrics.swing_height is None or metrics.duty_factor is None:
         return lines
     heights = (_number(each, 100, 1) for each in metrics.swing_height)
@@ -262,6 +277,11 @@ def gait_lines(result: "EvaluationResult") -> list[str]:
     )
     swings = ", ".join(f"{foot} {height}" for foot, height in zip(feet, heights, strict=True))
     lines += [f"gait: {', '.join(values)}", f"swing height [cm]: {swings}"]
+    loads = metrics.load_cells()
+    lines.append(
+        f"largest loads (and 95th percentile): torque {loads[0]} and joint speed {loads[1]} of the "
+        f"limits, foot force {loads[2]} times the weight"
+    )
     width = max(map(len, feet))
     for (foot, contacts), duty in zip(result.contacts.items(), metrics.duty_factor, strict=True):
         blocks = contacts.translate({ord("1"): "#", ord("0"): "."})
@@ -302,6 +322,21 @@ def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
         key = group.terrain or group.direction
         rows.append((*cells, *(_percent(success.get((key, level))) for level in levels)))
     return rows
+
+
+def dimension_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
+    """Return how many robots succeed at each dimension of stairs, gaps and obstacles, as rows."""
+    groups = result.groups.get("by_terrain_dimension", ())
+    directions = list(dict.fromkeys(str(group.direction) for group in groups))
+    rows: dict[tuple[str, str], dict[str, str]] = {}
+    for group in groups:
+        fell = f", {group.falls} fell" if group.falls else ""
+        cell = f"{round((group.success or 0) * group.robots)} of {group.robots}{fell}"
+        size = f"{group.parameter} {_number(group.value, 100, 1)} cm"
+        rows.setdefault((str(group.terrain), size), {})[str(group.direction)] = cell
+    head = [("\nterrain", "dimension", *directions)] if rows else []
+    cells = ((*key, *(row.get(name, "-") for name in directions)) for key, row in rows.items())
+    return [*head, *cells]
 
 
 def _number(value: float | None, factor: float = 1, digits: int = 3) -> str:

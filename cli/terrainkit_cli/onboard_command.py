@@ -33,8 +33,9 @@ class Onboard(Command):
     robot.xml, scene.xml, meshes, and report.md with pictures. The robot is then simulated to test
     that it stands. The input file is never changed.
 
-    Exit code 0: success. 1: errors remain in the file; with --strict, also if the robot does not
-    stand or a framework was skipped. 2: a file cannot be read or written, or an option is invalid.
+    Exit code 0: the folder was written. 1: errors prevent that; with --strict, also if errors
+    remain in the file, the robot does not stand, or a framework was skipped. 2: a file cannot be
+    read or written, or an option is invalid.
     """
 
     file: Annotated[str, positional("FILE")] = ""
@@ -76,8 +77,8 @@ class Onboard(Command):
     may differ from the robot."""
 
     strict: bool = False
-    """Exit with code 1 also if the robot does not stand, or does not fit a framework of --config.
-    The folder is written anyway."""
+    """Exit with code 1 also if errors remain in the file, or the robot does not stand or does not
+    fit a framework of --config. The folder is written anyway."""
 
     overwrite: bool = False
     """Replace the folder if it contains an onboarded robot."""
@@ -113,12 +114,10 @@ class Onboard(Command):
         render.result(f"  python -m mujoco.viewer --mjcf={scene}")
         for line in _train_commands(result):
             render.report(f"{line}\n")  # with absolute paths: for use in another folder
-        errors, warnings = _remaining_errors(result), _warnings(result)
-        for error in errors:
-            render.error(f"{self.file}: {error}")
+        warnings = _remaining_errors(result) + _warnings(result)
         for warning in warnings:
             render.note(f"warning: {self.file}: {warning}")
-        return int(bool(errors or (self.strict and warnings)))
+        return int(self.strict and bool(warnings))
 
     def _options(self, steps: render.Steps) -> "OnboardOptions":
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (

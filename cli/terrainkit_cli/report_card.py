@@ -1,14 +1,16 @@
 """The report card of a policy on a suite or a map, and its limits."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import is_map
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import EvaluationConfig
+    from terrainkit_robots.policy.margins import Margins
     from terrainkit_robots.rl.run import PolicySpec
 
 CARD_SUFFIXES = (".json", ".md", ".png")
@@ -16,7 +18,11 @@ CARD_SUFFIXES = (".json", ".md", ".png")
 
 
 def report_suite(
-    spec: "PolicySpec", suite: str, config: "EvaluationConfig", repetitions: int
+    spec: "PolicySpec",
+    suite: str,
+    config: "EvaluationConfig",
+    repetitions: int,
+    margins: "Margins | None" = None,
 ) -> list[bytes]:
     """Measure a policy, print the card, and return it as the files of a report card.
 
@@ -25,6 +31,7 @@ def report_suite(
         suite: Name of a suite, or a map (.npz).
         config: Seed and device.
         repetitions: Robots on each patch.
+        margins: Margins of the policy, which the card includes.
 
     Raises:
         ConfigError: if there is no such suite, or the policy cannot cross a map.
@@ -37,6 +44,7 @@ def report_suite(
     from terrainkit_robots.report_card.picture import draw_card
 
     terrain_map = TerrainMap.load(suite) if is_map(suite) else generate_suite(suite)
+    render.note(f"measuring {spec.policy_name} on {suite}: {repetitions} robots on each patch")
     with render.steps() as steps:
         card = measure(
             spec,
@@ -51,8 +59,38 @@ def report_suite(
     render.result(
         f"\nThe table counts the robots, of {repetitions} on each patch, that crossed. {CRITERION}"
     )
-    document = json.dumps(card.as_json(), indent=1)
-    return [f"{document}\n".encode(), card.as_markdown().encode(), draw_card(card)]
+    card = replace(card, margins=margins)
+    return [to_json(card.as_json()), card.as_markdown().encode(), draw_card(card)]
+
+
+def report_margins(
+    spec: "PolicySpec", config: "EvaluationConfig", repetitions: int | None
+) -> "Margins":
+    """Measure the margins of a policy, print them, and return them."""
+    from terrainkit_robots.policy.margins import DEFAULT_REPETITIONS, NOTE, measure_margins
+    from terrainkit_robots.rl.runner import available_processors
+    from terrainkit_robots.text import count
+
+    threads = count(available_processors(), "thread")
+    render.note(f"measuring margins: {config.seconds:g} s, with {threads}")
+    with render.steps() as steps:
+        margins = measure_margins(
+            spec,
+            config,
+            repetitions or DEFAULT_REPETITIONS,
+            lambda fraction: steps.update(f"margins: {fraction:.0%} of {config.seconds:g} s"),
+        )
+    render.result(f"margins of {margins.robot}, {margins.checkpoint}")
+    render.table(margins.rows())
+    render.result(f"\n{NOTE}")
+    for each in margins.left_out:
+        render.note(f"warning: left out: {each}")
+    return margins
+
+
+def to_json(document: dict[str, Any]) -> bytes:
+    """Return values of JSON as the content of a file."""
+    return f"{json.dumps(document, indent=1)}\n".encode()
 
 
 def report_limits(spec: "PolicySpec", config: "EvaluationConfig", repetitions: int) -> list[bytes]:
@@ -60,16 +98,17 @@ def report_limits(spec: "PolicySpec", config: "EvaluationConfig", repetitions: i
     from terrainkit_robots.report_card.limits import measure_limits
     from terrainkit_robots.simulation.robot_limits import derive_limits
 
+    render.note(f"measuring the limits of {spec.policy_name}: {repetitions} robots in each test")
     with render.steps() as steps:
         result = measure_limits(
             spec,
             derive_limits(spec.robot.folder).limits,
             repetitions,
             config,
-            lambda fraction: steps.update(f"limits: {fraction:.0%} of the rounds"),
+            lambda fraction: steps.update(f"limits: {fraction:.0%}"),
         )
     render.table(result.rows())
-    return [f"{json.dumps(result.as_json(), indent=1)}\n".encode()]
+    return [to_json(result.as_json())]
 
 
 def targets(output: Path, *, is_card: bool) -> list[Path]:

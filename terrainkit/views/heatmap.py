@@ -36,7 +36,7 @@ def draw_heatmap(title: str, rows: Sequence[HeatmapRow], *, note: str = "") -> b
 
     Args:
         title: Text above the heatmap.
-        rows: Rows with the same number of levels.
+        rows: Rows; without a last level, its cell is empty.
         note: Heading of the notes.
 
     Returns:
@@ -48,7 +48,7 @@ def draw_heatmap(title: str, rows: Sequence[HeatmapRow], *, note: str = "") -> b
         font = cv2.FONT_HERSHEY_SIMPLEX
         cv2.putText(image, text, (x, y + 19), font, 0.5, color, 1, cv2.LINE_AA)
 
-    levels = len(rows[0].texts)
+    levels = max(len(row.texts) for row in rows)
     left = _CHARACTER * max(len(row.label) for row in rows) + 2 * _MARGIN
     right = left + levels * _CELL_WIDTH + _MARGIN
     widest_note = max(len(text) for text in (note, *(row.note for row in rows)))

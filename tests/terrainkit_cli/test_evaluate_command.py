@@ -7,9 +7,10 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, suites
-from terrainkit_cli.evaluate_command import result_rows, summary_line
-from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult, RolloutMetrics
+from terrainkit_cli.evaluate_command import dimension_rows, result_rows, summary_line
+from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult
 from terrainkit_robots.policy.export import export_policy
+from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.report_card import limits
 from terrainkit_robots.report_card.limits import LimitResult, PolicyLimits
 from terrainkit_robots.rl import run as run_module
@@ -27,12 +28,13 @@ def here(run_beside_walk):
 def test_evaluate_prints_a_table(here):
     code, out, err = here("walk", "--seconds", "2.1", "--num-envs", "2")
     assert (code, err) == (0, "")
-    first, followed, gait, swing, *contacts = out.splitlines()[:8]
-    head, *rows = out.splitlines()[8:]
+    first, followed, gait, swing, loads, *contacts = out.splitlines()[:9]
+    head, *rows = out.splitlines()[9:]
     assert first.startswith("quadruped, model_7.pt, on plane: 2 robots, 0 fell; error 0.")
     assert followed.startswith("commands followed: ")
     assert "steps/s" in gait
     assert "FL_foot" in swing
+    assert loads.startswith("largest loads (and 95th percentile): torque ")
     assert [line.split()[0] for line in contacts] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     columns = "forward left yaw fell m/s rad/s followed swing [cm]"
     assert head.split() == columns.split()
@@ -80,6 +82,9 @@ def test_evaluate_loads_the_given_checkpoint(here, monkeypatch):
         ("walk --command 1 0 0 --random-commands", "expected one of them"),
         ("walk --suite basics-2", "no suite 'basics-2'; did you mean 'basics-1'?"),
         ("walk --suite basics-1 --limits", "--suite, --limits: got both"),
+        ("walk --limits --margins", "--margins, --limits: got both"),
+        ("walk --limits --seconds 3", "--seconds: got a value; expected none with --suite"),
+        ("walk --margins --num-envs 3", "--num-envs: got a value; expected none with"),
         ("walk --limits --terrain plane", "--terrain: got a value; expected none with"),
         ("walk --limits --random-commands", "--random-commands: got a value; expected none with"),
         ("walk --limits --repetitions 0", "--repetitions: got 0; expected an integer from 1"),
@@ -163,7 +168,8 @@ def test_suite_prints_and_writes_a_report_card(here, rejected, tmp_path, monkeyp
     monkeypatch.setattr(suites, "generate_suite", lambda _: generate(config))
     words = ("walk", "--suite", "basics-1", "--repetitions", 2, "-o", "card.json")
     code, out, err = here(*words)
-    assert (code, err) == (0, "")
+    told = "terrainkit: measuring model_7.pt on basics-1: 2 robots on each patch\n"
+    assert (code, err) == (0, told)
     lines = out.splitlines()
     assert lines[0].startswith("quadruped, model_7.pt, on basics-1: success ")
     assert lines[1].split() == ["test", "level", "0", "1", "success", "passed", "level"]
@@ -178,6 +184,37 @@ def test_suite_prints_and_writes_a_report_card(here, rejected, tmp_path, monkeyp
     assert (tmp_path / "card.md").read_text().startswith("# quadruped on basics-1\n")
     assert (tmp_path / "card.png").read_bytes().startswith(b"\x89PNG")
     assert "card.json exists" in rejected("evaluate", *words)
+
+
+def test_margins_are_printed_and_written(here, tmp_path):
+    words = ("walk", "--margins", "--seconds", "0.04", "--repetitions", 1, "-o", "margins.json")
+    code, out, err = here(*words)
+    assert code == 0
+    assert err.startswith("terrainkit: measuring margins: 0.04 s, with ")
+    about, head, nominal, latency = out.splitlines()[:4]
+    assert about == "margins of quadruped, model_7.pt"
+    assert head.split()[:5] == ["condition", "fell", "of", "7", "m/s"]
+    assert nominal.split()[:2] == ["nominal", "0"]
+    assert latency.split()[:4] == ["latency", "10", "ms", "0"]
+    assert out.splitlines()[-1] == "wrote margins.json"
+    document = json.loads((tmp_path / "margins.json").read_text())
+    assert (document["schema_version"], document["seconds"]) == (1, 0.04)
+    first = document["margins"][1]
+    assert (first["condition"], first["unit"], first["value"]) == ("latency", "ms", 10)
+
+
+def test_dimension_rows_count_successes_by_direction():
+    key = {"terrain": "gap", "parameter": "width", "value": 0.1, "robots": 4}
+    groups = [
+        make_metrics(**key, direction="forward", success=0.75, falls=1),
+        make_metrics(**key, direction="backward", success=1.0, falls=0),
+    ]
+    rows = dimension_rows(make_result(make_metrics(), by_terrain_dimension=groups))
+    assert rows == [
+        ("\nterrain", "dimension", "forward", "backward"),
+        ("gap", "width 10.0 cm", "3 of 4, 1 fell", "4 of 4"),
+    ]
+    assert dimension_rows(make_result(make_metrics())) == []
 
 
 def test_suite_may_be_a_map(here, rejected, tmp_path):
@@ -204,7 +241,8 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
 
     monkeypatch.setattr(limits, "measure_limits", measure)
     code, out, err = here("walk", "--limits", "-o", "limits.json")
-    assert (code, err) == (0, "")
+    told = "terrainkit: measuring the limits of model_7.pt: 10 robots in each test\n"
+    assert (code, err) == (0, told)
     assert out.splitlines() == [
         "test    10 of 10 cross  next value          limit of the robot",
         "stairs  10.0 cm         7 of 10 at 12.0 cm  17.9 cm",

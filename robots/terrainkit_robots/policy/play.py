@@ -12,15 +12,12 @@ from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
     EvaluationResult,
-    EvaluationRollout,
-    Progress,
-    command_schedule,
     is_plane,
     make_eval_env,
-    rollout,
     summarize,
 )
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.rollout import EvaluationRollout, Progress, command_schedule, rollout
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv

@@ -1,7 +1,7 @@
 """The report card: success with confidence intervals by test and level, as JSON and Markdown."""
 
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,9 @@ from scipy.stats import binomtest
 from terrainkit import TerrainMap
 from terrainkit.suites import suite_hash
 from terrainkit.terrain.parameter import format_value
-from terrainkit_robots.policy.evaluate import EvaluationConfig, Progress
+from terrainkit_robots.policy.evaluate import EvaluationConfig
+from terrainkit_robots.policy.margins import NOTE, Margins
+from terrainkit_robots.policy.rollout import Progress
 from terrainkit_robots.report_card.crossing import (
     CROSSED,
     EXTRA_TIME,
@@ -128,10 +130,15 @@ class ReportCard:
     tests: tuple[TestResult, ...]
     """Results by test."""
 
+    margins: Margins | None = None
+    """Margins of the policy, if they were measured."""
+
     def as_json(self) -> dict[str, Any]:
         """Return the card as values of JSON."""
         about = {"schema_version": SCHEMA_VERSION, "criterion": CRITERION}
-        return about | {"confidence": CONFIDENCE} | asdict(self)
+        margins = {"margins": self.margins.as_json()} if self.margins else {}
+        card = asdict(replace(self, margins=None))
+        return about | {"confidence": CONFIDENCE} | card | margins
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return the card as rows of text with a header: crossed attempts by test and level."""
@@ -144,15 +151,15 @@ class ReportCard:
 
     def as_markdown(self) -> str:
         """Return the card as a Markdown document."""
-        header, *rows = self.rows()
-        table = [header, ("---",) * len(header), *rows]
-        lines = (f"| {' | '.join(row)} |" for row in table)
+        margins = "\n## Margins\n\n" if self.margins else ""
+        margins += f"{_markdown_table(self.margins.rows())}\n{NOTE}\n" if self.margins else ""
         return (
             f"# {self.robot} on {self.map}\n\n"
             f"Policy {self.checkpoint}, {self.repetitions} attempts on each patch at "
             f"{self.speed:g} m/s, seed {self.seed}. SHA-256 of the map: `{self.sha256}`.\n\n"
             f"Success: {_percent(self)}, with the {CONFIDENCE:.0%} confidence interval. The table "
-            "has the number of attempts that crossed.\n\n" + "\n".join(lines) + f"\n\n{CRITERION}\n"
+            "has the number of attempts that crossed.\n\n"
+            f"{_markdown_table(self.rows())}\n{CRITERION}\n{margins}"
         )
 
 
@@ -252,6 +259,11 @@ def _success(outcomes: NDArray[np.int8]) -> tuple[float, tuple[float, float]]:
     crossed, number = int((outcomes == CROSSED).sum()), outcomes.size
     low, high = binomtest(crossed, number).proportion_ci(CONFIDENCE, method="wilson")
     return crossed / number, (float(low), float(high))
+
+
+def _markdown_table(rows: list[tuple[str, ...]]) -> str:
+    lines = rows[0], ("---",) * len(rows[0]), *rows[1:]
+    return "".join(f"| {' | '.join(row)} |\n" for row in lines)
 
 
 def _value_text(value: Any) -> str:

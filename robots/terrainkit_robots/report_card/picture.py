@@ -1,6 +1,9 @@
 """The picture of a report card: success by test and level."""
 
+from itertools import groupby
+
 from terrainkit.views.heatmap import HeatmapRow, draw_heatmap
+from terrainkit_robots.policy.margins import Margins
 from terrainkit_robots.report_card.card import ReportCard, summary
 from terrainkit_robots.report_card.crossing import CROSSED, OUTCOMES
 
@@ -16,4 +19,24 @@ def draw_card(card: ReportCard) -> bytes:
         )
         for test in card.tests
     ]
-    return draw_heatmap(summary(card), rows, note="passed level")
+    if card.margins is None:
+        return draw_heatmap(summary(card), rows, note="passed level")
+    rows += _margin_rows(card.margins)
+    return draw_heatmap(summary(card), rows, note="passed level, or first value with falls")
+
+
+def _margin_rows(margins: Margins) -> list[HeatmapRow]:
+    """Return a row per disturbance, and a cell per value: the share of robots that do not fall."""
+    rows, first = [], margins.first_falls()
+    for name, group in groupby(margins.margins[1:], lambda each: each.condition):
+        found = list(group)
+        values = {f"{each.value:g}": each for each in found}
+        rows.append(
+            HeatmapRow(
+                label=f"{name} [{found[0].unit or 1}]",
+                success=[1 - each.falls / each.robots for each in found],
+                texts=[*values],
+                note=", ".join(k for k, each in values.items() if each in first) or "none",
+            )
+        )
+    return rows

@@ -68,6 +68,8 @@ class MetricsLogger(Logger):
     def __init__(self, runner: "LeggedRunner") -> None:
         self._runner = runner
         self.means: dict[str, float] = {}  # latest mean of each value in the env's log
+        # Of each episode, as the rewards and lengths that rsl-rl keeps.
+        self.fallbuffer, self.speedbuffer = (deque[float](maxlen=100) for _ in range(2))
         world = (runner.is_distributed, runner.gpu_world_size, runner.gpu_global_rank)
         env = runner.env
         super().__init__(None, runner.cfg, env.cfg, env.num_envs, *world, runner.device)
@@ -88,13 +90,18 @@ class MetricsLogger(Logger):
             super().stop_logging_writer()
             self.writer = None
 
-    def process_env_step(self, rewards: torch.Tensor, *args: Any, **kwargs: Any) -> None:
+    def process_env_step(
+        self, rewards: torch.Tensor, dones: torch.Tensor, extras: Any, *args: Any, **kwargs: Any
+    ) -> None:
         """Check and record the rewards of a step."""
         if not torch.isfinite(rewards).all():
             sums = self._runner.env.episode_sums.items()
             names = [name for name, total in sums if not np.isfinite(total).all()]
             raise ConfigError(f"rewards are not finite: {listing(names) or 'of robots that fell'}")
-        super().process_env_step(rewards, *args, **kwargs)
+        super().process_env_step(rewards, dones, extras, *args, **kwargs)
+        for name, buffer in (("falls", self.fallbuffer), ("speed", self.speedbuffer)):
+            if self.writer is not None and (count := int(dones.sum())):
+                buffer.extend([extras["log"][f"Episode/{name}"]] * count)
 
     def log(self, **values: Any) -> None:
         """Log an iteration, save a checkpoint if one is due, and end training by raising `_Stop`.
@@ -389,8 +396,8 @@ class LeggedRunner(OnPolicyRunner):
             eta=(self._last - self._completed) * pace,
             reward=statistics.mean(logger.rewbuffer) if lengths else None,
             episode_length=statistics.mean(lengths) if lengths else None,
-            falls=logger.means.get("Episode/falls"),
-            speed=logger.means.get("Episode/speed"),
+            falls=statistics.mean(logger.fallbuffer) if lengths else None,
+            speed=statistics.mean(logger.speedbuffer) if lengths else None,
             noise_std=self.alg.get_policy().output_std.detach().mean().item(),
             rewards=rewards,
             shares=shares,
@@ -496,6 +503,11 @@ def resolve_device(name: str) -> str:
     return f"cuda:{os.environ['LOCAL_RANK']}" if "LOCAL_RANK" in os.environ else name
 
 
+def available_processors() -> int:
+    """Return the number of processors that this process may use."""
+    return len(getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0))
+
+
 def process_share(task: Task) -> Task:
     """Return the task of this process: under torchrun, its share of the environments.
 
@@ -507,8 +519,7 @@ def process_share(task: Task) -> Task:
     if num_envs < count:
         expected = f"expected one for each of {count} processes"
         raise ConfigError(f"env.num_envs: got {num_envs}; {expected}")
-    available = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
-    threads = task.env.num_threads or max(1, len(available) // local_count)
+    threads = task.env.num_threads or max(1, available_processors() // local_count)
     num_envs = num_envs // count + (rank < num_envs % count)
     env = replace(task.env, num_envs=num_envs, num_threads=threads)
     return replace(task, env=env, runner=replace(task.runner, seed=task.runner.seed + rank))

@@ -1,5 +1,6 @@
 """Many MuJoCo simulations of one scene, stepped together by `mujoco.batch.Batch`."""
 
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -19,6 +20,9 @@ Ids = NDArray[np.int64]
 
 class Simulation:
     """n simulations of a scene; its arrays are views that change with every step."""
+
+    after_step: Callable[[], object] | None = None
+    """Called after every physics step; None to step without interruption, which is faster."""
 
     def __init__(self, scene: Scene, num_envs: int, num_threads: int = 0) -> None:
         """Allocate the simulations in the model's default state."""
@@ -43,7 +47,10 @@ class Simulation:
         # A reset also restores the counters, so only counts that start at 0 are reliable.
         self.batch.warning[:, self._unstable, 1] = 0
         with quiet_mujoco():
-            self.batch.step(nstep=count, stage=self._stage)
+            for _ in range(count if self.after_step else 1):
+                self.batch.step(nstep=1 if self.after_step else count, stage=self._stage)
+                if self.after_step:
+                    self.after_step()
         return (self.batch.warning[:, self._unstable, 1] > 0).any(axis=1)
 
     def reset(self, env_ids: Ids, qpos: NDArray[np.float64], qvel: NDArray[np.float64]) -> None:

@@ -8,9 +8,10 @@ import numpy as np
 from terrainkit.views.viewer import FIELD_OF_VIEW, show_map
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.policy.evaluate import EvaluationConfig, rollout
+from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.policy.play import demo_commands, make_play_env
+from terrainkit_robots.policy.rollout import rollout
 from terrainkit_robots.rl.run import Run
 from terrainkit_robots.rl.terrain import MapGround
 from terrainkit_robots.viewer.robot_scene import RobotScene

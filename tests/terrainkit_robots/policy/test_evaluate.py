@@ -9,15 +9,15 @@ import torch
 from terrainkit import generate
 from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
-    ErrorMean,
     EvaluationConfig,
-    EvaluationRollout,
     command_grid,
     eval_task,
     evaluate,
     make_eval_env,
     summarize,
 )
+from terrainkit_robots.policy.metrics import ErrorMean
+from terrainkit_robots.policy.rollout import EvaluationRollout
 from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
 from terrainkit_robots.rl.run import open_run
 
@@ -157,7 +157,7 @@ def test_summary_groups_by_command(make_run):
     assert document["all"]["lin_vel_error"] is None  # nothing is measured before settling
     assert len(document["by_command"]) == 75
     assert document["by_command"][0]["command"] == [-1.0, -0.5, -1.0]
-    assert document["all"]["followed"] == 0
+    assert document["all"]["followed"] is None
     assert document["feet"] == ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]
     assert "by_terrain" not in document
 

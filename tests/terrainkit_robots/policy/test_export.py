@@ -15,10 +15,11 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy import export as module
-from terrainkit_robots.policy.evaluate import eval_task, rollout
+from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.policy.onnx_policy import open_onnx
+from terrainkit_robots.policy.rollout import rollout
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Control, Env, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 import torch
 
-from terrainkit_robots.policy.evaluate import (
+from terrainkit_robots.policy.evaluate import eval_task
+from terrainkit_robots.policy.rollout import (
     SETTLING_TIME,
     EvaluationRollout,
     command_schedule,
-    eval_task,
     rollout,
 )
 from terrainkit_robots.rl.config import Commands, Env, Task

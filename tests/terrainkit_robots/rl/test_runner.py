@@ -12,7 +12,7 @@ from rsl_rl.utils import WandbLogWriter
 
 from terrainkit.errors import ConfigError, PluginError
 from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
-from terrainkit_robots.rl.config import Algorithm, Policy, Task
+from terrainkit_robots.rl.config import Algorithm, Policy, Task, Termination
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.runner import LeggedRunner, resolve_device, runner_config
@@ -115,6 +115,30 @@ def test_progress_callback_gets_every_iteration(make, task, map_ground):
     assert "tracking_lin_vel" in last.rewards
     assert last.steps_per_second > 0
     assert 0 < last.learning_fraction < 1
+
+
+def test_progress_has_the_falls_of_the_last_100_episodes(make, task):
+    seen, fallen = [], []
+    task = replace(task, termination=Termination(tilt=0.1))
+    runner = make(task, progress_callback=lambda progress: seen.append((progress, len(fallen))))
+    step = runner.env.step
+
+    def record(actions):
+        result = step(actions)
+        (_, _, dones, extras), count = result, len(fallen)
+        fallen.extend((~extras["time_outs"][dones]).tolist())
+        if ended := fallen[count:]:  # episodes that end in one step count alike
+            fallen[count:] = [np.mean(ended)] * len(ended)
+        return result
+
+    runner.env.step = record
+    runner.learn(40)
+    for progress, count in seen:
+        expected = pytest.approx(np.mean(fallen[max(0, count - 100) : count])) if count else None
+        assert progress.falls == expected
+    assert len(fallen) > 100
+    assert 0 < seen[-1][0].falls < 1
+    assert 0 < seen[-1][0].speed < 1
 
 
 def test_load_rejects_another_task(make, task, tmp_path, map_ground):
