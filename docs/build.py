@@ -33,9 +33,10 @@ from terrainkit.settings.schema import Config, field_keys, field_types, is_requi
 from terrainkit.settings.toml_text import value_text
 from terrainkit.settings.type_hint import NONE, describe, is_table, parse_hint
 from terrainkit.terrain import presets, registry
+from terrainkit.terrain.paper import Paper, get_paper, paper_names
 from terrainkit.terrain.sub_terrain import SubTerrain
-from terrainkit.terrain.terrain_docs import TerrainDoc, overlay_doc, terrain_doc
-from terrainkit.views.preview import write_preview
+from terrainkit.terrain.terrain_docs import TerrainDoc, overlay_doc, parameter_texts, terrain_doc
+from terrainkit.views.preview import render_preview, write_preview
 from terrainkit_cli.main import COMMANDS
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
@@ -81,6 +82,8 @@ def terrains_page() -> str:
         'legged_gym\'s "stairs up", which a robot climbs from the platform outward, are',
         '`pyramid_stairs_inverted` here. Its "stairs down" are `pyramid_stairs`.',
         "",
+        "[papers.md](papers.md) has the ranges and sources of the presets of published work.",
+        "",
         "`parkour_course` on patches of 18 m x 4 m; the arrows are goals:",
         "",
         "![parkour_course](pictures/parkour_course.png)",
@@ -114,6 +117,58 @@ def terrain_section(about: TerrainDoc) -> str:
 def parameter_rows(about: TerrainDoc) -> list[str]:
     rows = [f"| {p.name} | {p.easy} | {p.hard or p.easy} | {p.text} |" for p in about.parameters]
     return ["| parameter | easy | hard | |", "|---|---|---|---|", *rows]
+
+
+def papers_page() -> str:
+    parts = [
+        "# Terrains of published work\n",
+        NOTE,
+        PAPERS,
+        "| preset | work | source |\n|---|---|---|",
+    ]
+    for name in paper_names():
+        paper = get_paper(name)
+        parts.append(f"| [{name}](#{name}) | {paper.title} ({paper.year}) | {source_link(paper)} |")
+    return "\n".join([*parts, "", *map(paper_section, paper_names())])
+
+
+PAPERS = """Presets with the terrains of papers and projects. `terrainkit list --papers` prints the
+citations, `terrainkit list PRESET` a preset, and `terrainkit generate --preset PRESET` generates
+it. The figures were read in the code or the tables of the work, and the tests compare each with the
+generated terrain. Figures of terrains marked second-hand were read in the work of others. A preset
+sets the terrains only; `terrainkit list PRESET` prints the options for a map of the size of the
+work. In Python, `terrainkit.terrain.paper.get_paper` returns an entry. The pictures show difficulty
+0, 0.5 and 1, from left to right.
+"""
+
+
+def source_link(paper: Paper) -> str:
+    hosts = {"arXiv:": "https://arxiv.org/abs/", "doi:": "https://doi.org/"}
+    for prefix, host in hosts.items():
+        if paper.source.startswith(prefix):
+            return f"[{paper.source}]({host}{paper.source.removeprefix(prefix)})"
+    return f"<{paper.source}>"
+
+
+def paper_section(name: str) -> str:
+    paper = get_paper(name)
+    lines = [
+        f"## {name}\n",
+        f"{paper.authors}: *{paper.title}* ({paper.year}), {source_link(paper)}.\n",
+        f"![{name}](pictures/{name}.png)\n",
+        "| terrain | proportion | easy:hard |\n|---|---|---|",
+    ]
+    for each in paper.terrains:
+        mark = ", second-hand" if each.name in paper.second_hand else ""
+        kind = f"{each.name} ({each.terrain})" if each.name != each.terrain else each.name
+        texts = ", ".join(parameter_texts(each))
+        lines.append(f"| {kind}{mark} | {each.proportion:g} | {texts} |")
+    settings = ", ".join(f"`{key} = {value_text(value, 100)}`" for key, value in paper.map.items())
+    lines += [f"\nMap: {settings}."] if settings else []
+    lines.append(f"\nFigures: {markup(paper.figures)}.")
+    for title, texts in (("Not stated", paper.not_stated), ("Different", paper.differences)):
+        lines += [f"\n{title}:\n", *(f"- {markup(text)}" for text in texts)] if texts else []
+    return "\n".join(lines) + "\n"
 
 
 def rules_page() -> str:
@@ -256,7 +311,9 @@ def llms_text() -> str:
 
 def pictures() -> dict[str, Callable[[], None]]:
     """Return the functions that draw the pictures, by name."""
-    return {name: partial(draw_terrain, name) for name in registry.terrain_names()} | {
+    return {
+        **{name: partial(draw_terrain, name) for name in registry.terrain_names()},
+        **{name: partial(draw_paper, name) for name in paper_names()},
         "map": draw_map,
         "feasibility": partial(draw_feasibility, "quadruped"),
         "parkour_course": draw_courses,
@@ -290,6 +347,18 @@ def draw_terrain(name: str) -> None:
         for difficulty in (0.1, 0.5, 1.0)
     ]
     picture = cv2.cvtColor(render_patches(patches, width=800), cv2.COLOR_RGB2BGR)
+    cv2.imwrite(str(PICTURES / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+
+
+def draw_paper(name: str) -> None:
+    """Render each terrain of a work once, on patches as in the work."""
+    paper = get_paper(name)
+    terrains = tuple(dataclasses.replace(each, proportion=1.0) for each in paper.terrains)
+    size = {"rows": 3, "cols": len(terrains), "border": 1.0, "seed": SEED}
+    config = MapConfig(**{**paper.map, **size}, terrains=terrains)
+    picture = cv2.cvtColor(
+        render_preview(terrainkit.generate(config), width=820), cv2.COLOR_RGB2BGR
+    )
     cv2.imwrite(str(PICTURES / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
@@ -355,6 +424,7 @@ def main() -> int:
         return 2
     pages = {
         "terrains.md": terrains_page(),
+        "papers.md": papers_page(),
         "rules.md": rules_page(),
         "config.md": config_page(),
         "cli.md": cli_page(),

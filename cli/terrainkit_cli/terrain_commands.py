@@ -1,5 +1,6 @@
 """The commands for terrains and maps: list, info, preview, check-map and diff."""
 
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,9 @@ import numpy as np
 from terrainkit.errors import ConfigError
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain import presets, registry
+from terrainkit.terrain.paper import get_paper, paper_names
 from terrainkit.terrain.parameter import format_value
+from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import Limits, MapFile, OutputPath, RobotName
 from terrainkit_cli.map_text import bytes_text, size_text, written
@@ -25,6 +28,9 @@ class List(PluginCommand):
     """Name of a terrain or overlay, to print its parameters, or of a preset, to print its
     terrains. `stairs` and `rough` are terrains and presets: the terrain is printed."""
 
+    papers: bool = False
+    """List the presets of published work, with their citations and ranges (easy:hard)."""
+
     def run(self) -> int:
         """Print the terrains, overlays and presets, or the contents of one."""
         from terrainkit.terrain.terrain_docs import (
@@ -34,6 +40,14 @@ class List(PluginCommand):
             terrain_summaries,
         )
 
+        if self.papers:
+            if self.terrain:
+                raise ConfigError(f"--papers: got {self.terrain!r} as well; expected one of them")
+            for name in paper_names():
+                _print_citation(name)
+                _print_wrapped("; ".join(map(_ranges_text, get_paper(name).terrains)), indent=4)
+            render.result("\nterrainkit list NAME shows all values, their source and what differs.")
+            return 0
         if not self.terrain:
             render.table(list(terrain_summaries().items()))
             if names := (*registry.registered_terrains(), *registry.registered_overlays()):
@@ -49,9 +63,12 @@ class List(PluginCommand):
             mixes = (
                 (name, ", ".join(c.name for c in presets.get_preset(name)))
                 for name in presets.preset_names()
+                if name not in paper_names()
             )
             render.result("\npresets:")
             render.table([(f"  {name}", mix) for name, mix in mixes])
+            render.result("\npresets of published work, which list --papers describes:")
+            _print_wrapped(", ".join(paper_names()), indent=2)
             render.result(
                 "\nterrainkit list NAME shows a terrain's parameters, or a preset's terrains."
             )
@@ -69,12 +86,72 @@ class List(PluginCommand):
 
 
 def _print_preset(name: str) -> None:
-    render.result(f"{name}: a preset, for --preset of terrainkit generate\n")
+    from terrainkit.terrain.terrain_docs import parameter_texts
+
+    paper = get_paper(name) if name in paper_names() else None
+    if paper:
+        _print_citation(name)
+        render.result("")
+    options = "".join(
+        f" --{key.replace('_', '-')} {' '.join(map(format_value, np.atleast_1d(value).tolist()))}"
+        for key, value in (paper.map.items() if paper else ())
+    )
+    render.result(f"terrainkit generate --preset {name}{options} -o map.npz")
+    render.result("")
     rows = [("terrain", "proportion", "parameters")]
     for sub_terrain in presets.get_preset(name):
-        values = (f"{key}={format_value(v)}" for key, v in sub_terrain.parameters.items())
-        rows.append((sub_terrain.name, f"{sub_terrain.proportion:g}", ", ".join(values)))
-    render.table(rows)
+        parameters = ", ".join(parameter_texts(sub_terrain))
+        rows.append((sub_terrain.name, f"{sub_terrain.proportion:g}", parameters))
+    render.table(_wrapped_rows(rows))
+    if paper:
+        _print_wrapped(f"\nfigures: {paper.figures}")
+        for title, texts in (
+            ("second-hand", paper.second_hand and (", ".join(paper.second_hand),)),
+            ("not stated", paper.not_stated),
+            ("different", paper.differences),
+        ):
+            for text in texts:
+                _print_wrapped(f"{title}: {text}")
+
+
+def _ranges_text(sub_terrain: SubTerrain) -> str:
+    from terrainkit.terrain.terrain_docs import parameter_texts
+
+    ranges = ", ".join(text for text in parameter_texts(sub_terrain) if ":" in text)
+    return f"{sub_terrain.name} {ranges}".rstrip()
+
+
+def _print_citation(name: str) -> None:
+    paper = get_paper(name)
+    render.result(name)
+    _print_wrapped(f"{paper.authors}: {paper.title} ({paper.year}), {paper.source}", indent=4)
+
+
+def _print_wrapped(text: str, indent: int = 0) -> None:
+    """Print a text whose lines are as wide as a report."""
+    first, later = " " * indent, " " * max(indent, 4)
+    lines = text.lstrip("\n")
+    render.result(
+        "\n" * (len(text) - len(lines))
+        + textwrap.fill(
+            lines,
+            render.width(),
+            initial_indent=first,
+            subsequent_indent=later,
+            break_on_hyphens=False,
+            break_long_words=False,
+        )
+    )
+
+
+def _wrapped_rows(rows: list[tuple[str, str, str]]) -> list[tuple[str, str, str]]:
+    """Return the rows of a table, whose last column continues on further rows."""
+    used = sum(max(len(row[k]) for row in rows) + 2 for k in (0, 1))
+    wrapped = []
+    for first, second, text in rows:
+        lines = textwrap.wrap(text, max(render.width() - used, 20)) or [""]
+        wrapped += [(first, second, lines[0]), *(("", "", line) for line in lines[1:])]
+    return wrapped
 
 
 @dataclass(frozen=True, kw_only=True)

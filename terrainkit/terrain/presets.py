@@ -6,6 +6,7 @@ from typing import Any
 from terrainkit.errors import ConfigError
 from terrainkit.settings.text import expected_names
 from terrainkit.terrain import registry
+from terrainkit.terrain.paper import get_paper, paper_names
 from terrainkit.terrain.parameter import parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
 
@@ -35,53 +36,6 @@ _OBSTACLES: dict[str, list[dict[str, Any]]] = {
 _COURSE = {"terrain": "course", "order": "random", "start": 1.5}
 
 _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
-    # The columns of legged_gym in its order. Its "stairs up" are climbed from the platform outward,
-    # so they are the inverted pyramid here, and its "stairs down" the upright one.
-    "legged_gym": {
-        "pyramid_slope_inverted": {},
-        "pyramid_slope": {},
-        "rough_slope": {},
-        "pyramid_stairs_inverted": {"proportion": 2.0},
-        "pyramid_stairs": {},
-        "obstacles": {},
-        "stepping_stones": {},
-        "gap": {},
-        "pit": {},
-    },
-    # `terrain_proportions` of legged_gym: slopes .1, rough slopes .1, stairs up .35 and down .25,
-    # obstacles .2. With 20 columns, as there, each terrain has whole columns.
-    "legged_gym_rough": {
-        "pyramid_slope_inverted": {"proportion": 0.05},
-        "pyramid_slope": {"proportion": 0.05},
-        "rough_slope": {"proportion": 0.1},
-        "pyramid_stairs_inverted": {"proportion": 0.35},
-        "pyramid_stairs": {"proportion": 0.25},
-        "obstacles": {"proportion": 0.2},
-    },
-    # ROUGH_TERRAINS_CFG of Isaac Lab 2.3. Its rough ground is 0.02 to 0.10 m high at every
-    # difficulty.
-    "isaaclab": {
-        "pyramid_stairs": {"proportion": 2.0, "step_width": 0.3},
-        "pyramid_stairs_inverted": {"proportion": 2.0, "step_width": 0.3},
-        "random_grid": {"proportion": 2.0, "height": (0.05, 0.2), "block": 0.45},
-        "rough": {"proportion": 2.0, "amplitude": 0.04, "step": 0.02, "spacing": 0.1},
-        "pyramid_slope": {"platform": 2.0},
-        "pyramid_slope_inverted": {"platform": 2.0},
-    },
-    # ROUGH_TERRAINS_CFG of mjlab 1.6, with slopes up to 0.7: its slope of 1 is a wall here.
-    "mjlab": {
-        "flat": {"proportion": 2.0},
-        "pyramid_stairs": {"proportion": 2.0, "step_height": (0.0, 0.1), "step_width": 0.3},
-        "pyramid_stairs_inverted": {
-            "proportion": 2.0,
-            "step_height": (0.0, 0.1),
-            "step_width": 0.3,
-        },
-        "pyramid_slope": {"grade": (0.0, 0.7), "platform": 2.0},
-        "pyramid_slope_inverted": {"grade": (0.0, 0.7), "platform": 2.0},
-        "rough": {"amplitude": 0.04, "step": 0.02, "spacing": 0.1},
-        "wave": {},
-    },
     # Courses of one obstacle as in the training of both, and mixed ones as in their distillation.
     "parkour_course": {
         **{
@@ -122,7 +76,7 @@ _EQUAL_PARTS = {
 
 def preset_names() -> tuple[str, ...]:
     """Return the names of the presets."""
-    return (*_PRESETS, *_EQUAL_PARTS, "all")
+    return (*paper_names(), *_PRESETS, *_EQUAL_PARTS, "all")
 
 
 def get_preset(name: str) -> tuple[SubTerrain, ...]:
@@ -136,6 +90,8 @@ def get_preset(name: str) -> tuple[SubTerrain, ...]:
     """
     if name not in preset_names():
         raise ConfigError(f"no preset {name!r}; {expected_names(name, preset_names())}")
+    if name in paper_names():
+        return get_paper(name).terrains
     if name in _PRESETS:
         return tuple(_sub_terrain(each, **values) for each, values in _PRESETS[name].items())
     names = _all_names() if name == "all" else _EQUAL_PARTS[name]

@@ -8,6 +8,7 @@ from terrainkit.errors import plugin_errors
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.terrain import registry
 from terrainkit.terrain.parameter import Parameter, format_value, parameters_of
+from terrainkit.terrain.sub_terrain import SubTerrain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,3 +97,19 @@ def _text(text: str, parameter: Parameter) -> str:
     if not parameter.choices:
         return text
     return f"{text} One of: {', '.join(map(str, parameter.choices))}.".strip()
+
+
+def parameter_texts(sub_terrain: SubTerrain) -> list[str]:
+    """Return the parameters that a sub-terrain gives, as `--set` of the command line reads them.
+
+    Parameters of the elements of a course are preceded by the terrain of the element.
+    """
+    declared, texts = parameters_of(sub_terrain.terrain_class), []
+    for name, value in sub_terrain.parameters.items():
+        if declared[name].table:
+            texts += [f"{each.terrain}.{text}" for each in value for text in parameter_texts(each)]
+        elif isinstance(value, tuple) and not declared[name].is_vector:
+            texts.append(f"{name}={':'.join(map(format_value, value))}")
+        else:
+            texts.append(f"{name}={format_value(value)}")
+    return texts

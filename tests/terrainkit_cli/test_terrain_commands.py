@@ -4,6 +4,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.terrain import registry
+from terrainkit.terrain.paper import paper_names
 
 
 def test_list_names_every_terrain(terrainkit):
@@ -15,14 +16,35 @@ def test_list_names_every_terrain(terrainkit):
     ("name", "line"),
     [
         ("pyramid_stairs", "step_height 0.05 0.23 Rise of a step [m]."),
-        ("legged_gym", "pyramid_stairs_inverted 2 inverted=true"),
-        ("legged_gym", "gap 1"),
+        ("legged_gym", "gap 1 width=0:1, depth=5, platform=3"),
+        ("hard", "gap 1"),
+        ("extreme_parkour", "steps 1 order=random, slot_length=3.95, platform=1,"),
+        (
+            "beamdojo",
+            "second-hand: stones_everywhere, stone_rows, beams, stepping_beams, gap_track",
+        ),
         ("stairs", "parameter easy hard"),  # the terrain, and not the preset
     ],
 )
 def test_list_shows_parameters_or_terrains(terrainkit, name, line):
     lines = terrainkit("list", name).stdout.splitlines()
     assert line in [" ".join(each.split()) for each in lines]
+
+
+def test_list_papers_has_the_citations_in_100_columns(terrainkit, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    lines = terrainkit("list", "--papers").stdout.splitlines()
+    assert {*paper_names()} < {*lines}
+    assert "    (2023), arXiv:2309.14341" in lines
+    assert any("hurdles height=0.15:0.4," in line for line in lines)
+    for name in paper_names():
+        lines += terrainkit("list", name).stdout.splitlines()
+    assert max(map(len, lines)) <= 100
+
+
+def test_list_papers_with_a_name_is_an_error(terrainkit):
+    run = terrainkit("list", "--papers", "barkour")
+    assert (run.returncode, "--papers: got 'barkour' as well" in run.stderr) == (2, True)
 
 
 def test_info_describes_the_map(terrainkit, small_map):

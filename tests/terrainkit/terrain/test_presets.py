@@ -1,4 +1,4 @@
-"""Tests of the presets, whose sub-terrains are in presets.json.
+"""Tests of the presets; sub-terrains are in presets.json, of published work in test_paper.py.
 
 Write it anew with `python -m tests.terrainkit.terrain.test_presets`.
 """
@@ -10,10 +10,11 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.terrain import presets, registry
+from terrainkit.terrain.paper import paper_names
 from terrainkit.terrain.parameter import parameters_of
 
 TABLES = Path(__file__).with_name("presets.json")
-NAMES = [name for name in presets.preset_names() if name != "all"]
+NAMES = [name for name in presets.preset_names() if name not in (*paper_names(), "all")]
 
 
 def text_of_presets():
