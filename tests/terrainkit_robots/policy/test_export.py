@@ -103,7 +103,7 @@ def test_json_describes_the_policy(exported):
     assert config["joints"]["frictionloss"] == [0.0] * 12  # asset.joint_friction is off
     assert config["joints"]["passive_damping"] == [0.1] * 12
     assert config["contact"] == {"friction": 0.8}
-    assert config["task"]["domain_rand"]["friction"] == [0.5, 1.25]
+    assert config["task"]["domain_rand"]["friction"] == [0.3, 1.25]
 
 
 @pytest.mark.parametrize("wheels", [False, True])
