@@ -1,25 +1,27 @@
 """Time of a MuJoCo step on boxes and on a heightfield, relative to a plane.
 
 The bundled quadruped stands on spawn origins all over the map. CPU time is measured, and the
-shortest of several alternating runs counts, since other load only adds time.
+shortest of several alternating runs counts, since other load only adds time. `near_boxes` has only
+the boxes near each robot, as in training.
 """
 
 import time
 import warnings
 from collections.abc import Iterator
 
-import mujoco
 import numpy as np
 
 import terrainkit
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Scene
+from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
 from terrainkit_robots.spec.robot import Robot
 
 _NUM_PLACES = 20
 _NUM_RUNS = 12
-_NUM_STEPS = 200
+_NUM_STEPS = 50
 _NUM_ROWS = (1, 2, 4, 8)
 _FLAT_TERRAINS = ("pyramid_stairs_inverted", "pyramid_stairs", "stairs", "obstacles", "pit", "gap")
 """Terrains that boxes represent completely."""
@@ -29,17 +31,16 @@ def run() -> Iterator[tuple[str, float]]:
     warnings.simplefilter("ignore", terrainkit.TerrainkitWarning)  # cliffs, as expected
     for preset in ("stairs", "legged_gym"):
         terrain_map = terrainkit.generate(terrainkit.MapConfig(preset=preset))
-        boxes, hfield = _step_times(terrain_map)
-        yield f"{preset}_boxes_over_plane", boxes
-        yield f"{preset}_hfield_over_plane", hfield
+        for name, cost in _step_times(terrain_map).items():
+            yield f"{preset}_{name}_over_plane", cost
 
     counts, costs = [], []
     for rows in _NUM_ROWS:
         terrain_map = _flat_map(rows)
-        boxes, hfield = _step_times(terrain_map)
+        times = _step_times(terrain_map)
         counts.append(len(terrain_map.boxes().centers))
-        costs.append(boxes / hfield)
-        yield f"{counts[-1]}_boxes_over_plane", boxes
+        costs.append(times["boxes"] / times["hfield"])
+        yield f"{counts[-1]}_boxes_over_plane", times["boxes"]
         yield f"{counts[-1]}_boxes_over_hfield", costs[-1]
     # The cost grows with the number of boxes and with its logarithm.
     slope, offset = np.polyfit(np.log(counts), costs, 1)
@@ -60,32 +61,36 @@ def _flat_map(rows: int) -> terrainkit.TerrainMap:
     return terrainkit.generate(config)
 
 
-def _step_times(terrain_map: terrainkit.TerrainMap) -> tuple[float, float]:
-    """Return the times of a step on boxes and on a heightfield, relative to a plane."""
-    terrains = (Plane(), MapGround(terrain_map, "boxes"), MapGround(terrain_map, "hfield"))
-    rollouts = [_standing(terrain, terrain_map.env_origins.reshape(-1, 3)) for terrain in terrains]
-    times = np.empty((_NUM_RUNS, 3, _NUM_PLACES))
-    for k, i, j in np.ndindex(times.shape):
-        model, places = rollouts[i]
-        start = time.thread_time()
-        mujoco.mj_step(model, places[j], nstep=_NUM_STEPS)
-        times[k, i, j] = time.thread_time() - start
-    plane, boxes, hfield = times.min(axis=0).mean(axis=1)
-    return boxes / plane, hfield / plane
+def _step_times(terrain_map: terrainkit.TerrainMap) -> dict[str, float]:
+    """Return the times of a step relative to a plane: all boxes, those near a robot, heights."""
+    task = get_task("quadruped").task
+    boxes, hfield = (MapGround(terrain_map, kind) for kind in ("boxes", "hfield"))
+    grounds = {"plane": Plane(), "boxes": boxes, "near_boxes": boxes, "hfield": hfield}
+    origins = terrain_map.env_origins.reshape(-1, 3)
+    simulations = {
+        name: _standing(task, ground, origins, all_geoms=name == "boxes")
+        for name, ground in grounds.items()
+    }
+    times = dict.fromkeys(simulations, np.inf)
+    for _ in range(_NUM_RUNS):
+        for name, simulation in simulations.items():
+            start = time.thread_time()
+            for _ in range(_NUM_STEPS):
+                simulation.step(task.control.decimation)
+            times[name] = min(times[name], time.thread_time() - start)
+    return {name: times[name] / times["plane"] for name in ("boxes", "near_boxes", "hfield")}
 
 
-def _standing(terrain: Ground, origins: np.ndarray) -> tuple[mujoco.MjModel, list[mujoco.MjData]]:
-    """Return the training scene, and states in which the robot stands at some of the origins."""
-    spec = get_task("quadruped")
-    robot = Robot.load(spec.folder)
-    scene = Scene(robot, terrain, spec.task)
-    states = []
-    for k in np.linspace(0, len(origins) - 1, _NUM_PLACES).astype(int):
-        data = mujoco.MjData(scene.model)
-        data.qpos[:] = scene.default_qpos
-        data.qpos[:3] = 0.0 if isinstance(terrain, Plane) else origins[k]
-        data.qpos[2] += 0.35
-        data.ctrl[:] = robot.default_pose
-        mujoco.mj_step(scene.model, data, nstep=300)
-        states.append(data)
-    return scene.model, states
+def _standing(task: Task, terrain: Ground, origins: np.ndarray, *, all_geoms: bool) -> Simulation:
+    """Return simulations in which the robot stands at some of the origins, on one thread."""
+    robot = Robot.load(get_task("quadruped").folder)
+    scene = Scene(robot, terrain, task, all_geoms=all_geoms)
+    simulation = Simulation(scene, _NUM_PLACES, 1)
+    qpos = np.tile(scene.default_qpos, (_NUM_PLACES, 1))
+    if not terrain.is_plane:
+        qpos[:, :3] = origins[np.linspace(0, len(origins) - 1, _NUM_PLACES).astype(int)]
+    qpos[:, 2] += 0.35
+    simulation.reset(np.arange(_NUM_PLACES), qpos, np.zeros((_NUM_PLACES, scene.model.nv)))
+    simulation.ctrl[:] = robot.default_pose
+    simulation.step(300)
+    return simulation
