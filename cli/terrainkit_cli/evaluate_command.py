@@ -38,8 +38,13 @@ class PolicyCommand(PluginCommand):
     """A folder written by terrainkit train, a checkpoint in one, or a robot with a bundled
     policy."""
 
-    policy: Annotated[Path, option("FILE.onnx")] | None = None
-    """In place of RUN: an exported policy, with policy.json beside it or in its metadata."""
+    policy: Annotated[Path, option("FILE.onnx|FILE.pt")] | None = None
+    """In place of RUN: a policy of any project, as ONNX or TorchScript, with policy.json or
+    Unitree's deploy.yaml beside it, or with metadata of terrainkit or mjlab."""
+
+    contract: Annotated[Path, option("FILE")] | None = None
+    """The contract of --policy, if it is elsewhere: policy.json, or a YAML file in the form of
+    deploy.yaml or unitree_rl_gym's deploy_mujoco."""
 
     robot: RobotName = ""
     """The robot of --policy: a robot's name, or a folder written by terrainkit onboard."""
@@ -84,17 +89,19 @@ class PolicyCommand(PluginCommand):
             raise ConfigError(f"RUN: missing; {expected}")
         if self.policy and not self.robot and not self.task:
             raise ConfigError("--robot: missing; expected the robot of --policy")
-        if not self.policy and self.robot:
-            raise ConfigError("--robot: got a value; expected none without --policy")
+        if not self.policy and (self.robot or self.contract):
+            name = "--robot" if self.robot else "--contract"
+            raise ConfigError(f"{name}: got a value; expected none without --policy")
         if self.policy and self.checkpoint is not None:
             raise ConfigError("--checkpoint: got a value; expected none with --policy")
         require_training()
         if self.policy:
-            from terrainkit_robots.policy.onnx_policy import open_onnx
+            from terrainkit_robots.policy.open_policy import open_policy
             from terrainkit_robots.rl.tasks import load_task_file
 
-            own = load_task_file(str(self.task)).name if self.task else ""
-            return open_onnx(self.policy, self.robot or own)
+            own = load_task_file(str(self.task)) if self.task else None
+            robot, task = self.robot or (own.name if own else ""), own.task if own else None
+            return open_policy(self.policy, robot, self.contract, task)
         from terrainkit_robots.rl.run import open_run
 
         return open_run(self.source, self.checkpoint, self.task)
@@ -120,7 +127,7 @@ class PolicyCommand(PluginCommand):
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(PolicyCommand):
-    """Measure the velocity errors, gait, falls and success of a policy.
+    """Measure velocity errors, gait, falls and success of a policy.
 
     On a plane, the commands of the robots form a grid over the command ranges of the task. On a
     map, robots walk forward, backward, left and right from the spawn origin of every patch until

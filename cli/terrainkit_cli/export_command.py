@@ -28,8 +28,9 @@ class Export(PluginCommand):
     A policy is exported from a run: a folder written by terrainkit train, a checkpoint in one, or
     the name of a robot with a bundled policy. The output folder contains policy.onnx, policy.pt
     (TorchScript), robot.xml (MJCF) with its meshes, and policy.json. The latter describes the
-    observations and their scales, the default pose, gains, limits, and the order of the joints. The
-    exported policies are verified against the checkpoint.
+    observations and their scales, the default pose, gains, limits, and the order of the joints;
+    policy.onnx also has it in its metadata, with the keys of mjlab. The exported policies are
+    verified against the checkpoint.
     """
 
     source: Annotated[str, positional("MAP.npz|RUN")] = ""
@@ -70,6 +71,9 @@ class Export(PluginCommand):
     example: bool = False
     """For a run: also write run_policy.py, a program that runs the policy in plain MuJoCo."""
 
+    deploy_yaml: bool = False
+    """For a run: also write deploy.yaml, the description that Unitree's controllers read."""
+
     overwrite: bool = False
     """Replace existing files."""
 
@@ -96,8 +100,8 @@ class Export(PluginCommand):
         return {name: value for name, value in given.items() if value is not None}
 
     def _export_map(self) -> None:
-        for name, given in (("checkpoint", self.checkpoint is not None), ("example", self.example)):
-            if given:
+        for name in ("checkpoint", "example", "deploy-yaml"):
+            if getattr(self, name.replace("-", "_")) not in (None, False):
                 raise ConfigError(f"--{name}: got the map {self.source}; expected a run")
         terrain_map = TerrainMap.load(self.source)
         if not self.output:
@@ -130,7 +134,13 @@ class Export(PluginCommand):
             # The folder of a bundled policy is part of an installed package.
             default = Path(f"{run.folder.name}_policy")
         folder = self.output or default
-        result = export_policy(run, folder, example=self.example, overwrite=self.overwrite)
+        result = export_policy(
+            run,
+            folder,
+            example=self.example,
+            deploy_yaml=self.deploy_yaml,
+            overwrite=self.overwrite,
+        )
         render.result(
             f"wrote {', '.join(map(str, result.files))}: {result.num_observations} observations "
             f"to {result.num_actions} actions, from {run.policy_name}"
@@ -138,6 +148,8 @@ class Export(PluginCommand):
         errors = zip(result.files, result.errors, strict=False)
         differences = ", ".join(f"{file.name} {error:.1e}" for file, error in errors)
         render.result(f"verified: largest difference from the checkpoint: {differences}")
+        for note in result.notes:
+            render.result(note)
         if self.example:
             render.result(f"next: python {quote(str(result.files[-1]))} --vx 0.5 --viewer")
 

@@ -40,6 +40,7 @@ COMMAND_GROUPS = {
         "train": "train_command",
         "evaluate": "evaluate_command",
         "play": "play_command",
+        "check-policy": "check_policy_command",
     },
 }
 """Module of each command, so that only the one in use is imported, by the title of its group."""
@@ -138,7 +139,6 @@ def _run_command(prog: str, command_class: "type[Command]", argv: list[str]) -> 
 def _print_overview() -> None:
     # The text fits into 24 lines, the size of a terminal.
     render.result("usage: terrainkit COMMAND [OPTIONS | --help]; see also --version, completion.")
-    render.result("Generate terrain for legged robots, check robot files, and train policies.")
     rows: list[tuple[str, str]] = []
     for group, names in COMMAND_GROUPS.items():
         summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)

@@ -23,6 +23,7 @@ from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
     Checkpoint,
     Packages,
+    RobotName,
     TaskFile,
     TerrainName,
     XacroArguments,
@@ -45,6 +46,7 @@ Kind = Literal["map", "robot", "run"]
 OPTION_TYPES: dict[str, Kind] = {
     "terrain": "run",
     "checkpoint": "run",
+    "robot": "run",
     "package": "robot",
     "xacro_arg": "robot",
 }
@@ -135,7 +137,10 @@ class View(PluginCommand, ViewerCommand):
     source: Annotated[str, positional("MAP.npz|ROBOT|RUN")] = ""
     """A map; a URDF, xacro or MJCF file, an onboarded folder, a bundled robot, or a name of the
     package robot_descriptions, such as go2_description; or a run of terrainkit train, a checkpoint
-    in one, or a bundled policy."""
+    in one, or a bundled policy; or with --robot, a policy of any project (.onnx or .pt)."""
+
+    robot: RobotName = ""
+    """The robot of a policy of another project, whose contract is beside it or in its metadata."""
 
     policy: bool = False
     """Show the bundled policy of a robot instead of the robot."""
@@ -165,7 +170,7 @@ class View(PluginCommand, ViewerCommand):
             command = install_command("view")
             raise ConfigError(f"view requires viser; install it with: {command}")
         self.check_address()
-        kind = source_kind(self.source, policy=self.policy)
+        kind = source_kind(self.source, policy=self.policy or bool(self.robot))
         for name, expected in OPTION_TYPES.items():
             if getattr(self, name) != getattr(type(self), name) and kind != expected:
                 option = name.replace("_", "-")
@@ -202,6 +207,12 @@ class View(PluginCommand, ViewerCommand):
 
     def _open_run(self) -> "Show":
         require_training()
+        if self.robot:
+            from terrainkit_robots.policy.open_policy import open_policy as open_foreign
+            from terrainkit_robots.viewer.show_policy import PolicyView
+
+            spec = open_foreign(Path(self.source), self.robot)
+            return partial(PolicyView, run=spec, terrain=self.terrain or None)
         return open_policy(self.source, self.checkpoint, self.terrain or None, self.task)
 
 

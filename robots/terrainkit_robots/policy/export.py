@@ -14,10 +14,21 @@ import torch
 from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
-from terrainkit.errors import ExportError
+from terrainkit.errors import ExportError, listing
 from terrainkit.files.atomic_write import atomic_folder, atomic_write, check_target
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
+from terrainkit_robots.policy.contracts.contract import (
+    FORMATS,
+    MJLAB,
+    TERM_NAMES,
+    UNITREE,
+    Contract,
+    from_description,
+    unknown_terms,
+)
+from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, write_deploy_yaml
+from terrainkit_robots.policy.contracts.mjlab import write_metadata
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.load import load_actor, single_torch_thread
 from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
@@ -60,13 +71,20 @@ class ExportResult:
 
     files: tuple[Path, ...]
     errors: tuple[float, float]
+    notes: tuple[str, ...]
+    """What readers of other formats lack or cannot read."""
     num_observations: int
     num_actions: int
 
 
 @single_torch_thread()
 def export_policy(
-    run: Run, folder: Path, *, example: bool = False, overwrite: bool = False
+    run: Run,
+    folder: Path,
+    *,
+    example: bool = False,
+    deploy_yaml: bool = False,
+    overwrite: bool = False,
 ) -> ExportResult:
     """Export the policy of a run to a folder, which is created if it does not exist.
 
@@ -76,14 +94,16 @@ def export_policy(
         run: The run.
         folder: The folder.
         example: Whether to write a program that runs the policy in MuJoCo.
+        deploy_yaml: Whether to write `deploy.yaml`, the contract that Unitree's controllers read.
         overwrite: Whether existing files may be replaced.
 
     Raises:
         ConfigError: If the run has no checkpoint.
-        ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, or if
-            an exported policy does not match the live one.
+        ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, if an
+            exported policy does not match the live one, or if `deploy.yaml` cannot describe it.
     """
-    names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE] + [EXAMPLE.name] * example
+    names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE] + [YAML_FILE] * deploy_yaml
+    names += [EXAMPLE.name] * example
     files = tuple(folder / name for name in names)
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
@@ -99,6 +119,17 @@ def export_policy(
     network = OnnxNetwork(actor, run.task.normalization)
     description = describe_policy(env) | {"recurrent": network.describe_state()} | training
     text = json.dumps(description, indent=2) + "\n"
+    metadata, notes = {METADATA_KEY: text}, []
+    if deploy_yaml:
+        contract = from_description(description, UNITREE)
+        other_files[YAML_FILE] = write_deploy_yaml(contract).encode()
+        notes += _unknown_terms(contract)
+    try:
+        contract = from_description(description, MJLAB)
+        metadata |= write_metadata(contract)
+        notes += _unknown_terms(contract)
+    except ExportError as error:
+        notes.append(f"{ONNX_FILE} has no {error}")
     random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
     obs = torch.cat([env.get_observations()["policy"], random])
     # A recurrent network depends on the observations before.
@@ -110,7 +141,7 @@ def export_policy(
         # Recurrent networks check the shapes of their inputs.
         warnings.simplefilter("ignore", torch.jit.TracerWarning)
         warnings.filterwarnings("ignore", message="Exporting a model to ONNX with a batch_size")
-        onnx_data, script_file = export_onnx(network, obs, text), io.BytesIO()
+        onnx_data, script_file = export_onnx(network, obs, metadata), io.BytesIO()
         torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
         script = torch.jit.load(io.BytesIO(script_file.getvalue()))
         live = [network.clipped(actor, each).numpy() for each in steps]
@@ -131,7 +162,22 @@ def export_policy(
         with atomic_folder(folder) as new:
             _write_files(new, contents)
     sizes = {"num_observations": actor.obs_dim, "num_actions": env.num_actions}
-    return ExportResult(files=files, errors=errors, **sizes)
+    return ExportResult(files=files, errors=errors, notes=tuple(notes), **sizes)
+
+
+def _unknown_terms(contract: Contract) -> list[str]:
+    """Return a note about the terms that the readers of a format lack."""
+    if not (names := unknown_terms(contract)):
+        return []
+    formulas = {
+        name: _FORMULAS[own]
+        for own, names in TERM_NAMES.items()
+        for name in names
+        if own in _FORMULAS
+    }
+    known = "; ".join(dict.fromkeys(formulas[name] for name in names if name in formulas))
+    what = f"readers of {FORMATS[contract.style]} lack {listing(names)}, and stop"
+    return [f"{what}; add what policy.json describes{': ' if known else ''}{known}"]
 
 
 def _write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
@@ -201,13 +247,13 @@ def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
     return results
 
 
-def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: str) -> bytes:
+def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: Mapping[str, str]) -> bytes:
     """Return a policy as an ONNX file.
 
     Args:
         network: The network.
         obs: Observations to trace it with, shape (n, k).
-        metadata: Text of the metadata `METADATA_KEY`.
+        metadata: Its metadata by key.
     """
     file, model = io.BytesIO(), network.model
     names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
@@ -220,7 +266,8 @@ def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: str) -> bytes
         network, inputs, file, **names, dynamic_axes=axes, opset_version=ONNX_OPSET, dynamo=False
     )
     model = onnx.load_model_from_string(file.getvalue())
-    model.metadata_props.add(key=METADATA_KEY, value=metadata)
+    for key, value in metadata.items():
+        model.metadata_props.add(key=key, value=value)
     onnx.checker.check_model(model)
     return bytes(model.SerializeToString())
 
@@ -282,7 +329,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "unit": "m",
         "points": [[x, y] for x in scan_x for y in scan_y],
     }
-    gait = {"period": float(f"{env.gait.period:.7g}"), "min_yaw_rate": MIN_YAW_RATE}
+    gait = {"period": float(env.gait.period), "min_yaw_rate": MIN_YAW_RATE}
     names = "name", "base", "spawn_height", "base_height_target"
     dt, decimation = task.sim.dt, task.control.decimation
     return {

@@ -3,6 +3,7 @@
 It imports neither torch nor mujoco, since a child process calls `load_model` first.
 """
 
+import json
 from collections.abc import Sequence
 from contextlib import chdir
 from functools import cache
@@ -27,18 +28,15 @@ ARENA_SIZE = 1 << 30
 _FLOATS = ("tensor(float)", "tensor(double)", "tensor(float16)")
 
 
-def load_model(
-    data: bytes, folder: Path, metadata_key: str
-) -> dict[str, NDArray[np.uint8] | NDArray[np.int64]]:
+def load_model(data: bytes, folder: Path) -> dict[str, NDArray[np.uint8] | NDArray[np.int64]]:
     """Return a model with its external data, after calling it once.
 
     Args:
         data: The ONNX file.
         folder: The folder of its external data.
-        metadata_key: Key of the text to return from its metadata.
 
     Returns:
-        `model`, the file with its external data inside; `text`, in UTF-8, empty if there is none;
+        `model`, the file with its external data inside; `metadata`, a JSON object of texts;
         `sizes`, the numbers of observations and actions; and `state`, number of layers and width
         of each input with the state of a recurrent network, shape (k, 2).
 
@@ -66,8 +64,8 @@ def load_model(
         raise ConfigError(f"got actions of shape {actions.shape}; expected (2, a) for two rows")
     if (got := [each.shape for each in new]) != [each.shape for each in state]:
         raise ConfigError(f"got states of the shapes {got}; expected the shapes of the inputs")
-    text = session.get_modelmeta().custom_metadata_map.get(metadata_key, "")
-    arrays = {"model": model, "text": text.encode()}
+    metadata = json.dumps(session.get_modelmeta().custom_metadata_map)
+    arrays = {"model": model, "metadata": metadata.encode()}
     return {name: np.frombuffer(value, np.uint8) for name, value in arrays.items()} | {
         "sizes": np.array([num_obs, actions.shape[1]]),
         "state": np.array(sizes, np.int64).reshape(-1, 2),

@@ -12,7 +12,7 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.policy.play import demo_commands, make_play_env
 from terrainkit_robots.policy.rollout import rollout
-from terrainkit_robots.rl.run import Run
+from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import MapGround
 from terrainkit_robots.viewer.robot_scene import RobotScene
 
@@ -34,12 +34,14 @@ _CAMERA_OFFSET = np.array([-1.5, -2.5, 1.5])
 class PolicyView:
     """A robot that a policy walks on the terrain of its training, in the scene of a server."""
 
-    def __init__(self, server: "viser.ViserServer", run: Run, terrain: str | None = None) -> None:
+    def __init__(
+        self, server: "viser.ViserServer", run: PolicySpec, terrain: str | None = None
+    ) -> None:
         """Load the policy, and add the terrain, the robot and the controls.
 
         Args:
             server: The server.
-            run: Run of the policy.
+            run: The policy, such as a run.
             terrain: Terrain as `load_terrain` takes it; None for the terrain of the training.
 
         Raises:

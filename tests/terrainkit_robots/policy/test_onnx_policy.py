@@ -16,7 +16,8 @@ from terrainkit.files.child_process import ProcessLimits
 from terrainkit_robots.policy import onnx_policy
 from terrainkit_robots.policy.evaluate import EvaluationConfig, evaluate
 from terrainkit_robots.policy.export import export_policy
-from terrainkit_robots.policy.onnx_policy import OnnxPolicy, open_onnx
+from terrainkit_robots.policy.onnx_policy import OnnxPolicy
+from terrainkit_robots.policy.open_policy import open_policy
 from terrainkit_robots.rl.config import Control, Env, Observations, Task, Terrain
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec, open_run
@@ -59,7 +60,7 @@ def change_json(path, **keys):
 
 
 def test_exported_policy_is_evaluated_as_its_run(trained, mine):
-    spec, result = open_onnx(mine, "quadruped"), json.loads(evaluate(trained, SHORT).as_json())
+    spec, result = open_policy(mine, "quadruped"), json.loads(evaluate(trained, SHORT).as_json())
     outside = json.loads(evaluate(spec, SHORT).as_json())
     assert (result.pop("checkpoint"), outside.pop("checkpoint")) == ("model_2.pt", "mine.onnx")
     assert (outside.pop("all"), outside) == (pytest.approx(result.pop("all"), abs=1e-4), result)
@@ -76,7 +77,7 @@ def test_environment_is_that_of_the_training(make_run, map_file, tmp_path, contr
     LeggedRunner(LeggedEnv(run.task, run.robot, load_terrain(map_file)), run.folder).save()
     run, seen = open_run(run.folder), []
     export_policy(run, tmp_path / "exported")
-    spec = open_onnx(tmp_path / "exported" / "policy.onnx", "quadruped")
+    spec = open_policy(tmp_path / "exported" / "policy.onnx", "quadruped")
 
     def move(obs):
         seen.append(obs)
@@ -104,7 +105,7 @@ def test_functions_are_evaluated_in_place_of_a_checkpoint(trained, quadruped):
 
 def test_metadata_is_used_without_a_json_file(mine):
     mine.with_name("policy.json").unlink()
-    assert open_onnx(mine, "quadruped").policy_name == "mine.onnx"
+    assert open_policy(mine, "quadruped").policy_name == "mine.onnx"
 
 
 def test_json_replaces_gains_and_joint_order(mine):
@@ -116,7 +117,7 @@ def test_json_replaces_gains_and_joint_order(mine):
     action = policy["action"] | {"joints": joints["name"]}
     # The offsets of the observation have the old order.
     change_json(mine, joints=joints, action=action, observation=None)
-    spec = open_onnx(mine, "quadruped").robot.spec
+    spec = open_policy(mine, "quadruped").robot.spec
     assert list(spec.joint_order) == joints["name"]
     assert spec.per_joint("stiffness") == dict.fromkeys(joints["name"], 31.0)
 
@@ -144,7 +145,7 @@ def test_json_replaces_gains_and_joint_order(mine):
 def test_json_that_does_not_describe_the_environment_is_rejected(mine, keys, message):
     change_json(mine, **keys)
     with pytest.raises(ConfigError, match=message) as info:
-        open_onnx(mine, "quadruped")
+        open_policy(mine, "quadruped")
     assert str(info.value).startswith(str(mine.with_name("policy.json")))
     assert "\n" not in str(info.value)
 
@@ -154,12 +155,12 @@ def test_json_that_is_not_an_object_is_rejected(mine, text):
     encoding = "latin-1" if text == "\xff" else "utf-8"
     mine.with_name("policy.json").write_bytes(text.encode(encoding, "surrogatepass"))
     with pytest.raises(ConfigError, match=r"policy\.json: "):
-        open_onnx(mine, "quadruped")
+        open_policy(mine, "quadruped")
 
 
 def test_policy_of_another_robot_is_rejected(mine):
     with pytest.raises(ConfigError, match=r"got FL_hip_joint, .* which biped lacks, .* left_hip"):
-        open_onnx(mine, "biped")
+        open_policy(mine, "biped")
 
 
 FLOAT, INT64, BOOL = TensorProto.FLOAT, TensorProto.INT64, TensorProto.BOOL
@@ -334,7 +335,7 @@ def test_policy_with_a_batch_of_one_runs_row_by_row(tmp_path):
 def test_other_networks_are_rejected(mine, options, message):
     make_onnx(mine, **options)
     with pytest.raises(ConfigError, match=message):
-        open_onnx(mine, "quadruped")
+        open_policy(mine, "quadruped")
 
 
 def test_files_that_cannot_be_read_are_rejected(mine, tmp_path):
@@ -344,8 +345,8 @@ def test_files_that_cannot_be_read_are_rejected(mine, tmp_path):
         (mine.with_name("policy.json"), r"policy\.json is not a policy: not an ONNX file"),
     ):
         with pytest.raises(ConfigError, match=message):
-            open_onnx(path, "quadruped")
+            open_policy(path, "quadruped")
     mine.with_name("policy.json").unlink()
     make_onnx(mine)
-    with pytest.raises(ConfigError, match=r"no policy\.json beside it, nor in its metadata"):
-        open_onnx(mine, "quadruped")
+    with pytest.raises(ConfigError, match=r"no policy\.json or deploy\.yaml beside it"):
+        open_policy(mine, "quadruped")
