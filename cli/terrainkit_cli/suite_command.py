@@ -17,7 +17,7 @@ from terrainkit_cli.parse import Command, positional
 
 @dataclass(frozen=True, kw_only=True)
 class Suite(Command):
-    """List, show or generate suites: fixed maps for comparing policies.
+    """List, show or generate suites: fixed maps to compare policies.
 
     A suite has a version and the SHA-256 of its content, and never changes. Its rows are levels,
     and its columns are tests.

@@ -152,7 +152,7 @@ def test_train_help_shows_task_values(run_main, monkeypatch):
     assert "--laps INT A value that is in no section. (default: 3)" in output
     assert "--domain-rand.friction FLOAT FLOAT|none" in output
     assert "--asset.self-collisions, --asset.no-self-collisions" in output
-    assert "(default: 0.5 1.25)" in output
+    assert "(default: 0.3 1.25)" in output
 
 
 def test_train_options_avoid_slow_imports():
