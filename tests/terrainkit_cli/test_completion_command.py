@@ -42,7 +42,7 @@ def completed(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
-        ("terrainkit ch", ["check-map", "check-policy", "check-robot"]),
+        ("terrainkit ch", ["check-map", "check-robot", "check-policy"]),
         ("terrainkit check-robot --fo", ["--format"]),
         ("terrainkit check-robot a.urdf --format s", ["sarif"]),
         ("terrainkit check-robot ", ["biped", "quadruped"]),
