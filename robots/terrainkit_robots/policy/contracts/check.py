@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from terrainkit.errors import ConfigError, prefixed_errors
-from terrainkit_robots.policy.contracts.contract import Contract
+from terrainkit_robots.policy.contracts.contract import DEFAULT_STEP_DT, PER_JOINT, Contract
 from terrainkit_robots.policy.contracts.environment import make_spec
 from terrainkit_robots.policy.contracts.repairs import other_simulations, repairs
 from terrainkit_robots.policy.contracts.robot import load_model
@@ -105,7 +105,7 @@ def check_values(contract: Contract, robot: Robot) -> Iterator[Finding]:
     for note in contract.notes:
         got, _, expected = note.partition(", so expected ")
         yield Finding("POL002", got, expected, "write one value for each motor")
-    step = contract.step_dt or 0.02
+    step = contract.step_dt or DEFAULT_STEP_DT
     if not 0.008 <= step <= 0.05:
         hint = "step_dt is the time between two actions [s]"
         yield Finding("POL003", f"step_dt {step:g} s", "0.008 to 0.05 s", hint)
@@ -124,7 +124,7 @@ def check_values(contract: Contract, robot: Robot) -> Iterator[Finding]:
     if ratios and not 0.25 <= (ratio := float(np.median(ratios))) <= 4:
         hint = "check that the gains are those of this robot, per radian"
         yield Finding("POL008", f"stiffness {ratio:.3g} times as in robot.toml", "0.25 to 4", hint)
-    tables = {name: getattr(contract, name) for name in _PER_JOINT}
+    tables = {name: getattr(contract, name) for name in PER_JOINT}
     tables |= {
         f"scale of {term.name}": term.scale
         for term in contract.terms
@@ -134,12 +134,9 @@ def check_values(contract: Contract, robot: Robot) -> Iterator[Finding]:
         yield from _asymmetries(name, values, contract, robot)
 
 
-_PER_JOINT = "default_pose", "stiffness", "damping", "action_scale", "action_offset"
-
-
 def _joint_findings(contract: Contract, k: int, model: Any, robot: Robot) -> Iterator[Finding]:
     joint = contract.joints[k]
-    pose, stiffness, damping, scale, offset = (getattr(contract, name)[k] for name in _PER_JOINT)
+    pose, stiffness, damping, scale, offset = (getattr(contract, name)[k] for name in PER_JOINT)
     low, high = model.range if model.range[0] < model.range[1] else (-np.inf, np.inf)
     effort = robot.spec.per_joint("effort")[joint]
     for name, value in (("default position", pose), ("action offset", offset)):

@@ -33,6 +33,13 @@ the robot is commanded to stand, and the points of its height scan are ordered b
 UNITREE, MJLAB = 0, 1
 """Positions of the names of the two formats."""
 
+PER_JOINT = "default_pose", "stiffness", "damping", "action_scale", "action_offset"
+"""Fields of a contract with one number for each joint."""
+
+DEFAULT_STEP_DT = 0.02
+"""Time between two actions where a format does not state it [s], as in mjlab's and Isaac Lab's
+tasks."""
+
 MAX_HISTORY = 100
 """Longest history [steps], as `observations.history_length` allows."""
 
@@ -127,7 +134,7 @@ class Contract:
         if len(set(self.joints)) != len(self.joints) or not self.joints or not self.terms:
             got = f"got {len(self.joints)} joints, {len(self.terms)} observation terms"
             raise ConfigError(f"{got}; expected at least one each, and no joint twice")
-        for name in ("default_pose", "stiffness", "damping", "action_scale", "action_offset"):
+        for name in PER_JOINT:
             check_length(name, getattr(self, name), len(self.joints))
         if self.target_limits:
             check_length("clip of the action", self.target_limits, len(self.joints))
@@ -140,7 +147,7 @@ class Contract:
                 got = f"got scale {term.scale}, history {term.history}, {dict(term.params)}"
                 expected = f"expected numbers, a history up to {MAX_HISTORY}, a period above 0"
                 raise ConfigError(f"observation term {term.name}: {truncate(got, 150)}; {expected}")
-        step = 0.02 if self.step_dt is None else self.step_dt
+        step = DEFAULT_STEP_DT if self.step_dt is None else self.step_dt
         if not all(map(math.isfinite, numbers)) or not 1e-3 <= step <= 60:
             got = f"got step_dt {step:g}, or a value that is not finite"
             raise ConfigError(f"{got}; expected finite numbers, and a step of 0.001 s or more")

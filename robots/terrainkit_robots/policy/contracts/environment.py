@@ -9,7 +9,12 @@ import torch
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.settings.type_hint import MAX_VALUE
-from terrainkit_robots.policy.contracts.contract import Contract, ContractTerm, own_name
+from terrainkit_robots.policy.contracts.contract import (
+    DEFAULT_STEP_DT,
+    Contract,
+    ContractTerm,
+    own_name,
+)
 from terrainkit_robots.policy.contracts.robot import contract_robot, imu_position
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.rl.config import Task
@@ -19,10 +24,6 @@ from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray, projected_gravity
-
-DEFAULT_STEP_DT = 0.02
-"""Time between two actions where a format does not state it [s], as in mjlab's and Isaac Lab's
-tasks."""
 
 _SOURCES = {"absolute_dof_pos": "dof_pos", "grid_height_scan": "height_scan"}
 """Terms that are another order or offset of a term of the environment."""

@@ -6,7 +6,13 @@ from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 from typing import Any
 
-from terrainkit_robots.policy.contracts.contract import TERM_NAMES, Contract, own_name
+from terrainkit_robots.policy.contracts.contract import (
+    DEFAULT_STEP_DT,
+    PER_JOINT,
+    TERM_NAMES,
+    Contract,
+    own_name,
+)
 from terrainkit_robots.spec.robot import Robot
 
 _DEGREES = 180 / math.pi
@@ -31,8 +37,6 @@ _WIDTHS |= {"gait_phase": 2, "running_gait_phase": 2}
 
 MAX_PAIRS = 100
 """Largest number of pairs of joints that are exchanged; of more, neighbors and mirror images."""
-
-_ROWS = "default_pose", "stiffness", "damping", "action_scale", "action_offset"
 
 
 @dataclass(frozen=True)
@@ -77,9 +81,9 @@ def repairs(contract: Contract, robot: Robot) -> Iterator[Repair]:
         text = f"the joints {', '.join(moved_names[:2])}{more} are exchanged"
         yield Repair("POL020", text, replace(contract, joints=joints))
         rows: dict[str, Any] = {
-            key: tuple(getattr(contract, key)[k] for k in order) for key in _ROWS
+            key: tuple(getattr(contract, key)[k] for k in order) for key in PER_JOINT
         }
-        if any(rows[key] != getattr(contract, key) for key in _ROWS):
+        if any(rows[key] != getattr(contract, key) for key in PER_JOINT):
             text = f"{text}, with their values"
             yield Repair("POL020", text, replace(contract, joints=joints, **rows))
 
@@ -134,7 +138,7 @@ def other_simulations(contract: Contract, robot: Robot) -> Iterator[Repair]:
     }
     yield Repair("POL028", "the gains are those of robot.toml", replace(contract, **own))
     for factor in (0.5, 2):
-        step = factor * (contract.step_dt or 0.02)
+        step = factor * (contract.step_dt or DEFAULT_STEP_DT)
         yield Repair("POL003", f"step_dt is {step:g} s", replace(contract, step_dt=step))
         terms = tuple(
             replace(term, params={**term.params, "period": factor * term.params["period"]})
