@@ -20,7 +20,7 @@ GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
 for two legs of 0.7 m, as in unitree_rl_gym."""
 
 # legged_gym's.
-CURRICULUM_STEP, CURRICULUM_TRACKING = 0.5, 0.8
+CURRICULUM_STEP, CURRICULUM_TRACKING = 0.5, 0.5
 """Extension of the range of forward velocities [m/s], and the share of the tracking reward from
 which it is extended."""
 

@@ -146,7 +146,7 @@ class Commands(Config):
     """Forward velocity [m/s]."""
     curriculum: bool = False
     """Whether the range of the forward velocity grows by 0.5 m/s to both sides whenever the robots
-    earn 80 % of the tracking reward."""
+    earn half of the tracking reward."""
     max_curriculum: NonNegativeFloat = 1.0
     """Limit of that range to both sides [m/s]."""
     lin_vel_y: Velocities = (-0.5, 0.5)
@@ -288,8 +288,8 @@ class Rewards(Config):
     # legged_gym has a constant width of 0.25 m2/s2, with which standing still earned 64 % of the
     # tracking rewards for the biped's commands.
     tracking_sigma: PositiveFloat = 0.06
-    """Width of the tracking rewards, exp(-error^2 / sigma), at zero command [m2/s2]; otherwise it
-    is proportional to the squared command."""
+    """Width of the wide kernel of the tracking rewards, exp(-error^2 / sigma), at zero command
+    [m2/s2]; otherwise it is proportional to the squared command."""
     # Without the limit of 9 cm, anymal_c, with legs of 0.64 m, swung its feet 12 cm high.
     swing_height: PositiveFloat | None = None
     """Height of a swinging foot above the ground, as a fraction of the leg length; none: 0.18, on

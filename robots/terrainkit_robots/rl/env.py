@@ -80,7 +80,12 @@ class LeggedEnv(VecEnv):
         """Arrays that own terms keep between steps, which a checkpoint has."""
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
         self.sensors = Sensors(
-            self.sim, terrain, task, self.gait.averaging_time, scan=self.has_height_scan
+            self.sim,
+            terrain,
+            task,
+            averaging_time=self.gait.averaging_time,
+            leg_length=robot.leg_length,
+            scan=self.has_height_scan,
         )
         self.push_vel = np.zeros((n, 3), np.float32)  # of this step, world frame [m/s]
         self.steps_until_push = np.zeros(n, np.int64)

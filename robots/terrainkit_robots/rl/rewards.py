@@ -25,7 +25,12 @@ MIN_YAW_RATE = 0.1
 
 # With a constant kernel width of 0.25 m2/s2, it was 64 % for the biped's commands.
 STANDING_TRACKING = 0.25
-"""Share of the tracking rewards that a robot earns by standing, at any command."""
+"""Value of the wide tracking kernel for a robot that stands, at any command."""
+
+# An error of a tenth of the command costs 1 % of the wide kernel and 10 % of the narrow one. With
+# the wide one alone, policies kept errors of 0.1 m/s, and stood before risers for its 25 %.
+NARROW = 8.0
+"""Width of the wide tracking kernel relative to the narrow one."""
 
 SWING_HEIGHT = 0.18
 """Default height of a swinging foot, as a fraction of the leg length."""
@@ -94,20 +99,22 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     """Return how well linear and yaw velocity are tracked, 0 to 1.
 
     On two legs, velocities are averaged over the gait: the sway is larger than small commands.
-    The width of each kernel is proportional to the command. Where only one of the two velocities is
-    commanded, the reward of the other one is multiplied by the tracking of the commanded velocity,
-    so that standing still does not earn it.
+    The reward is the mean of a wide kernel, which pays for any progress, and a narrow one. Their
+    widths are proportional to the command. Where only one of the two velocities is commanded, the
+    reward of the other one is multiplied by the tracking of the commanded velocity, so that
+    standing still does not earn it.
     """
     commands = env.state.commands
     squared = np.square(commands - env.state.mean_vel)
     errors = squared[:, :2].sum(axis=1), squared[:, 2]
     squares = _sum_squares(commands[:, :2]), np.square(commands[:, 2])
     # A robot that stands still has the squared error s, the squared command. With a width of
-    # -s / log(0.25), its reward exp(-s / width) is 0.25 for any command.
+    # -s / log(0.25), its wide kernel exp(-s / width) is 0.25 for any command.
     log_standing = np.float32(np.log(STANDING_TRACKING))
     width_at_rest = np.float32(env.cfg.rewards.tracking_sigma)
     widths = (np.where(s > 0, -s / log_standing, width_at_rest) for s in squares)
-    lin, yaw = (np.exp(-error / width) for error, width in zip(errors, widths, strict=True))
+    ratios = (error / width for error, width in zip(errors, widths, strict=True))
+    lin, yaw = ((np.exp(-ratio) + np.exp(-NARROW * ratio)) / 2 for ratio in ratios)
     moving = is_moving(commands)
     only_yaw, only_lin = moving & (squares[0] == 0), moving & (squares[1] < MIN_YAW_RATE**2)
     return lin * np.where(only_yaw, yaw, 1), yaw * np.where(only_lin, lin, 1)
@@ -205,9 +212,12 @@ def _swing_height(env: "LeggedEnv") -> np.float32:
 
 
 def foot_swing_height(env: "LeggedEnv") -> FloatArray:
-    """Penalize feet off the arc that they should swing in, mean square, relative to its height."""
-    phase, height = env.state.swing_phase, env.state.foot_height / _swing_height(env)
-    # Clipped for the same reason as the base height: the foot may be above a deep hole.
+    """Penalize feet off the arc that they should swing in, mean square, relative to its height.
+
+    The arc is above the highest ground near a foot: in front of a riser, the foot has to rise
+    before it is above the step, and above a gap it does not have to descend.
+    """
+    phase, height = env.state.swing_phase, env.state.foot_clearance / _swing_height(env)
     return (np.square(np.clip(height, 0, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
 
 

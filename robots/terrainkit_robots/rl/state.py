@@ -15,6 +15,12 @@ from terrainkit_robots.transforms import FloatArray
 CONTACT_FORCE = 1.0
 """Vertical force from which a foot is in contact [N], as in legged_gym."""
 
+NEAR_FOOT = 0.22
+"""How far the ground near a foot extends, as a fraction of the leg length: 10 cm at 0.45 m."""
+
+_AT_FOOT = 4
+"""The middle one of the points near a foot."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
@@ -35,6 +41,7 @@ class State:
     dof_acc: FloatArray  # joint accelerations, from the last two velocities [rad/s2], shape (n, j)
     torques: FloatArray  # motor torques [N m], shape (n, j)
     foot_height: FloatArray  # height of the feet above the ground under them [m], shape (n, f)
+    foot_clearance: FloatArray  # the same above the highest ground near them [m], shape (n, f)
     foot_vel: FloatArray  # velocity of the feet, world frame [m/s], shape (n, f, 3)
     foot_force: FloatArray  # contact force on the feet, world frame [N], shape (n, f, 3)
     foot_air_time: FloatArray  # time since each foot was last in contact [s], shape (n, f); the
@@ -65,17 +72,31 @@ class State:
             getattr(self, field.name)[env_ids] = getattr(other, field.name)
 
 
+def _offsets(radius: float) -> FloatArray:
+    """Return a point and eight points around it, x and y, shape (9, 2)."""
+    steps = np.array([-1, 0, 1], np.float32) * np.float32(radius)
+    return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
 class Sensors:
     """Measure n robots."""
 
     def __init__(
-        self, sim: Simulation, terrain: Ground, task: Task, averaging_time: float, *, scan: bool
+        self,
+        sim: Simulation,
+        terrain: Ground,
+        task: Task,
+        *,
+        averaging_time: float,
+        leg_length: float,
+        scan: bool,
     ) -> None:
         self._sim, self._terrain = sim, terrain
         self._dt = np.float32(task.dt)
         self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
         points = np.stack([each.ravel() for each in np.meshgrid(x, y, indexing="ij")])
+        self._near_foot = _offsets(NEAR_FOOT * leg_length)
         self._scan_points = points[:, : None if scan else 0].astype(np.float32)
 
     def scan_points(self, pos: FloatArray, quat: FloatArray) -> tuple[FloatArray, ...]:
@@ -105,6 +126,8 @@ class Sensors:
         dof_vel, foot_pos = qvel.take(scene.joint_qvel, 1), sim.sensor("foot_position", rows)
         foot_force = -sim.sensor("foot_force", rows)
         penalized = sim.sensor("penalized_force", rows)
+        near_foot = foot_pos[:, :, None, :2] + self._near_foot
+        ground = self._terrain.height(*np.moveaxis(near_foot, -1, 0), foot_pos[..., 2:])
         torques = sim.torque[rows].astype(np.float32)
         vel = np.concatenate([lin_vel[:, :2], ang_vel[:, 2:]], axis=1)
         last_vel, dof_acc = np.zeros_like(vel), np.zeros_like(dof_vel)
@@ -128,9 +151,8 @@ class Sensors:
             "dof_vel": dof_vel,
             "dof_acc": dof_acc,
             "torques": torques,
-            "foot_height": foot_pos[..., 2]
-            - self._terrain.height(*np.moveaxis(foot_pos, -1, 0))
-            - scene.sole_depth,
+            "foot_height": foot_pos[..., 2] - ground[..., _AT_FOOT] - scene.sole_depth,
+            "foot_clearance": foot_pos[..., 2] - ground.max(axis=2) - scene.sole_depth,
             "foot_vel": sim.sensor("foot_velocity", rows),
             "foot_force": foot_force,
             "foot_air_time": air_time,

@@ -41,8 +41,8 @@ MAX_PENALTY, MAX_DROP, MAX_DEVIATIONS = 2.0, 0.1, 3.0
 """Limits of a penalty at the end of the training and of a drop of the reward, relative to the sum
 of the positive rewards, and of an increase of the falls, in standard deviations."""
 
-# `rewards.STANDING_TRACKING` is 0.25.
-MAX_STANDING, MAX_ACTION_TORQUE = 0.26, 1.0
+# Half of `rewards.STANDING_TRACKING` is 0.125.
+MAX_STANDING, MAX_ACTION_TORQUE = 0.135, 1.0
 """Limits of the share of the tracking rewards that standing earns, and of the torque of an action
 of 1 at the default pose, relative to the effort."""
 

@@ -19,7 +19,8 @@ def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, 
     vectors = "base_pos base_lin_vel base_ang_vel projected_gravity commands mean_vel"
     others: dict[str, Shape] = dict.fromkeys(vectors.split(), (3,))
     others |= dict.fromkeys(["base_height", "fallen"], ())
-    others |= dict.fromkeys(["swing_phase", "foot_height", "foot_air_time"], (feet,))
+    of_feet = "swing_phase foot_height foot_clearance foot_air_time"
+    others |= dict.fromkeys(of_feet.split(), (feet,))
     others |= dict.fromkeys(["foot_vel", "foot_force"], (feet, 3))
     others |= {"base_quat": (4,), "gait_phase": (2,)}
     others |= {"penalized_force": (penalized,), "height_scan": (points,)}

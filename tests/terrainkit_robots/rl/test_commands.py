@@ -103,21 +103,21 @@ class TestCurriculum:
 
         return make
 
-    @pytest.mark.parametrize(("share", "expected"), [(0.79, [-1, 1]), (0.81, [-1.5, 1.5])])
-    def test_range_grows_above_80_percent(self, make, share, expected):
+    @pytest.mark.parametrize(("share", "expected"), [(0.49, [-1, 1]), (0.51, [-1.5, 1.5])])
+    def test_range_grows_above_half_of_the_reward(self, make, share, expected):
         command = make(curriculum=True)
         command.end_episodes(np.full(3, share, np.float32))
         assert command.lin_vel_x.tolist() == [-1, 1]  # too few episodes
         command.end_episodes(np.full(1, share, np.float32))
         assert command.lin_vel_x.tolist() == expected
-        command.end_episodes(np.full(4, 0.795, np.float32))  # the sums start again
+        command.end_episodes(np.full(4, 0.495, np.float32))  # the sums start again
         assert command.lin_vel_x.tolist() == expected
 
     def test_mean_of_all_episodes_counts(self, make):
         command = make(curriculum=True)
-        command.end_episodes(np.float32([1, 1]))
-        command.end_episodes(np.float32([1, 0.25, 0.7]))
-        assert command.lin_vel_x.tolist() == [-1, 1]  # 3.95 / 5
+        command.end_episodes(np.float32([1, 0.25]))
+        command.end_episodes(np.float32([0.25, 0.25, 0.7]))
+        assert command.lin_vel_x.tolist() == [-1, 1]  # 2.45 / 5
         command.end_episodes(np.float32([1, 1, 1, 0.25]))
         assert command.lin_vel_x.tolist() == [-1.5, 1.5]
 
@@ -230,6 +230,6 @@ class TestResampling:
             expected = env.commands.copy()
             _, rewards, *_ = env.step(torch.zeros(4, 12))
             error = np.square(expected - env.state.mean_vel)[:, :2].sum(axis=1)
-            share = error / np.square(expected[:, :2]).sum(axis=1)
-            np.testing.assert_allclose(rewards, 0.02 * 0.25**share, rtol=1e-4)
+            wide = 0.25 ** (error / np.square(expected[:, :2]).sum(axis=1))
+            np.testing.assert_allclose(rewards, 0.02 * (wide + wide**8) / 2, rtol=1e-4)
             assert (env.commands != expected).any()

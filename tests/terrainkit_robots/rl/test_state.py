@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from terrainkit_robots.rl.config import Commands, Terrain
-from terrainkit_robots.rl.state import CONTACT_FORCE
+from terrainkit_robots.rl.state import CONTACT_FORCE, NEAR_FOOT
+from terrainkit_robots.rl.terrain import Plane
 
 
 @pytest.fixture
@@ -144,6 +145,30 @@ class TestByHand:
         np.testing.assert_array_equal(seen[2:], seen[:2])
 
 
+class _Step(Plane):
+    """A plane that is measured as a step of 10 cm up along x."""
+
+    edge = 0.0
+
+    def height(self, x, *_, **__):
+        return np.where(x > self.edge, np.float32(0.1), np.float32(0))
+
+
+@pytest.mark.parametrize(("distance", "clearance"), [(0.9, 0.1), (1.1, 0), (-0.1, 0)])
+def test_clearance_is_above_the_highest_ground_near_a_foot(
+    nominal_env, quadruped, distance, clearance
+):
+    # A foot on the step itself is above it in both; one in front of it is still 10 cm below.
+    step = _Step()
+    env = nominal_env(1, step)
+    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
+    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0]
+    step.edge = foot[0] + distance * NEAR_FOOT * quadruped.leg_length
+    fields = env.sensors.read(np.array([0]), None)
+    difference = fields["foot_height"] - fields["foot_clearance"]
+    assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
+
+
 class TestStateCopies:
     def test_state_shares_no_memory(self, random_env):
         # A reward that modifies the state must not change the simulation.
@@ -169,7 +194,7 @@ class TestStateCopies:
         assert dones.tolist() == [False, True, False]
         new = nominal_env(3).state
         for name, fresh in vars(new).items():
-            if name not in ("commands", "gait_phase", "foot_height", "foot_vel"):
+            if name not in ("commands", "gait_phase", "foot_height", "foot_clearance", "foot_vel"):
                 found = getattr(env.state, name)[1]
                 np.testing.assert_allclose(found, fresh[1], atol=1e-6, err_msg=name)
         where = np.array([1])
