@@ -27,6 +27,7 @@ import terrainkit
 from terrainkit.errors import ConfigError, listing
 from terrainkit.feasibility import assess_map
 from terrainkit.feasibility.report import routes
+from terrainkit.features.building_codes import Clause, clauses
 from terrainkit.map.config import MapConfig
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.schema import Config, field_keys, field_types, is_required
@@ -59,7 +60,8 @@ def terrains_page() -> str:
         "Each terrain with its parameters. A parameter with two values is a range from difficulty",
         "0 to difficulty 1. Replace it with one value or another range in a",
         "[configuration file](conventions.md#configuration-files) or with `--set`. The pictures",
-        "show difficulty 0.1, 0.5 and 1 on patches of 8 m x 8 m, with holes truncated.\n",
+        "show difficulty 0.1, 0.5 and 1 on patches of 8 m x 8 m, with holes truncated; a building",
+        "cut off above its ground floor, cut off above the next floor, and whole.\n",
         "| terrain | range | description |",
         "|---|---|---|",
         *(summary_row(terrain_doc(name)) for name in registry.terrain_names()),
@@ -87,8 +89,48 @@ def terrains_page() -> str:
         "`parkour_course` on patches of 18 m x 4 m; the arrows are goals:",
         "",
         "![parkour_course](pictures/parkour_course.png)",
+        "",
+        "Stairs of `residential`, `public`, `industrial` and `fire_escape` at difficulty 1, at the",
+        "limit of their codes:",
+        "",
+        "![built_stairs](pictures/built_stairs.png)",
+        BUILDING_CODES,
+        *(building_code_row(each) for each in clauses()),
     ]
     return "\n".join(parts) + "\n"
+
+
+BUILDING_CODES = """
+## Building codes
+
+The presets `residential`, `public`, `industrial` and `fire_escape` reach from easy stairs to the
+limits of building codes. The presets with `_beyond_code` go on from there to steeper stairs, with
+risers that differ. `check_flight` returns the clauses that a flight violates:
+
+```python
+import terrainkit
+from terrainkit.terrains.staircase import Staircase
+
+grid = terrainkit.MapConfig().patch_grid(0, 0)
+flight = Staircase(riser=0.19, going=0.26).flight(grid)
+assert [each.quantity for each in terrainkit.check_flight(flight, "ibc")] == ["riser", "going"]
+```
+
+The table has only limits of dimensions, and codes have exceptions. Values that were not read in the
+official publication of a code are second-hand. Never call stairs compliant because of it. Lengths
+are in m, and angles in rad.
+
+| code | clause | quantity | limit | read in |
+|---|---|---|---|---|"""
+
+
+def building_code_row(clause: Clause) -> str:
+    low, high = (f"{each:.4g}" for each in (clause.minimum, clause.maximum))
+    limit = f"{low} to {high}" if clause.minimum else f"at most {high}"
+    if clause.maximum == float("inf"):
+        limit = f"at least {low}"
+    source = clause.source + (" (second-hand)" if clause.second_hand else "")
+    return f"| {clause.code} | {clause.clause} | {clause.quantity} | {limit} | {source} |"
 
 
 OVERLAYS = """## Overlays
@@ -314,9 +356,11 @@ def pictures() -> dict[str, Callable[[], None]]:
     return {
         **{name: partial(draw_terrain, name) for name in registry.terrain_names()},
         **{name: partial(draw_paper, name) for name in paper_names()},
+        "building": draw_building,
         "map": draw_map,
         "feasibility": partial(draw_feasibility, "quadruped"),
         "parkour_course": draw_courses,
+        "built_stairs": draw_built_stairs,
         "quadruped": partial(draw_robot, "quadruped"),
         "quadruped_map": partial(draw_walk, "quadruped_map"),
     }
@@ -330,6 +374,28 @@ def draw_map() -> None:
 def draw_terrain(name: str) -> None:
     """Render patches of a terrain at difficulty 0.1, 0.5 and 1."""
     terrain = terrainkit.SubTerrain(terrain=name)
+    draw_patches(name, [(terrain, difficulty) for difficulty in (0.1, 0.5, 1.0)])
+
+
+def draw_building() -> None:
+    """Render a building cut off above the ground floor and above the next floor, and whole."""
+    building = terrainkit.SubTerrain(terrain="building")
+    storey = building.at(1.0).floors(MapConfig().patch_grid(0, 0))[1]
+    draw_patches("building", [(building, 1.0)] * 3, cuts=(1.2, storey + 1.2, np.inf))
+
+
+def draw_built_stairs() -> None:
+    shapes = {"residential": 2, "public": 1, "industrial": 2, "fire_escape": 1}
+    stairs = [presets.get_preset(name)[k] for name, k in shapes.items()]
+    draw_patches("built_stairs", [(each, 1.0) for each in stairs])
+
+
+def draw_patches(
+    name: str,
+    terrains: list[tuple[terrainkit.SubTerrain, float]],
+    cuts: tuple[float, ...] = (),
+) -> None:
+    """Render a patch of each terrain with its difficulty; see `render_patches`."""
     patches = [
         terrainkit.make_patch(
             MapConfig(
@@ -344,9 +410,9 @@ def draw_terrain(name: str) -> None:
             0,
             0,
         )
-        for difficulty in (0.1, 0.5, 1.0)
+        for terrain, difficulty in terrains
     ]
-    picture = cv2.cvtColor(render_patches(patches, width=800), cv2.COLOR_RGB2BGR)
+    picture = cv2.cvtColor(render_patches(patches, width=800, cuts=cuts), cv2.COLOR_RGB2BGR)
     cv2.imwrite(str(PICTURES / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 

@@ -1,6 +1,6 @@
 """Pictures of patches for the documentation, rendered by MuJoCo in the colors of the preview."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import mujoco
@@ -28,7 +28,9 @@ MARGIN = 12
 """Margin above and below the patches [pixels]."""
 
 
-def render_patches(patches: list[Patch], width: int) -> NDArray[np.uint8]:
+def render_patches(
+    patches: list[Patch], width: int, cuts: Sequence[float] = ()
+) -> NDArray[np.uint8]:
     """Return an RGB picture of `patches` side by side, shape (height, width, 3).
 
     The patches are seen from low x and low y; each is a block with its solids.
@@ -36,18 +38,25 @@ def render_patches(patches: list[Patch], width: int) -> NDArray[np.uint8]:
     Args:
         patches: Patches of the same size.
         width: Width of the picture [pixels].
+        cuts: Height of each patch at which solids are cut off [m]; empty for no cut.
     """
-    meshes = [_block(patch, k) for k, patch in enumerate(patches)]
+    heights = cuts or [np.inf] * len(patches)
+    meshes = [_block(*each, k) for k, each in enumerate(zip(patches, heights, strict=True))]
     (frame,) = stream_frames(partial(_frames, meshes, (width, width)))
     used = np.flatnonzero((frame != frame[0, 0]).any(axis=(1, 2)))
     return frame[max(0, used[0] - MARGIN) : used[-1] + MARGIN]
 
 
-def _block(patch: Patch, index: int) -> TriMesh:
-    """Return the ground of a patch as a block, with the solids, at place `index` of the row."""
+def _block(patch: Patch, cut: float, index: int) -> TriMesh:
+    """Return the ground of a patch as a block, with the solids, at place `index` of the row.
+
+    Upright boxes are cut off at a height; higher ones are not shown.
+    """
     threshold = 0.75 * patch.grid.cell
     ground = full_mesh(np.maximum(patch.heights, MIN_HEIGHT), patch.grid, threshold)
-    mesh = concatenate_meshes([_with_thickness(closed_mesh(ground)), *solid_meshes(patch.solids)])
+    solids = patch.solids.select(patch.solids.bounds()[0][:, 2] < cut)
+    mesh = concatenate_meshes([_with_thickness(closed_mesh(ground)), *solid_meshes(solids)])
+    mesh.vertices[:, 2] = np.minimum(mesh.vertices[:, 2], cut)
     # The row runs to the right of a camera that looks along x and y.
     step = sum(patch.grid.size) / 2 + GAP
     offset = np.array([index * step, -index * step, 0.0]) - [*patch.grid.lower, 0.0]

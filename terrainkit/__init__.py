@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from terrainkit.curriculum import update_levels
     from terrainkit.curriculum.waypoints import Waypoints
     from terrainkit.errors import TerrainkitError, TerrainkitWarning
+    from terrainkit.features.building_codes import check_flight
+    from terrainkit.features.flight import Flight
     from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
     from terrainkit.importing.options import ImportOptions
     from terrainkit.map.config import MapConfig
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from terrainkit.terrain.sub_terrain import SubTerrain
 
 __all__ = [
+    "Flight",
     "ImportOptions",
     "ImportReport",
     "ImportedMap",
@@ -42,6 +45,7 @@ __all__ = [
     "TerrainkitError",
     "TerrainkitWarning",
     "Waypoints",
+    "check_flight",
     "generate",
     "generate_suite",
     "get_suite",
@@ -65,6 +69,8 @@ _NAMES = {
     "curriculum": ("update_levels",),
     "curriculum.waypoints": ("Waypoints",),
     "errors": ("TerrainkitError", "TerrainkitWarning"),
+    "features.building_codes": ("check_flight",),
+    "features.flight": ("Flight",),
     "geometry.solids": ("Solids", "make_boxes", "make_cylinders", "make_hulls"),
     "importing.options": ("ImportOptions",),
     "map.config": ("MapConfig",),

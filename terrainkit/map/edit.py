@@ -12,7 +12,7 @@ from terrainkit.geometry.solids import Solids
 from terrainkit.map.config import MapConfig
 from terrainkit.map.generation import pad_poses
 from terrainkit.map.patch import find_origin, with_heading
-from terrainkit.map.spawn import find_spawn, sample_spawns
+from terrainkit.map.spawn import find_spawn, is_on_floor, sample_spawns
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain.patch_geometry import checked_heights
 
@@ -88,7 +88,12 @@ def place_patch_spawns(
         ConfigError: if the patch has no place to spawn.
     """
     grid, block, near = patch_ground(config, heights, solids, row, col)
-    kept = [find_spawn(config, grid, block, near, (x, y)) for x, y in spawns[:, :2].tolist()]
+    kept = [
+        (x, y, z)
+        if is_on_floor(config, near, (x, y, z))
+        else find_spawn(config, grid, block, near, (x, y))
+        for x, y, z in spawns[:, :3].tolist()
+    ]
     if None not in kept and np.allclose(np.array(kept)[:, :2], spawns[:, :2], atol=1e-4):
         positions = np.array(kept)
     else:

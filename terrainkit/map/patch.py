@@ -193,7 +193,9 @@ def _build_patch(
     goals = _place_goals(config, name, geometry)
     origin = find_origin(config, name, grid, heights, solids, position)
     spawns_rng = partial(child_rng, SPAWNS_STREAM)
-    spawns = sample_spawns(config, grid, heights, solids, origin, spawns_rng)
+    with plugin_errors(plugin):
+        floors = terrain.floors(grid)
+    spawns = sample_spawns(config, grid, heights, solids, origin, spawns_rng, floors)
     x, y, _ = spawns[0].tolist()
     requested, realized = _parameters(terrain, grid)
     for k, overlay in enumerate(overlays):

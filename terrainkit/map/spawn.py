@@ -102,6 +102,7 @@ def sample_spawns(
     solids: Solids,
     origin: tuple[float, float, float],
     rng: Callable[[], np.random.Generator],
+    floors: tuple[float, ...] = (),
 ) -> NDArray[np.float64]:
     """Return up to `spawns_per_patch` spawn positions on the level ground around the origin.
 
@@ -117,6 +118,8 @@ def sample_spawns(
         origin: Spawn origin of the patch [m], the first position.
         rng: Function that returns the random number generator. It is slow, so it is called only if
             needed.
+        floors: Heights of the floors of a building [m]. If there are any, positions are on all of
+            them and anywhere on the ground.
 
     Returns:
         Positions (x, y, z) [m], shape (n, 3) with 1 <= n <= `spawns_per_patch`.
@@ -133,7 +136,9 @@ def sample_spawns(
     region = regions[tuple(cells.T)]
     # The ground is level between the origin and the center of a flat disk that contains it.
     contains_origin = np.hypot(*(places[:, :2] - chosen[0][:2]).T) <= config.spawn_radius
-    places = rng().permutation(places[np.isin(region, region[contains_origin])])
+    places = places[np.isin(region, region[contains_origin]) | bool(floors)]
+    upper = [_floor_disks(config, grid, solids, z) for z in floors]
+    places = rng().permutation(np.concatenate([places, *upper]))
     while len(chosen) < config.spawns_per_patch:
         distance = np.hypot(*(places[:, :2] - chosen[-1][:2]).T)
         places = places[distance >= 2 * config.spawn_radius]
@@ -141,6 +146,43 @@ def sample_spawns(
             break
         chosen.append(places[0])
     return np.array(chosen)
+
+
+def is_on_floor(config: MapConfig, solids: Solids, position: tuple[float, float, float]) -> bool:
+    """Return whether a disk around a position is on solids, level and free.
+
+    Args:
+        config: Configuration of the map.
+        solids: Solids of the patch.
+        position: Center of the disk, x, y and z [m].
+    """
+    x, y, z = position
+    angle = np.linspace(0.0, 2 * np.pi, 32, endpoint=False)
+    circle = config.spawn_radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    disk = np.vstack([circle, 0 * circle]) + np.array([x, y])
+    is_level = _is_supported(config, disk, solids, z)
+    return bool(is_level.all() and _is_free(config, np.array([[x, y, z, z]]), solids)[0])
+
+
+def _is_supported(
+    config: MapConfig, xy: NDArray[np.float64], solids: Solids, z: float
+) -> NDArray[np.bool_]:
+    """Return at which points, shape (n, 2), the top of a solid is at a height [m]."""
+    tops = SolidIndex(solids).intervals(xy)[..., 1]
+    return np.asarray((np.abs(tops - z) <= config.spawn_tolerance).any(axis=1))
+
+
+def _floor_disks(config: MapConfig, grid: Grid, solids: Solids, z: float) -> NDArray[np.float64]:
+    """Return the centers of the cells with a level and free disk on solids at a height [m]."""
+    from scipy.ndimage import distance_transform_edt
+
+    xy = np.stack(np.meshgrid(grid.axis(0), grid.axis(1), indexing="ij"), axis=-1)
+    is_level = _is_supported(config, xy.reshape(-1, 2), solids, z).reshape(grid.shape)
+    # Samples beyond the disk are level as well, and so is the surface between two of them.
+    reach = distance_transform_edt(np.pad(is_level, 1))[1:-1, 1:-1] * grid.cell
+    xy = xy[reach > config.spawn_radius + grid.cell]
+    disks = np.column_stack([xy, np.full((len(xy), 2), z)])
+    return np.asarray(disks[_is_free(config, disks, solids), :3])
 
 
 def _free_disks(

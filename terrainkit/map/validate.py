@@ -213,14 +213,13 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
             grid = config.patch_grid(row, col)
             if (xy < np.array(grid.lower)).any() or (xy > np.array(grid.upper)).any():
                 yield f"{subject} is outside the patch"
-            ground = terrain_map.height(xy + disk)
-            free = terrain_map.clearance(xy + disk).min()
+            ground, free = _floor_and_headroom(terrain_map, xy + disk, z)
             if free < config.spawn_headroom - TOLERANCE:
                 headroom = config.spawn_headroom
                 yield f"{subject} has {free:.3f} m of headroom; expected {headroom:g} m"
             spread = float(ground.max() - ground.min())
             slack = _rounding(terrain_map) * spread / config.spawn_radius
-            above = float(z - terrain_map.height(xy))
+            above = float(z - ground[0])
             if abs(above) > TOLERANCE + slack:
                 side = "above" if above > 0 else "below"
                 yield f"{subject} is {abs(above):.3f} m {side} the ground"
@@ -235,6 +234,25 @@ def _check_spawn(terrain_map: TerrainMap) -> Iterator[str]:
                     f"{subject} is {others.min():.3f} m from spawn {others.argmin()}; expected at "
                     f"least {2 * config.spawn_radius:g} m, two spawn radii"
                 )
+
+
+def _floor_and_headroom(
+    terrain_map: TerrainMap, xy: NDArray[np.float64], z: float
+) -> tuple[NDArray[np.float64], float]:
+    """Return the heights of the ground or of a floor, and the least free height above it [m].
+
+    Args:
+        terrain_map: The map.
+        xy: Points of a disk, the center first [m], shape (n, 2).
+        z: Height of its center [m].
+    """
+    ground = terrain_map.height(xy)
+    if z > ground[0] + TOLERANCE:
+        near = np.column_stack([xy, np.full(len(xy), z + terrain_map.config.spawn_tolerance)])
+        floor, ceiling = terrain_map.scan(near, "down"), terrain_map.scan(near, "up")
+        if abs(floor[0] - z) <= TOLERANCE:
+            return floor, float(np.nanmin(np.append(ceiling, np.inf))) - z
+    return ground, float(terrain_map.clearance(xy).min())
 
 
 def _check_mesh(terrain_map: TerrainMap, mesh: TriMesh) -> Iterator[str]:

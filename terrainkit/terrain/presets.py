@@ -33,9 +33,48 @@ _OBSTACLES: dict[str, list[dict[str, Any]]] = {
     "squeeze": [{"terrain": "slit", "opening": (1.3, 0.8), "offset": 0.4}],
 }
 
+_OPEN = {"risers": "open", "handrail": 0.95, "number": 7}
+
+_BUILT_STAIRS: dict[str, tuple[str, dict[str, Any], dict[str, float]]] = {
+    # Shapes, parameters from easy to the limit of the code, and the hard end beyond the code. The
+    # limits are in `features/building_codes.toml`: IRC, IBC, OSHA with EN ISO 14122-3, and Ontario.
+    "residential": (
+        "straight quarter_turn winders curved",
+        {"riser": (0.15, 0.196), "going": (0.3, 0.254), "width": 0.95, "landing": 1.0},
+        {"riser": 0.26, "going": 0.2},
+    ),
+    "public": (
+        "straight half_turn quarter_turn curved",
+        {"riser": (0.12, 0.178), "going": (0.36, 0.28), "width": 1.2, "landing": 1.25},
+        {"riser": 0.24, "going": 0.22},
+    ),
+    "industrial": (
+        "straight half_turn quarter_turn",
+        {"riser": (0.165, 0.209), "going": (0.28, 0.241), "width": 0.8, "landing": 0.85, **_OPEN},
+        {"riser": 0.28, "going": 0.19},
+    ),
+    "fire_escape": (
+        "straight half_turn",
+        {"riser": (0.17, 0.21), "going": (0.28, 0.22), "width": 0.65, "landing": 0.8, **_OPEN},
+        {"riser": 0.28, "going": 0.17},
+    ),
+}
+
+
+BEYOND_CODE = "_beyond_code"
+"""Suffix of the presets with stairs that are steeper than the building code allows, and uneven."""
+
 _COURSE = {"terrain": "course", "order": "random", "start": 1.5}
 
 _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
+    # One to three storeys, and parts of them.
+    "indoor": {
+        "one_storey": {"terrain": "building", "storeys": 1},
+        "two_storeys": {"terrain": "building", "proportion": 2.0},
+        "three_storeys": {"terrain": "building", "storeys": 3},
+        "rooms": {},
+        "stairwell": {"terrain": "staircase", "shape": "half_turn", "wall": 1.0},
+    },
     # Courses of one obstacle as in the training of both, and mixed ones as in their distillation.
     "parkour_course": {
         **{
@@ -51,6 +90,15 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
 }
 """Terrain (its name by default), proportion (1 by default) and parameters of each sub-terrain, by
 preset."""
+
+for _name, (_shapes, _given, _beyond) in _BUILT_STAIRS.items():
+    _steeper = {name: (_given[name][1], value) for name, value in _beyond.items()}
+    _uneven = {"riser_difference": (0.0095, 0.04)}
+    for _suffix, _values in ("", _given), (BEYOND_CODE, _given | _steeper | _uneven):
+        _PRESETS[_name + _suffix] = {
+            f"{_name}_{shape}": {"terrain": "staircase", "shape": shape, **_values}
+            for shape in _shapes.split()
+        }
 
 _EQUAL_PARTS = {
     "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),

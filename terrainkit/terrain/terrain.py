@@ -155,6 +155,15 @@ class Terrain(Parameterized, ABC):
         """
         return Solids.empty()
 
+    def floors(self, grid: Grid) -> tuple[float, ...]:
+        """Return the heights of the floors of a building, the ground among them [m].
+
+        Robots are spawned on all of them if a patch has several spawn positions, which requires
+        that all level disks on the ground and on these floors are connected. By default there are
+        none, and all spawn positions are on the level ground around the first one.
+        """
+        return ()
+
     def goals(
         self, grid: Grid, heights: NDArray[np.float32], rng: "np.random.Generator"
     ) -> NDArray[np.floating]:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_blocks, max_number
+from terrainkit.features.flight import Flight, Stairway
 from terrainkit.features.lane import Lane, lane_goals
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
@@ -14,7 +15,7 @@ from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpenStairs(FlatTerrain, Lane):
+class OpenStairs(FlatTerrain, Lane, Stairway):
     """Stairs of separate treads up and down along x, between flat strips at both ends.
 
     There are no risers: a foot can slip between two treads. The robot is spawned at low x. The
@@ -36,15 +37,28 @@ class OpenStairs(FlatTerrain, Lane):
     start: float = parameter.length(2.0)
     """Length of the flat strip at each end along x [m]."""
 
+    def flight(self, grid: Grid) -> Flight:
+        """Return the description of a flight; see :class:`Stairway`."""
+        first, last, number = self._stairs(grid)
+        top = last - first - 2 * number * self.tread
+        return Flight(
+            riser=self.riser,
+            going=self.tread,
+            number=number,
+            width=grid.size[1],
+            landing=min(first - grid.lower[0], top),
+            thickness=self.thickness,
+        )
+
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the treads."""
         first, last, number = self._stairs(grid)
-        below = np.arange(number)
+        below, up = np.arange(number), self.flight(grid).tops()
         # A tread up, its counterpart down, and the top.
         x0 = np.concatenate([first + below * self.tread, last - (below + 1) * self.tread])
         x1 = np.append(x0 + self.tread, last - number * self.tread)
         x0 = np.append(x0, first + number * self.tread)
-        top = self.riser * np.concatenate([below + 1, below + 1, [number + 1]])
+        top = np.concatenate([up, up, [self.riser * (number + 1)]])
         low, high = 0 * top + grid.lower[1], 0 * top + grid.upper[1]
         lower = np.column_stack([x0, low, top - self.thickness])
         return make_blocks(lower, np.column_stack([x1, high, top]))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import MAX_PER_AXIS, SINK
+from terrainkit.features.flight import Flight, Stairway
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders, make_hulls
 from terrainkit.terrain import FlatTerrain, parameter
@@ -17,7 +18,7 @@ _ARC_POINTS = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpiralStairs(FlatTerrain):
+class SpiralStairs(FlatTerrain, Stairway):
     """Treads without risers that climb counterclockwise around a column.
 
     The robot is spawned at low x in front of the first tread. There is a goal on every fourth tread
@@ -51,10 +52,24 @@ class SpiralStairs(FlatTerrain):
         x = grid.lower[0] + grid.length(grid.cells(self.start)) / 2
         return x, grid.center[1] - (self.column + self.radius) / 2
 
+    def flight(self, grid: Grid) -> Flight:
+        """Return the description of the stairs, which have no landing; see :class:`Stairway`."""
+        _, angle = self._stairs(grid)
+        above = math.floor(2 * math.pi / (angle[1] - angle[0]) + 1e-9)  # treads of a turn
+        return Flight(
+            riser=self.riser,
+            going=self.tread,
+            number=self.number,
+            width=self.radius - self.column,
+            landing=0.0,
+            thickness=self.thickness,
+            headroom=above * self.riser - self.thickness if above < self.number else math.inf,
+        )
+
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the treads and the column."""
         (x, y), angle = self._stairs(grid)
-        top = self.riser * np.arange(1, self.number + 1)
+        top = self.flight(grid).tops()
         arc = angle[:, None] + np.linspace(0.0, angle[1] - angle[0], _ARC_POINTS)
         # The inner corners are inside the column.
         theta = np.column_stack([arc, arc[:, [0, -1]]])

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.features.flight import Flight, Stairway
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stairs(Terrain):
+class Stairs(Stairway):
     """A flight of stairs up and one down along x, between flat strips at both ends.
 
     The robot is spawned at low x. The steps span the width of the patch, and the top step takes the
@@ -39,16 +40,28 @@ class Stairs(Terrain):
         """Return the center of the flat start."""
         return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the treads, counted from the flat strips at both ends."""
+    def flight(self, grid: Grid) -> Flight:
+        """Return the description of a flight; see :class:`Stairway`."""
         landing, width = grid.cells(self.landing), grid.cells(self.step_width)
-        flight = grid.shape[0] - 2 * landing  # cells between the landings
-        if flight < width:
+        free = grid.shape[0] - 2 * landing  # cells between the landings
+        if free < width:
             raise ConfigError(
                 f"stairs: two landings of {self.landing:g} m leave no step of "
                 f"{self.step_width:g} m in a patch {grid.size[0]:g} m long"
             )
-        num_steps = (flight - width) // (2 * width) + 1
+        number = (free - width) // (2 * width)
+        return Flight(
+            riser=self.step_height,
+            going=grid.length(width),
+            number=number,
+            width=grid.size[1],
+            landing=grid.length(min(landing, free - 2 * number * width)),
+        )
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the treads, counted from the flat strips at both ends."""
+        flight = self.flight(grid)
+        landing, width = grid.cells(self.landing), grid.cells(self.step_width)
         from_end = np.minimum(np.arange(grid.shape[0]), np.arange(grid.shape[0])[::-1])
-        rise = self.step_height * np.clip((from_end - landing) // width + 1, 0, num_steps)
+        rise = flight.riser * np.clip((from_end - landing) // width + 1, 0, flight.number + 1)
         return np.broadcast_to((-rise if self.inverted else rise)[:, None], grid.shape)

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.features.flight import Flight, Stairway
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class StairsTurning(Terrain):
+class StairsTurning(Stairway):
     """Four flights of stairs around a square court, joined by quarter-turn landings.
 
     Two flights climb and two descend, so that they form a loop. The robot is spawned at low x in
@@ -43,6 +44,17 @@ class StairsTurning(Terrain):
         landing = grid.cells(self.landing)
         start, y = grid.length(grid.cells(self.start)), self._first_cell(grid)[1] + landing / 2
         return grid.lower[0] + start / 2, grid.lower[1] + grid.length(y)
+
+    def flight(self, grid: Grid) -> Flight:
+        """Return the description of a flight; see :class:`Stairway`."""
+        landing = grid.length(grid.cells(self.landing))
+        return Flight(
+            riser=self.riser,
+            going=grid.length(grid.cells(self.tread)),
+            number=self._tread_count(grid),
+            width=landing,
+            landing=landing,
+        )
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the flights, counterclockwise from the landing at low x and low y."""

@@ -101,6 +101,10 @@ LIMITS = [
     ("boxes", {"min_side": (1.8, 1.81)}, "got min_side 1.81 m and max_side 1.8 m"),
     ("boxes", {"min_side": (1.0, 3.0), "max_side": 4.0}, "a box that fits beside a platform of 2"),
     ("boxes", {"height": (1.0, 9.0), "tilt": 0.1}, "a box that fits beside a platform of 2"),
+    ("building", {"storeys": (4, 5)}, "got 5 storeys 2.4 m high"),
+    ("building", {"door_height": (2.19, 2.2)}, "expected .* sill < door_height < 2.2 m"),
+    ("building", {"door": (1.3, 1.32)}, "expected .* door < 0.85 room_size - 0.22 m"),
+    ("building", {"corridor": (5.3, 5.6)}, "stairs and a corridor that fit in a patch of 8 m"),
     ("continuous_ramps", {"length": (5.0, 5.01)}, "got elements of 5.01 m x 1.2 m between strips"),
     ("continuous_ramps", {"width": (8.0, 8.01)}, "got elements of 0.6 m x 8.01 m between strips"),
     ("crawl", {"min_depth": (0.6, 0.61)}, "expected min_depth <= max_depth, and a bar"),
@@ -154,6 +158,8 @@ LIMITS = [
     ("spiral_stairs", {"radius": (3.0, 3.01)}, "a spiral that fits behind a start of 2 m"),
     ("spiral_stairs", {"tread": (1.41, 1.42)}, "a tread of at most a quarter turn"),
     ("spiral_stairs", {"number": (200, 201)}, "at most 200 treads"),
+    ("staircase", {"width": (7.86, 7.87)}, "expected a straight staircase .* that fits in a patch"),
+    ("staircase", {"riser_difference": (0.119, 0.12)}, "with riser_difference < riser"),
     ("stairs", {"landing": (3.8, 3.9)}, "two landings of 3.9 m leave no step of 0.31 m"),
     ("stairs_turning", {"landing": (2.8, 2.9)}, "expected flights that fit in a patch of 8 m x 8"),
     ("stakes", {"diameter": (0.3, 0.001), "gap": 0.001}, "got .* from one to the next; expected"),
@@ -318,6 +324,7 @@ GOALS = {
     "ladder": [4.0, 6.5],
     "open_stairs": [4.0, 7.0],
     "side_ramps": [3.0, 4.6, 6.2, 7.6],
+    "staircase": [4.309, 7.309],
     "slit": [3.5, 5.0, 6.5, 7.95],
     "stepfield": [2.95, 3.95, 4.95, 5.95, 7.5],
     "stepping_beams": [7.7],
@@ -337,7 +344,7 @@ def test_every_terrain_goals_are_on_free_ground(terrain, given_parameters, grid,
     goals = terrain_map.goals.reshape(-1, 4)
     x, y, z = goals[~np.isnan(goals[:, 0]), :3].astype(float).T
     above = np.column_stack([x, y, z + 0.2])
-    assert np.isnan(terrain_map.scan(above, "up")).all()
+    assert not (terrain_map.scan(above, "up") < z + 1.0).any()
     assert terrain_map.scan(above, "down") == pytest.approx(z, abs=1e-4)
     if terrain in GOALS and grid == GRID and not overlays:
         x, _, _, heading = terrain_map.patch(4, 0).goals.T

@@ -80,7 +80,7 @@ def test_names_are_the_modules():
 @pytest.mark.parametrize(
     ("name", "near"),
     [
-        ("stair", "did you mean 'stairs' or 'star' or 'open_stairs'? terrainkit list prints all"),
+        ("stair", "did you mean 'stairs' or 'star' or 'staircase'? terrainkit list prints all"),
         ("Obstacle", "register_terrain; did you mean 'obstacles'? terrainkit list prints all"),
         ("x" * 1000, "register_terrain; terrainkit list prints all"),
         ("stair_inverted", "register_terrain; terrainkit list prints all"),
