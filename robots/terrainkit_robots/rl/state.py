@@ -126,8 +126,8 @@ class Sensors:
         dof_vel, foot_pos = qvel.take(scene.joint_qvel, 1), sim.sensor("foot_position", rows)
         foot_force = -sim.sensor("foot_force", rows)
         penalized = sim.sensor("penalized_force", rows)
-        near_foot = foot_pos[:, :, None, :2] + self._near_foot
-        ground = self._terrain.height(*np.moveaxis(near_foot, -1, 0), foot_pos[..., 2:])
+        x, y = np.moveaxis(foot_pos[:, :, None, :2] + self._near_foot, -1, 0)
+        ground = self._terrain.height(x, y, foot_pos[..., 2:])
         torques = sim.torque[rows].astype(np.float32)
         vel = np.concatenate([lin_vel[:, :2], ang_vel[:, 2:]], axis=1)
         last_vel, dof_acc = np.zeros_like(vel), np.zeros_like(dof_vel)
