@@ -51,13 +51,13 @@ def test_export_run_into_its_own_folder(terrainkit, run_folder):
     assert names(run_folder / "exported") == FILES
     first, second, note = run.stdout.splitlines()
     assert first.startswith("wrote run/exported/policy.onnx, run/exported/policy.pt, ")
-    assert first.endswith("47 observations to 12 actions, from model_2.pt")
+    assert first.endswith("141 observations to 12 actions, from model_2.pt")
     assert second.startswith("verified: largest difference from the checkpoint: policy.onnx ")
     assert second.endswith(", policy.pt 0.0e+00")
-    assert note.startswith("readers of metadata of mjlab lack moving_gait_phase, and stop")
+    assert note.startswith("policy.onnx has no metadata of mjlab: observations.history_length")
     assert json.loads((run_folder / "exported" / "policy.json").read_text())["iteration"] == 2
     run = terrainkit("export", "run", "--checkpoint", 1, "-o", "a")
-    assert run.stdout.splitlines()[0].endswith("47 observations to 12 actions, from model_1.pt")
+    assert run.stdout.splitlines()[0].endswith("141 observations to 12 actions, from model_1.pt")
     assert names(run_folder.parent / "a") == FILES
 
 

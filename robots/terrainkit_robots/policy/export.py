@@ -343,7 +343,7 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "parts": _observation_parts(env),
             "size": env.get_observations()["policy"].shape[1],
             "clip": task.normalization.clip_observations,
-            "history_length": task.observations.history_length,
+            "history_length": env.history_length,
         },
         "action": {
             "size": env.num_actions,

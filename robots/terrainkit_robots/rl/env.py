@@ -71,7 +71,14 @@ class LeggedEnv(VecEnv):
         self.max_episode_length, self.step_dt = task.max_episode_length, task.dt
         self.scene = Scene(robot, terrain, task)
         self.has_height_scan = observations.uses_height_scan(task, is_plane=terrain.is_plane)
-        check_env_memory(task, robot, scan=self.has_height_scan, ngeom=self.scene.model.ngeom)
+        self.history_length = observations.history_length(task, robot)
+        check_env_memory(
+            task,
+            robot,
+            scan=self.has_height_scan,
+            history=self.history_length - 1,
+            ngeom=self.scene.model.ngeom,
+        )
         self.sim = Simulation(self.scene, n, task.env.num_threads)
         self.mass = float(self.scene.model.body_subtreemass[self.scene.base])
         self.rng = np.random.default_rng(task.runner.seed)
@@ -338,7 +345,7 @@ class LeggedEnv(VecEnv):
         terms = self.obs_terms["policy"]
         names = [*terms][: [*terms].index("history")] if "history" in terms else []
         width = sum(terms[name].function(self).shape[1] for name in names)
-        past = self.cfg.observations.history_length - 1
+        past = self.history_length - 1
         self.obs_history = np.zeros((self.num_envs, past * width), np.float32)
 
     def _make_waypoints(self) -> Waypoints | None:
@@ -358,7 +365,7 @@ class LeggedEnv(VecEnv):
             rng = self.rng if name == "policy" else None  # noise for the policy only
             values = observations.compute_observations(self, terms, rng)
             groups[name] = torch.from_numpy(values)
-        if past := self.cfg.observations.history_length - 1:
+        if past := self.history_length - 1:
             # The history of a new episode repeats its first observation.
             new, policy = self.steps_since_reset == 0, groups["policy"]
             width = self.obs_history.shape[1] // past

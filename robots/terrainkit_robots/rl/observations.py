@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.rl.config import Task
+from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray, quat_rotate_inverse
 
 if TYPE_CHECKING:
@@ -118,8 +119,7 @@ def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     }
     if env.cfg.commands.gait_period != 0:
         terms["gait_phase"] = term(lambda env: env.state.gait_phase, "phase")
-    has_lin_vel = options.base_lin_vel
-    if len(robot.spec.feet) == 2 if has_lin_vel is None else has_lin_vel:
+    if options.base_lin_vel:
         terms["base_lin_vel"] = term(
             lambda env: env.state.base_lin_vel + env.lin_vel_bias,
             "vector",
@@ -129,7 +129,7 @@ def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
         )
     if options.foot_contact:
         terms["foot_contact"] = term(lambda env: env.state.foot_contact.astype("f4"), "contacts")
-    if options.history_length > 1:
+    if env.history_length > 1:
         terms["history"] = term(lambda env: env.obs_history, "history")
     if env.has_height_scan:
         terms["height_scan"] = term(
@@ -142,6 +142,18 @@ def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
             unit="m",
         )
     return terms
+
+
+def history_length(task: Task, robot: Robot) -> int:
+    """Return how many of the latest observations the policy has.
+
+    Args:
+        task: The task.
+        robot: The robot, whose number of feet decides where the task does not.
+    """
+    options = task.observations
+    default = 1 if options.base_lin_vel else 5 if len(robot.spec.feet) == 2 else 3
+    return default if options.history_length is None else options.history_length
 
 
 def _deepest(env: "LeggedEnv") -> float:

@@ -72,8 +72,8 @@ def test_env_is_terminated_by_fall_with_its_last_observation():
     assert terminated
     assert not truncated
     assert reward < -0.5  # rewards.termination
-    # The policy observes its last action, which is 0 after a reset.
-    assert (observation == 3.0).sum() == 4
+    # The policy observes its last three actions, which are 0 after a reset.
+    assert (observation == 3.0).sum() == 3 * 4
     assert not (env.reset()[0] == 3.0).any()
 
 
@@ -82,7 +82,7 @@ def test_vector_env_steps_like_single_env(short_task):
     observations, _ = vector.reset(seed=5)
     np.testing.assert_array_equal(twin.reset(seed=5)[0], observations)
     assert not np.array_equal(twin.reset(seed=6)[0], observations)
-    assert observations.shape == vector.observation_space.shape == (3, 47)
+    assert observations.shape == vector.observation_space.shape == (3, 141)
     assert vector.observation_space.contains(observations)
     for step in range(5):
         observations, rewards, terminated, truncated, infos = vector.step(np.zeros((3, 12)))
@@ -164,7 +164,7 @@ def test_spaces_have_the_limits_of_the_task(short_task):
         (env.observation_space, env.action_space),
         (vector.single_observation_space, vector.single_action_space),
     ):
-        assert observation == gymnasium.spaces.Box(-7, 7, (47,), np.float32)
+        assert observation == gymnasium.spaces.Box(-7, 7, (141,), np.float32)
         assert action == gymnasium.spaces.Box(-3, 3, (12,), np.float32)
     assert vector.action_space.shape == (2, 12)
     assert env.metadata["render_fps"] == vector.metadata["render_fps"] == 62  # 1 / (4 * 0.004)

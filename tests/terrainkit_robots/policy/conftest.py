@@ -13,7 +13,16 @@ import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit_robots.policy.evaluate import eval_task
-from terrainkit_robots.rl.config import Control, Env, Normalization, Policy, Runner, Sim, Task
+from terrainkit_robots.rl.config import (
+    Control,
+    Env,
+    Normalization,
+    Observations,
+    Policy,
+    Runner,
+    Sim,
+    Task,
+)
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import Run, create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
@@ -26,6 +35,7 @@ SMALL = Task(
     env=Env(num_envs=4, num_threads=1),
     policy=Policy(actor_hidden_dims=(16, 16), critic_hidden_dims=(16, 16)),
     normalization=Normalization(clip_actions=0.3),  # small enough to clip
+    observations=Observations(history_length=1),
     runner=Runner(num_steps_per_env=4, save_interval=1),
 )
 

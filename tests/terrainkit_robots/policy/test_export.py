@@ -30,7 +30,7 @@ from terrainkit_robots.spec.robot import Robot
 
 FILES = ["policy.json", "policy.onnx", "policy.pt", "robot.xml"]
 EXAMPLE = "run_policy.py"
-SMALL = Task(env=Env(num_envs=4, num_threads=1))
+SMALL = Task(env=Env(num_envs=4, num_threads=1), observations=Observations(history_length=1))
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +202,8 @@ def test_example_computes_the_observations(exported, trained, monkeypatch):
 
 def test_example_observes_contacts_as_the_training(quadruped, trained, tmp_path, monkeypatch):
     """The training reads contact sensors, the example `cfrc_ext`."""
-    task = replace(eval_task(SMALL, 1), observations=Observations(foot_contact=True))
+    options = Observations(foot_contact=True, history_length=1)
+    task = replace(eval_task(SMALL, 1), observations=options)
     env = LeggedEnv(task, quadruped, Plane())
     config = describe_policy(env)
     assert config["feet"] == {"name": list(quadruped.spec.feet), "contact_force": 1.0}

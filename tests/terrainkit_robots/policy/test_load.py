@@ -8,7 +8,7 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
 from terrainkit_robots.policy.load import load_policy
-from terrainkit_robots.rl.config import Env, Task
+from terrainkit_robots.rl.config import Env, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
@@ -69,7 +69,7 @@ def test_load_policy_rejects_changed_weights(trained, env, tmp_path, change, tol
 def test_load_policy_rejects_another_robot_or_other_observations(
     trained, quadruped, biped, map_terrain
 ):
-    task = Task(env=Env(num_envs=1, num_threads=1))
+    task = Task(env=Env(num_envs=1, num_threads=1), observations=Observations(history_length=1))
     with pytest.raises(ConfigError, match="another robot, quadruped"):
         load_policy(trained, LeggedEnv(task, biped, Plane()))
     with pytest.raises(ConfigError, match=r"47 .* 234"):

@@ -132,7 +132,7 @@ def test_json_replaces_gains_and_joint_order(mine):
         ({"joints__gain": [3.0] * 12}, "joints.gain.0: got 3.0; expected 60.0, as in task"),
         ({"timing__decimation": 5}, "timing.decimation: got 5; expected 4"),
         ({"task__commands": {"speed": 1}}, "task.commands has no key 'speed'"),
-        ({"task__observations": {"foot_contact": True}}, "observation.size: got 47; expected 51"),
+        ({"task__observations": {"foot_contact": True}}, "observation.size: got 47; expected 153"),
         ({"observation__parts": [{"name": "camera"}]}, "parts.0.name: got camera; expected comm"),
         ({"observation__parts": 3}, "observation.parts: got 3; the environment"),
         ({"format_version": 2}, "format_version: got 2; expected 1"),

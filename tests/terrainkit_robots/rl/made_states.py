@@ -62,5 +62,6 @@ def made_env(
         num_envs=n,
         mass=100 / 9.81,
         has_height_scan=True,
+        history_length=task.observations.history_length or 1,
         joint_units=("rad",) * joints[0],
     )

@@ -17,6 +17,7 @@ from terrainkit_robots.rl.config import (
 )
 from terrainkit_robots.rl.observations import (
     compute_observations,
+    history_length,
     policy_terms,
     privileged_terms,
 )
@@ -145,13 +146,15 @@ class TestGroups:
         # The critic knows the velocity anyway, and needs no history.
         assert "history" not in privileged_terms(env)
 
-    @pytest.mark.parametrize(("name", "default"), [("quadruped", False), ("biped", True)])
-    def test_two_legs_observe_the_linear_velocity(self, request, make, name, default):
-        legged = request.getfixturevalue(name)
-        for setting in (None, not default):
-            task = Task(observations=Observations(base_lin_vel=setting))
-            observed = default if setting is None else setting
-            assert ("base_lin_vel" in policy_terms(make(task=task, robot=legged))) == observed
+    @pytest.mark.parametrize(("name", "default"), [("quadruped", 3), ("biped", 5)])
+    def test_history_is_longer_on_two_legs_and_none_with_the_velocity(self, request, name, default):
+        robot = request.getfixturevalue(name)
+        for options, expected in (
+            (Observations(), default),
+            (Observations(base_lin_vel=True), 1),
+            (Observations(base_lin_vel=True, history_length=2), 2),
+        ):
+            assert history_length(Task(observations=options), robot) == expected
 
     @pytest.mark.parametrize("gait_period", [0, None])
     @pytest.mark.parametrize("more", [False, True])

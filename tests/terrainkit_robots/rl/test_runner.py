@@ -145,8 +145,8 @@ def test_load_rejects_another_task(make, task, tmp_path, map_ground):
     make().save()
     wide = replace(task, policy=replace(task.policy, actor_hidden_dims=(32,)))
     for runner, told in (
-        (make(ground=map_ground), "belongs to another task: got 47 policy observations; exp"),
-        (make(wide), r"does not fit .*mlp\.0\.weight: got float32 \(16, 47\); exp"),
+        (make(ground=map_ground), "belongs to another task: got 141 policy observations; exp"),
+        (make(wide), r"does not fit .*mlp\.0\.weight: got float32 \(16, 141\); exp"),
     ):
         with pytest.raises(ConfigError, match=told):
             runner.load(tmp_path / "model_0.pt")

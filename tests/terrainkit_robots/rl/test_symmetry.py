@@ -162,7 +162,7 @@ class TestAugment:
         assert acted.shape == (4, 12)
         both, acted = augment(env, env.get_observations()[:3], None)
         assert acted is None
-        assert both["policy"].shape == (6, 47)
+        assert both["policy"].shape == (6, 141)
 
     def test_gradients_flow(self, env):
         actions = torch.zeros(1, 12, requires_grad=True)

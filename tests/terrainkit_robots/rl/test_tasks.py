@@ -166,7 +166,7 @@ def test_task_of_the_guide_has_its_terms(guide):
     task = replace(guide.task, env=Env(num_envs=4, num_threads=1))
     env = make_env(task, scene.Robot.load(guide.folder), Plane())
     assert [*env.obs_terms["policy"]][-2:] == ["height_command", "front_feet"]
-    assert env.mirror_maps.groups["policy"].index[-2:].tolist() == [49, 48]
+    assert env.mirror_maps.groups["policy"].index[-2:].tolist() == [143, 142]
     height = env.active_commands["height"].values
     assert 0.2 <= height.min() < height.max() <= 0.35
     assert env.state_dict()["arrays"]["height.values"].tolist() == height.tolist()

@@ -100,6 +100,7 @@ def test_damaged_files_are_rejected(data, message):
 
 
 def describe(quadruped, **sections):
+    sections = {"observations": Observations(history_length=1)} | sections
     task = Task(env=Env(num_envs=1, num_threads=1), **sections)
     document = describe_policy(LeggedEnv(task, quadruped, Plane()))
     return document | {"task": {"commands": vars(task.commands)}}
