@@ -75,6 +75,14 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "rooms": {},
         "stairwell": {"terrain": "staircase", "shape": "half_turn", "wall": 1.0},
     },
+    # With cells of 0.05 m and ten rows, each row of the gaps and the stones is one cell harder.
+    "hard": {
+        "gap": {"width": (0.05, 0.5)},
+        "stepping_stones": {"stone": (0.65, 0.2), "distance": 0.1},
+        "pit": {"depth": (0.05, 0.3)},
+        "boxes": {"height": (0.05, 0.3)},
+        "rails": {"width": (0.05, 0.2), "height": (0.05, 0.2)},
+    },
     # Courses of one obstacle as in the training of both, and mixed ones as in their distillation.
     "parkour_course": {
         **{
@@ -103,7 +111,6 @@ for _name, (_shapes, _given, _beyond) in _BUILT_STAIRS.items():
 _EQUAL_PARTS = {
     "rough": ("flat", "rough", "rough_slope", "obstacles", "wave"),
     "stairs": ("stairs", "pyramid_stairs", "pyramid_stairs_inverted"),
-    "hard": ("gap", "stepping_stones", "pit", "boxes", "rails"),
     "parkour": ("boxes", "hurdles", "gap_track", "side_ramps", "stepping_beams", "crawl", "slit"),
     "sparse": (
         "stepping_stones",
