@@ -29,6 +29,7 @@ from terrainkit.feasibility import assess_map
 from terrainkit.feasibility.report import routes
 from terrainkit.features.building_codes import Clause, clauses
 from terrainkit.map.config import MapConfig
+from terrainkit.perception import EdgeMap, RayCaster, depth_directions
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.schema import Config, field_keys, field_types, is_required
 from terrainkit.settings.toml_text import value_text
@@ -360,6 +361,7 @@ def pictures() -> dict[str, Callable[[], None]]:
         "map": draw_map,
         "feasibility": partial(draw_feasibility, "quadruped"),
         "parkour_course": draw_courses,
+        "perception": draw_perception,
         "built_stairs": draw_built_stairs,
         "quadruped": partial(draw_robot, "quadruped"),
         "quadruped_map": partial(draw_walk, "quadruped_map"),
@@ -432,6 +434,27 @@ def draw_courses() -> None:
     courses = MapConfig(preset="parkour_course", rows=4, patch_size=(18, 4), border=1, seed=SEED)
     picture = PICTURES / "parkour_course.png"
     write_preview(terrainkit.generate(courses), picture, width=820, overwrite=True)
+
+
+def draw_perception() -> None:
+    """Draw a depth image of stairs, and the edges of the patch with a foothold mask."""
+    stairs = terrainkit.SubTerrain(terrain="pyramid_stairs", parameters={"inverted": True})
+    terrain_map = terrainkit.generate(
+        MapConfig(rows=1, cols=1, border=0, mode="selected", terrains=(stairs,))
+    )
+    eye, down = terrain_map.env_origins[:, 0] + [0.0, 0.0, 0.5], np.radians(6)
+    camera = depth_directions(480, 360, 1.4)
+    quat = [[np.cos(down / 2), 0, np.sin(down / 2), 0]]
+    depth = RayCaster(terrain_map).sense(eye, quat, camera)[0] * camera[..., 0]
+    x, y = np.meshgrid(np.linspace(8, 4, 360), np.linspace(6.4, 1.6, 432), indexing="ij")
+    edges = EdgeMap(terrain_map)
+    xy = np.stack([x, y], axis=-1)
+    views = []
+    for values in (1 / depth, edges.distance(xy)):
+        shown = cv2.normalize(values, None, 0, 255, cv2.NORM_MINMAX).astype(np.uint8)
+        views.append(cv2.applyColorMap(shown, cv2.COLORMAP_VIRIDIS))
+    views[1][~edges.is_foothold(xy, 0.03)] = (60, 60, 220)
+    cv2.imwrite(str(PICTURES / "perception.png"), np.hstack(views))
 
 
 def draw_robot(name: str) -> None:

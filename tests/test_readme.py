@@ -4,6 +4,7 @@ import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import terrainkit as tk
@@ -51,6 +52,15 @@ def test_readme_python_runs():
     assert Path("map.xml").exists()
     exec(robots, {})
     assert Path("my_robot/robot.toml").exists()
+
+
+def test_perception_page_python_runs():
+    names = {}
+    exec("".join(blocks((ROOT / "docs/perception.md").read_text(), "python")), names)
+    assert names["heights"].shape == names["ceilings"].shape == (40, 187)
+    assert names["depth"].shape == (40, 36, 64)
+    assert names["occupied"].shape == (40, 17, 11, 11)
+    assert 0.04 < np.isnan(names["measured"]).mean() < 0.3
 
 
 @pytest.mark.usefixtures("healthy_robots")

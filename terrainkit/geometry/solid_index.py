@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.geometry.ray_grid import NUDGE, Floats, RayGrid
 from terrainkit.geometry.segments import segment_indices
 from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
 
@@ -12,8 +13,8 @@ _MAX_PAIRS = 2_000_000
 _MIN_BIN, _MAX_BINS = 0.5, 1_000_000
 """Minimum side of the bins of the index [m], and their largest number."""
 
-_VERTICAL = 1e-6
-"""Largest z component of the unit normal of a vertical face."""
+_PARALLEL = 1e-6
+"""Largest cosine of the angle between a line and the normal of a face that it is parallel to."""
 
 Crossings = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]
 """Index of the line, index of the solid, bottom and top [m] of each crossing, shapes (k,)."""
@@ -32,7 +33,8 @@ class SolidIndex:
         Args:
             solids: The solids.
             radius: Widen every solid horizontally by this distance [m], one number or shape (n,);
-                edges become sharp, not round, so corners are widened by more.
+                edges become sharp, not round, so corners are widened by more. A negative distance
+                narrows solids.
         """
         self._number = len(solids)
         if not self._number:
@@ -43,8 +45,9 @@ class SolidIndex:
         self._cylinders, self._num_boxes = solids.cylinders.astype(float), len(solids.boxes)
         self._axes = rotation_matrices(solids.cylinders[:, 6:])[..., 2]
         # Single precision rounds by less than a tenth of a millimeter.
-        margin = self._radius[:, None] + 1e-4
+        margin = np.maximum(self._radius[:, None], 0.0) + 1e-4
         lower, upper = solids.bounds()
+        self._bottom, self._top = lower[:, 2] - 1e-4, upper[:, 2] + 1e-4
         self._lower, self._upper = lower[:, :2] - margin, upper[:, :2] + margin
         self._make_bins()
 
@@ -78,6 +81,10 @@ class SolidIndex:
         result = np.full((len(xy), int(rank.max(initial=-1)) + 1, 2), np.nan)
         result[line, rank] = np.column_stack([bottom, top])
         return result
+
+    def count(self, xy: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Return the number of solids on the vertical line through each of `xy` [m], shape (n,)."""
+        return np.bincount(self.crossings(xy)[0], minlength=len(xy))
 
     def crossings(self, xy: NDArray[np.float64]) -> Crossings:
         """Return the solids that the vertical lines through `xy` cross.
@@ -125,55 +132,104 @@ class SolidIndex:
         solid = self._solids[starts[line] + place]
         near = ((xy[line] >= self._lower[solid]) & (xy[line] <= self._upper[solid])).all(axis=1)
         line, solid = line[near], solid[near]
-        bottom, top = self._between_planes(xy[line], solid)
-        k = solid - self._num_boxes
-        round_ = (k >= 0) & (k < len(self._cylinders))
-        low, high = self._inside_cylinders(xy[line[round_]], k[round_])
-        bottom[round_] = np.maximum(bottom[round_], low)
-        top[round_] = np.minimum(top[round_], high)
+        bottom, top = self._between_planes(xy[line], None, solid)
+        round_, k = self._round(solid)
+        z = self._cylinders[k, 2]
+        up = np.tile(np.array([0.0, 0.0, 1.0]), (len(k), 1))
+        points = np.column_stack([xy[line[round_]], z])
+        low, high = self._inside_cylinders(points, up, k)
+        bottom[round_] = np.maximum(bottom[round_], z + low)
+        top[round_] = np.minimum(top[round_], z + high)
         hit = top > bottom
         return line[hit], solid[hit], bottom[hit], top[hit]
 
+    def first_hits(self, origins: Floats, directions: Floats, limits: Floats) -> Floats:
+        """Return the distance at which each ray meets a solid [m], its limit where it does not.
+
+        Args:
+            origins: Starts [m], shape (n, 3). A ray that starts in a solid meets its far side, as
+                MuJoCo's `mj_ray` does.
+            directions: Unit vectors, shape (n, 3).
+            limits: Largest distance of each ray [m], shape (n,).
+        """
+        result = limits.copy()
+        if not self._number:
+            return result
+        rectangle, rays = (np.zeros(2), self._shape.astype(float)), (origins, directions, limits)
+        grid = RayGrid.enter(rays, self._corner, self._bin, rectangle)
+        ends = np.concatenate([[0], self._ends])
+        while len(grid.rays):
+            i, j, leave, (low, high) = grid.square(1.0)
+            bins = np.minimum((i * self._shape[1] + j).astype(np.int64), len(self._ends) - 1)
+            row, place = segment_indices(ends[bins + 1] - ends[bins])
+            solid = self._solids[ends[bins[row]] + place]
+            near = (low[row] <= self._top[solid]) & (high[row] >= self._bottom[solid])
+            ray, solid = grid.rays[row[near]], solid[near]
+            hit = self._ray_hits(origins[ray], directions[ray], solid)
+            np.minimum.at(result, ray, hit)
+            grid.move(leave + NUDGE, result[grid.rays] > leave)
+        return result
+
+    def _ray_hits(self, starts: Floats, directions: Floats, solid: NDArray[np.int64]) -> Floats:
+        """Return the distance at which each ray meets a solid [m], inf where it does not."""
+        low, high = self._between_planes(starts, directions, solid)
+        round_, k = self._round(solid)
+        inside = self._inside_cylinders(starts[round_], directions[round_], k)
+        low[round_] = np.maximum(low[round_], inside[0])
+        high[round_] = np.minimum(high[round_], inside[1])
+        return np.where((high > low) & (high >= 0), np.where(low >= 0, low, high), np.inf)
+
+    def _round(self, solid: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the positions of the cylinders among solids, and their numbers."""
+        k = solid - self._num_boxes
+        round_ = np.flatnonzero((k >= 0) & (k < len(self._cylinders)))
+        return round_, k[round_]
+
     def _between_planes(
-        self, xy: NDArray[np.float64], solid: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the interval of z between the faces of each solid; empty if top < bottom."""
+        self, starts: Floats, directions: Floats | None, solid: NDArray[np.int64]
+    ) -> tuple[Floats, Floats]:
+        """Return the interval of lines between the faces of each solid; empty if top < bottom.
+
+        Args:
+            starts: Points of the lines; shape (n, 2) for vertical lines, else (n, 3).
+            directions: Directions, shape (n, 3); None for vertical lines.
+            solid: Solids, shape (n,).
+        """
         if not len(solid):
             return np.empty(0), np.empty(0)
         pair, place = segment_indices(self._num_planes[solid])
         normal, distance = np.split(self._planes[self._first_plane[solid][pair] + place], [3], 1)
         # A half-space n . p <= d that is widened horizontally by r has the distance d + r |n_xy|.
         left = distance[:, 0] + self._radius[solid][pair] * np.hypot(normal[:, 0], normal[:, 1])
-        left -= (normal[:, :2] * xy[pair]).sum(axis=1)
-        nz = normal[:, 2]
-        steep = np.abs(nz) <= _VERTICAL
-        z = left / np.where(steep, 1.0, nz)
-        # A vertical face does not bound z: the line is on one side of it.
-        outside = steep & (left < -1e-9)
-        bottom = np.where(outside, np.inf, np.where(~steep & (nz < 0), z, -np.inf))
-        top = np.where(outside, -np.inf, np.where(~steep & (nz > 0), z, np.inf))
+        left -= (normal[:, : starts.shape[1]] * starts[pair]).sum(axis=1)
+        rate = normal[:, 2] if directions is None else (normal * directions[pair]).sum(axis=1)
+        parallel = np.abs(rate) <= _PARALLEL
+        t = left / np.where(parallel, 1.0, rate)
+        # A parallel face does not bound the line, which is on one side of it.
+        outside = parallel & (left < -1e-9)
+        bottom = np.where(outside, np.inf, np.where(~parallel & (rate < 0), t, -np.inf))
+        top = np.where(outside, -np.inf, np.where(~parallel & (rate > 0), t, np.inf))
         first = np.cumsum(self._num_planes[solid]) - self._num_planes[solid]
         return np.maximum.reduceat(bottom, first), np.minimum.reduceat(top, first)
 
     def _inside_cylinders(
-        self, xy: NDArray[np.float64], k: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the interval of z inside the infinite cylinders `k`; empty if top < bottom."""
-        axis, center = self._axes[k], self._cylinders[k, :3]
+        self, starts: Floats, directions: Floats, k: NDArray[np.int64]
+    ) -> tuple[Floats, Floats]:
+        """Return the interval of lines inside the infinite cylinders `k`; empty if top < bottom."""
+        axis, offset = self._axes[k], starts - self._cylinders[k, :3]
         radius = self._cylinders[k, 3] + self._radius[k + self._num_boxes]
-        # The distance from the axis of the point at height center_z + t is |q + t e|.
-        offset = np.column_stack([xy - center[:, :2], np.zeros(len(k))])
+        # The distance from the axis of the point at t is |q + t e|.
         q = offset - axis * (axis * offset).sum(axis=1, keepdims=True)
-        e = np.array([0.0, 0.0, 1.0]) - axis * axis[:, 2:]
+        e = directions - axis * (axis * directions).sum(axis=1, keepdims=True)
         a, b = (e * e).sum(axis=1), (q * e).sum(axis=1)
         c = (q * q).sum(axis=1) - radius**2
-        upright = a < _VERTICAL**2
-        # The line is inside where a t^2 + 2 b t + c <= 0. Along an upright axis, a and b are 0.
+        parallel = a < _PARALLEL**2
+        # The line is inside where a t^2 + 2 b t + c <= 0. Along the axis, a and b are 0.
         root = np.sqrt(np.clip(b**2 - a * c, 0, None))
-        scale = np.where(upright, 1.0, a)
-        miss = np.where(upright, c > 0, b**2 < a * c)
-        low = np.where(upright, -np.inf, center[:, 2] - (b + root) / scale)
-        high = np.where(upright, np.inf, center[:, 2] - (b - root) / scale)
+        scale = np.where(parallel, 1.0, a)
+        miss = np.where(parallel, c > 0, b**2 < a * c)
+        low = np.where(parallel, -np.inf, -(b + root) / scale)
+        high = np.where(parallel, np.inf, -(b - root) / scale)
         return np.where(miss, np.inf, low), np.where(miss, -np.inf, high)
 
 

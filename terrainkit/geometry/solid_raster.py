@@ -1,14 +1,18 @@
 """SolidRaster: solids sampled on a fine grid, for fast height scans of many robots."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.solid_index import SolidIndex
-from terrainkit.geometry.solids import Solids
+from terrainkit.geometry.solids import Solids, rotation_matrices
 
 PIXEL = 0.025
 """Distance between two samples [m]; an edge is off by at most half of it."""
+_TILT = 1e-12
+"""Largest difference between 1 and the z component of the axis of a level solid."""
 
 
 class SolidRaster:
@@ -18,33 +22,87 @@ class SolidRaster:
     each solid.
     """
 
-    def __init__(self, solids: Solids) -> None:
+    def __init__(self, solids: Solids, *, exact: bool = False) -> None:
         """Sample solids on a grid of pixels of side `PIXEL`.
 
         Args:
             solids: The solids.
+            exact: Compute the intersections in pixels in which a solid ends, or is not level.
 
         Raises:
             MemoryLimitError: if the samples would not fit in memory.
         """
-        lower, upper = (corners[:, :2] for corners in solids.bounds())
-        self._corner = lower.min(axis=0, initial=0.0)
-        extent = upper.max(axis=0, initial=0.0) - self._corner
+        corners = np.stack(solids.bounds())[..., :2]
+        self._corner = corners[0].min(axis=0, initial=0.0)
+        extent = corners[1].max(axis=0, initial=0.0) - self._corner
         self._shape = np.ceil(extent / PIXEL).astype(np.int64) + 1
         pixels_total = int(self._shape.prod())
         check_memory(pixels_total * 5, f"a height scan of solids with {pixels_total} pixels")
-        covered = np.zeros(self._shape, dtype=bool)
-        first = np.floor((lower - self._corner) / PIXEL).astype(np.int64)
-        last = np.ceil((upper - self._corner) / PIXEL).astype(np.int64)
-        for (i0, j0), (i1, j1) in zip(first, last, strict=True):
-            covered[i0 : i1 + 1, j0 : j1 + 1] = True
-        pixels = np.argwhere(covered)
-        bounds = SolidIndex(solids).intervals(self._corner + (pixels + 0.5) * PIXEL)
+        pixels = np.argwhere(self._covered(corners))
+        centers = self._corner + (pixels + 0.5) * PIXEL
+        self._index = SolidIndex(solids)
+        self._row = np.zeros(self._shape, dtype=np.int32)
+        if exact:
+            level = _is_level(solids)
+            is_mixed = self._covered(corners[:, ~level])[tuple(pixels.T)]
+            rest = np.flatnonzero(~is_mixed)
+            radius = 0.5001 * 2**0.5 * PIXEL
+            touch = SolidIndex(solids, radius=radius).count(centers[rest])
+            fill = SolidIndex(solids.select(level), radius=-radius).count(centers[rest])
+            is_mixed[rest] = touch != fill
+            self._row[tuple(pixels[is_mixed].T)] = -1
+            keep = rest[(touch == fill) & (touch > 0)]
+            pixels, centers = pixels[keep], centers[keep]
+        bounds = self._index.intervals(centers)
         # Row 0 of the table has no solids; NaN compares as False.
         self._bounds = np.full((len(pixels) + 1, *bounds.shape[1:]), np.nan, dtype=np.float32)
         self._bounds[1:] = bounds
-        self._row = np.zeros(self._shape, dtype=np.int32)
         self._row[tuple(pixels.T)] = np.arange(1, len(pixels) + 1)
+
+    def _covered(self, corners: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return the pixels that bounding boxes overlap.
+
+        Args:
+            corners: Lower and upper corners [m], shape (2, n, 2).
+        """
+        covered = np.zeros(self._shape, dtype=bool)
+        first = np.floor((corners[0] - self._corner) / PIXEL).astype(np.int64)
+        last = np.ceil((corners[1] - self._corner) / PIXEL).astype(np.int64)
+        for (i0, j0), (i1, j1) in zip(first, last, strict=True):
+            covered[i0 : i1 + 1, j0 : j1 + 1] = True
+        return covered
+
+    def bounds(
+        self, x: NDArray[np.floating], y: NDArray[np.floating]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+        """Return the solids above and below points.
+
+        Args:
+            x: Points along x [m], of any shape.
+            y: Points along y [m], of the same shape.
+
+        Returns:
+            Indices of the m points with solids in the raveled arrays, shape (m,), and bottom and
+            top of each solid there [m], padded with NaN, shape (m, k, 2).
+        """
+        x, y = x.ravel(), y.ravel()
+        i = ((x - self._corner[0]) / PIXEL).astype(np.int64)
+        j = ((y - self._corner[1]) / PIXEL).astype(np.int64)
+        # The conversion to integers rounds toward 0, so the lower bound is checked before it.
+        above = (x >= self._corner[0]) & (y >= self._corner[1])
+        inside = above & (i < self._shape[0]) & (j < self._shape[1])
+        row = self._row.reshape(-1).take((i * self._shape[1] + j) * inside) * inside
+        hit = np.flatnonzero(row)
+        row = row.take(hit)
+        bounds = self._bounds.take(np.maximum(row, 0), axis=0)
+        mixed = np.flatnonzero(row < 0)
+        if len(mixed):
+            points = np.stack([x.take(hit[mixed]), y.take(hit[mixed])], axis=1).astype(float)
+            exact = self._index.intervals(points)
+            more = max(0, exact.shape[1] - bounds.shape[1])
+            bounds = np.pad(bounds, ((0, 0), (0, more), (0, 0)), constant_values=np.nan)
+            bounds[mixed, : exact.shape[1]] = exact
+        return hit, bounds
 
     def top(
         self, x: NDArray[np.float32], y: NDArray[np.float32], z: NDArray[np.float32] | float
@@ -61,15 +119,37 @@ class SolidRaster:
         Returns:
             Heights [m], of the broadcast shape; -inf without such a solid.
         """
-        i = ((x - self._corner[0]) / PIXEL).astype(np.int64)
-        j = ((y - self._corner[1]) / PIXEL).astype(np.int64)
-        # The conversion to integers rounds toward 0, so the lower bound is checked before it.
-        above = (x >= self._corner[0]) & (y >= self._corner[1])
-        inside = above & (i < self._shape[0]) & (j < self._shape[1])
-        row = self._row[np.where(inside, i, 0), np.where(inside, j, 0)] * inside
-        result = np.full(np.broadcast_shapes(row.shape, np.shape(z)), -np.inf, dtype=np.float32)
-        hit = np.broadcast_to(row > 0, result.shape)
-        bottom, top = np.moveaxis(self._bounds[np.broadcast_to(row, result.shape)[hit]], -1, 0)
-        reached = bottom <= np.broadcast_to(z, result.shape)[hit][:, None]
-        result[hit] = np.max(top, axis=1, where=reached, initial=-np.inf)
+        hit, bounds, z, result = self._lookup(x, y, z, -np.inf)
+        reached = bounds[..., 0] <= z
+        result.put(hit, np.max(bounds[..., 1], axis=1, where=reached, initial=-np.inf))
         return result
+
+    def ceiling(
+        self, x: NDArray[np.float32], y: NDArray[np.float32], z: NDArray[np.float32] | float
+    ) -> NDArray[np.float32]:
+        """Return the lowest bottom of the solids whose bottom is above `z`; inf without one.
+
+        Args:
+            x: Points along x [m].
+            y: Points along y [m].
+            z: Height of the robot at each point [m]; x, y and z are broadcast.
+        """
+        hit, bounds, z, result = self._lookup(x, y, z, np.inf)
+        beyond = bounds[..., 0] > z
+        result.put(hit, np.min(bounds[..., 0], axis=1, where=beyond, initial=np.inf))
+        return result
+
+    def _lookup(self, x: Any, y: Any, z: Any, fill: float) -> tuple[NDArray[Any], ...]:
+        """Return points with solids, their bounds, their z, and a result for all points."""
+        x, y, z = np.broadcast_arrays(x, y, z)
+        hit, bounds = self.bounds(x, y)
+        return hit, bounds, z.ravel().take(hit)[:, None], np.full(x.shape, fill, np.float32)
+
+
+def _is_level(solids: Solids) -> NDArray[np.bool_]:
+    """Return the boxes and cylinders whose top and bottom are level, as a mask of all solids."""
+    shapes = np.concatenate([solids.boxes, solids.cylinders]).astype(float)
+    upward = np.abs(rotation_matrices(shapes[:, 6:])[:, 2])
+    is_box = np.arange(len(shapes)) < len(solids.boxes)
+    level = np.where(is_box, upward.max(axis=1, initial=0.0), upward[:, 2]) > 1 - _TILT
+    return np.append(level, np.zeros(len(solids.hull_counts), bool))

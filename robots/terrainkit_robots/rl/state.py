@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.perception.height_scan import HeightScan
 from terrainkit_robots import transforms
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.simulation import Simulation
@@ -95,9 +96,8 @@ class Sensors:
         self._dt = np.float32(task.dt)
         self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
-        points = np.stack([each.ravel() for each in np.meshgrid(x, y, indexing="ij")])
+        self._scan = HeightScan(terrain, x if scan else (), y)
         self._near_foot = _offsets(NEAR_FOOT * leg_length)
-        self._scan_points = points[:, : None if scan else 0].astype(np.float32)
 
     def scan_points(self, pos: FloatArray, quat: FloatArray) -> tuple[FloatArray, ...]:
         """Return x, y and z of the points of the height scan [m], shape (n, k) each.
@@ -106,11 +106,7 @@ class Sensors:
             pos: Positions of the base [m], shape (n, 3).
             quat: Orientations of the base (w, x, y, z), shape (n, 4).
         """
-        # The points turn with the yaw.
-        (x, y), yaw = self._scan_points, transforms.quat_to_yaw(quat)[:, None]
-        c, s = np.cos(yaw), np.sin(yaw)
-        x, y = pos[:, :1] + c * x - s * y, pos[:, 1:2] + s * x + c * y
-        return x, y, self._terrain.height(x, y, pos[:, 2:], scan=True)
+        return self._scan.points(pos, transforms.quat_to_yaw(quat))
 
     def read(self, rows: Any, last: State | None) -> dict[str, Any]:
         """Return the measured fields of `State`.

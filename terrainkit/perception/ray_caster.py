@@ -1,0 +1,151 @@
+"""RayCaster: depth images and lidar scans of the ground and the solids."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from terrainkit.curriculum.arrays import like
+from terrainkit.errors import ConfigError
+from terrainkit.geometry.ground_rays import GroundRays
+from terrainkit.geometry.solid_index import SolidIndex
+from terrainkit.geometry.solids import rotation_matrices
+from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.perception.height_scan import to_floats
+
+_RAYS_AT_ONCE = 16_384
+"""Rays that are cast at once, so that their arrays stay in the cache."""
+
+Floats = NDArray[np.float64]
+
+
+class RayCaster:
+    """Rays against the ground, with its vertical walls, and the visible solids of a map.
+
+    The ground ends at the edge of the map. A ray that starts below the ground has distance 0; a ray
+    that starts in a solid meets its far side, as with MuJoCo's `mj_ray`.
+    """
+
+    def __init__(self, terrain_map: TerrainMap) -> None:
+        """Prepare the ground and the solids.
+
+        Args:
+            terrain_map: The map.
+        """
+        threshold, solids = terrain_map.config.wall_threshold, terrain_map.solids
+        first, cell = terrain_map.first_sample, terrain_map.grid.cell
+        self._ground = GroundRays(terrain_map.heights, first, cell, threshold)
+        self._solids = SolidIndex(solids.select(solids.visible))
+
+    def cast(self, origins: Any, directions: Any, max_distance: float = 10.0) -> Any:
+        """Return the distance along each ray to the first surface [m], inf where there is none.
+
+        Args:
+            origins: Starts of the rays [m], shape (n, 3).
+            directions: Directions of any length above 0, shape (n, 3).
+            max_distance: Largest distance [m].
+
+        Returns:
+            Distances [m], shape (n,), single precision.
+
+        Raises:
+            ConfigError: if a shape is wrong, a value is not finite, or a direction is 0.
+        """
+        starts = to_floats("origins", origins, [None, 3]).astype(np.float64)
+        given = to_floats("directions", directions, [len(starts), 3])
+        return like(self._cast(starts, _units(given), max_distance), origins)
+
+    def sense(self, position: Any, quat: Any, directions: Any, max_distance: float = 10.0) -> Any:
+        """Return what sensors of the same kind measure at n poses.
+
+        Args:
+            position: Positions of the sensors [m], shape (n, 3).
+            quat: Orientations of the sensors (w, x, y, z), shape (n, 4).
+            directions: Directions in the frame of the sensor, shape (..., 3), such as
+                :func:`depth_directions` or :func:`lidar_directions`.
+            max_distance: Largest distance [m].
+
+        Returns:
+            Distances along the rays [m], shape (n, ...), single precision; inf where there is no
+            surface. The depth in an image is the distance times the x of the direction.
+
+        Raises:
+            ConfigError: if a shape is wrong, a value is not finite, or a direction or quaternion is
+                0.
+        """
+        starts = to_floats("position", position, [None, 3]).astype(np.float64)
+        turns = rotation_matrices(_units(to_floats("quat", quat, [len(starts), 4])))
+        shape = np.shape(directions)[:-1]
+        pattern = _units(to_floats("directions", directions, [*shape, 3]).reshape(-1, 3))
+        result = np.empty((len(starts), len(pattern)), np.float32)
+        size = max(1, _RAYS_AT_ONCE // max(1, len(pattern)))
+        for k in range(0, len(starts), size):
+            rows = slice(k, k + size)
+            toward = np.einsum("nij,kj->nki", turns[rows], pattern).reshape(-1, 3)
+            origins = np.repeat(starts[rows], len(pattern), axis=0)
+            result[rows] = self._cast(origins, toward, max_distance).reshape(-1, len(pattern))
+        return like(result.reshape(len(starts), *shape), position)
+
+    def _cast(self, origins: Floats, directions: Floats, max_distance: float) -> Any:
+        if not max_distance > 0:
+            raise ConfigError(f"max_distance: got {max_distance}; expected a number above 0")
+        result = np.empty(len(origins), np.float32)
+        for k in range(0, len(origins), _RAYS_AT_ONCE):
+            starts, toward = (each[k : k + _RAYS_AT_ONCE] for each in (origins, directions))
+            limits = np.full(len(starts), float(max_distance))
+            ground = self._ground.cast(starts, toward, limits)
+            found = self._solids.first_hits(starts, toward, ground)
+            result[k : k + _RAYS_AT_ONCE] = np.where(found < limits, found, np.inf)
+        return result
+
+
+def depth_directions(width: int, height: int, fov: float = 1.5) -> Floats:
+    """Return the directions of the pixels of a depth camera, which looks along x; z is up.
+
+    Args:
+        width: Pixels per row.
+        height: Number of rows.
+        fov: Horizontal field of view, from edge to edge of the image [rad].
+
+    Returns:
+        Unit vectors, shape (height, width, 3): the first is at the upper left.
+
+    Raises:
+        ConfigError: if the image is empty, or the field of view is not between 0 and pi.
+    """
+    if width < 1 or height < 1 or not 0 < fov < np.pi:
+        raise ConfigError(
+            f"depth camera: got {width} x {height} pixels and fov {fov:g}; expected at least 1 x 1 "
+            "pixels and an angle between 0 and pi, such as 1.5"
+        )
+    pixel = 2 * np.tan(fov / 2) / width
+    y, z = (pixel * ((n - 1) / 2 - np.arange(n)) for n in (width, height))
+    left, up = np.meshgrid(y, z)
+    return _units(np.stack([np.ones_like(left), left, up], axis=-1))
+
+
+def lidar_directions(elevations: Sequence[float], num_azimuths: int = 360) -> Floats:
+    """Return the directions of a lidar, whose axis is z.
+
+    Args:
+        elevations: Angle of each channel above the horizontal plane [rad].
+        num_azimuths: Rays per channel and turn; the first is along x, and they turn to the left.
+
+    Returns:
+        Unit vectors, shape (channels, num_azimuths, 3).
+    """
+    elevation = to_floats("elevations", elevations, [None])[:, None]
+    azimuth = 2 * np.pi * np.arange(num_azimuths) / num_azimuths
+    x, y, z = np.broadcast_arrays(
+        np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)
+    )
+    return np.stack([x, y, z], axis=-1)
+
+
+def _units(vectors: NDArray[Any]) -> Floats:
+    vectors = vectors.astype(np.float64)
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if not (length > 0).all():
+        raise ConfigError("directions and quaternions: got a length of 0; expected more than 0")
+    return np.asarray(vectors / length)

@@ -1,0 +1,98 @@
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from terrainkit.errors import ConfigError
+from terrainkit.integrations.mujoco import make_spec
+from terrainkit.perception import RayCaster, depth_directions, lidar_directions
+from tests.terrainkit.test_every_view import mesh_model
+
+
+@pytest.mark.parametrize(
+    ("origin", "direction", "distance"),
+    [
+        ((0.45, 1.0, 0.25), (1, 0, 0), 0.55),  # the wall
+        ((0.45, 1.0, 0.51), (1, 0, 0), np.inf),  # above it, over the edge of the map
+        ((1.55, 1.0, 0.75), (-1, 0, 0), np.inf),
+        ((0.45, 1.0, 0.25), (0, 0, -2), 0.25),
+        ((1.0 + 1e-4, 1.0, 1.0), (0, 0, -1), 0.5),
+        ((1.0 - 1e-4, 1.0, 1.0), (0, 0, -1), 1.0),
+        ((0.7, 0.7, 0.3), (3, 0, 4), np.inf),
+        ((0.7, 1.0, 0.4), (3, 0, -4), 0.5),  # the ground, 0.3 m ahead
+        ((0.7, 1.0, 0.4), (3, 4, 0), 0.5),
+        ((-0.5, 1.0, 0.3), (1, 0, -0.1), 1.5 * 1.01**0.5),  # from beyond the map
+        ((1.5, 1.0, 0.4), (0, 0, 1), 0.0),  # below the ground
+    ],
+)
+def test_distance_to_a_step(step_map, origin, direction, distance):
+    found = RayCaster(step_map).cast([origin], [direction])
+    assert found.tolist() == [pytest.approx(distance, abs=1e-5)]
+
+
+def cast(model, origins, directions):
+    data, normal, geom = mujoco.MjData(model), np.zeros(3), np.zeros(1, np.int32)
+    mujoco.mj_forward(model, data)
+    seen = np.array([1, 1, 1, 0, 1, 1], np.uint8)
+    pairs = zip(origins, directions, strict=True)
+    found = [mujoco.mj_ray(model, data, *pair, seen, 1, -1, geom, normal) for pair in pairs]
+    return np.where(np.array(found) < 0, np.inf, found)
+
+
+@pytest.mark.parametrize("name", ["terrain_map", "level_map", "solid_map"])
+def test_distances_are_those_of_mujoco(name, request):
+    terrain_map = request.getfixturevalue(name)
+    boxes = name == "solid_map"  # its mesh has no solids that do not collide
+    spec = make_spec(terrain_map, collision="boxes").compile() if boxes else None
+    model = spec or mesh_model(terrain_map.mesh())
+    rng, grid = np.random.default_rng(0), terrain_map.grid
+    xy = rng.uniform(np.add(grid.lower, 0.3), np.subtract(grid.upper, 0.3), (1500, 2))
+    origins = np.column_stack([xy, terrain_map.height(xy) + rng.uniform(0.05, 0.9, len(xy))])
+    directions = rng.standard_normal((len(xy), 3)) * [1, 1, 0.3]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    expected = cast(model, origins, directions)
+    expected[expected > 10] = np.inf
+    rays = RayCaster(terrain_map)
+    # Rounding decides whether a ray passes an edge, and rays that graze the ground multiply it.
+    moved = [
+        rays.cast(origins + 1e-4 * np.array(offset), directions)
+        for offset in np.stack(np.meshgrid(*[(-1, 0, 1)] * 3), -1).reshape(-1, 3)
+    ]
+    assert (np.min(moved, axis=0) - 1e-3 <= expected).all()
+    assert (np.max(moved, axis=0) + 1e-3 >= expected).all()
+    assert (np.isclose(moved[13], expected, 0, 1e-3)).mean() > 0.995
+    assert np.isfinite(expected).mean() > 0.3
+
+
+def test_ray_that_starts_in_a_solid_meets_its_far_side(solid_map):
+    found = RayCaster(solid_map).cast([[5.2, 6.2, 0.5]] * 2, [[0, 0, 1], [0, 1, 0]])
+    assert found.tolist() == pytest.approx([0.1, 0.3])
+
+
+def test_sensors_turn_with_their_quaternion(step_map):
+    half = np.sqrt(0.5)
+    quat = torch.tensor([[1.0, 0, 0, 0], [half, 0, half, 0], [half, 0, 0, half]])
+    position = torch.tensor([[0.45, 1.0, 0.25]]).expand(3, 3)
+    found = RayCaster(step_map).sense(position, quat, [[[1.0, 0, 0]]], max_distance=0.6)
+    assert isinstance(found, torch.Tensor)
+    assert found.shape == (3, 1, 1)
+    assert found.flatten().tolist() == pytest.approx([0.55, 0.25, np.inf])  # ahead, down, left
+
+
+def test_directions_of_sensors():
+    image = depth_directions(4, 2, fov=np.pi / 2)  # the edges are at y = 1 and -1
+    assert image.shape == (2, 4, 3)
+    assert (image[0, 0] / image[0, 0, 0]).tolist() == pytest.approx([1, 0.75, 0.25])
+    assert (image[1, 3] / image[1, 3, 0]).tolist() == pytest.approx([1, -0.75, -0.25])
+    ring = lidar_directions([0.0, np.pi / 6], 4)
+    assert ring[1, 1].tolist() == pytest.approx([0, 3**0.5 / 2, 0.5])
+
+
+def test_invalid_rays_are_rejected(step_map):
+    rays = RayCaster(step_map)
+    with pytest.raises(ConfigError, match="got a length of 0"):
+        rays.cast([[0, 0, 0]], [[0, 0, 0]])
+    with pytest.raises(ConfigError, match="max_distance: got 0"):
+        rays.cast([[0, 0, 0]], [[0, 0, 1]], 0)
+    with pytest.raises(ConfigError, match=r"such as 1\.5"):
+        depth_directions(4, 2, fov=4.0)
