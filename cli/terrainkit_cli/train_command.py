@@ -57,11 +57,11 @@ class Train(PluginCommand, ConfigCommand):
     """Folder of the run, new or empty; by default logs/ROBOT/DATE-TIME."""
 
     resume: Annotated[str, option("RUN")] = ""
-    """Continue a run: its folder, or one of its checkpoints. Robot, terrain and task default to the
-    run's own. Training continues in the same folder, as if it had not been interrupted. With
-    another terrain or task, a new run starts with the networks of this run. It also starts with its
-    optimizer state if --algorithm.learning-rate and --algorithm.schedule are the same, and with its
-    terrain levels if the map is the same."""
+    """Continue a run: its folder, or one of its checkpoints. Without ROBOT, robot and task are the
+    run's own; without --terrain, the terrain. Training continues in the same folder, as if it had
+    not been interrupted. With another terrain or task, a new run starts with the networks of this
+    run. It also starts with its optimizer state if --algorithm.learning-rate and
+    --algorithm.schedule are the same, and with its terrain levels if the map is the same."""
 
     device: Device = "cpu"
     """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""
@@ -79,13 +79,14 @@ class Train(PluginCommand, ConfigCommand):
         given, rest = cls.split(argv)
         from terrainkit_robots.rl.tasks import get_task, load_task_file
 
-        own = load_task_file(path) if (path := given.get("task")) else None
-        if resume := given.get("resume"):
+        if path := given.get("task"):
+            task = load_task_file(path).task
+        elif (resume := given.get("resume")) and not _names_task(rest):
             from terrainkit_robots.rl.run import open_run
 
-            task = open_run(resume).task if own is None else own.task
+            task = open_run(resume).task
         else:
-            task = get_task(_task_word(rest)).task if own is None else own.task
+            task = get_task(_task_word(rest)).task
         path = given.get("config")
         return type(task).load(path, task) if path else task
 
@@ -121,6 +122,13 @@ class Train(PluginCommand, ConfigCommand):
             signal_number = stop_signal() if completed < task.runner.max_iterations else 0
         _print_result(runner, task, self.task)
         return 128 + signal_number if signal_number else 0
+
+
+def _names_task(argv: Sequence[str]) -> bool:
+    """Return whether ROBOT is among words."""
+    from terrainkit_robots.rl.tasks import task_names
+
+    return any(word in task_names() or isdir(word) for word in argv)  # noqa: PTH112 - see below
 
 
 def _task_word(argv: Sequence[str]) -> str:

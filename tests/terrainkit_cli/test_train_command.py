@@ -75,6 +75,15 @@ def test_train_resumes_a_run(train, tmp_path, capsys):
     assert capsys.readouterr().err.endswith("than the 2 iterations that are completed\n")
 
 
+def test_a_named_task_replaces_the_task_of_the_run(train, tmp_path):
+    words = ("--num-envs", 4, "--max-iterations", 1)
+    assert train("quadruped", *words, "--rewards.progress", 0.25, "--log-dir", "run") == 0
+    for named, name, expected in ((("quadruped",), "a", 0.5), ((), "b", 0.25)):
+        given = (*named, "--resume", "run", "--rewards.collision", -2, "--log-dir", name)
+        assert train(*given, *words) == 0
+        assert open_run(tmp_path / name).task.rewards.progress == expected
+
+
 @pytest.fixture
 def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Return a function that makes training raise signals in an iteration."""
