@@ -83,6 +83,15 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "boxes": {"height": (0.05, 0.3)},
         "rails": {"width": (0.05, 0.2), "height": (0.05, 0.2)},
     },
+    # Stones of 0.1 m, ramps of 1:12 to 1:8, and steps with the riser of `staircase`.
+    "street": {
+        "street": {"proportion": 2.0},
+        "sidewalk": {},
+        "road": {},
+        "cobblestones": {"terrain": "random_grid", "height": (0.005, 0.025), "block": 0.1},
+        "street_ramp": {"terrain": "slope", "grade": (0.083, 0.125), "landing": 1.5},
+        "steps": {"terrain": "staircase", "number": 3, "nosing": 0.0},
+    },
     # Courses of one obstacle as in the training of both, and mixed ones as in their distillation.
     "parkour_course": {
         **{
