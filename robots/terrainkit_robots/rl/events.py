@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 MAX_RESET_RELIEF = 0.06
 """Height range of the ground under a robot that is not reset exactly at its origin [m]."""
 
+MAX_PUSH, BIPED_MAX_PUSH = 1.25, 0.75
+"""Default of the largest velocity that a push adds along x and along y [m/s]."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class EventTerm:
@@ -165,7 +168,9 @@ def push(env: "LeggedEnv") -> None:
     """Add a velocity to the robots that are due, at regular intervals."""
     env.push_vel[:] = 0
     if interval := push_interval(env):
-        limit = env.cfg.domain_rand.max_push_vel_xy
+        default = BIPED_MAX_PUSH if len(env.robot.spec.feet) == 2 else MAX_PUSH
+        setting = env.cfg.domain_rand.max_push_vel_xy
+        limit = default if setting is None else setting
         env.steps_until_push -= 1
         env_ids = np.flatnonzero(env.steps_until_push <= 0)
         env.steps_until_push[env_ids] = interval
@@ -176,7 +181,7 @@ def push(env: "LeggedEnv") -> None:
 def push_interval(env: "LeggedEnv") -> int:
     """Return the steps between two pushes; 0 for no pushes."""
     cfg = env.cfg.domain_rand
-    is_pushed = cfg.push_interval_s and cfg.max_push_vel_xy
+    is_pushed = cfg.push_interval_s and cfg.max_push_vel_xy != 0
     return max(1, round(cfg.push_interval_s / env.cfg.dt)) if is_pushed else 0
 
 

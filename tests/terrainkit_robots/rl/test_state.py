@@ -127,6 +127,15 @@ class TestByHand:
         env.step(torch.zeros(2, 3))
         assert env.state.foot_air_time[1, 0] == pytest.approx(env.cfg.dt)
 
+    @pytest.mark.parametrize(("name", "most"), [("quadruped", 1.25), ("biped", 0.75)])
+    def test_pushes_are_weaker_on_two_legs(
+        self, request, nominal_env, no_randomization, name, most
+    ):
+        pushed = replace(no_randomization, push_interval_s=0.02, max_push_vel_xy=None)
+        env = nominal_env(64, robot=request.getfixturevalue(name), domain_rand=pushed)
+        env.step(torch.zeros(64, env.num_actions))
+        assert 0.9 * most < np.abs(env.push_vel).max() <= most
+
     def test_push_adds_to_world_velocity(self, nominal_env, cart, no_randomization):
         pushed = replace(no_randomization, push_interval_s=0.04, max_push_vel_xy=0.8)
         env = nominal_env(64, robot=cart, domain_rand=pushed)
