@@ -46,8 +46,11 @@ data.qpos[qpos_index] = joints["default_position"]
 controlled = [config["joints"]["name"].index(name) for name in config["action"]["joints"]]
 
 
-def observe(command: Any, action: Any, rotation: Any, previous: Any = None) -> Any:
-    """Return the observation; the columns of `rotation` are the axes of the base."""
+def observe(command: Any, action: Any, rotation: Any, past: Any = None) -> Any:
+    """Return the observation; the columns of `rotation` are the axes of the base.
+
+    `past` has the history of each part, and is updated.
+    """
     terms = {"commands": command, "actions": action, "projected_gravity": -rotation[2]}
     terms |= {"dof_pos": data.qpos[qpos_index], "dof_vel": data.qvel[qvel_index]}
     terms |= {"base_ang_vel": data.qvel[3:6], "base_lin_vel": rotation.T @ data.qvel[:3]}
@@ -61,16 +64,18 @@ def observe(command: Any, action: Any, rotation: Any, previous: Any = None) -> A
     if scan := config["height_scan"]:
         terms["height_scan"] = np.full(len(scan["points"]), data.qpos[2])  # above a plane
     values: list[Any] = []
+    past = {} if past is None else past
     for part in config["observation"]["parts"]:
-        if part["name"] == "history":  # at first, it repeats the current observation
-            past = np.concatenate(values) if previous is None else previous
-            terms["history"] = np.resize(past, part["stop"] - part["start"])
         if part["name"] in own:
             terms[part["name"]] = np.atleast_1d(own[part["name"]](data, rotation))
-        if np.size(terms.get(part["name"], ())) != part["stop"] - part["start"]:
+        size = part["history"] * np.size(terms.get(part["name"], ()))
+        if size != part["stop"] - part["start"]:
             sys.exit(f"observation {part['name']}: unknown; define it in a file for --observations")
         value = np.clip(terms[part["name"]] - part["offset"], *part.get("clip", (-np.inf, np.inf)))
-        values.append(value * part["scale"])
+        value = value * part["scale"]
+        steps = past.get(part["name"], part["history"] * [value])  # at first, copies
+        past[part["name"]] = [*steps[1:], value]  # the oldest first
+        values += past[part["name"]]
     return np.concatenate(values, dtype=np.float32)
 
 
@@ -79,12 +84,13 @@ if args.viewer:
 
     viewer = mujoco.viewer.launch_passive(model, data)
 command, action = np.array([args.vx, args.vy, args.yaw]), np.zeros(len(controlled))
-rotation, velocity, obs = np.eye(3), np.zeros(3), None
+rotation, velocity = np.eye(3), np.zeros(3)
+history: dict[str, Any] = {}
 steps = max(1, round(args.seconds / timing["policy_dt"]))
 memory = config["recurrent"] or {"inputs": []}  # the state of a recurrent network
 state = {name: np.zeros(memory["shape"], np.float32) for name in memory["inputs"]}
 for _ in range(steps):
-    obs = observe(command, action, rotation, obs)
+    obs = observe(command, action, rotation, history)
     (action, *_), *values = policy.run(None, {"obs": obs[None], **state})
     state = dict(zip(memory["inputs"], values, strict=True))
     target = joints["action_offset"].copy()

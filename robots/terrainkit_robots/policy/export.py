@@ -3,7 +3,7 @@
 import io
 import json
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import onnx
 import torch
+from numpy.typing import NDArray
 from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
@@ -34,6 +35,7 @@ from terrainkit_robots.policy.load import load_actor, single_torch_thread
 from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
 from terrainkit_robots.rl.config import Normalization
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.observations import ObservationTerm
 from terrainkit_robots.rl.rewards import MIN_YAW_RATE
 from terrainkit_robots.rl.run import Run, last_checkpoint
 from terrainkit_robots.rl.state import CONTACT_FORCE
@@ -42,7 +44,7 @@ from terrainkit_robots.transforms import FloatArray
 
 ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
 
-FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 1, "terrainkit", 17
+FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 2, "terrainkit", 17
 """Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots have."""
 
 RECURRENT_STEPS = 10
@@ -56,7 +58,8 @@ _FORMULAS = {
     "clip of its own is (clip(raw - offset, *clip)) * scale",
     "gait": "gait_phase = (sin, cos)(2 pi time / period); 0 while commanded to stand: no linear "
     "velocity, and a yaw rate below min_yaw_rate",
-    "history": "first numbers of the previous obs; in the first step, copies of the numbers before",
+    "history": "a part has its values of the last `history` steps, the oldest first; in the first "
+    "step, copies of the current ones",
     "foot_contact": "1 if the vertical contact force on the foot is above contact_force, else 0",
     "action": "target = action_offset + action_scale * action for the joints of action.joints, "
     "action_offset for the others",
@@ -116,7 +119,8 @@ def export_policy(
     scan = env.cfg.terrain.measure_heights  # also if the terrain of the training decided
     terrain = replace(run.task.terrain, measure_heights=scan)
     training["task"] = asdict(replace(run.task, terrain=terrain))
-    network = OnnxNetwork(actor, run.task.normalization)
+    order = observation_order(env)
+    network = OnnxNetwork(actor, run.task.normalization, order)
     description = describe_policy(env) | {"recurrent": network.describe_state()} | training
     text = json.dumps(description, indent=2) + "\n"
     metadata, notes = {METADATA_KEY: text}, []
@@ -141,14 +145,14 @@ def export_policy(
         # Recurrent networks check the shapes of their inputs.
         warnings.simplefilter("ignore", torch.jit.TracerWarning)
         warnings.filterwarnings("ignore", message="Exporting a model to ONNX with a batch_size")
-        onnx_data, script_file = export_onnx(network, obs, metadata), io.BytesIO()
+        onnx_data, script_file = export_onnx(network, obs[:, order], metadata), io.BytesIO()
         torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
         script = torch.jit.load(io.BytesIO(script_file.getvalue()))
         live = [network.clipped(actor, each).numpy() for each in steps]
         # TorchScript of rsl-rl keeps the state of one robot.
         rows = slice(1) if actor.is_recurrent else slice(None)
-        script_actions = [script(each[rows]).numpy() for each in steps]
-    onnx_actions = run_onnx(onnx_data, [each.numpy() for each in steps])
+        script_actions = [script(each[rows][:, order]).numpy() for each in steps]
+    onnx_actions = run_onnx(onnx_data, [each[:, order].numpy() for each in steps])
     errors = (
         verify_actions(np.stack(onnx_actions), np.stack(live), ONNX_FILE),
         verify_actions(np.stack(script_actions), np.stack(live)[:, rows], TORCHSCRIPT_FILE),
@@ -191,17 +195,23 @@ class OnnxNetwork(torch.nn.Module):
     Args:
         actor: The network.
         normalization: Limits of observations and actions.
+        order: Order of the exported observations; see `observation_order`.
     """
 
-    def __init__(self, actor: MLPModel, normalization: Normalization) -> None:
+    indices: torch.Tensor
+
+    def __init__(
+        self, actor: MLPModel, normalization: Normalization, order: NDArray[np.int64]
+    ) -> None:
         super().__init__()
+        self.register_buffer("indices", torch.from_numpy(np.argsort(order)))
         limits = normalization.clip_observations, normalization.clip_actions
         self.clip_obs, self.clip_actions = (torch.nn.Hardtanh(-limit, limit) for limit in limits)
         self.model: Any = actor.as_onnx(verbose=False).eval()
 
     def forward(self, obs: torch.Tensor, *state: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Return the actions, and the state of the next step."""
-        result = self.model(self.clip_obs(obs), *state)
+        result = self.model(self.clip_obs(obs[:, self.indices]), *state)
         actions, *new = result if state else (result,)
         return self.clip_actions(actions), *new[: len(state)]
 
@@ -221,14 +231,17 @@ class OnnxNetwork(torch.nn.Module):
 class ScriptNetwork(torch.nn.Module):
     """An actor with clipped observations and actions, which keeps its state; see `OnnxNetwork`."""
 
+    indices: torch.Tensor
+
     def __init__(self, actor: MLPModel, network: OnnxNetwork) -> None:
         super().__init__()
+        self.register_buffer("indices", network.indices)
         self.clip_obs, self.clip_actions = network.clip_obs, network.clip_actions
         self.model = actor.as_jit().eval()
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return the actions."""
-        return self.clip_actions(self.model(self.clip_obs(obs)))
+        return self.clip_actions(self.model(self.clip_obs(obs[:, self.indices])))
 
     @torch.jit.export  # type: ignore[untyped-decorator]
     def reset(self) -> None:
@@ -343,7 +356,6 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
             "parts": _observation_parts(env),
             "size": env.get_observations()["policy"].shape[1],
             "clip": task.normalization.clip_observations,
-            "history_length": env.history_length,
         },
         "action": {
             "size": env.num_actions,
@@ -364,19 +376,48 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     }
 
 
-def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
-    """Return slice, unit, offset, scale and clip of each observation term."""
-    parts, start = [], 0
+def observation_order(env: LeggedEnv) -> NDArray[np.int64]:
+    """Return where each number of an exported observation is in an observation of `env`.
+
+    The history of `env` consists of whole observations, the newest first. An exported observation
+    has the history of each term, the oldest step first, as in mjlab and Isaac Lab.
+    """
+    terms = list(_terms(env))
+    width = sum(size for *_, size, history in terms if history > 1)
+    return np.concatenate(
+        [
+            (start + np.arange(history)[::-1, None] * width + np.arange(size)).ravel()
+            for _, _, start, size, history in terms
+        ]
+    )
+
+
+def _terms(env: LeggedEnv) -> Iterator[tuple[str, ObservationTerm, int, int, int]]:
+    """Yield name, term, first number in an observation of `env`, size and steps of each term."""
+    start, steps = 0, env.history_length
+    has_history = "history" in env.obs_terms["policy"]
     for name, term in env.obs_terms["policy"].items():
         size = term.function(env).shape[1]
-        part: dict[str, Any] = {"name": name, "start": start, "stop": start + size}
+        if name == "history":  # of the terms before it
+            has_history = False
+        else:
+            yield name, term, start, size, steps if has_history else 1
+        start += size
+
+
+def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
+    """Return slice, steps of the history, unit, offset, scale and clip of each term."""
+    parts, first = [], 0
+    for name, term, _, size, history in _terms(env):
+        part: dict[str, Any] = {"name": name, "start": first, "stop": first + size * history}
+        part["history"] = history
         part["unit"] = term.unit if isinstance(term.unit, str) else list(term.unit)
         part["offset"] = _to_list(np.broadcast_to(term.offset, size))
         part["scale"] = _to_list(np.broadcast_to(term.scale, size))
         if term.clip is not None:
             part["clip"] = list(term.clip)
         parts.append(part)
-        start += size
+        first = part["stop"]
     return parts
 
 

@@ -2,12 +2,15 @@
 
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isclose
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+import torch
+from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning, prefixed_errors
 from terrainkit_robots.policy.contracts.contract import UNITREE, Contract, from_description
@@ -16,7 +19,12 @@ from terrainkit_robots.policy.contracts.environment import make_spec
 from terrainkit_robots.policy.contracts.mjlab import JOINTS_KEY, read_metadata
 from terrainkit_robots.policy.contracts.robot import qpos_order, replace_joints
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.export import JSON_FILE, METADATA_KEY, describe_policy
+from terrainkit_robots.policy.export import (
+    JSON_FILE,
+    METADATA_KEY,
+    describe_policy,
+    observation_order,
+)
 from terrainkit_robots.policy.onnx_policy import OnnxPolicy, one_line, read_file
 from terrainkit_robots.policy.torchscript import ScriptPolicy
 from terrainkit_robots.rl.config import Task
@@ -145,7 +153,24 @@ def _open_description(found: ForeignPolicy, path: Path, robot: Robot, default: T
         raise ConfigError(
             f"{path}: {got}; expected {sizes[0]} and {sizes[1]}, as in {found.source}"
         )
-    return spec
+    return replace(spec, policy=_OrderedPolicy(policy, observation_order(env)))
+
+
+class _OrderedPolicy:
+    """A policy that receives its observations in the order of exported ones."""
+
+    def __init__(self, policy: OnnxPolicy | ScriptPolicy, order: NDArray[np.int64]) -> None:
+        self.policy, self.__name__ = policy, policy.__name__
+        self.num_obs, self.num_actions = policy.num_obs, policy.num_actions
+        self._order = torch.from_numpy(order)
+
+    def __call__(self, obs: torch.Tensor) -> Any:
+        """Return actions (n, a) for observations of the environment."""
+        return self.policy(obs[:, self._order])
+
+    def reset(self, dones: torch.Tensor) -> None:
+        """Clear the state of robots, a mask of shape (n,)."""
+        self.policy.reset(dones)
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:

@@ -15,8 +15,13 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy import export as module
-from terrainkit_robots.policy.evaluate import eval_task
-from terrainkit_robots.policy.export import METADATA_KEY, describe_policy, export_policy
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, eval_task
+from terrainkit_robots.policy.export import (
+    METADATA_KEY,
+    describe_policy,
+    export_policy,
+    observation_order,
+)
 from terrainkit_robots.policy.load import load_policy
 from terrainkit_robots.policy.open_policy import open_policy
 from terrainkit_robots.policy.rollout import rollout
@@ -87,7 +92,7 @@ def test_onnx_file_is_valid_and_holds_the_json(exported):
 
 def test_json_describes_the_policy(exported):
     config = json.loads((exported / "policy.json").read_text())
-    assert (config["format_version"], config["iteration"]) == (1, 2)
+    assert (config["format_version"], config["iteration"]) == (2, 2)
     assert config["robot"]["name"] == "quadruped"
     assert config["timing"] == {"physics_dt": 0.005, "decimation": 4, "policy_dt": 0.02}
     joints = config["joints"]["name"]
@@ -234,13 +239,19 @@ def test_exported_policy_with_a_history(make_run, tmp_path, monkeypatch):
     assert max(result.errors) <= 1e-5
     assert result.num_observations == 150
     names = run_example(tmp_path / "exported", monkeypatch, "--seconds", "0.04")
-    assert [names["config"]["observation"]["parts"][-1][k] for k in ("start", "stop")] == [50, 150]
-    observe, args = names["observe"], (names["command"], names["action"], np.eye(3))
-    first = observe(*args)
-    np.testing.assert_array_equal(first, np.tile(first[:50], 3))
-    previous = np.arange(150, dtype=np.float32)
-    second = observe(*args, previous)
-    np.testing.assert_array_equal(second, np.concatenate([first[:50], previous[:100]]))
+    parts = names["config"]["observation"]["parts"]
+    assert [(part["start"], part["stop"]) for part in parts[:2]] == [(0, 9), (9, 18)]
+    assert {part["history"] for part in parts} == {3}
+    past, args = {}, (names["action"], np.eye(3))
+    observed = [names["observe"](np.array([vx, 0, 0]), *args, past) for vx in (1.0, 0.5, 0.25)]
+    scale = parts[0]["scale"][0]
+    for obs, seen in zip(observed, ([1, 1, 1], [1, 1, 0.5], [1, 0.5, 0.25]), strict=True):
+        assert obs[[0, 3, 6]].tolist() == [scale * each for each in seen]  # the oldest first
+    # The exported network sees what the environment observes in its own order.
+    env = build_eval_env(open_run(run.folder), Plane(), 2, EvaluationConfig())
+    order = observation_order(env)
+    assert sorted(order) == list(range(150))
+    assert order[:9].tolist() == [100, 101, 102, 50, 51, 52, 0, 1, 2]
 
 
 def test_example_has_the_joints_and_friction_of_the_training(exported, trained, monkeypatch):
@@ -285,7 +296,7 @@ def test_json_describes_the_height_scan(quadruped, map_terrain):
 
 def test_example_sees_a_plane_in_the_height_scan(exported, monkeypatch):
     names = run_example(exported, monkeypatch, "--seconds", "0.02")
-    scan = {"name": "height_scan", "start": 0, "stop": 3, "offset": 0.3, "scale": 5}
+    scan = {"name": "height_scan", "start": 0, "stop": 3, "history": 1, "offset": 0.3, "scale": 5}
     names["config"]["height_scan"] = {"points": [[0, 0], [0.1, 0], [0.2, 0]]}
     names["config"]["observation"]["parts"] = [scan | {"clip": [-1, 1]}]
     names["data"].qpos[2] = 0.4

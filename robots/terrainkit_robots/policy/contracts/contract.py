@@ -198,19 +198,13 @@ def from_description(document: Mapping[str, Any], style: int) -> Contract:
         ExportError: If a reader of that format would misread the policy.
     """
     joints, action, scan = document["joints"], document["action"], document["height_scan"]
-    history, control = document["observation"]["history_length"], document["control_type"]
+    control = document["control_type"]
     default, points = Terrain(), (scan or {}).get("points")
     grid = [[x, y] for x in default.measured_points_x for y in default.measured_points_y]
     for name, got, is_expressible, expected in (
         ("control.control_type", control, control == "P", "P: positions"),
         ("wheels", "velocity targets", "velocity" not in joints["drive"], "position targets"),
         ("action_scale", "joints without an action", action["joints"] == joints["name"], "none"),
-        (
-            "observations.history_length",
-            history,
-            history == 1,
-            "1: readers expect the oldest first",
-        ),
         ("runner.rsl_rl", "a recurrent network", not document.get("recurrent"), "a network"),
         ("terrain.measured_points", "another grid", points in (None, grid), "the default grid"),
     ):
@@ -229,6 +223,7 @@ def from_description(document: Mapping[str, Any], style: int) -> Contract:
             name=TERM_NAMES.get(name, (name, name))[style],
             scale=tuple(part["scale"]),
             clip=tuple(part["clip"]) if "clip" in part else None,
+            history=part["history"],
             params=params,
         )
         terms.append(term)

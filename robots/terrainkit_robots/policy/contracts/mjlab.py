@@ -84,7 +84,10 @@ def write_metadata(contract: Contract) -> dict[str, str]:
         "observation_names": ",".join(term.name for term in terms),
         "observation_terms_scale": ",".join(_join(term.scale, ";") for term in terms),
         "observation_terms_clip": ",".join(_join(term.clip or _INFINITE, ";") for term in terms),
-        "observation_terms_history_length": ",".join("0" for _ in terms),
+        # 0 is the current step alone.
+        "observation_terms_history_length": ",".join(
+            str(term.history if term.history > 1 else 0) for term in terms
+        ),
         "observation_terms_flatten_history_dim": ",".join("1" for _ in terms),
         "action_scale": _join(contract.action_scale),
     }

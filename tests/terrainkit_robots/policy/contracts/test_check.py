@@ -72,4 +72,4 @@ def test_change_with_which_the_robot_walks_names_the_fault(found, contract, robo
 def test_contracts_for_other_networks_are_found(found, contract, robot):
     fewer = replace(contract, terms=contract.terms[1:])
     (finding,) = check_contract(fewer, found.policy, robot, get_task("quadruped").task)
-    assert (finding.code, finding.got) == ("POL001", "got a network for 47 observations")
+    assert (finding.code, finding.got) == ("POL001", "got a network for 141 observations")

@@ -120,7 +120,7 @@ def test_targets_are_limited_and_have_an_offset(contract):
         ({"terms": (ContractTerm(name="last_action", scale=(1.0,) * 5),)}, "got 5 numbers; .* 12"),
         (
             {"terms": (ContractTerm(name="last_action"),)},
-            "network for 47 observations; expected 12",
+            "network for 141 observations; expected 12",
         ),
         ({"joints": tuple("abcdefghijkl")}, "joint names: got a, b, .*, which quadruped lacks"),
     ],
