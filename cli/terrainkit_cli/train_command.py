@@ -81,7 +81,7 @@ class Train(PluginCommand, ConfigCommand):
 
         if path := given.get("task"):
             task = load_task_file(path).task
-        elif (resume := given.get("resume")) and not _names_task(rest):
+        elif (resume := given.get("resume")) and not _known_task(rest):
             from terrainkit_robots.rl.run import open_run
 
             task = open_run(resume).task
@@ -124,11 +124,13 @@ class Train(PluginCommand, ConfigCommand):
         return 128 + signal_number if signal_number else 0
 
 
-def _names_task(argv: Sequence[str]) -> bool:
-    """Return whether ROBOT is among words."""
+def _known_task(argv: Sequence[str]) -> str:
+    """Return the first word that names a task or a folder, empty if there is none."""
     from terrainkit_robots.rl.tasks import task_names
 
-    return any(word in task_names() or isdir(word) for word in argv)  # noqa: PTH112 - see below
+    names = task_names()
+    # Path.is_dir raises OSError for long names.
+    return next((word for word in argv if word in names or isdir(word)), "")  # noqa: PTH112
 
 
 def _task_word(argv: Sequence[str]) -> str:
@@ -142,15 +144,13 @@ def _task_word(argv: Sequence[str]) -> str:
     """
     from terrainkit_robots.rl.tasks import task_names
 
-    names = task_names()
-    for word in argv:
-        if word in names or isdir(word):  # noqa: PTH112 - Path.is_dir raises OSError for long names
-            return word
+    if known := _known_task(argv):
+        return known
     if argv and argv[0] and not is_option(argv[0]):
         return argv[0]
     raise ConfigError(
         "ROBOT: missing; expected a folder written by terrainkit onboard, or one of: "
-        f"{listing(names)}"
+        f"{listing(task_names())}"
     )
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from terrainkit.curriculum.arrays import like
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.ground_rays import GroundRays
+from terrainkit.geometry.ray_grid import Floats
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import rotation_matrices
 from terrainkit.map.terrain_map import TerrainMap
@@ -16,8 +17,6 @@ from terrainkit.perception.height_scan import to_floats
 
 _RAYS_AT_ONCE = 16_384
 """Rays that are cast at once, so that their arrays stay in the cache."""
-
-Floats = NDArray[np.float64]
 
 
 class RayCaster:

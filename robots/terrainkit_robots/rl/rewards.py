@@ -217,7 +217,8 @@ def foot_swing_height(env: "LeggedEnv") -> FloatArray:
     The arc is above the highest ground near a foot: in front of a riser, the foot has to rise
     before it is above the step, and above a gap it does not have to descend.
     """
-    phase, height = env.state.swing_phase, env.state.foot_clearance / _swing_height(env)
+    phase, height = env.state.swing_phase, env.state.foot_height_over_edges / _swing_height(env)
+    # Clipped for the same reason as the base height: the foot may be above a deep hole.
     return (np.square(np.clip(height, 0, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
 
 

@@ -42,7 +42,7 @@ class State:
     dof_acc: FloatArray  # joint accelerations, from the last two velocities [rad/s2], shape (n, j)
     torques: FloatArray  # motor torques [N m], shape (n, j)
     foot_height: FloatArray  # height of the feet above the ground under them [m], shape (n, f)
-    foot_clearance: FloatArray  # the same above the highest ground near them [m], shape (n, f)
+    foot_height_over_edges: FloatArray  # the same above the highest ground near them [m]
     foot_vel: FloatArray  # velocity of the feet, world frame [m/s], shape (n, f, 3)
     foot_force: FloatArray  # contact force on the feet, world frame [N], shape (n, f, 3)
     foot_air_time: FloatArray  # time since each foot was last in contact [s], shape (n, f); the
@@ -73,12 +73,6 @@ class State:
             getattr(self, field.name)[env_ids] = getattr(other, field.name)
 
 
-def _offsets(radius: float) -> FloatArray:
-    """Return a point and eight points around it, x and y, shape (9, 2)."""
-    steps = np.array([-1, 0, 1], np.float32) * np.float32(radius)
-    return np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
 class Sensors:
     """Measure n robots."""
 
@@ -97,7 +91,8 @@ class Sensors:
         self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
         self._scan = HeightScan(terrain, x if scan else (), y)
-        self._near_foot = _offsets(NEAR_FOOT * leg_length)
+        steps = np.float32(NEAR_FOOT * leg_length) * np.array([-1, 0, 1], np.float32)
+        self._near_foot = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
 
     def scan_points(self, pos: FloatArray, quat: FloatArray) -> tuple[FloatArray, ...]:
         """Return x, y and z of the points of the height scan [m], shape (n, k) each.
@@ -148,7 +143,7 @@ class Sensors:
             "dof_acc": dof_acc,
             "torques": torques,
             "foot_height": foot_pos[..., 2] - ground[..., _AT_FOOT] - scene.sole_depth,
-            "foot_clearance": foot_pos[..., 2] - ground.max(axis=2) - scene.sole_depth,
+            "foot_height_over_edges": foot_pos[..., 2] - ground.max(axis=2) - scene.sole_depth,
             "foot_vel": sim.sensor("foot_velocity", rows),
             "foot_force": foot_force,
             "foot_air_time": air_time,

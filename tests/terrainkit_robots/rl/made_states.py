@@ -19,7 +19,7 @@ def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, 
     vectors = "base_pos base_lin_vel base_ang_vel projected_gravity commands mean_vel"
     others: dict[str, Shape] = dict.fromkeys(vectors.split(), (3,))
     others |= dict.fromkeys(["base_height", "fallen"], ())
-    of_feet = "swing_phase foot_height foot_clearance foot_air_time"
+    of_feet = "swing_phase foot_height foot_height_over_edges foot_air_time"
     others |= dict.fromkeys(of_feet.split(), (feet,))
     others |= dict.fromkeys(["foot_vel", "foot_force"], (feet, 3))
     others |= {"base_quat": (4,), "gait_phase": (2,)}

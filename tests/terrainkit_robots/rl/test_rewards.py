@@ -97,7 +97,7 @@ def test_default_swing_height_is_limited_on_four_legs(robot, num_feet, leg_lengt
     robot = replace(robot, spec=replace(robot.spec, leg_length=leg_length))
     sizes = shapes(joints=2, feet=num_feet, penalized=3, points=0)
     phase, heights = [[0.5] * num_feet], [[height] * num_feet]
-    given = made_state(sizes, 1, swing_phase=phase, foot_clearance=heights)
+    given = made_state(sizes, 1, swing_phase=phase, foot_height_over_edges=heights)
     assert paid("foot_swing_height", robot, given) == pytest.approx([0], abs=1e-6)
     scaled = paid("foot_swing_height", robot, given, swing_height=2 * height / leg_length)
     assert scaled == pytest.approx([0.25])

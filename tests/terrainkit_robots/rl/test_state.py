@@ -174,7 +174,7 @@ def test_clearance_is_above_the_highest_ground_near_a_foot(
     foot = env.sim.sensor("foot_position", np.array([0]))[0, 0]
     step.edge = foot[0] + distance * NEAR_FOOT * quadruped.leg_length
     fields = env.sensors.read(np.array([0]), None)
-    difference = fields["foot_height"] - fields["foot_clearance"]
+    difference = fields["foot_height"] - fields["foot_height_over_edges"]
     assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
 
 
@@ -203,7 +203,13 @@ class TestStateCopies:
         assert dones.tolist() == [False, True, False]
         new = nominal_env(3).state
         for name, fresh in vars(new).items():
-            if name not in ("commands", "gait_phase", "foot_height", "foot_clearance", "foot_vel"):
+            if name not in (
+                "commands",
+                "gait_phase",
+                "foot_height",
+                "foot_height_over_edges",
+                "foot_vel",
+            ):
                 found = getattr(env.state, name)[1]
                 np.testing.assert_allclose(found, fresh[1], atol=1e-6, err_msg=name)
         where = np.array([1])
