@@ -26,6 +26,7 @@ from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.spec.robot_spec import RobotSpec
+from terrainkit_robots.text import short_path
 
 CASES = Path(__file__).parent / "cases"
 FINDINGS = CASES.with_name("findings.json")
@@ -242,7 +243,8 @@ def text_of(finding, folder):
         for name, value in finding.measured.items()
     ]
     about = f"{finding.severity} {finding.certainty} {finding.subject}, line {finding.line}"
-    message = OTHERS_SENTENCE.sub(r"\1: ...", finding.message.replace(str(folder), "FOLDER"))
+    text = finding.message.replace(str(folder), "FOLDER").replace(short_path(folder), "FOLDER")
+    message = OTHERS_SENTENCE.sub(r"\1: ...", text)
     return "; ".join([f"{about}: {message}", *measured])
 
 
