@@ -56,6 +56,10 @@ _HFIELD_LENGTH = 16.0
 """Length at which heightfields beside boxes are divided [m]; a long one enlarges many nodes of
 MuJoCo's bounding volume hierarchy."""
 
+_MIN_HFIELD_CELLS = 32
+"""Smallest length at which they are divided [cells]. Elevation files have cells of up to
+kilometers: in parts of 16 m, one of 559 x 495 samples 10 m apart had 109,161 heightfields."""
+
 _Part = tuple[slice, slice]
 """A rectangle of samples, counted on the map with `_MARGIN` more samples on each side: sample i of
 the map is i + _MARGIN here."""
@@ -321,7 +325,7 @@ def _remaining_parts(terrain_map: "TerrainMap", decomposition: BoxDecomposition)
         )
         for _, r0, r1, c0, c1 in merged.astype(int).tolist()
     ]
-    max_length = max(_HFIELD_LENGTH / terrain_map.config.cell, 1.0)
+    max_length = max(_HFIELD_LENGTH / terrain_map.config.cell, _MIN_HFIELD_CELLS)
     return [each for part in parts for each in _split_by_length(part, max_length)]
 
 

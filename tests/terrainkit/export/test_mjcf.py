@@ -340,6 +340,21 @@ def test_mjcf_has_friction_of_each_cell(tmp_path, terrain, collision):
     assert len(np.unique(expected)) > 10
 
 
+def test_mjcf_has_few_heightfields_on_a_map_of_large_cells(tmp_path):
+    """Heightfields of 16 m would have 2 samples each, and some would be beyond the map."""
+    hills = SubTerrain(
+        terrain="wave", parameters={"amplitude": 20.0, "number": 2, "platform": 60.0}
+    )
+    size = {"rows": 1, "cols": 1, "patch_size": (700.0, 500.0), "cell": 10.0, "border": 0.0}
+    terrain_map = generate(
+        MapConfig(**size, spawn_radius=5.0, spawn_tolerance=9.0, terrains=(hills,))
+    )
+    model = loaded(terrain_map, tmp_path, collision="boxes")
+    assert model.nhfield == 4  # 74 x 54 samples, in parts of about 32
+    xy = np.random.default_rng(0).uniform((20, 20), (680, 480), (200, 2))
+    np.testing.assert_allclose(ray_cast(model, xy)[0], terrain_map.height(xy), atol=0.01)
+
+
 def test_mjcf_splits_a_heightfield_where_the_friction_changes():
     """Cells 2 to 3 of 8 along x are slippery: samples 4 to 6 with the margin of 2."""
     terrain_map = plot(np.zeros((8, 3)), static_friction=0.8)
