@@ -257,6 +257,8 @@ class Rewards(Config):
     # 0.01 on each of 12 joints, as in legged_gym, since the term is a mean.
     action_rate: float = -0.12
     """Change of the action, squared."""
+    action_l2: float = 0.0
+    """Action, squared."""
     # legged_gym's scale.
     collision: float = -1.0
     """Contacts of penalized bodies."""
@@ -309,6 +311,9 @@ class Termination(Config):
     """Largest contact force on a termination body [N]."""
     tilt: Annotated[float, Meta(gt=0, le=math.pi)] = 1.3
     """Largest angle between the z axes of base and world [rad]."""
+    stuck_time: PositiveFloat | None = None
+    """Time over which progress below a fifth of the commanded velocity counts as a fall [s]; none:
+    never."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -294,7 +294,8 @@ class LeggedEnv(VecEnv):
         history = self.action_history[:, rows].copy()
         names = "actions", "last_actions", "last_last_actions"
         actions: dict[str, Any] = dict(zip(names, history, strict=True))
-        return State(**self.sensors.read(rows, last), **actions, **self._command_state(rows))
+        measured = self.sensors.read(rows, last, self.commands[rows])
+        return State(**measured, **actions, **self._command_state(rows))
 
     def _command_state(self, rows: Any) -> dict[str, Any]:
         """Return the fields of `State` that depend on the commands."""

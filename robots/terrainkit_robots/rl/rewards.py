@@ -112,7 +112,12 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     # -s / log(0.25), its wide kernel exp(-s / width) is 0.25 for any command.
     log_standing = np.float32(np.log(STANDING_TRACKING))
     width_at_rest = np.float32(env.cfg.rewards.tracking_sigma)
-    widths = (np.where(s > 0, -s / log_standing, width_at_rest) for s in squares)
+    # A heading command ends in yaw rates near 0. Their kernels would be narrower than any sway.
+    floors = np.float32(0), width_at_rest
+    widths = (
+        np.where(s > 0, np.maximum(-s / log_standing, floor), width_at_rest)
+        for s, floor in zip(squares, floors, strict=True)
+    )
     ratios = (error / width for error, width in zip(errors, widths, strict=True))
     lin, yaw = ((np.exp(-ratio) + np.exp(-NARROW * ratio)) / 2 for ratio in ratios)
     moving = is_moving(commands)
@@ -176,6 +181,11 @@ def action_rate(env: "LeggedEnv") -> FloatArray:
     return np.square(env.state.actions - env.state.last_actions).mean(axis=1)
 
 
+def action_l2(env: "LeggedEnv") -> FloatArray:
+    """Penalize large actions, mean square."""
+    return np.square(env.state.actions).mean(axis=1)
+
+
 def collision(env: "LeggedEnv") -> FloatArray:
     """Count penalized bodies that touch something."""
     return (env.state.penalized_force > np.float32(0.1)).sum(axis=1, dtype=np.float32)
@@ -214,12 +224,13 @@ def _swing_height(env: "LeggedEnv") -> np.float32:
 def foot_swing_height(env: "LeggedEnv") -> FloatArray:
     """Penalize feet off the arc that they should swing in, mean square, relative to its height.
 
-    The arc is above the highest ground near a foot: in front of a riser, the foot has to rise
-    before it is above the step, and above a gap it does not have to descend.
+    The arc is above the edge ahead of a foot: in front of a riser, the foot has to rise before it
+    is above the step, and above a gap it does not have to descend.
     """
     phase, height = env.state.swing_phase, env.state.foot_height_over_edges / _swing_height(env)
-    # Clipped for the same reason as the base height: the foot may be above a deep hole.
-    return (np.square(np.clip(height, 0, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
+    # Clipped for the same reason as the base height: a foot may be above or in a deep hole. With the
+    # limit 0, a foot before a riser gained nothing by rising until it was above the step.
+    return (np.square(np.clip(height, -1, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
 
 
 def foot_slip(env: "LeggedEnv") -> FloatArray:

@@ -17,10 +17,7 @@ CONTACT_FORCE = 1.0
 """Vertical force from which a foot is in contact [N], as in legged_gym."""
 
 NEAR_FOOT = 0.22
-"""How far the ground near a foot extends, as a fraction of the leg length: 10 cm at 0.45 m."""
-
-_AT_FOOT = 4
-"""The middle one of the points near a foot."""
+"""Distance of an edge that a foot has to clear, as a fraction of the leg length: 10 of 45 cm."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,7 +39,7 @@ class State:
     dof_acc: FloatArray  # joint accelerations, from the last two velocities [rad/s2], shape (n, j)
     torques: FloatArray  # motor torques [N m], shape (n, j)
     foot_height: FloatArray  # height of the feet above the ground under them [m], shape (n, f)
-    foot_height_over_edges: FloatArray  # the same above the highest ground near them [m]
+    foot_height_over_edges: FloatArray  # the same above edges ahead, with gaps filled [m]
     foot_vel: FloatArray  # velocity of the feet, world frame [m/s], shape (n, f, 3)
     foot_force: FloatArray  # contact force on the feet, world frame [N], shape (n, f, 3)
     foot_air_time: FloatArray  # time since each foot was last in contact [s], shape (n, f); the
@@ -91,8 +88,7 @@ class Sensors:
         self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
         self._scan = HeightScan(terrain, x if scan else (), y)
-        steps = np.float32(NEAR_FOOT * leg_length) * np.array([-1, 0, 1], np.float32)
-        self._near_foot = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+        self._near_foot = np.float32(NEAR_FOOT * leg_length) * np.arange(-2, 3, dtype=np.float32)
 
     def scan_points(self, pos: FloatArray, quat: FloatArray) -> tuple[FloatArray, ...]:
         """Return x, y and z of the points of the height scan [m], shape (n, k) each.
@@ -103,12 +99,13 @@ class Sensors:
         """
         return self._scan.points(pos, transforms.quat_to_yaw(quat))
 
-    def read(self, rows: Any, last: State | None) -> dict[str, Any]:
+    def read(self, rows: Any, last: State | None, commands: FloatArray) -> dict[str, Any]:
         """Return the measured fields of `State`.
 
         Args:
             rows: Index of the robots.
             last: State before the step; None after a reset, when nothing is in contact yet.
+            commands: Forward and left velocity [m/s] and yaw rate [rad/s], shape (n, 3).
         """
         sim, scene, dt = self._sim, self._sim.scene, self._dt
         qpos, qvel = sim.qpos[rows].astype(np.float32), sim.qvel[rows].astype(np.float32)
@@ -117,8 +114,7 @@ class Sensors:
         dof_vel, foot_pos = qvel.take(scene.joint_qvel, 1), sim.sensor("foot_position", rows)
         foot_force = -sim.sensor("foot_force", rows)
         penalized = sim.sensor("penalized_force", rows)
-        x, y = np.moveaxis(foot_pos[:, :, None, :2] + self._near_foot, -1, 0)
-        ground = self._terrain.height(x, y, foot_pos[..., 2:])
+        ground, edges = self._ground_of_feet(foot_pos, quat, commands)
         torques = sim.torque[rows].astype(np.float32)
         vel = np.concatenate([lin_vel[:, :2], ang_vel[:, 2:]], axis=1)
         last_vel, dof_acc = np.zeros_like(vel), np.zeros_like(dof_vel)
@@ -142,8 +138,8 @@ class Sensors:
             "dof_vel": dof_vel,
             "dof_acc": dof_acc,
             "torques": torques,
-            "foot_height": foot_pos[..., 2] - ground[..., _AT_FOOT] - scene.sole_depth,
-            "foot_height_over_edges": foot_pos[..., 2] - ground.max(axis=2) - scene.sole_depth,
+            "foot_height": foot_pos[..., 2] - ground - scene.sole_depth,
+            "foot_height_over_edges": foot_pos[..., 2] - edges - scene.sole_depth,
             "foot_vel": sim.sensor("foot_velocity", rows),
             "foot_force": foot_force,
             "foot_air_time": air_time,
@@ -151,3 +147,20 @@ class Sensors:
             "height_scan": pos[:, 2:3] - self.scan_points(pos, quat)[2],
             "fallen": np.zeros(len(pos), bool),
         }
+
+    def _ground_of_feet(
+        self, foot_pos: FloatArray, quat: FloatArray, commands: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the heights of the ground under the feet and of the edges that they have to clear.
+
+        In the commanded direction, a foot has to clear an edge one step of `NEAR_FOOT` ahead of it,
+        and a gap with ground at most two steps behind and two steps ahead.
+        """
+        yaw = transforms.quat_to_yaw(quat)
+        cos, sin, (forward, left) = np.cos(yaw), np.sin(yaw), commands[:, :2].T
+        direction = np.stack([cos * forward - sin * left, sin * forward + cos * left], axis=1)
+        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-6)
+        points = foot_pos[:, :, None, :2] + self._near_foot[:, None] * direction[:, None, None]
+        ground = self._terrain.height(points[..., 0], points[..., 1], foot_pos[..., 2:])
+        gap = np.minimum(ground[..., :2].max(axis=2), ground[..., 3:].max(axis=2))
+        return ground[..., 2], np.maximum(ground[..., 2:4].max(axis=2), gap)

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from terrainkit_robots.rl.env import LeggedEnv
 
 
+STUCK = 0.2
+"""Progress as a fraction of the command below which a robot is stuck."""
+
+
 def illegal_contact(env: "LeggedEnv") -> BoolArray:
     """Return which robots touch something with a termination body."""
     force = env.sim.sensor("termination_force")
@@ -31,7 +35,25 @@ def terrain_out_of_bounds(env: "LeggedEnv") -> BoolArray:
     return np.asarray(((xy < terrain.lower) | (xy > terrain.upper)).any(axis=1))
 
 
+def stuck(env: "LeggedEnv") -> BoolArray:
+    """Return which robots make no progress along their linear velocity command.
+
+    The progress is a moving average over `stuck_time`, which is 1 after a reset.
+    """
+    limit = env.cfg.termination.stuck_time
+    if limit is None:
+        return np.zeros(env.num_envs, bool)
+    progress = env.buffers.setdefault("progress", np.ones(env.num_envs, np.float32))
+    commands, velocity = env.state.commands[:, :2], env.state.base_lin_vel[:, :2]
+    squares = np.square(commands).sum(axis=1)
+    fraction = np.where(squares > 0, (commands * velocity).sum(axis=1), 1)
+    fraction /= np.where(squares > 0, squares, 1)
+    progress[env.steps_since_reset <= 1] = 1
+    progress += np.float32(env.cfg.dt / limit) * (np.clip(fraction, -1, 1) - progress)
+    return progress < STUCK
+
+
 TERMINATIONS = {
-    each.__name__: each for each in (illegal_contact, bad_orientation, terrain_out_of_bounds)
+    each.__name__: each for each in (illegal_contact, bad_orientation, terrain_out_of_bounds, stuck)
 }
 """Every termination of this module by name."""

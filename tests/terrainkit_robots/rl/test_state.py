@@ -154,28 +154,62 @@ class TestByHand:
         np.testing.assert_array_equal(seen[2:], seen[:2])
 
 
-class _Step(Plane):
-    """A plane that is measured as a step of 10 cm up along x."""
+class _Steps(Plane):
+    """A plane that is measured as steps along y, each from an edge to an edge at a height."""
 
-    edge = 0.0
+    steps = ()
 
-    def height(self, x, *_, **__):
-        return np.where(x > self.edge, np.float32(0.1), np.float32(0))
+    def height(self, _, y, *__, **___):
+        height = np.zeros_like(y)
+        for start, end, top in self.steps:
+            height[(y > start) & (y < end)] = top
+        return height
 
 
-@pytest.mark.parametrize(("distance", "clearance"), [(0.9, 0.1), (1.1, 0), (-0.1, 0)])
-def test_clearance_is_above_the_highest_ground_near_a_foot(
-    nominal_env, quadruped, distance, clearance
-):
-    # A foot on the step itself is above it in both; one in front of it is still 10 cm below.
-    step = _Step()
-    env = nominal_env(1, step)
+# Distances in units of `NEAR_FOOT`, for a foot at 0 that moves to the left.
+@pytest.mark.parametrize(
+    ("steps", "clearance"),
+    [
+        ([(0.9, 9, 0.1)], 0.1),  # an edge ahead
+        ([(1.1, 9, 0.1)], 0),  # not yet
+        ([(-9, 0.9, 0.1)], 0),  # on a step, before its edge
+        ([(-9, -0.1, 0.1)], 0),  # a step down
+        ([(-0.1, 1.1, -1)], 1),  # in a gap
+        ([(-2.1, 9, -1)], 0),  # in a pit, far from its edge
+        ([(-9, 9, -1), (-9, -1.9, 0), (1.9, 9, 0)], 1),  # in the middle of a gap
+        ([(-9, 9, -1), (-9, -1.9, 0), (2.1, 9, 0)], 0),  # the gap is too wide
+    ],
+)
+def test_clearance_is_above_edges_ahead_and_gaps(nominal_env, quadruped, steps, clearance):
+    ground = _Steps()
+    env = nominal_env(1, ground)
     env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
-    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0]
-    step.edge = foot[0] + distance * NEAR_FOOT * quadruped.leg_length
-    fields = env.sensors.read(np.array([0]), None)
+    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0, 1]
+    unit = NEAR_FOOT * quadruped.leg_length
+    ground.steps = [(foot + unit * a, foot + unit * b, top) for a, b, top in steps]
+    fields = env.sensors.read(np.array([0]), None, np.float32([[0, 0.5, 0]]))
     difference = fields["foot_height"] - fields["foot_height_over_edges"]
     assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
+
+
+def test_feet_clear_no_edge_beside_them(nominal_env, quadruped):
+    ground = _Steps()
+    env = nominal_env(1, ground)
+    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
+    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0, 1]
+    ground.steps = [(foot + 0.5 * NEAR_FOOT * quadruped.leg_length, 9, 0.1)]
+    turned = np.sqrt(0.5), 0, 0, np.sqrt(0.5)  # forward is to the left
+    for command, quat, clearance in [
+        ([0.5, 0, 0], (1, 0, 0, 0), 0),
+        ([0, 0, 1], (1, 0, 0, 0), 0),
+        ([0, 0.5, 0], (1, 0, 0, 0), 0.1),
+        ([0.5, 0, 0], turned, 0.1),
+        ([0, 0.5, 0], turned, 0),
+    ]:
+        env.sim.qpos[0, 3:7] = quat  # the sensors keep the position of the foot
+        fields = env.sensors.read(np.array([0]), None, np.float32([command]))
+        difference = fields["foot_height"] - fields["foot_height_over_edges"]
+        assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
 
 
 class TestStateCopies:

@@ -8,6 +8,7 @@ from terrainkit_robots.rl.config import Env, Task, Termination
 from terrainkit_robots.rl.terminations import (
     bad_orientation,
     illegal_contact,
+    stuck,
     terrain_out_of_bounds,
 )
 from terrainkit_robots.rl.terrain import Plane
@@ -95,3 +96,44 @@ class TestInEnvironment:
             assert step(env) == ([False] * 4, [False] * 4)
         env.sim.qpos[0, 3:7] = (0, 1, 0, 0)
         assert step(env) == ([True] * 4, [False, True, True, True])
+
+
+class TestStuck:
+    """The progress decays as 0.98^k with a step of 0.02 s and a time of 1 s: to 0.2 in 80 steps."""
+
+    def steps_until_stuck(self, commands, velocity, steps=150, **limits):
+        """Return the step at which each of some robots was first stuck; 0 for never."""
+        shape = len(commands), 3
+        vel = np.broadcast_to(np.asarray(velocity, np.float32), shape)
+        env = SimpleNamespace(
+            cfg=Task(termination=Termination(**limits)),
+            num_envs=len(commands),
+            buffers={},
+            steps_since_reset=np.zeros(len(commands), np.int64),
+            state=SimpleNamespace(commands=np.asarray(commands, np.float32), base_lin_vel=vel),
+        )
+        first = np.zeros(len(commands), np.int64)
+        for step in range(1, steps + 1):
+            env.steps_since_reset += 1
+            first[stuck(env) & (first == 0)] = step
+        return first.tolist()
+
+    def test_by_hand(self):
+        commands = [[1, 0, 0], [-0.5, 0.5, 0], [0, 0, 0], [0, 0, 1]]
+        assert self.steps_until_stuck(commands, [0, 0, 0], stuck_time=1.0) == [80, 80, 0, 0]
+        # Along the command, a robot keeps 0.22 or 0.18 of it: (f + (1 - f) 0.98^k) < 0.2.
+        along = [0.22, 0.5, 0], [0.18, 0, 0]
+        assert self.steps_until_stuck(commands[:1], along[0], stuck_time=1.0) == [0]
+        assert self.steps_until_stuck(commands[:1], along[1], 300, stuck_time=1.0) == [184]
+        # Walking back counts once: 1 - 2 (1 - 0.98^k) < 0.2.
+        assert self.steps_until_stuck(commands[:1], [-9, 0, 0], stuck_time=1.0) == [26]
+
+    def test_is_off_by_default(self):
+        assert self.steps_until_stuck([[1, 0, 0]], [0, 0, 0], 1000) == [0]
+
+    def test_starts_anew_with_an_episode(self, nominal_env):
+        env = nominal_env(1, termination=Termination(stuck_time=1.0))
+        env.set_commands(np.array([[0.5, 0, 0]], np.float32))
+        falls = [step for step in range(200) if env.step(torch.zeros(1, 12))[2].any()]
+        assert len(falls) == 2
+        assert falls[1] - falls[0] == pytest.approx(falls[0], abs=3)
