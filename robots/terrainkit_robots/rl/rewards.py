@@ -228,7 +228,7 @@ def foot_swing_height(env: "LeggedEnv") -> FloatArray:
     is above the step, and above a gap it does not have to descend.
     """
     phase, height = env.state.swing_phase, env.state.foot_height_over_edges / _swing_height(env)
-    # Clipped for the same reason as the base height: a foot may be above or in a deep hole. With the
+    # Clipped for the same reason as the base height: a foot may be above or in a hole. With the
     # limit 0, a foot before a riser gained nothing by rising until it was above the step.
     return (np.square(np.clip(height, -1, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
 
