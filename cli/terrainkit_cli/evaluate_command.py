@@ -131,9 +131,10 @@ class Evaluate(PolicyCommand):
 
     On a plane, the commands of the robots form a grid over the command ranges of the task. On a
     map, robots walk forward, backward, left and right from the spawn origin of every patch until
-    they have crossed half of it. The rollout has no noise, pushes or domain randomization. The
-    first 2 s after each command and the time after a fall are not measured. The same seed gives the
-    same result.
+    they have crossed half of it, at three quarters of the task's largest velocities. The success is
+    the share that crosses, of the robots that fell or were commanded that far. The rollout has no
+    noise, pushes or domain randomization. The first 2 s after each command and the time after a
+    fall are not measured. The same seed gives the same result.
     """
 
     seconds: float = 20.0
@@ -338,7 +339,9 @@ def dimension_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
     rows: dict[tuple[str, str], dict[str, str]] = {}
     for group in groups:
         fell = f", {group.falls} fell" if group.falls else ""
-        cell = f"{round((group.success or 0) * group.robots)} of {group.robots}{fell}"
+        cell = "not measured"
+        if group.success is not None:
+            cell = f"{round(group.success * group.robots)} of {group.robots}{fell}"
         size = f"{group.parameter} {_number(group.value, 100, 1)} cm"
         rows.setdefault((str(group.terrain), size), {})[str(group.direction)] = cell
     head = [("\nterrain", "dimension", *directions)] if rows else []

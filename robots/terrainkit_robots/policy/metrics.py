@@ -29,7 +29,8 @@ class RolloutMetrics:
         unit: Unit of the disturbance; x for a factor.
         robots: Number of robots.
         falls: Number of robots that fell.
-        success: Fraction of successful robots; None on a plane.
+        success: Fraction of robots that crossed half a patch, of those that fell or whose commands
+            led that far; None if there are none, as on a plane.
         lin_vel_error: Norm of the horizontal velocity error [m/s].
         lin_vel_error_1s: The same with velocities averaged over 1 s, which removes the sway of the
             gait.

@@ -72,8 +72,8 @@ class EvaluationRollout:
     """A rollout that measures each robot up to its first fall.
 
     On a map, a robot is measured until it has crossed half a patch: the terrain beyond belongs to
-    another patch. It succeeds if it crosses, or walks half of the commanded distance without a
-    fall.
+    another patch. It succeeds if it crosses. A robot that was commanded less than that distance,
+    and did not fall, says nothing about the terrain.
     """
 
     def __init__(self, env: LeggedEnv) -> None:
@@ -183,13 +183,16 @@ class EvaluationRollout:
             mask: Mask of the robots, shape (n,).
             **key: Fields of :class:`RolloutMetrics` that define the group.
         """
-        success = self.crossed | (~self.falls & (self.distance >= self.commanded_distance / 2))
+        tried = self.crossed | self.falls | (self.commanded_distance >= self.half_patch)
+        crossed = self.crossed[mask & tried]
         errors: dict[str, Any] = {name: each.over(mask) for name, each in self.errors.items()}
         return RolloutMetrics(
             **key,
             robots=int(mask.sum()),
             falls=int(self.falls[mask].sum()),
-            success=None if self.env.terrain.is_plane else float(success[mask].mean()),
+            success=None
+            if self.env.terrain.is_plane or not crossed.size
+            else float(crossed.mean()),
             **errors,
             **self._gait_metrics(mask),
             **self.loads.metrics(mask),

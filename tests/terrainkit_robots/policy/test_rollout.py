@@ -132,18 +132,26 @@ def test_fall_ends_the_measurement(make_sliding):
     assert (metrics.falls, metrics.robots, metrics.lin_vel_error) == (1, 1, None)
 
 
-def test_success_is_half_a_patch_or_half_the_distance(make_sliding, map_terrain):
+def test_success_is_half_a_patch(make_sliding, map_terrain):
     # Patches are 6 m long: half is crossed after 2.7 s at 1.1 m/s.
     velocities = [[1.1, 0, 0], [1.1, 0, 0], [0.3, 0, 0], [0.7, 0, 0], [1, 0, 0]]
     env = make_sliding(velocities, fall_times=[0, 3.5, 0, 0, 2.0], terrain=map_terrain)
     measured = run(env, 4.0, np.tile(FORWARD, (5, 1)))
     assert measured.falls.tolist() == [False, False, False, False, True]
     success = [measured.metrics(np.arange(5) == k).success for k in range(5)]
-    assert success == [1, 1, 0, 1, 0]
+    assert success == [1, 1, 0, 0, 0]
     counts = measured.errors["lin_vel_error"].count
     assert counts[1] == counts[0] < 100
     metrics = measured.metrics(np.ones(5, bool))
-    assert (metrics.success, metrics.falls) == (0.6, 1)
+    assert (metrics.success, metrics.falls) == (0.4, 1)
+
+
+def test_commands_that_do_not_cross_a_patch_measure_no_success(make_sliding, map_terrain):
+    # 2 m in 4 s, where half a patch is 3 m; the last robot falls, and the first is faster.
+    env = make_sliding([[0.9, 0, 0], [0.5, 0, 0], [0, 0, 0]], [0, 0, 2.0], terrain=map_terrain)
+    measured = run(env, 4.0, np.tile(0.5 * FORWARD, (3, 1)))
+    assert [measured.metrics(np.arange(3) == k).success for k in range(3)] == [1, None, 0]
+    assert measured.metrics(np.ones(3, bool)).success == 0.5
 
 
 @pytest.mark.parametrize(("stop_early", "steps"), [(True, 5), (False, 20)])
