@@ -75,10 +75,10 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "rooms": {},
         "stairwell": {"terrain": "staircase", "shape": "half_turn", "wall": 1.0},
     },
-    # With cells of 0.05 m and ten rows, each row of the gaps and the stones is one cell harder.
+    # With cells of 0.05 m and ten rows, gaps grow and stones shrink by one cell in each row.
     "hard": {
-        "gap": {"width": (0.05, 0.5)},
-        "stepping_stones": {"stone": (0.65, 0.2), "distance": 0.1},
+        "gap": {"proportion": 2.0, "width": (0.05, 0.5)},
+        "stepping_stones": {"proportion": 2.0, "stone": (0.65, 0.2), "distance": (0.05, 0.1)},
         "pit": {"depth": (0.05, 0.3)},
         "boxes": {"height": (0.05, 0.3)},
         "rails": {"width": (0.05, 0.2), "height": (0.05, 0.2)},

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit_robots.rl.near_terrain import FAR, MAX_GEOMS, _reach
+from terrainkit_robots.rl.near_terrain import FAR, MIN_RATIO, _reach
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapGround
@@ -13,9 +13,9 @@ _NUM = 12
 
 @pytest.fixture(scope="module")
 def stairs():
-    """Return 12 patches of stairs and of slopes, with more boxes than are near a robot."""
+    """Return stairs, pits and slopes, with far more boxes than are near a robot."""
     kinds = tuple(SubTerrain(terrain=name) for name in ("pyramid_stairs", "pit", "pyramid_slope"))
-    config = MapConfig(rows=6, cols=4, patch_size=(6.0, 6.0), border=1.0, terrains=kinds)
+    config = MapConfig(rows=6, cols=12, patch_size=(6.0, 6.0), border=1.0, terrains=kinds)
     return MapGround(generate(config), "boxes")
 
 
@@ -57,7 +57,7 @@ def test_geoms_that_are_not_near_are_far_below(scenes, stairs):
     sim.step(1)
     pos = sim.batch.expand("geom_pos")
     boxes = [k for k in range(scene.model.ngeom) if "near_" in scene.model.geom(k).name]
-    assert len(boxes) == terrain.num_boxes <= MAX_GEOMS
+    assert len(boxes) == terrain.num_boxes <= terrain.is_box.sum() / MIN_RATIO
     for env, square in enumerate(terrain.squares(sim.qpos[:, :2])):
         near = terrain.near[terrain.starts[square] : terrain.starts[square + 1]]
         expected = terrain.pos[near[terrain.is_box[near]]]
