@@ -31,7 +31,9 @@ class Street(Curbside):
     curb has a curb ramp at a random place, and trees in gratings and poles behind it. Boxes are
     parked in front of the house. There is a goal on the sidewalk in front of the steps and one in
     front of the door. In mode curriculum, the rows of a column have the same layout. All but the
-    gutter and the drain are solids, whose lengths are not rounded to cells.
+    gutter and the drain are solids, whose lengths are not rounded to cells. `terrainkit
+    feasibility` does not see the bars of the grating: it counts the drain as a gap of the width of
+    the gutter.
     """
 
     has_column_seed: ClassVar[bool] = True

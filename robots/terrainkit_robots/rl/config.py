@@ -415,7 +415,7 @@ class Algorithm(Config):
     clip_param: PositiveFloat = 0.2
     """Clipping of the policy ratio."""
     # 0.01, legged_gym's, was slower per sample. On maps, 0.005 keeps the actions too noisy: the
-    # task `quadruped_map` has 0.002.
+    # task `quadruped_map` has 0.0015.
     entropy_coef: NonNegativeFloat = 0.005
     """Weight of the entropy bonus."""
     # Three epochs were slower per sample.
