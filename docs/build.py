@@ -478,7 +478,7 @@ def draw_walk(policy: str) -> None:
     """Record a policy on stairs, and write three frames side by side."""
     up = terrainkit.SubTerrain(terrain="pyramid_stairs", parameters={"inverted": True})
     stairs = terrainkit.MapConfig(
-        rows=1, cols=1, border=4, mode="selected", selected_difficulty=0.33, terrains=(up,)
+        rows=1, cols=1, border=4, mode="selected", selected_difficulty=0.56, terrains=(up,)
     )
     with TemporaryDirectory() as folder:
         ground, video = Path(folder) / "stairs.npz", Path(folder) / "walk.mp4"
