@@ -61,7 +61,8 @@ class Train(PluginCommand, ConfigCommand):
     run's own; without --terrain, the terrain. Training continues in the same folder, as if it had
     not been interrupted. With another terrain or task, a new run starts with the networks of this
     run. It also starts with its optimizer state if --algorithm.learning-rate and
-    --algorithm.schedule are the same, and with its terrain levels if the map is the same."""
+    --algorithm.schedule are the same, with its terrain levels if the map is the same, and with the
+    noise of its actions if --policy.init-noise-std is the same."""
 
     device: Device = "cpu"
     """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""

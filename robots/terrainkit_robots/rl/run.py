@@ -256,6 +256,7 @@ def parts_to_load(
     return {
         "actor": True,
         "critic": True,
+        "noise_std": task.policy.init_noise_std == run.task.policy.init_noise_std,
         "optimizer": rates[0] == rates[1],
         "curriculum": is_plane == was_plane
         and is_same_map

@@ -33,6 +33,9 @@ from terrainkit_robots.rl.symmetry import has_symmetry
 _NETWORKS = "actor", "critic", "student", "teacher", "rnd"
 """Names of networks that an algorithm of rsl-rl may have."""
 
+_NOISE = "distribution."
+"""Prefix of the parameters of the noise of the actions in the state of an actor."""
+
 _TABLES = "actor", "critic", "student", "teacher", "algorithm", "obs_groups"
 """Tables of rsl-rl's configuration that `runner.rsl_rl` may change; settings have the others."""
 
@@ -261,7 +264,8 @@ class LeggedRunner(OnPolicyRunner):
         By default training continues exactly; with another number of environments, only the
         networks, the optimizer and the curriculum do. A checkpoint of a policy alone has only
         networks.
-        `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels).
+        `load_cfg` selects parts: `actor`, `critic`, `optimizer`, `curriculum` (terrain levels), and
+        `noise_std`, the standard deviation of the actions.
         """
         own = self._algorithm_state()
         if "teacher_state_dict" in own and load_cfg is not None:
@@ -270,6 +274,9 @@ class LeggedRunner(OnPolicyRunner):
         parts = load_cfg or {name.removesuffix("_state_dict"): True for name in own}
         joints = self.env.robot.spec.joint_order
         with open_checkpoint(Path(path), joints, self.env.obs_sizes) as state:
+            if not parts.get("noise_std", True):
+                noise = {k: v for k, v in own["actor_state_dict"].items() if k.startswith(_NOISE)}
+                state["actor_state_dict"] = {**state["actor_state_dict"], **noise}
             state["student_state_dict"] = state["actor_state_dict"]
             for name in own.keys() & {f"{part}_state_dict" for part in _NETWORKS if part in parts}:
                 check_state(name, state[name], own[name])

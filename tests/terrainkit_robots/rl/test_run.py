@@ -119,6 +119,16 @@ def test_run_on_a_map_of_a_class_that_is_not_registered(tmp_path, task, mixed_ma
     assert (run.folder / MAP_FILE).read_text() == own  # to generate it where the class is
 
 
+def test_new_noise_is_the_task_s(tmp_path, task):
+    run = create_run(tmp_path / "run", task, "quadruped", "plane")
+    other = replace(task, policy=replace(task.policy, init_noise_std=0.125))
+    longer = replace(task, env=replace(task.env, episode_length_s=9.0))
+    loaded = [
+        parts_to_load(run, "quadruped", "plane", each)["noise_std"] for each in (other, longer)
+    ]
+    assert loaded == [False, True]
+
+
 def test_checkpoints_are_ordered_by_iteration(run):
     for name in ("model_9.pt", "model_10.pt", "model_100.pt", "model_x.pt", "my_model_7.pt"):
         (run / name).touch()

@@ -215,6 +215,19 @@ def test_load_takes_the_settings_of_the_optimizer_from_the_task(make, tmp_path):
     assert (loaded["lr"], loaded["betas"], loaded["maximize"]) == (0.25, (0.9, 0.999), False)
 
 
+@pytest.mark.parametrize("is_kept", [False, True])
+def test_load_may_start_with_the_noise_of_the_task(make, task, tmp_path, is_kept):
+    make().learn(1)
+    before = read_checkpoint(tmp_path / "model_1.pt")["actor_state_dict"]
+    runner = make(replace(task, policy=replace(task.policy, init_noise_std=0.125)))
+    runner.load(tmp_path / "model_1.pt", {"actor": True, "critic": True, "noise_std": is_kept})
+    after = runner.alg.get_policy().state_dict()
+    std = after.pop("distribution.std_param")
+    assert torch.equal(std, torch.full((12,), 0.125)) != is_kept
+    assert torch.equal(std, before.pop("distribution.std_param")) == is_kept
+    assert differences(before, after) == []
+
+
 @pytest.mark.parametrize("symmetry", [None, True, False])
 def test_symmetry_setting_reaches_rsl_rl(make, task, symmetry):
     runner = make(replace(task, algorithm=Algorithm(symmetry=symmetry)), folder=None)
