@@ -77,8 +77,19 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
     },
     # With cells of 0.05 m and ten rows, gaps grow and stones shrink by one cell in each row.
     "hard": {
-        "gap": {"proportion": 2.0, "width": (0.05, 0.5)},
-        "stepping_stones": {"proportion": 2.0, "stone": (0.65, 0.2), "distance": (0.05, 0.1)},
+        "gap_track": {
+            "proportion": 2.0,
+            "length": (0.05, 0.5),
+            "depth": 1.0,
+            "min_spacing": 1.2,
+            "max_spacing": 1.8,
+        },
+        "stepping_stones": {
+            "proportion": 2.0,
+            "stone": (0.65, 0.2),
+            "distance": (0.05, 0.1),
+            "platform": 1.5,
+        },
         "pit": {"depth": (0.05, 0.3)},
         "boxes": {"height": (0.05, 0.3)},
         "rails": {"width": (0.05, 0.2), "height": (0.05, 0.2)},

@@ -46,6 +46,9 @@ LEVEL_SIN2 = 0.01
 MIN_AIR_TIME = 0.5
 """Duration of a swing that `feet_air_time` neither rewards nor penalizes [s], as in legged_gym."""
 
+LANDING = 0.6
+"""Fraction of the swing from which a foot descends to its foothold."""
+
 CLEARANCE_SIGMA = 0.01
 """Squared error times velocity at which `foot_clearance` is exp(-1) [m3/s]; of LeggedGym-Ex."""
 
@@ -231,6 +234,14 @@ def foot_swing_height(env: "LeggedEnv") -> FloatArray:
     # Clipped for the same reason as the base height: a foot may be above or in a hole. With the
     # limit 0, a foot before a riser gained nothing by rising until it was above the step.
     return (np.square(np.clip(height, -1, 2) - np.sin(np.pi * phase)) * (phase > 0)).mean(axis=1)
+
+
+def foothold(env: "LeggedEnv") -> FloatArray:
+    """Penalize feet that stand or land in a hole or right before an edge, by its height, 0 to 1."""
+    state = env.state
+    height = (state.foot_height - state.foot_height_over_edges) / _swing_height(env)
+    lands = (state.swing_phase == 0) | (state.swing_phase > LANDING)
+    return (np.clip(height, 0, 1) * lands).mean(axis=1)
 
 
 def foot_slip(env: "LeggedEnv") -> FloatArray:

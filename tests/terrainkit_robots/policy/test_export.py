@@ -155,7 +155,7 @@ def run_example(folder, monkeypatch, *words):
         return runpy.run_path(program)
 
 
-@pytest.mark.parametrize("name", ["quadruped", "quadruped_map", "biped"])
+@pytest.mark.parametrize("name", ["quadruped", "quadruped_hard", "quadruped_map", "biped"])
 def test_example_walks_with_bundled_policies(name, tmp_path, monkeypatch, capsys):
     export_policy(open_run(name), tmp_path / "exported", example=True)
     names = run_example(tmp_path / "exported", monkeypatch, "--vx", "0.5", "--seconds", "3")

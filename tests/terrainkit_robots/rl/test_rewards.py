@@ -85,7 +85,7 @@ def test_every_reward_is_tested_by_hand():
 
 _BOUNDED = {"tracking_lin_vel", "tracking_ang_vel", "progress", "feet_gait", "upright"}
 _UNUSED = {"base_height", "orientation", "dof_vel", "dof_power", "action_smoothness", "action_l2"}
-_UNUSED |= {"foot_clearance", "feet_air_time"}  # these two are no penalties
+_UNUSED |= {"foothold", "foot_clearance", "feet_air_time"}  # these two are no penalties
 """Rewards with the scale 0."""
 _PENALTIES = sorted({*REWARDS} - _BOUNDED - {"feet_air_time", "foot_clearance"})
 

@@ -51,7 +51,7 @@ def test_register_task_adds_a_task(tmp_path):
     made = register_task("rover", tmp_path, MINE)
     assert get_task("rover") is made
     assert (made.name, made.folder, made.task) == ("rover", tmp_path, MINE)
-    assert task_names() == ("biped", "quadruped", "quadruped_map", "rover")
+    assert task_names() == ("biped", "quadruped", "quadruped_hard", "quadruped_map", "rover")
     assert register_task("standard", tmp_path).task == Task()
 
 
@@ -106,7 +106,7 @@ def test_entry_point_is_imported_on_use(tmp_path, monkeypatch, plugin):
     )
     monkeypatch.syspath_prepend(tmp_path)
     plugin("rover_tasks")
-    assert task_names() == ("biped", "quadruped", "quadruped_map", "rover")
+    assert task_names() == ("biped", "quadruped", "quadruped_hard", "quadruped_map", "rover")
     get_task("quadruped")
     assert "rover_tasks" not in sys.modules
     try:
