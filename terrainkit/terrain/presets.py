@@ -84,12 +84,7 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
             "min_spacing": 1.2,
             "max_spacing": 1.8,
         },
-        "stepping_stones": {
-            "proportion": 2.0,
-            "stone": (0.65, 0.2),
-            "distance": (0.05, 0.1),
-            "platform": 1.5,
-        },
+        "stepping_stones": {"proportion": 2.0, "stone": (0.65, 0.2), "platform": 1.5},
         "pit": {"depth": (0.05, 0.3)},
         "boxes": {"height": (0.05, 0.3)},
         "rails": {"width": (0.05, 0.2), "height": (0.05, 0.2)},

@@ -103,9 +103,9 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
 
     On two legs, velocities are averaged over the gait: the sway is larger than small commands.
     The reward is the mean of a wide kernel, which pays for any progress, and a narrow one. Their
-    widths are proportional to the command. Where only one of the two velocities is commanded, the
-    reward of the other one is multiplied by the tracking of the commanded velocity, so that
-    standing still does not earn it.
+    widths are proportional to the command. Where only one of the two velocities is commanded, or
+    only a small yaw rate beside a linear velocity, the reward of the other one is multiplied by
+    the tracking of the commanded velocity, so that standing still does not earn it.
     """
     commands = env.state.commands
     squared = np.square(commands - env.state.mean_vel)
@@ -115,17 +115,15 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     # -s / log(0.25), its wide kernel exp(-s / width) is 0.25 for any command.
     log_standing = np.float32(np.log(STANDING_TRACKING))
     width_at_rest = np.float32(env.cfg.rewards.tracking_sigma)
+    widths = [np.where(s > 0, -s / log_standing, width_at_rest) for s in squares]
     # A heading command ends in yaw rates near 0. Their kernels would be narrower than any sway.
-    floors = np.float32(0), width_at_rest
-    widths = (
-        np.where(s > 0, np.maximum(-s / log_standing, floor), width_at_rest)
-        for s, floor in zip(squares, floors, strict=True)
-    )
+    walks_ahead = (squares[0] > 0) & (widths[1] <= width_at_rest)
+    widths[1][walks_ahead] = width_at_rest
     ratios = (error / width for error, width in zip(errors, widths, strict=True))
     lin, yaw = ((np.exp(-ratio) + np.exp(-NARROW * ratio)) / 2 for ratio in ratios)
     moving = is_moving(commands)
-    only_yaw, only_lin = moving & (squares[0] == 0), moving & (squares[1] < MIN_YAW_RATE**2)
-    return lin * np.where(only_yaw, yaw, 1), yaw * np.where(only_lin, lin, 1)
+    only_yaw = moving & (squares[0] == 0)
+    return lin * np.where(only_yaw, yaw, 1), yaw * np.where(walks_ahead, lin, 1)
 
 
 def tracking_lin_vel(env: "LeggedEnv") -> FloatArray:
