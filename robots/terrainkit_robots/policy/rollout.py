@@ -81,7 +81,7 @@ class EvaluationRollout:
         self.env, self.start_pos = env, env.curriculum.progress.start.copy()
         self.half_patch = np.inf if env.terrain.is_plane else env.terrain.patch_length / 2
         self.falls, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
-        self.distance, self.commanded_distance = np.zeros(n), np.zeros(n)
+        self.commanded_distance = np.zeros(n)
         names = "lin_vel_error", "lin_vel_error_1s", "ang_vel_error", "ang_vel_error_1s"
         self.errors = {name: ErrorMean(n) for name in names}  # as in `RolloutMetrics`
         self._settling_steps = round(SETTLING_TIME / dt)
@@ -132,7 +132,6 @@ class EvaluationRollout:
         self.loads.add(settled)
         distance = np.linalg.norm(state.base_pos[:, :2] - self.start_pos, axis=1)
         commanded = np.linalg.norm(self.env.curriculum.progress.target, axis=1)
-        self.distance[active] = distance[active]
         self.commanded_distance[active] = commanded[active]
         self.crossed |= active & (distance > self.half_patch)
 

@@ -117,13 +117,13 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     width_at_rest = np.float32(env.cfg.rewards.tracking_sigma)
     widths = [np.where(s > 0, -s / log_standing, width_at_rest) for s in squares]
     # A heading command ends in yaw rates near 0. Their kernels would be narrower than any sway.
-    walks_ahead = (squares[0] > 0) & (widths[1] <= width_at_rest)
-    widths[1][walks_ahead] = width_at_rest
+    turns_little = (squares[0] > 0) & (widths[1] <= width_at_rest)
+    widths[1][turns_little] = width_at_rest
     ratios = (error / width for error, width in zip(errors, widths, strict=True))
     lin, yaw = ((np.exp(-ratio) + np.exp(-NARROW * ratio)) / 2 for ratio in ratios)
     moving = is_moving(commands)
     only_yaw = moving & (squares[0] == 0)
-    return lin * np.where(only_yaw, yaw, 1), yaw * np.where(walks_ahead, lin, 1)
+    return lin * np.where(only_yaw, yaw, 1), yaw * np.where(turns_little, lin, 1)
 
 
 def tracking_lin_vel(env: "LeggedEnv") -> FloatArray:

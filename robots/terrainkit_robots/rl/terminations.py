@@ -46,8 +46,10 @@ def stuck(env: "LeggedEnv") -> BoolArray:
     progress = env.buffers.setdefault("progress", np.ones(env.num_envs, np.float32))
     commands, velocity = env.state.commands[:, :2], env.state.base_lin_vel[:, :2]
     squares = np.square(commands).sum(axis=1)
-    fraction = np.where(squares > 0, (commands * velocity).sum(axis=1), 1)
-    fraction /= np.where(squares > 0, squares, 1)
+    # A robot that is commanded to stand makes all the progress.
+    fraction = np.where(
+        squares > 0, (commands * velocity).sum(axis=1) / np.maximum(squares, 1e-9), 1
+    )
     progress[env.steps_since_reset <= 1] = 1
     progress += np.float32(env.cfg.dt / limit) * (np.clip(fraction, -1, 1) - progress)
     return progress < STUCK
