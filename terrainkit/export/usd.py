@@ -102,10 +102,15 @@ def _set_collider(prim: Any, approximation: str, material: Any) -> None:
 
 def _add_solids(usd_stage: Any, solids: Solids, contact: dict[str, float]) -> None:
     """Add a prim for each solid. Invisible solids are drawn only as guides."""
-    from pxr import Gf, UsdGeom
+    from pxr import Gf, Sdf, UsdGeom
 
     shapes = np.concatenate([solids.boxes, solids.cylinders])
     hulls = solid_meshes(solids.select(np.arange(len(solids)) >= len(shapes)))
+    # Each change of a stage visits all siblings, so the prims are created in one change.
+    with Sdf.ChangeBlock():
+        for k in range(len(solids)):
+            spec = Sdf.CreatePrimInLayer(usd_stage.GetRootLayer(), f"/terrain/solids/solid_{k}")
+            spec.specifier = Sdf.SpecifierDef
     materials: dict[str, Any] = {}
     for k, friction in enumerate(solids.friction.tolist()):
         path = f"/terrain/solids/solid_{k}"
