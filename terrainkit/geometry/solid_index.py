@@ -40,7 +40,10 @@ class SolidIndex:
         if not self._number:
             return
         self._radius = np.broadcast_to(np.asarray(radius, float), self._number)
-        self._planes, self._num_planes = half_spaces(solids)
+        planes, self._num_planes = half_spaces(solids)
+        # A half-space n . p <= d that is widened horizontally by r has the distance d + r |n_xy|.
+        planes[:, 3] += np.repeat(self._radius, self._num_planes) * np.hypot(*planes[:, :2].T)
+        self._planes = np.ascontiguousarray(planes.T)
         self._first_plane = np.cumsum(self._num_planes) - self._num_planes
         self._cylinders, self._num_boxes = solids.cylinders.astype(float), len(solids.boxes)
         self._axes = rotation_matrices(solids.cylinders[:, 6:])[..., 2]
@@ -198,11 +201,12 @@ class SolidIndex:
         if not len(solid):
             return np.empty(0), np.empty(0)
         pair, place = segment_indices(self._num_planes[solid])
-        normal, distance = np.split(self._planes[self._first_plane[solid][pair] + place], [3], 1)
-        # A half-space n . p <= d that is widened horizontally by r has the distance d + r |n_xy|.
-        left = distance[:, 0] + self._radius[solid][pair] * np.hypot(normal[:, 0], normal[:, 1])
-        left -= (normal[:, : starts.shape[1]] * starts[pair]).sum(axis=1)
-        rate = normal[:, 2] if directions is None else (normal * directions[pair]).sum(axis=1)
+        *normal, left = self._planes.take(self._first_plane[solid][pair] + place, axis=1)
+        for n, start in zip(normal, starts.T, strict=False):
+            left -= n * start[pair]
+        rate = normal[2]
+        if directions is not None:
+            rate = sum(n * along[pair] for n, along in zip(normal, directions.T, strict=True))
         parallel = np.abs(rate) <= _PARALLEL
         t = left / np.where(parallel, 1.0, rate)
         # A parallel face does not bound the line, which is on one side of it.

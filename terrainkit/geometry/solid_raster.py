@@ -11,6 +11,8 @@ from terrainkit.geometry.solids import Solids, rotation_matrices
 
 PIXEL = 0.025
 """Distance between two samples [m]; an edge is off by at most half of it."""
+_BAND = 500_000
+"""Number of pixels that are sampled at once, to bound the memory."""
 _TILT = 1e-12
 """Largest difference between 1 and the z component of the axis of a level solid."""
 
@@ -38,26 +40,49 @@ class SolidRaster:
         self._shape = np.ceil(extent / PIXEL).astype(np.int64) + 1
         pixels_total = int(self._shape.prod())
         check_memory(pixels_total * 5, f"a height scan of solids with {pixels_total} pixels")
-        pixels = np.argwhere(self._covered(corners))
-        centers = self._corner + (pixels + 0.5) * PIXEL
         self._index = SolidIndex(solids)
         self._row = np.zeros(self._shape, dtype=np.int32)
-        if exact:
-            level = _is_level(solids)
-            is_mixed = self._covered(corners[:, ~level])[tuple(pixels.T)]
-            rest = np.flatnonzero(~is_mixed)
-            radius = 0.5001 * 2**0.5 * PIXEL
-            touch = SolidIndex(solids, radius=radius).count(centers[rest])
-            fill = SolidIndex(solids.select(level), radius=-radius).count(centers[rest])
-            is_mixed[rest] = touch != fill
-            self._row[tuple(pixels[is_mixed].T)] = -1
-            keep = rest[(touch == fill) & (touch > 0)]
-            pixels, centers = pixels[keep], centers[keep]
-        bounds = self._index.intervals(centers)
-        # Row 0 of the table has no solids; NaN compares as False.
-        self._bounds = np.full((len(pixels) + 1, *bounds.shape[1:]), np.nan, dtype=np.float32)
-        self._bounds[1:] = bounds
-        self._row[tuple(pixels.T)] = np.arange(1, len(pixels) + 1)
+        pixels = np.flatnonzero(self._covered(corners))
+        is_mixed = self._mixed(solids, corners, pixels) if exact else np.zeros(len(pixels), bool)
+        self._row.put(pixels[is_mixed], -1)
+        pixels = pixels[~is_mixed]
+        tables: list[NDArray[np.float32]] = []
+        num_rows = 1  # Row 0 of the table has no solids.
+        for start in range(0, len(pixels), _BAND):
+            band = pixels[start : start + _BAND]
+            bounds = self._index.intervals(self._centers(band)).astype(np.float32)
+            rows, row = _distinct(bounds)
+            self._row.put(band, num_rows + row)
+            num_rows += len(rows)
+            tables.append(rows)
+        # NaN compares as False.
+        most = max((table.shape[1] for table in tables), default=0)
+        self._bounds = np.full((num_rows, most, 2), np.nan, dtype=np.float32)
+        num_rows = 1
+        for table in tables:
+            self._bounds[num_rows : num_rows + len(table), : table.shape[1]] = table
+            num_rows += len(table)
+
+    def _centers(self, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the centers of pixels with these raveled indices [m], shape (n, 2)."""
+        places = np.stack(np.divmod(pixels, self._shape[1]), axis=1)
+        return np.asarray(self._corner + (places + 0.5) * PIXEL)
+
+    def _mixed(
+        self, solids: Solids, corners: NDArray[np.float64], pixels: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """Return the pixels in which a solid ends, or is not level."""
+        level = _is_level(solids)
+        is_mixed = self._covered(corners[:, ~level]).take(pixels)
+        radius = 0.5001 * 2**0.5 * PIXEL
+        touch = SolidIndex(solids, radius=radius)
+        fill = SolidIndex(solids.select(level), radius=-radius)
+        rest = np.flatnonzero(~is_mixed)
+        for start in range(0, len(rest), _BAND):
+            band = rest[start : start + _BAND]
+            centers = self._centers(pixels[band])
+            is_mixed[band] = touch.count(centers) != fill.count(centers)
+        return is_mixed
 
     def _covered(self, corners: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Return the pixels that bounding boxes overlap.
@@ -153,3 +178,18 @@ def _is_level(solids: Solids) -> NDArray[np.bool_]:
     is_box = np.arange(len(shapes)) < len(solids.boxes)
     level = np.where(is_box, upward.max(axis=1, initial=0.0), upward[:, 2]) > 1 - _TILT
     return np.append(level, np.zeros(len(solids.hull_counts), bool))
+
+
+def _distinct(
+    bounds: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Return the distinct rows of `bounds`, and the row of each pixel among them.
+
+    Pixels on a floor have the same bounds, so that the table of a building is small.
+    """
+    bits = bounds.reshape(len(bounds), -1).view(np.int32)  # NaN is not equal to itself
+    starts = np.ones(len(bits), dtype=bool)
+    starts[1:] = (bits[1:] != bits[:-1]).any(axis=1)
+    runs, row = np.unique(bits[starts], axis=0, return_inverse=True)
+    rows = runs.view(np.float32).reshape(-1, *bounds.shape[1:])
+    return rows, row.reshape(-1)[np.cumsum(starts) - 1]

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from terrainkit.geometry import solid_raster
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solid_raster import PIXEL, SolidRaster
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders
@@ -33,7 +34,9 @@ def test_solid_raster_without_solids_has_no_tops():
     assert np.isneginf(raster.top(np.zeros(2), np.ones(2), np.ones(2))).all()
 
 
-def test_solid_raster_agrees_with_the_index_within_a_pixel():
+@pytest.mark.parametrize("band", [1000, 500_000])
+def test_solid_raster_agrees_with_the_index_within_a_pixel(monkeypatch, band):
+    monkeypatch.setattr(solid_raster, "_BAND", band)
     rng = np.random.default_rng(0)
     center = rng.uniform(-3, 3, (20, 3))
     boxes = make_boxes(center[:10], rng.uniform(0.2, 1, (10, 3)), rpy=[0, 0, 0.5])
