@@ -29,7 +29,7 @@ _FLAT_TERRAINS = ("pyramid_stairs_inverted", "pyramid_stairs", "stairs", "obstac
 
 def run() -> Iterator[tuple[str, float]]:
     warnings.simplefilter("ignore", terrainkit.TerrainkitWarning)  # cliffs, as expected
-    for preset in ("stairs", "legged_gym"):
+    for preset in ("stairs", "legged_gym", "indoor", "street"):
         terrain_map = terrainkit.generate(terrainkit.MapConfig(preset=preset))
         for name, cost in _step_times(terrain_map).items():
             yield f"{preset}_{name}_over_plane", cost

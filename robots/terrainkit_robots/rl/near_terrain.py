@@ -1,8 +1,7 @@
 """The geoms of a map near each robot, in place of all its geoms.
 
-The time of a MuJoCo step grows with the number of boxes of a map. Here, all simulations have the
-same few boxes, which stand where the boxes near their robot are. Other geoms of the map are far
-below the robots that are not near them.
+The time of a MuJoCo step grows with the number of geoms of a map. Here, all simulations have the
+same few geoms, which take the types, shapes and poses of the geoms near their robot.
 """
 
 from dataclasses import dataclass
@@ -29,7 +28,18 @@ MIN_GEOMS = 64
 # Geoms that move are not in MuJoCo's bounding volume hierarchy, so each one takes time in every
 # step. Steps with 124 of 3,200 boxes were 1.4 times as fast, and with 67 of 10,400 4 times.
 MIN_RATIO = 8
-"""Smallest number of all boxes of a map over those near a robot from which only these are used."""
+"""Smallest number of all geoms of a map over those near a robot from which only these are used."""
+
+_FIELDS = (
+    "geom_type",
+    "geom_dataid",
+    "geom_pos",
+    "geom_quat",
+    "geom_size",
+    "geom_rbound",
+    "geom_aabb",
+)
+"""The fields of a model that differ between geoms near a robot."""
 
 FAR = -1e3
 """Height of the geoms that are not near a robot [m]."""
@@ -39,10 +49,7 @@ FAR = -1e3
 class NearTerrain:
     """The geoms of a map, and which of them are near each square: n geoms and m squares."""
 
-    pos: FloatArray  # position of each geom [m], shape (n, 3)
-    quat: FloatArray  # orientation of each geom (w, x, y, z), shape (n, 4)
-    size: FloatArray  # half sizes of a box [m], shape (n, 3)
-    is_box: NDArray[np.bool_]  # shape (n,)
+    fields: dict[str, NDArray[Any]]  # `_FIELDS` of each geom, by name
     lower: FloatArray  # lower corner of the squares, x and y [m]
     shape: tuple[int, int]  # number of squares along x and y
     starts: NDArray[np.int64]  # first entry of each square in `near`, shape (m + 1,)
@@ -60,10 +67,9 @@ class NearTerrain:
         return square
 
     @property
-    def num_boxes(self) -> int:
-        """The largest number of boxes near a square."""
-        before = np.append(0, np.cumsum(self.is_box[self.near]))
-        return int(np.diff(before[self.starts]).max())
+    def num_near(self) -> int:
+        """The largest number of geoms near a square."""
+        return int(np.diff(self.starts).max())
 
 
 def find_near_terrain(
@@ -78,11 +84,9 @@ def find_near_terrain(
         policy_dt: Time in which a robot moves between two choices of geoms [s].
     """
     world = np.flatnonzero(collides(model) & (model.geom_bodyid == 0))
-    is_box = model.geom_type[world] == mujoco.mjtGeom.mjGEOM_BOX
-    boxes = world[is_box]
     fields = model.geom_friction, model.geom_priority, model.geom_solref, model.geom_solimp
-    is_alike = all(len(np.unique(each[boxes], axis=0)) == 1 for each in fields)
-    if len(world) <= MIN_GEOMS or (~is_box).sum() > MIN_GEOMS or not is_alike:
+    is_alike = all(len(np.unique(each[world], axis=0)) == 1 for each in fields)
+    if len(world) <= MIN_GEOMS or not is_alike:
         return None
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -106,16 +110,13 @@ def find_near_terrain(
     order = np.argsort(every, kind="stable")
     starts = np.searchsorted(every[order], np.arange(lowest.size + 1))
     near = NearTerrain(
-        pos=model.geom_pos[world].copy(),
-        quat=model.geom_quat[world].copy(),
-        size=model.geom_size[world].copy(),
-        is_box=is_box,
+        fields={name: getattr(model, name)[world].copy() for name in _FIELDS},
         lower=lower,
         shape=limit,
         starts=starts,
         near=geoms[order],
     )
-    return near if near.num_boxes * MIN_RATIO <= len(boxes) else None
+    return near if near.num_near * MIN_RATIO <= len(world) else None
 
 
 def _reach(model: Any, base: int) -> float:
@@ -153,49 +154,43 @@ def _lowest_ground(
     return lowest[np.ix_(*at)], lower
 
 
-def add_near_boxes(mjspec: Any, terrain: NearTerrain) -> None:
-    """Replace the boxes of a map by as many as are near a robot.
+def add_near_geoms(mjspec: Any, terrain: NearTerrain) -> None:
+    """Replace the geoms of a map by as many as are near a robot.
 
     Args:
         mjspec: Model of a robot on the map.
         terrain: The geoms of the map.
     """
-    box = mujoco.mjtGeom.mjGEOM_BOX
-    boxes = [geom for geom in mjspec.worldbody.find_all("geom") if geom.type == box]
-    boxes = [geom for geom in boxes if geom.parent.name == "world"]
-    example = next(geom for geom in boxes if geom.contype or geom.conaffinity)
+    geoms = [geom for geom in mjspec.worldbody.find_all("geom") if geom.parent.name == "world"]
+    geoms = [geom for geom in geoms if geom.contype or geom.conaffinity]
     names = "contype conaffinity condim priority friction solmix solref solimp margin gap"
-    attributes = {name: getattr(example, name) for name in names.split()}
+    attributes = {name: getattr(geoms[0], name) for name in names.split()}
     # Deleting a geom takes a time that grows with their number: 45 s for 10,000 boxes, one by one.
     frame = mjspec.worldbody.add_frame()
-    for geom in boxes:
+    for geom in geoms:
         geom.set_frame(frame)
     mjspec.delete(frame)
-    for number in range(terrain.num_boxes):
+    for number in range(terrain.num_near):
         # MuJoCo ignores the orientation of a geom that is compiled without one.
         pose = {"pos": [0, 0, FAR], "quat": [0.8, 0.6, 0, 0], "size": [0.1, 0.1, 0.1]}
-        name = f"near_{number}"
-        mjspec.worldbody.add_geom(name=name, type=box, **pose, **attributes)
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        mjspec.worldbody.add_geom(name=f"near_{number}", type=box, **pose, **attributes)
     # The geoms move, which the bounding volume hierarchy does not know.
     mjspec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
 
 
 class NearGeoms:
-    """Moves the geoms of a map to where they are near the robots of a batch of simulations."""
+    """Makes the geoms of a batch of simulations the geoms of the map near their robots."""
 
     def __init__(self, batch: Any, model: Any, terrain: NearTerrain, num_envs: int) -> None:
-        geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == 0))
-        is_box = model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_BOX
-        self._boxes, self._others = geoms[is_box], geoms[~is_box]
-        names = "geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aabb"
-        fields = (batch.expand(name) for name in names)
-        self._pos, self._quat, self._size, self._rbound, aabb = fields
-        self._aabb = aabb.reshape(num_envs, -1, 6)
+        self._slots = np.flatnonzero(collides(model) & (model.geom_bodyid == 0))
+        self._fields = {
+            name: batch.expand(name).reshape(num_envs, model.ngeom, -1) for name in _FIELDS
+        }
         self._terrain, self._squares = terrain, np.full(num_envs, -1)
-        self._number = np.cumsum(~terrain.is_box) - 1  # of each geom that is not a box
 
     def update(self, position: FloatArray) -> None:
-        """Move the geoms of the robots that reached another square.
+        """Replace the geoms of the robots that reached another square.
 
         Args:
             position: Position of each robot, x and y [m], shape (n, 2).
@@ -203,13 +198,9 @@ class NearGeoms:
         terrain, squares = self._terrain, self._terrain.squares(position)
         for env in np.flatnonzero(squares != self._squares).tolist():
             near = terrain.near[slice(*terrain.starts[squares[env] : squares[env] + 2])]
-            is_box = terrain.is_box[near]
-            boxes, others = near[is_box], near[~is_box]
-            self._pos[env, self._boxes[len(boxes) :], 2] = FAR
-            slots = self._boxes[: len(boxes)]
-            self._pos[env, slots], self._quat[env, slots] = terrain.pos[boxes], terrain.quat[boxes]
-            self._size[env, slots] = self._aabb[env, slots, 3:] = terrain.size[boxes]
-            self._rbound[env, slots] = np.linalg.norm(terrain.size[boxes], axis=1)
-            self._pos[env, self._others, 2] = FAR
-            self._pos[env, self._others[self._number[others]]] = terrain.pos[others]
+            for name, values in self._fields.items():
+                values[env, self._slots[: len(near)]] = terrain.fields[name][near].reshape(
+                    len(near), -1
+                )
+            self._fields["geom_pos"][env, self._slots[len(near) :], 2] = FAR
         self._squares = squares

@@ -13,7 +13,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.near_terrain import add_near_boxes, find_near_terrain
+from terrainkit_robots.rl.near_terrain import add_near_geoms, find_near_terrain
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.simulation.geoms import collides, lowest_point
 from terrainkit_robots.spec.robot import Robot
@@ -66,7 +66,7 @@ class Scene:
             if surface is not None and not all_geoms:
                 self.near_terrain = find_near_terrain(self.model, base, surface, task.dt)
             if self.near_terrain:
-                add_near_boxes(mjspec, self.near_terrain)
+                add_near_geoms(mjspec, self.near_terrain)
                 self.model = mjspec.compile()
         model = self.model
         joints = [model.joint(name).id for name in robot.spec.joint_order]

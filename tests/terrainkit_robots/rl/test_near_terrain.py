@@ -11,24 +11,28 @@ from terrainkit_robots.rl.terrain import MapGround
 _NUM = 12
 
 
-@pytest.fixture(scope="module")
-def stairs():
-    """Return stairs, pits and slopes, with far more boxes than are near a robot."""
-    kinds = tuple(SubTerrain(terrain=name) for name in ("pyramid_stairs", "pit", "pyramid_slope"))
-    config = MapConfig(rows=6, cols=12, patch_size=(6.0, 6.0), border=1.0, terrains=kinds)
-    return MapGround(generate(config), "boxes")
+_STAIRS = tuple(SubTerrain(terrain=name) for name in ("pyramid_stairs", "pit", "pyramid_slope"))
+_CONFIGS = {  # with far more geoms than are near a robot
+    "stairs": MapConfig(rows=6, cols=12, patch_size=(6.0, 6.0), border=1.0, terrains=_STAIRS),
+    "street": MapConfig(rows=3, cols=8, border=1.0, preset="street"),  # boxes, cylinders and hulls
+}
+
+
+@pytest.fixture(scope="module", params=_CONFIGS)
+def ground(request):
+    return MapGround(generate(_CONFIGS[request.param]), "boxes")
 
 
 @pytest.fixture(scope="module")
-def scenes(quadruped, nominal_task, stairs):
-    return [Scene(quadruped, stairs, nominal_task(_NUM), all_geoms=each) for each in (True, False)]
+def scenes(quadruped, nominal_task, ground):
+    return [Scene(quadruped, ground, nominal_task(_NUM), all_geoms=each) for each in (True, False)]
 
 
-def walked(scene, stairs, robot):
+def walked(scene, ground, robot):
     """Return the positions of robots that slide over the patches."""
     sim, found = Simulation(scene, _NUM, 1), []
     qpos = np.tile(scene.default_qpos, (_NUM, 1))
-    qpos[:, :3] = stairs.env_origins.reshape(-1, 3)[:_NUM]
+    qpos[:, :3] = ground.env_origins.reshape(-1, 3)[:_NUM]
     qpos[:, 2] += robot.spawn_height
     sim.reset(np.arange(_NUM), qpos, np.zeros((_NUM, scene.model.nv)))
     for _ in range(60):
@@ -38,11 +42,11 @@ def walked(scene, stairs, robot):
     return np.array(found)
 
 
-def test_robots_move_as_on_all_geoms(scenes, stairs, quadruped):
+def test_robots_move_as_on_all_geoms(scenes, ground, quadruped):
     whole, near = scenes
     assert whole.near_terrain is None
     assert near.model.ngeom < whole.model.ngeom - 40
-    one, other = (walked(each, stairs, quadruped) for each in scenes)
+    one, other = (walked(each, ground, quadruped) for each in scenes)
     assert np.ptp(one[:, :, 0], axis=0).min() > 1  # they reached other squares
     differ = np.abs(one - other).max(axis=2)
     # The order of contacts may differ, and with it the last bits.
@@ -50,19 +54,20 @@ def test_robots_move_as_on_all_geoms(scenes, stairs, quadruped):
     assert first.max() < 1e-12
 
 
-def test_geoms_that_are_not_near_are_far_below(scenes, stairs):
+def test_geoms_that_are_not_near_are_far_below(scenes, ground):
     scene = scenes[1]
     terrain, sim = scene.near_terrain, Simulation(scene, 2, 1)
-    sim.qpos[:, :2] = stairs.env_origins[[0, 5], [0, 0], :2]
+    sim.qpos[:, :2] = ground.env_origins[[0, 2], [0, 0], :2]
+    squares = terrain.squares(sim.qpos[:, :2])
     sim.step(1)
-    pos = sim.batch.expand("geom_pos")
-    boxes = [k for k in range(scene.model.ngeom) if "near_" in scene.model.geom(k).name]
-    assert len(boxes) == terrain.num_boxes <= terrain.is_box.sum() / MIN_RATIO
-    for env, square in enumerate(terrain.squares(sim.qpos[:, :2])):
+    pos, kinds = sim.batch.expand("geom_pos"), sim.batch.expand("geom_type")
+    slots = [k for k in range(scene.model.ngeom) if "near_" in scene.model.geom(k).name]
+    assert len(slots) == terrain.num_near <= len(terrain.fields["geom_pos"]) / MIN_RATIO
+    for env, square in enumerate(squares):
         near = terrain.near[terrain.starts[square] : terrain.starts[square + 1]]
-        expected = terrain.pos[near[terrain.is_box[near]]]
-        placed = pos[env, boxes]
-        np.testing.assert_array_equal(placed[placed[:, 2] != FAR], expected)
+        placed = pos[env, slots, 2] != FAR
+        np.testing.assert_array_equal(pos[env, slots][placed], terrain.fields["geom_pos"][near])
+        np.testing.assert_array_equal(kinds[env, slots][placed], terrain.fields["geom_type"][near])
 
 
 def test_few_geoms_stay(quadruped, nominal_task):
