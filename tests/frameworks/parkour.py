@@ -1,5 +1,7 @@
 """The map of most checks, and where balls come to rest on its ground and its solids."""
 
+import os
+
 import numpy as np
 
 import terrainkit
@@ -7,7 +9,9 @@ import terrainkit
 RADIUS = 0.1
 """Radius of the balls [m]."""
 
-CONFIG = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, 6.0), border=5.0, preset="parkour")
+PRESET = os.environ.get("TERRAINKIT_PRESET", "parkour")
+WIDTH = 6.0 if PRESET == "parkour" else 8.0
+CONFIG = terrainkit.MapConfig(rows=4, cols=7, patch_size=(8.0, WIDTH), border=5.0, preset=PRESET)
 
 _DROP = 0.02
 """Initial distance of the balls from the surface below [m]."""
