@@ -30,7 +30,7 @@ from terrainkit_cli.argument_types import (
     is_map,
     parse_settings,
 )
-from terrainkit_cli.parse import Command, positional
+from terrainkit_cli.parse import Command, option, positional
 from terrainkit_cli.plugin_command import PluginCommand
 from terrainkit_cli.signals import Terminated
 from terrainkit_cli.training_extra import require_training
@@ -47,6 +47,7 @@ OPTION_TYPES: dict[str, Kind] = {
     "terrain": "run",
     "checkpoint": "run",
     "robot": "run",
+    "contract": "run",
     "package": "robot",
     "xacro_arg": "robot",
 }
@@ -140,7 +141,12 @@ class View(PluginCommand, ViewerCommand):
     in one, or a bundled policy; or with --robot, a policy of any project (.onnx or .pt)."""
 
     robot: RobotName = ""
-    """The robot of a policy of another project, whose contract is beside it or in its metadata."""
+    """The robot of a policy of another project: a robot's name, or a folder written by
+    terrainkit onboard."""
+
+    contract: Annotated[Path, option("FILE")] | None = None
+    """The contract of that policy, if it is not beside it or in its metadata: policy.json, or a
+    YAML file in the form of deploy.yaml or unitree_rl_gym's deploy_mujoco."""
 
     policy: bool = False
     """Show the bundled policy of a robot instead of the robot."""
@@ -207,11 +213,13 @@ class View(PluginCommand, ViewerCommand):
 
     def _open_run(self) -> "Show":
         require_training()
+        if self.contract and not self.robot:
+            raise ConfigError("--robot: missing; expected the robot of the policy")
         if self.robot:
-            from terrainkit_robots.policy.open_policy import open_policy as open_foreign
+            from terrainkit_cli.evaluate_command import open_outside_policy
             from terrainkit_robots.viewer.show_policy import PolicyView
 
-            spec = open_foreign(Path(self.source), self.robot)
+            spec = open_outside_policy(Path(self.source), self.robot, self.contract, self.task)
             return partial(PolicyView, run=spec, terrain=self.terrain or None)
         return open_policy(self.source, self.checkpoint, self.terrain or None, self.task)
 

@@ -15,6 +15,8 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError
 from terrainkit_cli.view_command import View
 from terrainkit_robots.description import bundled
+from terrainkit_robots.policy.export import export_policy
+from terrainkit_robots.rl.run import open_run
 
 DISPLAYS = "BROWSER", "DISPLAY", "WAYLAND_DISPLAY"
 IPV6 = pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="there is no IPv6")
@@ -114,6 +116,8 @@ def test_demo_without_its_packages_names_the_extra(rejected, monkeypatch):
         ("quadruped_map --package a=b", "--package: got the run quadruped_map"),
         ("quadruped --policy --checkpoint 3", "got checkpoint 3; expected one of"),
         ("empty --policy", "empty has no run.toml"),
+        ("quadruped_map --contract policy.json", "--robot: missing; expected the robot of the pol"),
+        ("map.npz --contract policy.json", "--contract: got the map map.npz; expected a run"),
     ],
 )
 @pytest.mark.usefixtures("map_file")
@@ -161,6 +165,16 @@ def test_view_shows_robots_and_policies(run_beside_walk, served, walking, words)
     code, output, errors = run_beside_walk("view", *words)
     assert code == 0, errors
     assert re.match(rf"http://localhost:\d+ shows {words[0]}; Ctrl\+C ends it\n", output)
+    assert "/robot/body_12" in served
+
+
+def test_view_shows_policies_of_other_projects(run_beside_walk, served, walking):
+    export_policy(open_run(walking), walking.parent / "out")
+    (walking.parent / "out" / "policy.json").rename(walking.parent / "contract.json")
+    words = "view out/policy.onnx --robot quadruped --contract contract.json"
+    code, output, errors = run_beside_walk(*words.split())
+    assert code == 0, errors
+    assert " shows out/policy.onnx; " in output
     assert "/robot/body_12" in served
 
 
