@@ -21,7 +21,7 @@ def to_numpy(name: str, values: Any) -> NDArray[Any]:
         values: An array, list or tensor of torch, on any device.
 
     Raises:
-        ConfigError: if lists have different lengths.
+        ConfigError: if lists have different lengths, or numpy lacks the dtype of a tensor.
     """
     if hasattr(values, "detach"):
         values = values.detach().cpu()
@@ -29,6 +29,9 @@ def to_numpy(name: str, values: Any) -> NDArray[Any]:
         return np.asarray(values)
     except ValueError:
         raise ConfigError(f"{name}: got lists of different lengths; expected one list") from None
+    except TypeError:  # such as bfloat16
+        expected = "one that numpy has, such as float32"
+        raise ConfigError(f"{name}: got values of {values.dtype}; expected {expected}") from None
 
 
 def like(array: NDArray[Any], original: Any) -> Any:

@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 
 from terrainkit.curriculum.arrays import like
-from terrainkit.errors import ConfigError
 from terrainkit.files.memory import check_memory
 from terrainkit.geometry.solid_raster import PIXEL
 from terrainkit.map.terrain_map import TerrainMap
-from terrainkit.perception.height_scan import exact_surface, to_floats
+from terrainkit.perception.height_scan import exact_surface, to_floats, to_number
 
 _MAX_SLOPE = 0.75
 """Slope of ground that is not a step, where the map has no threshold, as in legged_gym."""
@@ -37,14 +36,13 @@ class EdgeMap:
                 part of the surface: robots walk under it [m].
 
         Raises:
-            ConfigError: if a height is not above 0.
+            ConfigError: if a height is below 1 mm.
             MemoryLimitError: if the grid would not fit in memory.
         """
         import cv2
 
-        if not (step_height > 0 and headroom > 0):
-            got = f"step_height {step_height:g} and headroom {headroom:g}"
-            raise ConfigError(f"edges: got {got}; expected heights above 0, such as 0.05 and 1")
+        to_number("step_height", step_height, 1e-3)
+        to_number("headroom", headroom, 1e-3)
         surface, grid = exact_surface(terrain_map), terrain_map.grid
         per_cell = 2 if surface.visible is None else 2 * math.ceil(grid.cell / 2 / PIXEL - 1e-9)
         self._spacing, self._lower = grid.cell / per_cell, np.array(grid.lower)
@@ -107,6 +105,6 @@ class EdgeMap:
             Mask, shape (...).
 
         Raises:
-            ConfigError: if the shape is wrong, or a value is not finite.
+            ConfigError: if the shape is wrong, a value is not finite, or the radius is negative.
         """
-        return self.distance(xy) >= radius
+        return self.distance(xy) >= to_number("radius", radius, 0.0)

@@ -1,5 +1,7 @@
 """HeightScan: heights of the ground and of the solids at a grid around each robot."""
 
+import math
+import numbers
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
@@ -11,6 +13,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.geometry.solid_raster import SolidRaster
 from terrainkit.geometry.surface import HeightfieldSurface, WallTable
 from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.settings.type_hint import show
 
 Floats = NDArray[np.float32]
 
@@ -73,6 +76,29 @@ def to_floats(name: str, values: Any, shape: Sequence[int | None]) -> NDArray[An
     if not np.isfinite(array).all():
         raise ConfigError(f"{name}: got a value that is not finite; expected finite numbers")
     return array
+
+
+def to_number(
+    name: str, value: Any, low: float, high: float = math.inf, *, whole: bool = False
+) -> Any:
+    """Return a number of the caller after checking its range.
+
+    Args:
+        name: What the number is, for the error.
+        value: The number.
+        low: Lowest valid number.
+        high: Highest valid number.
+        whole: Whether it has to be an integer.
+
+    Raises:
+        ConfigError: if it is not a number, or outside of the range.
+    """
+    kind = numbers.Integral if whole else numbers.Real
+    if not isinstance(value, kind) or isinstance(value, bool) or not low <= value <= high:
+        range_ = f"{low:g} to {high:g}" if high < math.inf else f"at least {low:g}"
+        expected = f"a {'whole ' if whole else ''}number, {range_}"
+        raise ConfigError(f"{name}: got {show(value)}; expected {expected}")
+    return value
 
 
 class HeightScan:

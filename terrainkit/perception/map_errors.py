@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum.arrays import like, make_rng, to_indices
 from terrainkit.errors import ConfigError
-from terrainkit.perception.height_scan import Floats, HeightScan, to_floats
+from terrainkit.perception.height_scan import Floats, HeightScan, to_floats, to_number
 from terrainkit.perception.ray_caster import RayCaster
 
 _OCCLUSION_MARGIN = 0.02
@@ -52,13 +52,11 @@ class MapErrorOptions:
 
     def __post_init__(self) -> None:
         for name, high in _LIMITS.items():
-            value = getattr(self, name)
-            if not 0 <= value <= high:
-                raise ConfigError(f"map errors: {name}: got {value}; expected 0 to {high:g}")
-        low, high = self.delay
-        if not 0 <= low <= high <= _MAX_DELAY:
-            expected = f"two whole numbers from 0 to {_MAX_DELAY}, such as (0, 2)"
-            raise ConfigError(f"map errors: delay: got {self.delay}; expected {expected}")
+            to_number(f"map errors: {name}", getattr(self, name), 0.0, high)
+        to_floats("map errors: sensor", self.sensor, [3])
+        delay = to_indices("map errors: delay", self.delay, _MAX_DELAY + 1, 2)
+        if delay[0] > delay[1]:
+            raise ConfigError(f"map errors: delay: got {self.delay}; expected the lowest first")
 
 
 _MAX_DELAY = 100
@@ -94,10 +92,12 @@ class MapErrors:
             seed: Seed of all random numbers.
 
         Raises:
-            ConfigError: if the seed is invalid, or the occlusion has no rays.
+            ConfigError: if a number is out of range, or the occlusion has no rays.
         """
         if options.occlusion and rays is None:
             raise ConfigError("map errors: occlusion: got no rays; expected rays=RayCaster(map)")
+        to_number("num_envs", num_envs, 0, whole=True)
+        to_number("dt", dt, 1e-6, 1e3)
         self._scan, self._options, self._rays, self._dt, self._seed = scan, options, rays, dt, seed
         self._steps, n, k = 0, num_envs, scan.offsets.shape[1]
         self._drift, self._delay, self._age = np.zeros((n, 3)), np.zeros(n, int), np.zeros(n, int)
@@ -180,7 +180,8 @@ def _lattice_noise(x: Floats, y: Floats, side: float, seed: int) -> Floats:
     """
     i, j = (np.floor(each / side).astype(np.int64).astype(np.uint32) for each in (x, y))
     i, j = (
-        (each + np.uint32(seed)) * np.uint32(1664525) + np.uint32(1013904223) for each in (i, j)
+        (each + np.uint32(seed % 2**32)) * np.uint32(1664525) + np.uint32(1013904223)
+        for each in (i, j)
     )
     for _ in range(2):
         i = i + j * np.uint32(1664525)

@@ -13,10 +13,13 @@ from terrainkit.geometry.ray_grid import Floats
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import rotation_matrices
 from terrainkit.map.terrain_map import TerrainMap
-from terrainkit.perception.height_scan import to_floats
+from terrainkit.perception.height_scan import to_floats, to_number
 
 _RAYS_AT_ONCE = 16_384
 """Rays that are cast at once, so that their arrays stay in the cache."""
+
+_MAX_PIXELS = 100_000
+"""Largest number of pixels in a row or column of an image, and of rays per channel of a lidar."""
 
 
 class RayCaster:
@@ -83,12 +86,12 @@ class RayCaster:
             rows = slice(k, k + size)
             toward = np.einsum("nij,kj->nki", turns[rows], pattern).reshape(-1, 3)
             origins = np.repeat(starts[rows], len(pattern), axis=0)
-            result[rows] = self._cast(origins, toward, max_distance).reshape(-1, len(pattern))
+            distances = self._cast(origins, toward, max_distance)
+            result[rows] = distances.reshape(result[rows].shape)
         return like(result.reshape(len(starts), *shape), position)
 
     def _cast(self, origins: Floats, directions: Floats, max_distance: float) -> Any:
-        if not max_distance > 0:
-            raise ConfigError(f"max_distance: got {max_distance}; expected a number above 0")
+        to_number("max_distance", max_distance, 1e-6)
         result = np.empty(len(origins), np.float32)
         for k in range(0, len(origins), _RAYS_AT_ONCE):
             starts, toward = (each[k : k + _RAYS_AT_ONCE] for each in (origins, directions))
@@ -111,13 +114,11 @@ def depth_directions(width: int, height: int, fov: float = 1.5) -> Floats:
         Unit vectors, shape (height, width, 3): the first is at the upper left.
 
     Raises:
-        ConfigError: if the image is empty, or the field of view is not between 0 and pi.
+        ConfigError: if the image is empty, or the field of view is not between 0.001 and 3.14 rad.
     """
-    if width < 1 or height < 1 or not 0 < fov < np.pi:
-        raise ConfigError(
-            f"depth camera: got {width} x {height} pixels and fov {fov:g}; expected at least 1 x 1 "
-            "pixels and an angle between 0 and pi, such as 1.5"
-        )
+    for name, number in (("width", width), ("height", height)):
+        to_number(f"depth camera: {name}", number, 1, _MAX_PIXELS, whole=True)
+    to_number("depth camera: fov", fov, 1e-3, 3.14)
     pixel = 2 * np.tan(fov / 2) / width
     y, z = (pixel * ((n - 1) / 2 - np.arange(n)) for n in (width, height))
     left, up = np.meshgrid(y, z)
@@ -133,7 +134,11 @@ def lidar_directions(elevations: Sequence[float], num_azimuths: int = 360) -> Fl
 
     Returns:
         Unit vectors, shape (channels, num_azimuths, 3).
+
+    Raises:
+        ConfigError: if an angle is not a finite number, or there are no rays per channel.
     """
+    to_number("num_azimuths", num_azimuths, 1, _MAX_PIXELS, whole=True)
     elevation = to_floats("elevations", elevations, [None])[:, None]
     azimuth = 2 * np.pi * np.arange(num_azimuths) / num_azimuths
     x, y, z = np.broadcast_arrays(
@@ -144,6 +149,7 @@ def lidar_directions(elevations: Sequence[float], num_azimuths: int = 360) -> Fl
 
 def _units(vectors: NDArray[Any]) -> Floats:
     vectors = vectors.astype(np.float64)
+    vectors = vectors / np.maximum(np.abs(vectors).max(axis=-1, keepdims=True), 1e-300)
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     if not (length > 0).all():
         raise ConfigError("directions and quaternions: got a length of 0; expected more than 0")

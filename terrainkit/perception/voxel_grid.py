@@ -8,7 +8,7 @@ import numpy as np
 from terrainkit.curriculum.arrays import like
 from terrainkit.geometry.surface import HeightfieldSurface
 from terrainkit.map.terrain_map import TerrainMap
-from terrainkit.perception.height_scan import HeightScan, exact_surface, to_floats
+from terrainkit.perception.height_scan import HeightScan, exact_surface, to_floats, to_number
 
 
 class VoxelGrid:
@@ -36,12 +36,15 @@ class VoxelGrid:
             side: Height of a voxel [m].
 
         Raises:
-            ConfigError: if a center is not a finite number.
+            ConfigError: if a center is not a finite number, or the side is below 1 mm.
         """
         self._surface = exact_surface(surface) if isinstance(surface, TerrainMap) else surface
         self._columns = HeightScan(self._surface, x, y)
         self._z = to_floats("z", z, [None]).astype(np.float32)
-        self._shape, self._half = (len(x), len(y), len(z)), np.float32(side / 2)
+        self._shape, self._half = (
+            (len(x), len(y), len(z)),
+            np.float32(to_number("side", side, 1e-3, 100.0) / 2),
+        )
 
     def occupied(self, position: Any, yaw: Any) -> Any:
         """Return which voxels are occupied, shape (n, len(x), len(y), len(z)).
@@ -66,4 +69,4 @@ class VoxelGrid:
             low = lower[hit // x.shape[1], 0][..., None]
             inside = ((bottom < low + 2 * self._half) & (top > low)).any(axis=2)
             block.reshape(-1, len(self._z))[hit] |= inside
-        return like(result.reshape(-1, *self._shape), position)
+        return like(result.reshape(len(given), *self._shape), position)

@@ -40,5 +40,9 @@ def test_solids_overhead_have_no_edges(solid_map):
 
 
 def test_invalid_heights_are_rejected(step_map):
-    with pytest.raises(ConfigError, match=r"such as 0\.05 and 1"):
+    with pytest.raises(
+        ConfigError, match=r"step_height: got 0; expected a number, at least 0\.001"
+    ):
         EdgeMap(step_map, step_height=0)
+    with pytest.raises(ConfigError, match="radius: got nan; expected a number, at least 0"):
+        EdgeMap(step_map).is_foothold([[1, 1]], radius=np.nan)

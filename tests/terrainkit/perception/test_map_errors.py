@@ -95,14 +95,37 @@ def test_same_seed_gives_same_errors_whichever_robots_are_reset(make):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"missing": 1.1}, "missing: got 1.1; expected 0 to 1"),
-        ({"noise": np.nan}, "noise: got nan; expected 0 to 10"),
-        ({"delay": (2, 1)}, r"delay: got \(2, 1\); expected two whole numbers"),
+        ({"missing": 1.1}, "missing: got 1.1; expected a number, 0 to 1"),
+        ({"noise": np.nan}, "noise: got nan; expected a number, 0 to 10"),
+        ({"drift": "much"}, r"drift: got 'much'; expected a number"),
+        ({"delay": (2, 1)}, r"delay: got \(2, 1\); expected the lowest first"),
+        ({"delay": (0, 1.5)}, "delay: got values of float64; expected integers"),
+        ({"delay": (0, 101)}, "delay: got 0 to 101; expected 0 to 100"),
+        ({"delay": 3}, r"delay: got shape \(\); expected \(2,\)"),
+        ({"sensor": (0, 0)}, r"sensor: got shape \(2,\); expected \(3\)"),
     ],
 )
 def test_invalid_options_are_rejected(options, message):
     with pytest.raises(ConfigError, match=message):
         MapErrorOptions(**options)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"num_envs": 2.5}, "num_envs: got 2.5; expected a whole number, at least 0"),
+        ({"dt": np.nan}, "dt: got nan; expected a number, 1e-06 to 1000"),
+    ],
+)
+def test_invalid_numbers_are_rejected(step_map, values, message):
+    with pytest.raises(ConfigError, match=message):
+        MapErrors(HeightScan(step_map), MapErrorOptions(), **({"num_envs": 1, "dt": 0.02} | values))
+
+
+def test_grass_grows_with_any_seed(step_map):
+    options = MapErrorOptions(grass=0.1)
+    errors = MapErrors(HeightScan(step_map), options, 1, dt=0.02, seed=2**40 + 1)
+    assert np.isfinite(errors.below([[1.0, 1.0, 0.5]], [0.0])).all()
 
 
 def test_occlusion_needs_rays(step_map):

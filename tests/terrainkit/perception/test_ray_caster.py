@@ -94,5 +94,16 @@ def test_invalid_rays_are_rejected(step_map):
         rays.cast([[0, 0, 0]], [[0, 0, 0]])
     with pytest.raises(ConfigError, match="max_distance: got 0"):
         rays.cast([[0, 0, 0]], [[0, 0, 1]], 0)
-    with pytest.raises(ConfigError, match=r"such as 1\.5"):
+    with pytest.raises(ConfigError, match=r"fov: got 4\.0; expected a number, 0\.001 to 3\.14"):
         depth_directions(4, 2, fov=4.0)
+    with pytest.raises(ConfigError, match=r"width: got 4\.5; expected a whole number"):
+        depth_directions(4.5, 2)
+    with pytest.raises(ConfigError, match="num_azimuths: got 0; expected a whole number"):
+        lidar_directions([0.0], 0)
+
+
+def test_rays_of_any_length_and_number(step_map):
+    rays = RayCaster(step_map)
+    lengths = np.array([[0, 0, -1e-300], [0, 0, -1.0], [0, 0, -1e300]])
+    assert len(set(rays.cast([[1, 1, 2]] * 3, lengths).tolist())) == 1
+    assert rays.sense([[1, 1, 2]], [[1, 0, 0, 0]], np.zeros((0, 3))).shape == (1, 0)
