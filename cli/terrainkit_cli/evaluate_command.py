@@ -38,7 +38,8 @@ def open_outside_policy(
     from terrainkit_robots.rl.tasks import load_task_file
 
     own = load_task_file(str(task)) if task else None
-    return open_policy(policy, robot or (own.name if own else ""), contract, own and own.task)
+    robot, own_task = robot or (own.name if own else ""), own.task if own else None
+    return open_policy(policy, robot, contract, own_task)
 
 
 @dataclass(frozen=True, kw_only=True)

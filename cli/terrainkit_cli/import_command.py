@@ -107,6 +107,11 @@ def _report_lines(report: "ImportReport", *, has_solids: bool) -> Iterator[str]:
             f"overhangs over {report.overhang_area:.2f} m2, of which {report.lost_area:.2f} m2 are "
             f"lost; largest error {error:.3f} m at {at}{hint}"
         )
+    if report.hidden_area:
+        yield (
+            f"surfaces without thickness are above each other over {report.hidden_area:.2f} m2, "
+            "such as floors of a building; the map has only the highest"
+        )
     if report.num_open_bodies and (report.lost_area or report.lost_at):
         yield f"bodies that are not closed, and cannot become solids: {report.num_open_bodies}"
     at = f" at {_place(report.max_error_at)}" if report.max_error_at else ""

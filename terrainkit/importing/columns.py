@@ -39,9 +39,14 @@ class Columns:
     """Height of the surface above the lowest free space [m], shape (nx, ny); NaN where nothing
     hangs over the ground."""
 
+    sheets: Array
+    """Distance between the highest and the lowest surface that no face from below closes [m], shape
+    (nx, ny): above 0 where sheets without thickness are above each other."""
+
     def lowered(self, z: float) -> "Columns":
         """Return the columns of the mesh moved down by `z` [m]."""
-        return Columns(top=self.top - z, floor=self.floor - z, ceiling=self.ceiling - z)
+        top, floor, ceiling = self.top - z, self.floor - z, self.ceiling - z
+        return Columns(top=top, floor=floor, ceiling=ceiling, sheets=self.sheets)
 
 
 def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) -> Columns:
@@ -79,7 +84,28 @@ def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) 
     # The last of several gaps of a column is the lowest.
     ceiling[column[above]], floor[column[above]] = z[above], z[above + 1]
     top, floor, ceiling = (each.reshape(len(x), len(y)) for each in (top, floor, ceiling))
-    return Columns(top=top, floor=floor, ceiling=ceiling)
+    sheets = _sheets(column, z, sign, depth, top.size).reshape(top.shape)
+    return Columns(top=top, floor=floor, ceiling=ceiling, sheets=sheets)
+
+
+def _sheets(
+    column: NDArray[np.int64],
+    z: Array,
+    sign: NDArray[np.int64],
+    depth: NDArray[np.int64],
+    size: int,
+) -> Array:
+    """Return the distance from the highest to the lowest open surface of each column [m].
+
+    A face that points up is open if the depth does not return below the depth after it.
+    """
+    # Each column has its own range of numbers, so that the minimum from below does not mix them.
+    own = depth + column * (int(depth.max(initial=0)) - int(depth.min(initial=0)) + 1)
+    is_open = (sign > 0) & (np.minimum.accumulate(own[::-1])[::-1] == own)
+    low, high = np.full(size, np.inf), np.full(size, -np.inf)
+    np.minimum.at(low, column[is_open], z[is_open])
+    np.maximum.at(high, column[is_open], z[is_open])
+    return np.where(high >= low, high - low, 0.0)
 
 
 def _intersections(

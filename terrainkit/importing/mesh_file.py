@@ -68,7 +68,12 @@ class MeshSource(VertexSource):
         if all(len(a) == len(b) for a, b in zip(inner, (x, y), strict=True)):
             return found
         cells = np.ix_(*number)
-        return Columns(top=found.top[cells], floor=found.floor[cells], ceiling=found.ceiling[cells])
+        return Columns(
+            top=found.top[cells],
+            floor=found.floor[cells],
+            ceiling=found.ceiling[cells],
+            sheets=found.sheets[cells],
+        )
 
 
 def read(path: Path, options: ReadOptions) -> Source:

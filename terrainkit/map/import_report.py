@@ -81,6 +81,10 @@ class ImportReport:
     overhang_error_at: tuple[float, float] | None = None
     """Where that is in the map, x and y [m]; None without overhangs."""
 
+    hidden_area: float = 0.0
+    """Area where surfaces without thickness, such as floors, are more than half a cell above each
+    other, and the map has only the highest one [m2]."""
+
     num_thin_bodies: int = 0
     """Number of closed bodies narrower than a cell, which became solids."""
 
@@ -118,6 +122,7 @@ def make_report(
         num_lost_faces=num_lost,
         **(lost if num_lost else {}),
         **_overhangs(terrain_map, columns),
+        hidden_area=_hidden_area(terrain_map, columns),
         **counts,
     )
 
@@ -228,6 +233,12 @@ def _height_errors(
     has_wall = highest - lowest > terrain_map.config.wall_threshold
     error = np.where(has_wall, np.minimum(error, beyond), error)
     return np.where(z > top, error, 0.0) if only_above else error, top
+
+
+def _hidden_area(terrain_map: "TerrainMap", columns: Columns | None) -> float:
+    """Return the area where surfaces without thickness are above each other [m2]."""
+    cell = terrain_map.grid.cell
+    return 0.0 if columns is None else int((columns.sheets > cell / 2).sum()) * cell**2
 
 
 def _overhangs(terrain_map: "TerrainMap", columns: Columns | None) -> dict[str, Any]:

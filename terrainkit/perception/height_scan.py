@@ -94,7 +94,8 @@ def to_number(
         ConfigError: if it is not a number, or outside of the range.
     """
     kind = numbers.Integral if whole else numbers.Real
-    if not isinstance(value, kind) or isinstance(value, bool) or not low <= value <= high:
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    if not is_number or not low <= value <= high:
         range_ = f"{low:g} to {high:g}" if high < math.inf else f"at least {low:g}"
         expected = f"a {'whole ' if whole else ''}number, {range_}"
         raise ConfigError(f"{name}: got {show(value)}; expected {expected}")

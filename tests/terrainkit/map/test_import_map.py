@@ -255,6 +255,19 @@ def test_import_mesh_reports_what_a_heightfield_loses(tmp_path):
     assert len(imported.terrain_map.solids) == 0
 
 
+def test_import_mesh_reports_floors_without_thickness(tmp_path):
+    def sheet(low, high, z):
+        corners = [[low, low, z], [high, low, z], [high, high, z], [low, high, z]]
+        return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+
+    sunk = trimesh.creation.box((1, 1, 2), trimesh.transformations.translation_matrix([4, 4, 0]))
+    for sheets, area in (([sheet(1, 3, 2)], 4.0), ([], 0.0), ([sheet(1, 3, 0.01)], 0.0)):
+        mesh = trimesh.util.concatenate([sheet(0, 5, 0), sunk, *sheets])
+        mesh.export(tmp_path / "floors.obj")
+        report = import_map(tmp_path / "floors.obj", ImportOptions()).report
+        assert report.hidden_area == pytest.approx(area)
+
+
 def test_import_mesh_keeps_overhangs_as_solids(tmp_path):
     imported = import_map(save_bridge(tmp_path), ImportOptions(solids=True, patch_size=(3.0, 4.0)))
     terrain_map, report = imported.terrain_map, imported.report
