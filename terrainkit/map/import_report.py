@@ -212,6 +212,7 @@ def _height_errors(
     top = terrain_map.height(xy)
     error = np.abs(z - top)
     if len(terrain_map.solids):
+        error = np.full(len(z), np.inf)  # a solid may stand where the file has only ground
         high = max(float(heights.max()), float(terrain_map.solids.bounds()[1][:, 2].max())) + 1.0
         for shift in (-_BESIDE, _BESIDE):
             for direction in ((shift, shift), (shift, -shift)):

@@ -10,7 +10,7 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError, MemoryLimitError
 from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
-from terrainkit.map.import_report import ImportReport
+from terrainkit.map.import_report import ImportReport, _height_errors
 from terrainkit.map.validate import validate
 from tests.meshes import box, save_bridge
 
@@ -253,6 +253,15 @@ def test_import_mesh_reports_what_a_heightfield_loses(tmp_path):
     assert tk.TerrainMap.load(saved).import_reports == (imported.report,)
     assert imported.terrain_map.height([3.0, 2.0]) == pytest.approx(1.2)
     assert len(imported.terrain_map.solids) == 0
+
+
+def test_import_report_sees_solids_where_the_file_has_ground(tmp_path):
+    trimesh.creation.box((8, 8, 1)).export(tmp_path / "flat.obj")
+    terrain_map = import_map(tmp_path / "flat.obj", ImportOptions()).terrain_map
+    edited = terrain_map.edited(solids=tk.make_boxes(center=[4, 4, 3], size=[2, 2, 0.2]))
+    points = np.array([[4.0, 4.0, 0.5], [1.0, 1.0, 0.5]])  # the top of the file
+    errors, _ = _height_errors(edited, points, only_above=False)
+    assert errors.tolist() == pytest.approx([2.6, 0.0])
 
 
 def test_import_mesh_reports_floors_without_thickness(tmp_path):
