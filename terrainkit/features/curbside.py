@@ -41,10 +41,12 @@ _TRUNK = (0.12, 2.5)
 class Curbside(Lane):
     """The parent class of lanes that lead from a road across a curb to a sidewalk."""
 
-    # Clauses of the ADA Standards 2010, second-hand: 405.2 (quoted by corada.com), ramps of 1:12,
-    # and of 1:8 for a rise of 75 mm on existing sites; not looked up are 405.5, a width of 0.915 m,
-    # and 302.3, slots of 13 mm across the direction of travel. The flares are
-    # steeper than 1:10.
+    # Second-hand: curbs of 80 to 120 or 100 to 140 mm (RASt 06, Germany) and of 120 to 150 mm (UK,
+    # US); ramps of 1:12, and of 1:8 for a rise of 75 mm on existing sites (ADA Standards 2010,
+    # 405.2), 0.915 m wide (ADA) or 1.2 m (PROWAG); gutters 25 to 76 mm deep and 0.38 m wide
+    # (HEC-22) or more; slots of 13 mm across the direction of travel (ADA 302.3). The hardest
+    # ramp, of 1:8 over 0.2 m, and slots of 30 mm are beyond them. ADA has flares of at most 1:10;
+    # these are steep, as at returned curbs.
     curb: float = parameter.size(0.08, 0.15)
     """Height of the sidewalk above the road [m]."""
 

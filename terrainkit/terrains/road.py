@@ -30,8 +30,10 @@ class Road(Lane):
 
     has_column_seed: ClassVar[bool] = True
 
-    # Speed bumps are 76 to 152 mm high and 0.3 to 0.9 m long (second-hand, from sellers). Potholes
-    # are 0.1 to 0.75 m wide, and more than 50 mm is deep (second-hand, after ASTM D6433).
+    # Second-hand: speed bumps of car parks are 50 to 90 mm or 76 to 152 mm high and 0.35 to 0.9 m
+    # long; humps of roads are lower and longer (25 to 100 mm and from 0.9 m, UK Regulations 1999),
+    # and 20 m or more apart. Potholes are repaired from a depth of 40 mm, and are deep from 100 mm
+    # (UK councils), 0.1 to 0.75 m wide (after ASTM D6433).
     bump_height: float = parameter.size(0.05, 0.12)
     """Height of the speed bumps [m]."""
 
