@@ -42,6 +42,10 @@ MIN_GAIN, MAX_NAMED = 0.08, 3
 """Improvement of the score, 0 to 1, from which a change names a fault; largest number of changes
 that are named, if several are as good."""
 
+# The bundled policies have 0.92 and 0.81. Policies that bear latency and pushes also bear many
+# faults: the quadruped had 0.75 with two calves exchanged, and followed all commands.
+GOOD_SCORE = 0.85
+"""Score below which changes are tested although the robot follows its commands."""
 
 _Result = tuple[float, list[str]]
 
@@ -188,9 +192,11 @@ def check_motion(
         return score_contracts(simulated, candidates, policy, robot, task, seconds)
 
     ((score, motion),) = test(contract, [contract], SECONDS)
-    if not motion:
+    if not motion and score >= GOOD_SCORE:
         return
-    yield Finding("POL010", "; ".join(motion), "to follow the command", "see the other findings")
+    if motion:
+        hint = "see the other findings"
+        yield Finding("POL010", "; ".join(motion), "to follow the command", hint)
     candidates = list(repairs(contract, robot))
     short = test(contract, [each.contract for each in candidates], SHORT_SECONDS)
     best = sorted(range(len(short)), key=lambda k: -short[k][0])[:NUM_REPAIRS]
