@@ -58,10 +58,9 @@ class CheckPolicy(PluginCommand):
             raise ConfigError("POLICY, --robot: missing; expected policy.onnx --robot quadruped")
         require_training("onnx", "onnxruntime")
         from terrainkit_robots.policy.contracts.check import check_policy
-        from terrainkit_robots.rl.tasks import load_task_file
+        from terrainkit_robots.rl.tasks import robot_and_task
 
-        own = load_task_file(str(self.task)) if self.task else None
-        robot, task = self.robot or (own.name if own else ""), own.task if own else None
+        robot, task = robot_and_task(self.robot, self.task)
         with render.steps() as steps:
             steps.update(f"checking {self.policy}")
             findings = check_policy(Path(self.policy), robot, self.contract, task)

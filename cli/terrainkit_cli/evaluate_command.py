@@ -30,18 +30,6 @@ DEFAULT_REPETITIONS, MAX_REPETITIONS = 10, 100
 """Default and largest number of robots on each patch of a suite."""
 
 
-def open_outside_policy(
-    policy: Path, robot: str, contract: Path | None, task: Path | None
-) -> "PolicySpec":
-    """Return a policy of another project; see `PolicyCommand` for the arguments."""
-    from terrainkit_robots.policy.open_policy import open_policy
-    from terrainkit_robots.rl.tasks import load_task_file
-
-    own = load_task_file(str(task)) if task else None
-    robot, own_task = robot or (own.name if own else ""), own.task if own else None
-    return open_policy(policy, robot, contract, own_task)
-
-
 @dataclass(frozen=True, kw_only=True)
 class PolicyCommand(PluginCommand):
     """A command that rolls out a policy."""
@@ -108,7 +96,11 @@ class PolicyCommand(PluginCommand):
             raise ConfigError("--checkpoint: got a value; expected none with --policy")
         require_training()
         if self.policy:
-            return open_outside_policy(self.policy, self.robot, self.contract, self.task)
+            from terrainkit_robots.policy.open_policy import open_policy
+            from terrainkit_robots.rl.tasks import robot_and_task
+
+            robot, task = robot_and_task(self.robot, self.task)
+            return open_policy(self.policy, robot, self.contract, task)
         from terrainkit_robots.rl.run import open_run
 
         return open_run(self.source, self.checkpoint, self.task)

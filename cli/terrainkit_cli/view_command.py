@@ -216,10 +216,12 @@ class View(PluginCommand, ViewerCommand):
         if self.contract and not self.robot:
             raise ConfigError("--robot: missing; expected the robot of the policy")
         if self.robot:
-            from terrainkit_cli.evaluate_command import open_outside_policy
+            from terrainkit_robots.policy.open_policy import open_policy as open_foreign
+            from terrainkit_robots.rl.tasks import robot_and_task
             from terrainkit_robots.viewer.show_policy import PolicyView
 
-            spec = open_outside_policy(Path(self.source), self.robot, self.contract, self.task)
+            robot, task = robot_and_task(self.robot, self.task)
+            spec = open_foreign(Path(self.source), robot, self.contract, task)
             return partial(PolicyView, run=spec, terrain=self.terrain or None)
         return open_policy(self.source, self.checkpoint, self.terrain or None, self.task)
 

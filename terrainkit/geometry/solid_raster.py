@@ -46,8 +46,8 @@ class SolidRaster:
         is_mixed = self._mixed(solids, corners, pixels) if exact else np.zeros(len(pixels), bool)
         self._row.put(pixels[is_mixed], -1)
         pixels = pixels[~is_mixed]
-        tables: list[NDArray[np.float32]] = []
-        num_rows = 1  # Row 0 of the table has no solids.
+        tables = [np.empty((1, 0, 2), np.float32)]  # Row 0 of the table has no solids.
+        num_rows = 1
         for start in range(0, len(pixels), _BAND):
             band = pixels[start : start + _BAND]
             bounds = self._index.intervals(self._centers(band)).astype(np.float32)
@@ -55,13 +55,8 @@ class SolidRaster:
             self._row.put(band, num_rows + row)
             num_rows += len(rows)
             tables.append(rows)
-        # NaN compares as False.
-        most = max((table.shape[1] for table in tables), default=0)
-        self._bounds = np.full((num_rows, most, 2), np.nan, dtype=np.float32)
-        num_rows = 1
-        for table in tables:
-            self._bounds[num_rows : num_rows + len(table), : table.shape[1]] = table
-            num_rows += len(table)
+        most = max(table.shape[1] for table in tables)
+        self._bounds = np.concatenate([_padded(table, most) for table in tables])
 
     def _centers(self, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the centers of pixels with these raveled indices [m], shape (n, 2)."""
@@ -124,8 +119,7 @@ class SolidRaster:
         if len(mixed):
             points = np.stack([x.take(hit[mixed]), y.take(hit[mixed])], axis=1).astype(float)
             exact = self._index.intervals(points)
-            more = max(0, exact.shape[1] - bounds.shape[1])
-            bounds = np.pad(bounds, ((0, 0), (0, more), (0, 0)), constant_values=np.nan)
+            bounds = _padded(bounds, exact.shape[1])
             bounds[mixed, : exact.shape[1]] = exact
         return hit, bounds
 
@@ -178,6 +172,12 @@ def _is_level(solids: Solids) -> NDArray[np.bool_]:
     is_box = np.arange(len(shapes)) < len(solids.boxes)
     level = np.where(is_box, upward.max(axis=1, initial=0.0), upward[:, 2]) > 1 - _TILT
     return np.append(level, np.zeros(len(solids.hull_counts), bool))
+
+
+def _padded(bounds: NDArray[np.float32], number: int) -> NDArray[np.float32]:
+    """Return bounds of at least `number` solids, padded with NaN, which compares as False."""
+    more = max(0, number - bounds.shape[1])
+    return np.pad(bounds, ((0, 0), (0, more), (0, 0)), constant_values=np.nan)
 
 
 def _distinct(

@@ -102,10 +102,11 @@ def _sheets(
     # Each column has its own range of numbers, so that the minimum from below does not mix them.
     own = depth + column * (int(depth.max(initial=0)) - int(depth.min(initial=0)) + 1)
     is_open = (sign > 0) & (np.minimum.accumulate(own[::-1])[::-1] == own)
-    low, high = np.full(size, np.inf), np.full(size, -np.inf)
-    np.minimum.at(low, column[is_open], z[is_open])
-    np.maximum.at(high, column[is_open], z[is_open])
-    return np.where(high >= low, high - low, 0.0)
+    column, z = column[is_open], z[is_open]
+    low, high = np.zeros((2, size))
+    low[column] = z  # the last crossing of a column is the lowest
+    high[column[::-1]] = z[::-1]
+    return high - low
 
 
 def _intersections(

@@ -41,10 +41,8 @@ class VoxelGrid:
         self._surface = exact_surface(surface) if isinstance(surface, TerrainMap) else surface
         self._columns = HeightScan(self._surface, x, y)
         self._z = to_floats("z", z, [None]).astype(np.float32)
-        self._shape, self._half = (
-            (len(x), len(y), len(z)),
-            np.float32(to_number("side", side, 1e-3, 100.0) / 2),
-        )
+        self._shape = len(x), len(y), len(z)
+        self._half = np.float32(to_number("side", side, 1e-3, 100.0) / 2)
 
     def occupied(self, position: Any, yaw: Any) -> Any:
         """Return which voxels are occupied, shape (n, len(x), len(y), len(z)).

@@ -91,6 +91,24 @@ def load_task_file(path: str | Path) -> RegisteredTask:
     return new[0]
 
 
+def robot_and_task(robot: str, path: Path | None) -> tuple[str, Task | None]:
+    """Return the robot and the task of a policy of another project.
+
+    Args:
+        robot: Name or folder of the robot; empty for the robot of the file.
+        path: A file for :func:`load_task_file`; None for the task of the robot.
+
+    Returns:
+        Name or folder of the robot, and the task of the file.
+
+    Raises:
+        ConfigError: if the file registers no task or several.
+        PluginError: if it fails.
+    """
+    own = load_task_file(str(path)) if path else None
+    return robot or (own.name if own else ""), own.task if own else None
+
+
 def task_names() -> tuple[str, ...]:
     """Return the names of all tasks in alphabetical order; imports no module of a task."""
     return tuple(sorted({*_registered, *metadata.entry_points(group=ENTRY_POINTS).names}))
