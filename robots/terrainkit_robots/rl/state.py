@@ -19,6 +19,12 @@ CONTACT_FORCE = 1.0
 NEAR_FOOT = 0.22
 """Distance of an edge that a foot has to clear, as a fraction of the leg length: 10 of 45 cm."""
 
+# The diagonals find the gaps between stones, also where two of them cross.
+_NEAR_POINTS = np.array(
+    [[-2, 0], [-1, 0], [0, 0], [1, 0], [2, 0], [2, 2], [2, -2], [-2, -2], [-2, 2]], np.float32
+)
+"""Points around a foot at which the ground is measured, ahead and left, in steps of `NEAR_FOOT`."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State:
@@ -88,7 +94,7 @@ class Sensors:
         self._mean_weight = np.float32(task.dt / max(averaging_time, task.dt))
         x, y = task.terrain.measured_points_x, task.terrain.measured_points_y
         self._scan = HeightScan(terrain, x if scan else (), y)
-        self._near_foot = np.float32(NEAR_FOOT * leg_length) * np.arange(-2, 3, dtype=np.float32)
+        self._near_foot = np.float32(NEAR_FOOT * leg_length) * _NEAR_POINTS
 
     def scan_points(self, pos: FloatArray, quat: FloatArray) -> tuple[FloatArray, ...]:
         """Return x, y and z of the points of the height scan [m], shape (n, k) each.
@@ -154,13 +160,17 @@ class Sensors:
         """Return the heights of the ground under the feet and of the edges that they have to clear.
 
         In the commanded direction, a foot has to clear an edge one step of `NEAR_FOOT` ahead of it,
-        and a gap with ground at most two steps behind and two steps ahead.
+        and a gap with ground at most two steps behind and two steps ahead. It also has to clear a
+        gap with ground on both sides along a diagonal.
         """
         yaw = transforms.quat_to_yaw(quat)
         cos, sin, (forward, left) = np.cos(yaw), np.sin(yaw), commands[:, :2].T
-        direction = np.stack([cos * forward - sin * left, sin * forward + cos * left], axis=1)
-        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-6)
-        points = foot_pos[:, :, None, :2] + self._near_foot[:, None] * direction[:, None, None]
+        ahead = np.stack([cos * forward - sin * left, sin * forward + cos * left], axis=1)
+        ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-6)
+        axes = np.stack([ahead, ahead[:, ::-1] * np.float32([-1, 1])], axis=1)  # ahead and left
+        points = foot_pos[:, :, None, :2] + (self._near_foot @ axes)[:, None]
         ground = self._terrain.height(points[..., 0], points[..., 1], foot_pos[..., 2:])
-        gap = np.minimum(ground[..., :2].max(axis=2), ground[..., 3:].max(axis=2))
-        return ground[..., 2], np.maximum(ground[..., 2:4].max(axis=2), gap)
+        edge = ground[..., 2:4].max(axis=2)
+        gap = np.minimum(ground[..., :2].max(axis=2), ground[..., 3:5].max(axis=2))
+        diagonal_gap = np.minimum(ground[..., 5:7], ground[..., 7:]).max(axis=2)
+        return ground[..., 2], np.maximum(edge, np.maximum(gap, diagonal_gap))

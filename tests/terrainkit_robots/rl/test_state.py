@@ -212,6 +212,35 @@ def test_feet_clear_no_edge_beside_them(nominal_env, quadruped):
         assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
 
 
+class _Stones(Plane):
+    """A plane that is measured as stones around the point `at`, where gaps of a width cross."""
+
+    at, widths = (0.0, 0.0), (0.0, 0.0)
+
+    def height(self, x, y, *_, **__):
+        distances = np.abs(x - self.at[0]), np.abs(y - self.at[1])
+        in_gap = [each < width / 2 for each, width in zip(distances, self.widths, strict=True)]
+        return -np.logical_or(*in_gap).astype(np.float32)
+
+
+# Widths in units of `NEAR_FOOT`, across and along the direction of a foot in the gap.
+@pytest.mark.parametrize(
+    ("widths", "clearance"),
+    [((1.5, 0), 1), ((0, 1.5), 1), ((1.5, 1.5), 1), ((0, 3.9), 1), ((0, 4.1), 0), ((4.1, 4.1), 0)],
+)
+def test_feet_clear_gaps_between_stones_in_any_direction(
+    nominal_env, quadruped, widths, clearance
+):
+    ground = _Stones()
+    env = nominal_env(1, ground)
+    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
+    ground.at = env.sim.sensor("foot_position", np.array([0]))[0, 0, :2]
+    ground.widths = NEAR_FOOT * quadruped.leg_length * np.array(widths)
+    fields = env.sensors.read(np.array([0]), None, np.float32([[0.5, 0, 0]]))
+    difference = fields["foot_height"] - fields["foot_height_over_edges"]
+    assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
+
+
 class TestStateCopies:
     def test_state_shares_no_memory(self, random_env):
         # A reward that modifies the state must not change the simulation.
