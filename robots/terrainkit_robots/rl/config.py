@@ -275,7 +275,7 @@ class Rewards(Config):
     foot_swing_height: float = -2.0
     """Deviation of swinging feet from an arc of the height `swing_height`."""
     foothold: float = 0.0
-    """Feet that stand or land in a hole or right before an edge."""
+    """Feet that stand or land in a hole or near an edge."""
     foot_slip: float = -5.0
     """Horizontal velocity of feet in contact, squared."""
     stand_still: float = -2.4

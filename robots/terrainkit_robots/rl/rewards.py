@@ -235,11 +235,15 @@ def foot_swing_height(env: "LeggedEnv") -> FloatArray:
 
 
 def foothold(env: "LeggedEnv") -> FloatArray:
-    """Penalize feet that stand or land in a hole or right before an edge, by its height, 0 to 1."""
+    """Penalize feet that stand or land in a hole or near an edge, by the share of lower ground.
+
+    The ground is measured at five points within `NEAR_FOOT`, so that the penalty decreases before a
+    foot is out of a hole. A point counts by its depth, up to the height of a swinging foot.
+    """
     state = env.state
-    height = (state.foot_height - state.foot_height_over_edges) / _swing_height(env)
+    depth = np.clip(state.foot_ground_depth / _swing_height(env), 0, 1).mean(axis=2)
     lands = (state.swing_phase == 0) | (state.swing_phase > LANDING)
-    return (np.clip(height, 0, 1) * lands).mean(axis=1)
+    return (depth * lands).mean(axis=1)
 
 
 def foot_slip(env: "LeggedEnv") -> FloatArray:

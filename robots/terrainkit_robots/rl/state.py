@@ -21,7 +21,8 @@ NEAR_FOOT = 0.22
 
 # The diagonals find the gaps between stones, also where two of them cross.
 _NEAR_POINTS = np.array(
-    [[-2, 0], [-1, 0], [0, 0], [1, 0], [2, 0], [2, 2], [2, -2], [-2, -2], [-2, 2]], np.float32
+    [[0, 0], [-1, 0], [1, 0], [0, -1], [0, 1], [-2, 0], [2, 0], [2, 2], [2, -2], [-2, -2], [-2, 2]],
+    np.float32,
 )
 """Points around a foot at which the ground is measured, ahead and left, in steps of `NEAR_FOOT`."""
 
@@ -46,6 +47,7 @@ class State:
     torques: FloatArray  # motor torques [N m], shape (n, j)
     foot_height: FloatArray  # height of the feet above the ground under them [m], shape (n, f)
     foot_height_over_edges: FloatArray  # the same above edges ahead, with gaps filled [m]
+    foot_ground_depth: FloatArray  # of the ground near feet below these edges [m], shape (n, f, 5)
     foot_vel: FloatArray  # velocity of the feet, world frame [m/s], shape (n, f, 3)
     foot_force: FloatArray  # contact force on the feet, world frame [N], shape (n, f, 3)
     foot_air_time: FloatArray  # time since each foot was last in contact [s], shape (n, f); the
@@ -144,8 +146,9 @@ class Sensors:
             "dof_vel": dof_vel,
             "dof_acc": dof_acc,
             "torques": torques,
-            "foot_height": foot_pos[..., 2] - ground - scene.sole_depth,
+            "foot_height": foot_pos[..., 2] - ground[..., 0] - scene.sole_depth,
             "foot_height_over_edges": foot_pos[..., 2] - edges - scene.sole_depth,
+            "foot_ground_depth": edges[..., None] - ground,
             "foot_vel": sim.sensor("foot_velocity", rows),
             "foot_force": foot_force,
             "foot_air_time": air_time,
@@ -157,11 +160,15 @@ class Sensors:
     def _ground_of_feet(
         self, foot_pos: FloatArray, quat: FloatArray, commands: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the heights of the ground under the feet and of the edges that they have to clear.
+        """Return the heights of the ground near the feet and of the edges that they have to clear.
 
         In the commanded direction, a foot has to clear an edge one step of `NEAR_FOOT` ahead of it,
         and a gap with ground at most two steps behind and two steps ahead. It also has to clear a
         gap with ground on both sides along a diagonal.
+
+        Returns:
+            Height of the ground under each foot and one step behind, ahead, right and left of it
+            [m], shape (n, f, 5), and of the edges [m], shape (n, f).
         """
         yaw = transforms.quat_to_yaw(quat)
         cos, sin, (forward, left) = np.cos(yaw), np.sin(yaw), commands[:, :2].T
@@ -170,7 +177,7 @@ class Sensors:
         axes = np.stack([ahead, ahead[:, ::-1] * np.float32([-1, 1])], axis=1)  # ahead and left
         points = foot_pos[:, :, None, :2] + (self._near_foot @ axes)[:, None]
         ground = self._terrain.height(points[..., 0], points[..., 1], foot_pos[..., 2:])
-        edge = ground[..., 2:4].max(axis=2)
-        gap = np.minimum(ground[..., :2].max(axis=2), ground[..., 3:5].max(axis=2))
-        diagonal_gap = np.minimum(ground[..., 5:7], ground[..., 7:]).max(axis=2)
-        return ground[..., 2], np.maximum(edge, np.maximum(gap, diagonal_gap))
+        edge = np.maximum(ground[..., 0], ground[..., 2])
+        gap = np.minimum(ground[..., [1, 5]].max(axis=2), ground[..., [2, 6]].max(axis=2))
+        diagonal_gap = np.minimum(ground[..., 7:9], ground[..., 9:]).max(axis=2)
+        return ground[..., :5], np.maximum(edge, np.maximum(gap, diagonal_gap))

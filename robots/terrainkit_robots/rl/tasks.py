@@ -21,7 +21,7 @@ from types import ModuleType
 from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.config import Task
+from terrainkit_robots.rl.config import Algorithm, Rewards, Task
 from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -137,7 +137,15 @@ def get_task(name_or_folder: str | Path) -> RegisteredTask:
     if not (folder / SPEC_FILE).exists():
         raise ConfigError(f"{folder} has no {SPEC_FILE}; expected a folder of terrainkit onboard")
     spec = RobotSpec.load(folder / SPEC_FILE)
-    return RegisteredTask(name=spec.name, folder=folder.absolute(), task=Task())
+    return RegisteredTask(name=spec.name, folder=folder.absolute(), task=default_task(spec))
+
+
+def default_task(spec: RobotSpec) -> Task:
+    """Return the task of an onboarded robot: the defaults, and on two legs those of `biped`."""
+    if len(spec.feet) != 2:
+        return Task()
+    rewards, algorithm = Rewards(feet_gait=1.5, action_l2=-0.02), Algorithm(entropy_coef=0.0005)
+    return Task(rewards=rewards, algorithm=algorithm)
 
 
 for _path in Path(bundled.__file__).parent.glob("*/tasks/*.toml"):

@@ -102,7 +102,8 @@ def smoke_test(
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")
         if onboarded.folder is None:
             return SmokeTestResult(onboarded.report.facts.model.title, (check,))
-        result = run_checks(Robot.load(onboarded.folder), Task(), samples, progress)
+        task = get_task(onboarded.folder).task
+        result = run_checks(Robot.load(onboarded.folder), task, samples, progress)
     return replace(result, checks=(check, *result.checks))
 
 

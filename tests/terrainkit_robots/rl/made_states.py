@@ -22,6 +22,7 @@ def shapes(*, joints: int, feet: int, penalized: int, points: int) -> dict[str, 
     of_feet = "swing_phase foot_height foot_height_over_edges foot_air_time"
     others |= dict.fromkeys(of_feet.split(), (feet,))
     others |= dict.fromkeys(["foot_vel", "foot_force"], (feet, 3))
+    others |= {"foot_ground_depth": (feet, 5)}
     others |= {"base_quat": (4,), "gait_phase": (2,)}
     others |= {"penalized_force": (penalized,), "height_scan": (points,)}
     return {each.name: others.get(each.name, (joints,)) for each in fields(State)}

@@ -241,6 +241,19 @@ def test_feet_clear_gaps_between_stones_in_any_direction(
     assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
 
 
+def test_ground_near_feet_is_deep_over_a_gap(nominal_env, quadruped):
+    ground = _Stones()
+    env = nominal_env(1, ground)
+    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
+    unit = NEAR_FOOT * quadruped.leg_length
+    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0, :2]
+    ground.widths = 0, 1.5 * unit
+    for offset, depth in [(0, [1, 1, 1, 0, 0]), (1, [0, 0, 0, 0, 1]), (2, [0, 0, 0, 0, 0])]:
+        ground.at = foot + [0, offset * unit]  # the middle of the gap is to the left
+        fields = env.sensors.read(np.array([0]), None, np.float32([[0.5, 0, 0]]))
+        np.testing.assert_allclose(fields["foot_ground_depth"][0, 0], depth, atol=1e-6)
+
+
 class TestStateCopies:
     def test_state_shares_no_memory(self, random_env):
         # A reward that modifies the state must not change the simulation.

@@ -83,6 +83,13 @@ def test_get_task_accepts_a_folder(tmp_path, monkeypatch, kind):
     assert get_task("quadruped").folder == QUADRUPED
 
 
+def test_folder_of_a_biped_has_the_rewards_of_biped():
+    biped = get_task("biped")
+    task = get_task(biped.folder).task
+    assert (task.rewards, task.algorithm) == (biped.task.rewards, biped.task.algorithm)
+    assert task.commands == Task().commands != biped.task.commands
+
+
 def test_unknown_task_lists_known_ones(tmp_path):
     told = r"'quadrupde'; did you mean 'quadruped'\? Tasks are: biped, quadruped, qua"
     with pytest.raises(ConfigError, match=told):
