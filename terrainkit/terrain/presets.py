@@ -64,6 +64,15 @@ _BUILT_STAIRS: dict[str, tuple[str, dict[str, Any], dict[str, float]]] = {
 BEYOND_CODE = "_beyond_code"
 """Suffix of the presets with stairs that are steeper than the building code allows, and uneven."""
 
+_STONES = {"stone": (0.8, 0.2), "distance": (0.05, 0.1), "platform": 1.5}
+
+_HARD_STAIRS = {
+    "terrain": "pyramid_stairs",
+    "step_height": (0.05, 0.2),
+    "step_width": 0.31,
+    "platform": 1.2,
+}
+
 _COURSE = {"terrain": "course", "order": "random", "start": 1.5}
 
 _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
@@ -75,19 +84,29 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "rooms": {},
         "stairwell": {"terrain": "staircase", "shape": "half_turn", "wall": 1.0},
     },
-    # With cells of 0.05 m and ten rows, gaps grow and stones shrink by one cell in each row.
+    # The map on which `quadruped_hard` was trained. With cells of 0.05 m and ten rows, gaps grow by one
+    # cell in each row. A robot that steps between shallow stones does not fall.
     "hard": {
         "gap_track": {
-            "proportion": 2.0,
+            "proportion": 4.0,
             "length": (0.05, 0.5),
             "depth": 1.0,
             "min_spacing": 1.2,
             "max_spacing": 1.8,
+            "start": 1.0,
         },
-        "stepping_stones": {"proportion": 2.0, "stone": (0.65, 0.2), "platform": 1.5},
-        "pit": {"depth": (0.05, 0.3)},
-        "boxes": {"height": (0.05, 0.3)},
-        "rails": {"width": (0.05, 0.2), "height": (0.05, 0.2)},
+        "stepping_stones": {"proportion": 6.0, **_STONES, "depth": 1.0},
+        "shallow_stones": {
+            "terrain": "stepping_stones",
+            "proportion": 5.0,
+            **_STONES,
+            "depth": (0.06, 0.12),
+        },
+        "pit": {"proportion": 2.0, "depth": (0.05, 0.3), "side": 3.0},
+        "boxes": {"proportion": 2.0, "height": (0.05, 0.3)},
+        "rails": {"proportion": 2.0, "width": (0.05, 0.2), "height": (0.05, 0.2)},
+        "pyramid_stairs": _HARD_STAIRS,
+        "pyramid_stairs_inverted": {"proportion": 2.0, **_HARD_STAIRS, "inverted": True},
     },
     # Stones of 0.1 m, ramps of 1:12 to 1:8, and steps with the riser of `staircase`.
     "street": {

@@ -17,7 +17,7 @@ def test_list_names_every_terrain(terrainkit):
     [
         ("pyramid_stairs", "step_height 0.05 0.23 Rise of a step [m]."),
         ("legged_gym", "gap 1 width=0:1, depth=5, platform=3"),
-        ("hard", "gap_track 2 length=0.05:0.5, depth=1, min_spacing=1.2,"),
+        ("hard", "gap_track 4 length=0.05:0.5, depth=1, min_spacing=1.2,"),
         ("natural", "rough 1"),
         ("extreme_parkour", "steps 1 order=random, slot_length=3.95, platform=1,"),
         (
