@@ -154,6 +154,20 @@ class TestByHand:
         np.testing.assert_array_equal(seen[2:], seen[:2])
 
 
+def env_and_foot(nominal_env, ground):
+    """Return an environment on a ground, and the position of its first foot [m]."""
+    env = nominal_env(1, ground)
+    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
+    return env, env.sim.sensor("foot_position", np.array([0]))[0, 0, :2]
+
+
+def read_feet(env, command):
+    """Return how far edges are above the ground of the first foot, and the depths near it [m]."""
+    fields = env.sensors.read(np.array([0]), None, np.float32([command]))
+    difference = fields["foot_height"] - fields["foot_height_over_edges"]
+    return difference[0, 0], fields["foot_ground_depth"][0, 0]
+
+
 class _Steps(Plane):
     """A plane that is measured as steps along y, each from an edge to an edge at a height."""
 
@@ -182,21 +196,15 @@ class _Steps(Plane):
 )
 def test_clearance_is_above_edges_ahead_and_gaps(nominal_env, quadruped, steps, clearance):
     ground = _Steps()
-    env = nominal_env(1, ground)
-    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
-    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0, 1]
+    env, (_, foot) = env_and_foot(nominal_env, ground)
     unit = NEAR_FOOT * quadruped.leg_length
     ground.steps = [(foot + unit * a, foot + unit * b, top) for a, b, top in steps]
-    fields = env.sensors.read(np.array([0]), None, np.float32([[0, 0.5, 0]]))
-    difference = fields["foot_height"] - fields["foot_height_over_edges"]
-    assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
+    assert read_feet(env, [0, 0.5, 0])[0] == pytest.approx(clearance, abs=1e-6)
 
 
 def test_feet_clear_no_edge_beside_them(nominal_env, quadruped):
     ground = _Steps()
-    env = nominal_env(1, ground)
-    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
-    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0, 1]
+    env, (_, foot) = env_and_foot(nominal_env, ground)
     ground.steps = [(foot + 0.5 * NEAR_FOOT * quadruped.leg_length, 9, 0.1)]
     turned = np.sqrt(0.5), 0, 0, np.sqrt(0.5)  # forward is to the left
     for command, quat, clearance in [
@@ -207,9 +215,7 @@ def test_feet_clear_no_edge_beside_them(nominal_env, quadruped):
         ([0, 0.5, 0], turned, 0),
     ]:
         env.sim.qpos[0, 3:7] = quat  # the sensors keep the position of the foot
-        fields = env.sensors.read(np.array([0]), None, np.float32([command]))
-        difference = fields["foot_height"] - fields["foot_height_over_edges"]
-        assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
+        assert read_feet(env, command)[0] == pytest.approx(clearance, abs=1e-6)
 
 
 class _Stones(Plane):
@@ -228,30 +234,21 @@ class _Stones(Plane):
     ("widths", "clearance"),
     [((1.5, 0), 1), ((0, 1.5), 1), ((1.5, 1.5), 1), ((0, 3.9), 1), ((0, 4.1), 0), ((4.1, 4.1), 0)],
 )
-def test_feet_clear_gaps_between_stones_in_any_direction(
-    nominal_env, quadruped, widths, clearance
-):
+def test_feet_clear_gaps_between_stones_in_any_direction(nominal_env, quadruped, widths, clearance):
     ground = _Stones()
-    env = nominal_env(1, ground)
-    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
-    ground.at = env.sim.sensor("foot_position", np.array([0]))[0, 0, :2]
+    env, ground.at = env_and_foot(nominal_env, ground)
     ground.widths = NEAR_FOOT * quadruped.leg_length * np.array(widths)
-    fields = env.sensors.read(np.array([0]), None, np.float32([[0.5, 0, 0]]))
-    difference = fields["foot_height"] - fields["foot_height_over_edges"]
-    assert difference[0, 0] == pytest.approx(clearance, abs=1e-6)
+    assert read_feet(env, [0.5, 0, 0])[0] == pytest.approx(clearance, abs=1e-6)
 
 
 def test_ground_near_feet_is_deep_over_a_gap(nominal_env, quadruped):
     ground = _Stones()
-    env = nominal_env(1, ground)
-    env.sim.batch.forward(np.array([0]), stage=mujoco.mjtStage.mjSTAGE_VEL)
+    env, foot = env_and_foot(nominal_env, ground)
     unit = NEAR_FOOT * quadruped.leg_length
-    foot = env.sim.sensor("foot_position", np.array([0]))[0, 0, :2]
     ground.widths = 0, 1.5 * unit
     for offset, depth in [(0, [1, 1, 1, 0, 0]), (1, [0, 0, 0, 0, 1]), (2, [0, 0, 0, 0, 0])]:
-        ground.at = foot + [0, offset * unit]  # the middle of the gap is to the left
-        fields = env.sensors.read(np.array([0]), None, np.float32([[0.5, 0, 0]]))
-        np.testing.assert_allclose(fields["foot_ground_depth"][0, 0], depth, atol=1e-6)
+        ground.at = foot[0], foot[1] + offset * unit  # the middle of the gap is to the left
+        np.testing.assert_allclose(read_feet(env, [0.5, 0, 0])[1], depth, atol=1e-6)
 
 
 class TestStateCopies:
