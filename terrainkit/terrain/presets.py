@@ -84,8 +84,8 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "rooms": {},
         "stairwell": {"terrain": "staircase", "shape": "half_turn", "wall": 1.0},
     },
-    # The map on which `quadruped_hard` was trained. With cells of 0.05 m and ten rows, gaps grow by one
-    # cell in each row. A robot that steps between shallow stones does not fall.
+    # The map on which `quadruped_hard` was trained. With cells of 0.05 m and ten rows, gaps grow by
+    # one cell in each row. A robot that steps between shallow stones does not fall.
     "hard": {
         "gap_track": {
             "proportion": 4.0,
