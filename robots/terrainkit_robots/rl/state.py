@@ -174,7 +174,8 @@ class Sensors:
         cos, sin, (forward, left) = np.cos(yaw), np.sin(yaw), commands[:, :2].T
         ahead = np.stack([cos * forward - sin * left, sin * forward + cos * left], axis=1)
         ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-6)
-        axes = np.stack([ahead, ahead[:, ::-1] * np.float32([-1, 1])], axis=1)  # ahead and left
+        to_the_left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
+        axes = np.stack([ahead, to_the_left], axis=1)
         points = foot_pos[:, :, None, :2] + (self._near_foot @ axes)[:, None]
         ground = self._terrain.height(points[..., 0], points[..., 1], foot_pos[..., 2:])
         edge = np.maximum(ground[..., 0], ground[..., 2])
