@@ -64,7 +64,7 @@ _BUILT_STAIRS: dict[str, tuple[str, dict[str, Any], dict[str, float]]] = {
 BEYOND_CODE = "_beyond_code"
 """Suffix of the presets with stairs that are steeper than the building code allows, and uneven."""
 
-_STONES = {"stone": (0.8, 0.2), "distance": (0.05, 0.1), "platform": 1.5}
+_STONES = {"stone": (0.8, 0.2), "platform": 1.5}
 
 _HARD_STAIRS = {
     "terrain": "pyramid_stairs",
@@ -84,7 +84,7 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "rooms": {},
         "stairwell": {"terrain": "staircase", "shape": "half_turn", "wall": 1.0},
     },
-    # The map on which `quadruped_hard` was trained. With cells of 0.05 m and ten rows, gaps grow by
+    # The map of the task `quadruped_hard`. With cells of 0.05 m and ten rows, gaps grow by
     # one cell in each row. A robot that steps between shallow stones does not fall.
     "hard": {
         "gap_track": {
@@ -93,7 +93,7 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
             "depth": 1.0,
             "min_spacing": 1.2,
             "max_spacing": 1.8,
-            "start": 1.0,
+            "start": 1.4,
         },
         "stepping_stones": {"proportion": 6.0, **_STONES, "depth": 1.0},
         "shallow_stones": {

@@ -51,10 +51,8 @@ def test_validate_generated_map_has_no_issues(config):
 @pytest.mark.parametrize("preset", presets.preset_names())
 def test_validate_presets_realize_their_parameters_without_cliffs(preset):
     # Proportions below or above 1 need more columns.
-    cols = {"legged_gym_rough": 20, "parkour_course": 10, "humanoid_gym": 10, "ame_2": 20}.get(
-        preset
-    )
-    cols = cols or len(presets.get_preset(preset))
+    more = {"legged_gym_rough": 20, "parkour_course": 10, "humanoid_gym": 10, "ame_2": 20}
+    cols = (more | {"hard": 24}).get(preset) or len(presets.get_preset(preset))
     # A cliff would be a warning, which is an error here.
     assert found(tk.generate(tk.MapConfig(rows=3, cols=cols, border=1.0, preset=preset))) == []
 

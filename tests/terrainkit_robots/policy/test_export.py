@@ -162,7 +162,7 @@ def test_example_walks_with_bundled_policies(name, tmp_path, monkeypatch, capsys
     data = names["data"]
     assert data.time == pytest.approx(3)
     assert data.qpos[0] > 0.9  # of 1.5 m
-    assert abs(data.qpos[1]) < 0.3
+    assert abs(data.qpos[1]) < 0.4 * data.qpos[0]  # the first steps of the biped turn it
     assert names["rotation"][2, 2] > 0.9
     distance = np.hypot(*data.qpos[:2])
     first, second = capsys.readouterr().out.splitlines()
