@@ -178,7 +178,9 @@ class Sensors:
         axes = np.stack([ahead, to_the_left], axis=1)
         points = foot_pos[:, :, None, :2] + (self._near_foot @ axes)[:, None]
         ground = self._terrain.height(points[..., 0], points[..., 1], foot_pos[..., 2:])
-        edge = np.maximum(ground[..., 0], ground[..., 2])
-        gap = np.minimum(ground[..., [1, 5]].max(axis=2), ground[..., [2, 6]].max(axis=2))
-        diagonal_gap = np.minimum(ground[..., 7:9], ground[..., 9:]).max(axis=2)
-        return ground[..., :5], np.maximum(edge, np.maximum(gap, diagonal_gap))
+        near = np.moveaxis(ground, 2, 0)
+        here, back, front, _, _, far_back, far_front = near[:7]
+        gap = np.minimum(np.maximum(back, far_back), np.maximum(front, far_front))
+        diagonal_gaps = np.minimum(near[7:9], near[9:])
+        edges = np.max([here, front, gap, *diagonal_gaps], axis=0)
+        return ground[..., :5], edges

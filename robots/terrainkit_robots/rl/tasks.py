@@ -21,7 +21,7 @@ from types import ModuleType
 from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_robots.description import bundled
-from terrainkit_robots.rl.config import Algorithm, Rewards, Task
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -144,8 +144,8 @@ def default_task(spec: RobotSpec) -> Task:
     """Return the task of an onboarded robot: the defaults, and on two legs those of `biped`."""
     if len(spec.feet) != 2:
         return Task()
-    rewards, algorithm = Rewards(feet_gait=1.5, action_l2=-0.02), Algorithm(entropy_coef=0.0005)
-    return Task(rewards=rewards, algorithm=algorithm)
+    biped = Task.load(Path(bundled.__file__).parent / "biped" / "tasks" / "biped.toml")
+    return Task(rewards=biped.rewards, algorithm=biped.algorithm)
 
 
 for _path in Path(bundled.__file__).parent.glob("*/tasks/*.toml"):

@@ -22,7 +22,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.rewards import is_moving
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.rl.tasks import get_task
+from terrainkit_robots.rl.tasks import default_task, get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.smoke_test.short_training import TrainingRecord, train_briefly
@@ -102,8 +102,8 @@ def smoke_test(
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")
         if onboarded.folder is None:
             return SmokeTestResult(onboarded.report.facts.model.title, (check,))
-        task = get_task(onboarded.folder).task
-        result = run_checks(Robot.load(onboarded.folder), task, samples, progress)
+        robot = Robot.load(onboarded.folder)
+        result = run_checks(robot, default_task(robot.spec), samples, progress)
     return replace(result, checks=(check, *result.checks))
 
 

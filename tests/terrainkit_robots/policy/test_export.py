@@ -155,14 +155,18 @@ def run_example(folder, monkeypatch, *words):
         return runpy.run_path(program)
 
 
-@pytest.mark.parametrize("name", ["quadruped", "quadruped_hard", "quadruped_map", "biped"])
-def test_example_walks_with_bundled_policies(name, tmp_path, monkeypatch, capsys):
+# The first steps of the biped turn it.
+@pytest.mark.parametrize(
+    ("name", "sideways"),
+    [("quadruped", 0.3), ("quadruped_hard", 0.3), ("quadruped_map", 0.3), ("biped", 0.5)],
+)
+def test_example_walks_with_bundled_policies(name, sideways, tmp_path, monkeypatch, capsys):
     export_policy(open_run(name), tmp_path / "exported", example=True)
     names = run_example(tmp_path / "exported", monkeypatch, "--vx", "0.5", "--seconds", "3")
     data = names["data"]
     assert data.time == pytest.approx(3)
     assert data.qpos[0] > 0.9  # of 1.5 m
-    assert abs(data.qpos[1]) < 0.4 * data.qpos[0]  # the first steps of the biped turn it
+    assert abs(data.qpos[1]) < sideways
     assert names["rotation"][2, 2] > 0.9
     distance = np.hypot(*data.qpos[:2])
     first, second = capsys.readouterr().out.splitlines()
