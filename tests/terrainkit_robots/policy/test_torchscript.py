@@ -1,5 +1,6 @@
 import io
 import pickle
+import zipfile
 
 import pytest
 import torch
@@ -69,6 +70,17 @@ def test_state_is_kept_for_each_robot(tmp_path):
     torch.testing.assert_close(again[:1], steps[2])
 
 
+def damaged_archive():
+    """Return an archive whose code cannot be decompressed."""
+    name, file = "model/code/a.py", io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as zipped:
+        zipped.writestr(name, "x = 1\n" * 100)
+    data = bytearray(file.getvalue())
+    start = 30 + len(name)  # after the header of the file in the archive
+    data[start : start + 8] = b"\xff" * 8
+    return bytes(data)
+
+
 @pytest.mark.parametrize(
     ("data", "message"),
     [
@@ -76,6 +88,7 @@ def test_state_is_kept_for_each_robot(tmp_path):
         (Writes(), r"got code with torch\.save; expected a network"),
         (pickle.dumps({"model": 1}), "got no TorchScript archive"),
         (b"", "got no TorchScript archive"),
+        (damaged_archive(), "got no TorchScript archive"),
     ],
 )
 def test_code_is_read_before_it_is_loaded(data, message):
