@@ -103,7 +103,8 @@ def test_check_robot_checks_folder(check):
         ("good.urdf --package mine=none", "package mine: got none; expected an existing folder"),
         ("good.urdf --xacro-arg a=1", "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
         ("good.urdf --diff --format json", "--diff prints a diff"),
-        ("''", "it is a folder"),  # not all robots of the working directory
+        # An empty name does not check all robots of the working directory.
+        ("''", "got a folder; expected a file; it contains bad.urdf"),
         ("good.urdf --baseline none.json", "no file none.json; --write-baseline"),
         ("bad.urdf --baseline bad.urdf --write-baseline", "baseline bad.urdf: Expecting value"),
         ("bad.urdf --baseline good.urdf/a --write-baseline", "good.urdf is not a folder"),

@@ -3,9 +3,17 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from terrainkit.errors import listing
 from terrainkit_robots.description.model import Problem, RobotModel, Source
+from terrainkit_robots.description.package_resolver import is_folder
 from terrainkit_robots.description.robot_file import RobotFile, find_robot
-from terrainkit_robots.description.xml.document import XmlDocument, parse_xml, read_bytes
+from terrainkit_robots.description.robot_folder import robot_files
+from terrainkit_robots.description.xml.document import (
+    RobotFileError,
+    XmlDocument,
+    parse_xml,
+    read_bytes,
+)
 
 XACRO = "xacro"
 
@@ -42,6 +50,9 @@ def load_robot(
     contents = contents or {}
     robot = RobotFile(path=Path(path)) if Path(path) in contents else find_robot(path)
     path, packages = robot.path, {**robot.packages, **(packages or {})}
+    if is_folder(path):
+        found = listing(str(file.relative_to(path)) for file in robot_files(path))
+        raise RobotFileError(f"{path}: got a folder; expected a file; it contains {found}")
     data = contents[path] if path in contents else read_bytes(path)
     if data.startswith(_USD_STARTS) or (path.suffix == ".usdz" and data.startswith(b"PK")):
         doc = XmlDocument(file=path, data=data, root=None, sources={})
