@@ -136,29 +136,8 @@ def export_policy(
         notes.append(f"{ONNX_FILE} has no {error}")
     random = torch.randn(100, actor.obs_dim, generator=torch.Generator().manual_seed(0))
     obs = torch.cat([env.get_observations()["policy"], random])
-    # A recurrent network depends on the observations before.
-    steps = [obs.roll(k, 0) for k in range(RECURRENT_STEPS if actor.is_recurrent else 1)]
-    with warnings.catch_warnings(), torch.no_grad():
-        # torch deprecates TorchScript, which C++ controllers load, and its older ONNX exporter.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        warnings.filterwarnings("ignore", message=r"`torch\.jit\.\w+` is (deprecated|not supp)")
-        # Recurrent networks check the shapes of their inputs.
-        warnings.simplefilter("ignore", torch.jit.TracerWarning)
-        warnings.filterwarnings("ignore", message="Exporting a model to ONNX with a batch_size")
-        onnx_data, script_file = export_onnx(network, obs[:, order], metadata), io.BytesIO()
-        torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
-        script = torch.jit.load(io.BytesIO(script_file.getvalue()))
-        live = [network.clipped(actor, each).numpy() for each in steps]
-        # TorchScript of rsl-rl keeps the state of one robot.
-        rows = slice(1) if actor.is_recurrent else slice(None)
-        script_actions = [script(each[rows][:, order]).numpy() for each in steps]
-    onnx_actions = run_onnx(onnx_data, [each[:, order].numpy() for each in steps])
-    errors = (
-        verify_actions(np.stack(onnx_actions), np.stack(live), ONNX_FILE),
-        verify_actions(np.stack(script_actions), np.stack(live)[:, rows], TORCHSCRIPT_FILE),
-    )
-    contents = {JSON_FILE: text.encode(), ONNX_FILE: onnx_data, **other_files}
-    contents[TORCHSCRIPT_FILE] = script_file.getvalue()
+    networks, errors = _export_networks(network, actor, obs, order, metadata)
+    contents = {JSON_FILE: text.encode(), **networks, **other_files}
     if folder.is_dir():  # it may have other files
         with atomic_write(folder / JSON_FILE, overwrite=overwrite) as path:
             _write_files(path.parent, contents)
@@ -304,6 +283,38 @@ def verify_actions(exported: FloatArray, live: FloatArray, name: str) -> float:
         expected = f"expected at most {TOLERANCE:g}"
         raise ExportError(f"{name}: got actions off the live policy by {error:.2g}; {expected}")
     return error
+
+
+def _export_networks(
+    network: OnnxNetwork,
+    actor: MLPModel,
+    obs: torch.Tensor,
+    order: NDArray[np.int64],
+    metadata: Mapping[str, str],
+) -> tuple[dict[str, bytes], tuple[float, float]]:
+    """Return the ONNX and TorchScript files, and their errors on observations (n, k)."""
+    # A recurrent network depends on the observations before.
+    steps = [obs.roll(k, 0) for k in range(RECURRENT_STEPS if actor.is_recurrent else 1)]
+    with warnings.catch_warnings(), torch.no_grad():
+        # torch deprecates TorchScript, which C++ controllers load, and its older ONNX exporter.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        warnings.filterwarnings("ignore", message=r"`torch\.jit\.\w+` is (deprecated|not supp)")
+        # Recurrent networks check the shapes of their inputs.
+        warnings.simplefilter("ignore", torch.jit.TracerWarning)
+        warnings.filterwarnings("ignore", message="Exporting a model to ONNX with a batch_size")
+        onnx_data, script_file = export_onnx(network, obs[:, order], metadata), io.BytesIO()
+        torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
+        script = torch.jit.load(io.BytesIO(script_file.getvalue()))
+        live = [network.clipped(actor, each).numpy() for each in steps]
+        # TorchScript of rsl-rl keeps the state of one robot.
+        rows = slice(1) if actor.is_recurrent else slice(None)
+        script_actions = [script(each[rows][:, order]).numpy() for each in steps]
+    onnx_actions = run_onnx(onnx_data, [each[:, order].numpy() for each in steps])
+    errors = (
+        verify_actions(np.stack(onnx_actions), np.stack(live), ONNX_FILE),
+        verify_actions(np.stack(script_actions), np.stack(live)[:, rows], TORCHSCRIPT_FILE),
+    )
+    return {ONNX_FILE: onnx_data, TORCHSCRIPT_FILE: script_file.getvalue()}, errors
 
 
 def describe_policy(env: LeggedEnv) -> dict[str, Any]:

@@ -94,16 +94,20 @@ def train(
     except (TerrainkitError, OSError) as error:
         if runner.folder is None:
             raise
-        saved = run.checkpoints(runner.folder)
-        hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
-        if isinstance(error, TerrainkitError):
-            raise type(error)(f"{error}; {hint}") from error
-        reason = error.strerror or error
-        raise ExportError(f"cannot write in {runner.folder}: {reason}; {hint}") from error
+        raise _name_last_checkpoint(error, runner.folder) from error
     finally:
         if torch.distributed.is_available() and torch.distributed.is_initialized():
             torch.distributed.destroy_process_group()
     return runner
+
+
+def _name_last_checkpoint(error: TerrainkitError | OSError, folder: Path) -> TerrainkitError:
+    """Return an error of a training whose message has the last checkpoint."""
+    saved = run.checkpoints(folder)
+    hint = f"the last checkpoint is {saved[max(saved)]}" if saved else "there is no checkpoint"
+    if isinstance(error, TerrainkitError):
+        return type(error)(f"{error}; {hint}")
+    return ExportError(f"cannot write in {folder}: {error.strerror or error}; {hint}")
 
 
 def _load(runner: "LeggedRunner", resume: run.Run | None, parts: dict[str, bool] | None) -> None:
