@@ -53,17 +53,20 @@ def train(
         MemoryLimitError: If the environments do not fit in memory.
         ExportError: If the folder exists, or the disk is full.
     """
-    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # before torch is imported
-    import torch
-
-    from terrainkit_robots.rl.env import make_env
-    from terrainkit_robots.rl.runner import LeggedRunner, process_share, resolve_device
     from terrainkit_robots.rl.terrain import load_terrain
 
     task = tasks.get_task(robot).task if task is None else task
     ground = load_terrain(terrain, task.terrain.collision)
     parts = run.parts_to_load(resume, robot, terrain, task) if resume else None
     continued = resume if parts is None else None
+
+    # Importing torch takes seconds; what is wrong with the arguments is said before.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
+    import torch
+
+    from terrainkit_robots.rl.env import make_env
+    from terrainkit_robots.rl.runner import LeggedRunner, process_share, resolve_device
+
     process_task = process_share(task)
     if process_task.env.num_envs * process_task.runner.num_steps_per_env < 2:
         # PPO divides by the standard deviation of the advantages.
