@@ -83,10 +83,14 @@ def test_get_task_accepts_a_folder(tmp_path, monkeypatch, kind):
     assert get_task("quadruped").folder == QUADRUPED
 
 
-def test_folder_of_a_biped_has_the_rewards_of_biped():
+def test_folder_of_a_biped_observes_its_velocity_and_tracks_it_more():
     biped = get_task("biped")
     task = get_task(biped.folder).task
-    assert (task.rewards, task.algorithm) == (biped.task.rewards, biped.task.algorithm)
+    assert task.observations.base_lin_vel
+    assert not biped.task.observations.base_lin_vel
+    assert task.rewards.feet_gait == biped.task.rewards.feet_gait
+    for name in ("tracking_lin_vel", "tracking_ang_vel", "progress"):
+        assert getattr(task.rewards, name) == 2 * getattr(biped.task.rewards, name)
     assert task.commands == Task().commands != biped.task.commands
 
 
