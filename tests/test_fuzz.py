@@ -19,7 +19,7 @@ def forked(monkeypatch):
     from fuzzing import forked
 
     monkeypatch.setattr(forked, "SECONDS", 1)
-    monkeypatch.setattr(forked, "MEMORY", 100 << 20)
+    monkeypatch.setattr(forked, "MEMORY", 40 << 20)
     return forked
 
 
@@ -50,7 +50,7 @@ BEHAVIORS = {
     "crash": (lambda: os.kill(os.getpid(), signal.SIGTERM), "traceback"),
     "loop": (_loop, "hang"),
     "sleep": (partial(time.sleep, 100), "hang"),
-    "memory": (lambda: np.ones(1 << 25).size & 0, "memory"),
+    "memory": (lambda: np.ones(1 << 23).size & 0, "memory"),
     "partial file": (partial(_act, 2, errors=1, path="out.npz"), "files"),
     "file beside": (partial(_act, 0, path="x"), "files"),
     "file elsewhere": (partial(_act, 0, path="../x"), "files"),
