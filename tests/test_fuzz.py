@@ -78,6 +78,16 @@ def test_fork_finds_what_a_command_must_not_do(tmp_path, monkeypatch, forked, na
     assert (failure and failure.kind) == kind, failure
 
 
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_memory_that_a_process_starts_with_is_not_counted(tmp_path, monkeypatch, forked):
+    np.memmap(tmp_path / "file", np.uint8, "w+", shape=2 * forked.MEMORY)
+    private = np.memmap(tmp_path / "file", np.uint8, "c")
+    private[0] = 1  # after a write, forking copies the pages of the file too
+    assert private.sum() == 1
+    monkeypatch.setattr("terrainkit_cli.main.main", lambda _: 0)
+    assert forked.run_forked(tmp_path, lambda: forked.Command(words=[])) is None
+
+
 @pytest.mark.usefixtures("forked")
 def test_minimize_keeps_what_fails():
     from fuzz import minimize

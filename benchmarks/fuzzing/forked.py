@@ -77,7 +77,6 @@ def run_forked(folder: Path, prepare: Callable[[], Command]) -> Failure | None:
     for name in ("work", "tmp"):
         (folder / name).mkdir(parents=True)
     end = time.monotonic() + 6 * SECONDS
-    own = _memory()[1]  # a forked process starts with it
     if not (child := os.fork()):
         _run_and_exit(folder, prepare)
     pid, status, usage = os.wait4(child, os.WNOHANG)
@@ -88,8 +87,8 @@ def run_forked(folder: Path, prepare: Callable[[], Command]) -> Failure | None:
         os.killpg(child, signal.SIGKILL)
     if not pid:
         _, status, usage = os.wait4(child, 0)
-    code, gigabytes = os.waitstatus_to_exitcode(status), usage.ru_maxrss / 2**20 - own / 2**30
-    found = _failures(folder, code, gigabytes)
+    kibibytes = usage.ru_maxrss - int((folder / "memory").read_text())
+    found = _failures(folder, os.waitstatus_to_exitcode(status), kibibytes / 2**20)
     return next((Failure(kind, line) for kind, line in found if line), None)
 
 
@@ -140,19 +139,16 @@ def _run(folder: Path, prepare: Callable[[], Command]) -> int:
     log = {"words": command.words, "path": str(command.path)}
     (folder / "command").write_text(json.dumps(log))
     (folder / "before").write_text("\n".join(_listing(folder)))
+    address_space = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
-    resource.setrlimit(resource.RLIMIT_AS, (_memory()[0] + _ADDRESS_SPACE,) * 2)
+    resource.setrlimit(resource.RLIMIT_AS, (address_space + _ADDRESS_SPACE,) * 2)
+    # Forking copies file pages only for some mappings, so the parent can't tell what we start with.
+    (folder / "memory").write_text(str(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
     sys.addaudithook(_audit_hook(folder, 99))
     code = main(command.words)
     reason = command.check() if code == 0 else ""
     os.write(99, f"accepted {reason}\n".encode() if reason else b"")
     return code
-
-
-def _memory() -> tuple[int, int]:
-    """Return the address space and the resident memory without files of this process [bytes]."""
-    size, resident, shared, *_ = map(int, Path("/proc/self/statm").read_text().split())
-    return size * resource.getpagesize(), (resident - shared) * resource.getpagesize()
 
 
 def _listing(folder: Path) -> list[str]:
