@@ -1,11 +1,14 @@
-"""The generated pages of the docs have the defaults, names and limits of the code."""
+"""The generated pages of the docs have the defaults, names and limits of the code; links work."""
 
 import importlib.util
+import re
 from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parents[1] / "docs"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = [*ROOT.glob("*.md"), *DOCS.rglob("*.md"), *(ROOT / "benchmarks").rglob("*.md")]
 
 
 @pytest.fixture(scope="module")
@@ -23,3 +26,19 @@ def build():
 def test_generated_page_is_up_to_date(build, page):
     expected = getattr(build, f"{page}_page")()
     assert build.words((DOCS / f"{page}.md").read_text()) == build.words(expected)
+
+
+def _anchors(page):
+    """Return the anchors of the headings of a page, as GitHub and MkDocs make them."""
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    titles = re.findall(r"^#+ (.*?) *$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_files_and_headings(page):
+    text = re.sub(r"```.*?```|`[^`\n]*`", "", page.read_text(), flags=re.DOTALL)
+    for path, anchor in re.findall(r"\]\((?!\w+:)([^)#\s]*)#?([^)\s]*)\)", text):
+        target = page.parent / path if path else page
+        assert target.exists(), path
+        assert not anchor or anchor in _anchors(target), f"{path}#{anchor}"
