@@ -19,7 +19,7 @@ GAIT_PERIOD, BIPED_GAIT_PERIOD = 2.3, 3.0
 """Default period of the gait, in units of sqrt(leg length / g): 0.5 s for legs of 0.45 m, and 0.8 s
 for two legs of 0.7 m, as in unitree_rl_gym."""
 
-# legged_gym's.
+# The step is legged_gym's. Its share is 0.8, of a reward with a wider kernel.
 CURRICULUM_STEP, CURRICULUM_TRACKING = 0.5, 0.5
 """Extension of the range of forward velocities [m/s], and the share of the tracking reward from
 which it is extended."""
@@ -109,6 +109,7 @@ class VelocityCommand(CommandTerm):
         self.fixed: FloatArray | None = None  # overrides the sampled commands, shape (n, 3)
         self.lin_vel_x = np.array(cfg.lin_vel_x)  # range, which the curriculum extends [m/s]
         self.tracked = np.zeros(2)  # sum of the tracking of episodes, 0 to 1, and their number
+        self.steps = np.zeros(1, np.int64)  # since the start of training
         self._cfg = cfg
 
     def resample(self, rng: np.random.Generator, env_ids: Ids) -> None:
@@ -120,8 +121,20 @@ class VelocityCommand(CommandTerm):
         """
         sample = sample_commands(rng, len(env_ids), self._cfg, self.lin_vel_x)
         self.values[env_ids], self.heading[env_ids] = sample
+        if self.steps[0] < self._cfg.forward_steps:
+            self.values[env_ids, 0] = np.abs(self.values[env_ids, 0])
         forward = np.abs(self.values[env_ids, 0])
         self.speed[env_ids] = np.where(np.isnan(self.heading[env_ids]), np.nan, forward)
+
+    def resample_due(self, rng: np.random.Generator, steps: NDArray[np.int64]) -> None:
+        """Count the step, and sample new commands where the resampling time has passed.
+
+        Args:
+            rng: Generator of the random numbers.
+            steps: Steps of each environment since its reset, shape (n,).
+        """
+        self.steps += 1
+        super().resample_due(rng, steps)
 
     def end_episodes(self, tracking: FloatArray) -> None:
         """Extend the range of the forward velocity where it is tracked well, as in legged_gym.

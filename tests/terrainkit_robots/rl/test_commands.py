@@ -92,6 +92,18 @@ class TestHeading:
         assert (env.commands[:, 2] != before).any() == expected
 
 
+def test_no_command_is_backward_in_the_first_steps():
+    cfg = Commands(forward_steps=2, resampling_time=0.02)
+    command, rng = VelocityCommand(cfg, 1000, 0.02, heading_command=False), np.random.default_rng(0)
+    command.resample(rng, np.arange(1000))
+    slowest = [command.values[:, 0].min()]
+    for step in (1, 2, 3):
+        command.resample_due(rng, np.full(1000, step))
+        slowest.append(command.values[:, 0].min())
+    assert slowest[:2] == [0, 0]
+    np.testing.assert_allclose(slowest[2:], -1, atol=0.01)
+
+
 class TestCurriculum:
     """Four robots; the range grows when as many episodes have ended."""
 
