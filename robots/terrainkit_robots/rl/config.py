@@ -154,7 +154,7 @@ class Commands(Config):
     """Limit of that range to both sides [m/s]."""
     forward_steps: Annotated[int, Meta(ge=0)] = 0
     """Policy steps from the start of training in which no command is backward: the sign of negative
-    forward velocities is changed."""
+    forward velocities is changed. A run that starts with the networks of another run has none."""
     lin_vel_y: Velocities = (-0.5, 0.5)
     """Velocity to the left [m/s]."""
     ang_vel_yaw: Velocities = (-1.0, 1.0)

@@ -446,13 +446,17 @@ class LeggedEnv(VecEnv):
         }
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore a state; if the number of environments differs, restore only the curriculum."""
+        """Restore a state; if the number of environments differs, restore only the curricula."""
         parts = self.state_dict()
         check_state("env", state, dict.fromkeys(parts, ...))
         self.curriculum.load_state_dict(state["curriculum"])
         arrays, saved = self._arrays(), state["arrays"]
         num_envs = len(state["curriculum"]["levels"])
         if num_envs != self.num_envs and num_envs == len(saved["episode_length"]):
+            shared = [f"velocity.{name}" for name in ("lin_vel_x", "tracked", "steps")]
+            check_state("env.arrays", saved, {name: parts["arrays"][name] for name in shared})
+            for name in shared:
+                arrays[name][...] = saved[name].numpy()
             self.reset()
             return
         try:

@@ -268,6 +268,8 @@ class LeggedRunner(OnPolicyRunner):
         `noise_std`, the standard deviation of the actions.
         """
         own = self._algorithm_state()
+        # These networks walk forward already. A run that continues loads its own number of steps.
+        self.env.velocity_command.steps[:] = self.env.cfg.commands.forward_steps
         if "teacher_state_dict" in own and load_cfg is not None:
             self._load_teacher(Path(path))
             return {}

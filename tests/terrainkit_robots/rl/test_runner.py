@@ -65,11 +65,15 @@ def test_load_with_other_num_envs_keeps_curriculum(make, task, tmp_path, map_gro
     before = make(task, map_ground)
     before.env.curriculum.levels[:] = 2
     before.env.curriculum.sampler.statistics.success[1, 0] = 0.75
+    before.env.velocity_command.lin_vel_x[:] = -1.5, 2
+    before.env.velocity_command.steps[:] = 7
     before.save()
     more = make(replace(task, env=replace(task.env, num_envs=9)), map_ground)
     more.load(tmp_path / "model_0.pt")
     assert (more.env.curriculum.levels == 2).all()
     assert more.env.curriculum.sampler.statistics.success[1, 0] == 0.75
+    assert more.env.velocity_command.lin_vel_x.tolist() == [-1.5, 2]
+    assert more.env.velocity_command.steps == 7
     assert differences(before.alg.save(), more.alg.save()) == []
     more.learn(1)
 
@@ -84,6 +88,18 @@ def test_load_of_policy_takes_only_networks(make, tmp_path):
     assert after.current_learning_iteration == 0
     networks = [runner.alg.get_policy().state_dict() for runner in (before, after)]
     assert differences(*networks) == []
+
+
+def test_policy_of_another_run_gets_all_commands(make, task, tmp_path):
+    commands = replace(task.commands, forward_steps=1000, lin_vel_x=(-1.0, -0.5), standing=0.0)
+    task = replace(task, commands=commands)
+    before = make(task)
+    before.save()
+    new = make(task)
+    new.load(tmp_path / "model_0.pt", {"actor": True, "critic": True})
+    new.env.reset()
+    assert (before.env.commands[:, 0] > 0).all()
+    assert (new.env.commands[:, 0] < 0).all()
 
 
 def test_checkpoints_at_intervals_and_at_end(make, task, tmp_path, capfd):
