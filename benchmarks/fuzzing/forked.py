@@ -132,6 +132,8 @@ def _run(folder: Path, prepare: Callable[[], Command]) -> int:
     os.chdir(folder / "work")
     for name, number in (("stdout", 1), ("stderr", 2), ("audit", 99)):
         os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_APPEND), number)
+    # Forking copies file pages only for some mappings, so the parent can't tell what we start with.
+    (folder / "memory").write_text(str(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the libraries that write the input
         command = prepare()
@@ -142,8 +144,6 @@ def _run(folder: Path, prepare: Callable[[], Command]) -> int:
     address_space = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
     resource.setrlimit(resource.RLIMIT_AS, (address_space + _ADDRESS_SPACE,) * 2)
-    # Forking copies file pages only for some mappings, so the parent can't tell what we start with.
-    (folder / "memory").write_text(str(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss))
     sys.addaudithook(_audit_hook(folder, 99))
     code = main(command.words)
     reason = command.check() if code == 0 else ""

@@ -121,9 +121,9 @@ class VelocityCommand(CommandTerm):
         """
         sample = sample_commands(rng, len(env_ids), self._cfg, self.lin_vel_x)
         self.values[env_ids], self.heading[env_ids] = sample
-        if self.steps[0] < self._cfg.forward_steps:
-            self.values[env_ids, 0] = np.abs(self.values[env_ids, 0])
         forward = np.abs(self.values[env_ids, 0])
+        if self.steps[0] < self._cfg.forward_steps:
+            self.values[env_ids, 0] = forward
         self.speed[env_ids] = np.where(np.isnan(self.heading[env_ids]), np.nan, forward)
 
     def resample_due(self, rng: np.random.Generator, steps: NDArray[np.int64]) -> None:

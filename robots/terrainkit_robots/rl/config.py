@@ -423,7 +423,7 @@ class Algorithm(Config):
     # task `quadruped_map` has 0.0015.
     entropy_coef: NonNegativeFloat = 0.005
     """Weight of the entropy bonus."""
-    # Three epochs were slower per sample, and on a plane faster per CPU second.
+    # Three epochs were slower per sample, and with the default task also per CPU second.
     num_learning_epochs: PositiveInt = 5
     """Learning epochs per update."""
     num_mini_batches: PositiveInt = 4
