@@ -1,3 +1,4 @@
+import mmap
 import os
 import pickle
 import signal
@@ -28,6 +29,12 @@ def _loop():
         pass
 
 
+def _fill_new_pages():
+    """Use 64 MiB that malloc can't serve from memory that the parent has freed but not returned."""
+    np.frombuffer(mmap.mmap(-1, 64 << 20), np.uint8).fill(1)
+    return 0
+
+
 def _act(code, *, errors=0, text="", path=""):
     """Print lines, write a file, and return the exit code."""
     os.write(2, b"terrainkit: error: x\n" * errors + text.encode())
@@ -50,7 +57,7 @@ BEHAVIORS = {
     "crash": (lambda: os.kill(os.getpid(), signal.SIGTERM), "traceback"),
     "loop": (_loop, "hang"),
     "sleep": (partial(time.sleep, 100), "hang"),
-    "memory": (lambda: np.ones(1 << 23).size & 0, "memory"),
+    "memory": (_fill_new_pages, "memory"),
     "partial file": (partial(_act, 2, errors=1, path="out.npz"), "files"),
     "file beside": (partial(_act, 0, path="x"), "files"),
     "file elsewhere": (partial(_act, 0, path="../x"), "files"),
