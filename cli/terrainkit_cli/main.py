@@ -35,9 +35,8 @@ COMMAND_GROUPS = {
         "rule": "robot_commands",
         "onboard": "onboard_command",
         "smoke-test": "smoke_test_command",
-    },
-    "Policies": {
         "train": "train_command",
+        "average": "average_command",
         "evaluate": "evaluate_command",
         "play": "play_command",
         "check-policy": "check_policy_command",

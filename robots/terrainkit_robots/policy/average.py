@@ -1,0 +1,77 @@
+"""Average the networks of checkpoints, as stochastic weight averaging does (arXiv:1803.05407)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from terrainkit.errors import ConfigError, prefixed_errors
+from terrainkit_robots.checkpoint import check_state, policy_state, read_checkpoint, save_checkpoint
+from terrainkit_robots.rl.run import (
+    RUN_FILE,
+    Run,
+    checkpoints,
+    last_checkpoint,
+    open_run,
+    write_run_folder,
+)
+
+
+def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
+    """Write a run whose networks are the mean of the last checkpoints of another run.
+
+    The checkpoints of one training differ in what they bear, even if their rewards are the same.
+    The new run has no training state: it can be evaluated and exported, and a new run can start
+    with its networks.
+
+    Args:
+        run: The run. Checkpoints after the selected one are not used.
+        number: Number of checkpoints, at least 2.
+        folder: New folder.
+
+    Returns:
+        The new run.
+
+    Raises:
+        ConfigError: If the run has fewer checkpoints, or their networks differ in shape.
+        ExportError: If the folder is not empty, or cannot be written.
+    """
+    last = policy_state(read_checkpoint(last_checkpoint(run)))
+    saved = {i: path for i, path in checkpoints(run.folder).items() if i <= last["iteration"]}
+    if not 2 <= number <= len(saved):
+        raise ConfigError(
+            f"checkpoints: got {number}; expected at least 2 of the {len(saved)} that "
+            f"{run.folder} has up to iteration {last['iteration']}"
+        )
+    used = dict(list(saved.items())[-number:])
+    states = [_read_like(path, last) for path in used.values()]
+    for name in ("actor_state_dict", "critic_state_dict"):
+        last[name] = _mean([state[name] for state in states])
+    info = replace(run.info, averaged=tuple(used))
+    files = {path.name: path.read_bytes() for path in run.folder.glob("*.toml")}
+    write_run_folder(folder, files | {RUN_FILE: info.to_toml().encode()})
+    save_checkpoint(folder / f"model_{last['iteration']}.pt", last)
+    return open_run(folder)
+
+
+def _read_like(path: Path, other: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Read a checkpoint; raise ConfigError if its networks have not the form of another's."""
+    state = policy_state(read_checkpoint(path))
+    with prefixed_errors(f"{path}: "):
+        for name in ("actor_state_dict", "critic_state_dict"):
+            check_state(name, state[name], other[name])
+    return state
+
+
+def _mean(networks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the mean of each parameter; integers, such as numbers of samples, are the last's."""
+    import torch
+
+    means = {}
+    for name, last in networks[-1].items():
+        if last.is_floating_point():
+            values = torch.stack([network[name].double() for network in networks])
+            means[name] = values.mean(0).to(last.dtype)
+        else:
+            means[name] = last
+    return means
