@@ -45,14 +45,20 @@ class Checkpoint(TypedDict):
 
 def save_checkpoint(path: Path, state: Mapping[str, Any]) -> None:
     """Write a checkpoint completely, or not at all; see `LeggedRunner.state_dict`."""
+    data = checkpoint_bytes(state)
+    with atomic_write(path, overwrite=True) as target:
+        target.write_bytes(data)
+
+
+def checkpoint_bytes(state: Mapping[str, Any]) -> bytes:
+    """Return the content of a checkpoint file; torch itself aborts the process on a full disk."""
     import torch
 
-    data = io.BytesIO()  # torch itself aborts the process on a full disk
+    data = io.BytesIO()
     torch.save({"format": "terrainkit checkpoint", "version": 1, **state}, data)
-    with atomic_write(path, overwrite=True) as target:
-        # Not `getbuffer`: the traceback of an error would keep the view, and Python 3.12 crashes
-        # when it then collects the buffer.
-        target.write_bytes(data.getvalue())
+    # Not `getbuffer`: the traceback of an error would keep the view, and Python 3.12 crashes when
+    # it then collects the buffer.
+    return data.getvalue()
 
 
 def read_checkpoint(path: Path) -> dict[str, Any]:

@@ -6,15 +6,23 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import ConfigError, prefixed_errors
-from terrainkit_robots.checkpoint import check_state, policy_state, read_checkpoint, save_checkpoint
+from terrainkit_robots.checkpoint import (
+    check_state,
+    checkpoint_bytes,
+    policy_state,
+    read_checkpoint,
+)
 from terrainkit_robots.rl.run import (
+    MAP_FILE,
     RUN_FILE,
+    TASK_FILE,
     Run,
     checkpoints,
     last_checkpoint,
     open_run,
     write_run_folder,
 )
+from terrainkit_robots.spec.robot import SPEC_FILE
 
 
 def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
@@ -47,15 +55,16 @@ def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
     states = [_read_like(path, last) for path in used.values()]
     for name in ("actor_state_dict", "critic_state_dict"):
         last[name] = _mean([state[name] for state in states])
-    info = replace(run.info, averaged=tuple(used))
-    files = {path.name: path.read_bytes() for path in run.folder.glob("*.toml")}
-    write_run_folder(folder, files | {RUN_FILE: info.to_toml().encode()})
-    save_checkpoint(folder / f"model_{last['iteration']}.pt", last)
+    paths = [run.folder / name for name in (TASK_FILE, SPEC_FILE, MAP_FILE)]
+    files = {path.name: path.read_bytes() for path in paths if path.is_file()}
+    files[RUN_FILE] = replace(run.info, averaged=tuple(used)).to_toml().encode()
+    files[f"model_{last['iteration']}.pt"] = checkpoint_bytes(last)
+    write_run_folder(folder, files)
     return open_run(folder)
 
 
 def _read_like(path: Path, other: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Read a checkpoint; raise ConfigError if its networks have not the form of another's."""
+    """Read a checkpoint; raise ConfigError unless its networks have the form of another's."""
     state = policy_state(read_checkpoint(path))
     with prefixed_errors(f"{path}: "):
         for name in ("actor_state_dict", "critic_state_dict"):

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.checkpoint import policy_state, read_checkpoint, save_checkpoint
+from terrainkit_robots.checkpoint import checkpoint_bytes, policy_state, read_checkpoint
 from terrainkit_robots.rl.run import (
     MAP_FILE,
     RUN_FILE,
@@ -38,6 +38,6 @@ def bundle_policy(run: Run, folder: Path) -> Run:
     names = [TASK_FILE, SPEC_FILE] + [MAP_FILE] * (info.terrain != "plane")
     state = policy_state(read_checkpoint(last_checkpoint(run)))
     files = {name: (run.folder / name).read_bytes() for name in names}
-    write_run_folder(folder, files | {RUN_FILE: info.to_toml().encode()})
-    save_checkpoint(folder / f"model_{state['iteration']}.pt", state)
+    files |= {RUN_FILE: info.to_toml().encode()}
+    write_run_folder(folder, files | {f"model_{state['iteration']}.pt": checkpoint_bytes(state)})
     return open_run(folder)
