@@ -16,12 +16,12 @@ class Average(Command):
     """Average the networks of the last checkpoints of a run.
 
     Checkpoints of one training differ: one climbs a step, and the next stumbles over it. Their mean
-    is often better than each of them, if the noise of the actions was small: compare both with
-    terrainkit evaluate. The output is a new run without the state of the training.
+    is often better than any of them, but not always: compare with terrainkit evaluate. The output
+    is a new run without the state of the training.
     """
 
     source: Annotated[str, positional("RUN")] = ""
-    """A folder written by terrainkit train, or a checkpoint in one, after which none is used."""
+    """A folder written by terrainkit train, or a checkpoint in one; later ones are not used."""
 
     checkpoints: Annotated[int, option("N")] = 7
     """Number of checkpoints to average; training writes one every 100 iterations."""

@@ -48,8 +48,8 @@ def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
     saved = {i: path for i, path in checkpoints(run.folder).items() if i <= last["iteration"]}
     if not 2 <= number <= len(saved):
         raise ConfigError(
-            f"checkpoints: got {number}; expected at least 2 of the {len(saved)} that "
-            f"{run.folder} has up to iteration {last['iteration']}"
+            f"checkpoints: got {number}; expected 2 or more, and {run.folder} has {len(saved)} "
+            f"up to iteration {last['iteration']}"
         )
     used = dict(list(saved.items())[-number:])
     states = [_read_like(path, last) for path in used.values()]
