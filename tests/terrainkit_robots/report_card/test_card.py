@@ -101,7 +101,8 @@ def test_intervals_are_those_of_wilson(make_card):
 def test_card_is_written_as_json_markdown_and_picture(make_card, slopes_and_pits):
     card = make_card([[CROSSED, CROSSED], [CROSSED, FELL], [FELL, FELL]], [[FELL, FELL]] * 3)
     assert card.sha256 == suite_hash(slopes_and_pits)
-    assert summary(card) == "quadruped, model_2600.pt, on test-1: success 25% (9% to 53%)"
+    name = open_run("quadruped").checkpoint.name
+    assert summary(card) == f"quadruped, {name}, on test-1: success 25% (9% to 53%)"
     row = ("slope", "2", "1", "0", "50% (19% to 81%)", "0: grade 0")
     assert card.rows()[:2] == [("test", "level 0", "1", "2", "success", "passed level"), row]
     document = json.loads(json.dumps(card.as_json()))

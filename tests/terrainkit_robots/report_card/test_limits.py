@@ -92,7 +92,7 @@ def test_limits_are_printed_with_units(measure):
     assert {row[0]: row[2:] for row in rows}["stone"][0] == "-"
     document = results.as_json()
     about = [document[key] for key in ("robot", "checkpoint", "repetitions", "seed")]
-    assert about == ["quadruped", "model_2600.pt", 2, 3]
+    assert about == ["quadruped", open_run("quadruped").checkpoint.name, 2, 3]
     assert document["limits"][0]["passed"] == pytest.approx(0.2)
 
 
