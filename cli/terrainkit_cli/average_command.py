@@ -24,7 +24,8 @@ class Average(Command):
     """A folder written by terrainkit train, or a checkpoint in one; later ones are not used."""
 
     checkpoints: Annotated[int, option("N")] = 7
-    """Number of checkpoints to average; training writes one every 100 iterations."""
+    """Number of checkpoints to average, at least 2; by default, training writes one every 100
+    iterations (--runner.save-interval)."""
 
     output: OutputPath | None = None
     """Folder of the new run."""
@@ -47,5 +48,6 @@ class Average(Command):
             f"wrote {averaged.folder}: the mean of {self.checkpoints} checkpoints, "
             f"{first} to {last}"
         )
-        render.result(f"next: terrainkit evaluate {quote(str(averaged.folder))}")
+        task = f" --task {quote(str(self.task))}" if self.task else ""
+        render.result(f"next: terrainkit evaluate {quote(str(averaged.folder))}{task}")
         return 0

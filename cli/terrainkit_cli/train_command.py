@@ -62,7 +62,7 @@ class Train(PluginCommand, ConfigCommand):
     not been interrupted. With another terrain or task, a new run starts with the networks of this
     run. It also starts with its optimizer state if --algorithm.learning-rate and
     --algorithm.schedule are the same, with its terrain levels if the map is the same, and with the
-    noise of its actions unless --policy.init-noise-std changes it."""
+    noise of its actions if --policy.init-noise-std is the same."""
 
     device: Device = "cpu"
     """Device of the networks: cpu, cuda, cuda:1. The physics runs on the CPU."""

@@ -28,7 +28,8 @@ from terrainkit_robots.spec.robot import SPEC_FILE
 def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
     """Write a run whose networks are the mean of the last checkpoints of another run.
 
-    The checkpoints of one training differ in what they bear, even if their rewards are the same.
+    The checkpoints of one training differ in the terrain and the disturbances that they can handle,
+    even if their rewards are the same.
     The new run has no training state: it can be evaluated and exported, and a new run can start
     with its networks.
 
@@ -41,20 +42,25 @@ def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
         The new run.
 
     Raises:
-        ConfigError: If the run has fewer checkpoints, or their networks differ in shape.
+        ConfigError: If the run has fewer checkpoints, or they do not fit the selected one.
         ExportError: If the folder is not empty, or cannot be written.
     """
     last = policy_state(read_checkpoint(last_checkpoint(run)))
     saved = {i: path for i, path in checkpoints(run.folder).items() if i <= last["iteration"]}
+    if saved.get(last["iteration"]) != last_checkpoint(run):
+        raise ConfigError(
+            f"{last_checkpoint(run)}: got a checkpoint of iteration {last['iteration']}; expected "
+            f"the name model_{last['iteration']}.pt"
+        )
     if not 2 <= number <= len(saved):
         raise ConfigError(
-            f"checkpoints: got {number}; expected 2 or more, and {run.folder} has {len(saved)} "
-            f"up to iteration {last['iteration']}"
+            f"checkpoints: got {number}; expected at least 2; {run.folder} has {len(saved)} up to "
+            f"iteration {last['iteration']}"
         )
     used = dict(list(saved.items())[-number:])
     states = [_read_like(path, last) for path in used.values()]
     for name in ("actor_state_dict", "critic_state_dict"):
-        last[name] = _mean([state[name] for state in states])
+        last[name] = _mean([state[name] for state in states], last[name])
     paths = [run.folder / name for name in (TASK_FILE, SPEC_FILE, MAP_FILE)]
     files = {path.name: path.read_bytes() for path in paths if path.is_file()}
     files[RUN_FILE] = replace(run.info, averaged=tuple(used)).to_toml().encode()
@@ -72,15 +78,13 @@ def _read_like(path: Path, other: Mapping[str, Any]) -> Mapping[str, Any]:
     return state
 
 
-def _mean(networks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _mean(networks: Sequence[Mapping[str, Any]], last: Mapping[str, Any]) -> dict[str, Any]:
     """Return the mean of each parameter; integers, such as numbers of samples, are the last's."""
     import torch
 
-    means = {}
-    for name, last in networks[-1].items():
-        if last.is_floating_point():
+    means = dict(last)
+    for name, value in last.items():
+        if isinstance(value, torch.Tensor) and value.is_floating_point():
             values = torch.stack([network[name].double() for network in networks])
-            means[name] = values.mean(0).to(last.dtype)
-        else:
-            means[name] = last
+            means[name] = values.mean(0).to(value.dtype)
     return means

@@ -243,8 +243,7 @@ def parts_to_load(
     is_same_map = is_same_terrain(run, terrain)
     env = replace(task.env, num_envs=run.task.env.num_envs, num_threads=run.task.env.num_threads)
     is_same_task = replace(task, env=env, runner=run.task.runner) == run.task
-    sources = _sources(robot, terrain)
-    if is_same_task and sources == (run.info.robot, run.terrain):
+    if is_same_task and _sources(robot, terrain) == (run.info.robot, run.terrain):
         changed = [f"{name} of {run.info.robot}" for name in changed_robot_files(run)]
         changed += [] if is_same_map else [run.terrain]
         if changed:
@@ -255,14 +254,11 @@ def parts_to_load(
         if TRAINING_KEYS & read_checkpoint(last_checkpoint(run)).keys():
             return None
     rates = [(each.learning_rate, each.schedule) for each in (task.algorithm, run.task.algorithm)]
-    kept_noise = {run.task.policy.init_noise_std}
-    if sources[0] == run.info.robot:  # the default of a task that the run changed
-        kept_noise.add(tasks.get_task(robot).task.policy.init_noise_std)
     is_plane, was_plane = (each.terrain.collision == "plane" for each in (task, run.task))
     return {
         "actor": True,
         "critic": True,
-        "noise_std": task.policy.init_noise_std in kept_noise,
+        "noise_std": task.policy.init_noise_std == run.task.policy.init_noise_std,
         "optimizer": rates[0] == rates[1],
         "curriculum": is_plane == was_plane
         and is_same_map

@@ -48,9 +48,7 @@ def test_mean_of_the_last_checkpoints(run, tmp_path, selected, number, iteration
 
 @pytest.mark.parametrize("number", [-1, 0, 1, 5])
 def test_average_needs_as_many_checkpoints(run, tmp_path, number):
-    with pytest.raises(
-        ConfigError, match=rf"got {number}; expected 2 or more, and .*run has 4 up to"
-    ):
+    with pytest.raises(ConfigError, match=rf"got {number}; expected at least 2; .*run has 4 up to"):
         average_checkpoints(run, number, tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
@@ -63,3 +61,11 @@ def test_average_rejects_networks_of_other_shapes(run, tmp_path):
     with pytest.raises(ConfigError, match=r"model_3.pt: critic_state_dict.mlp.0.weight: got float"):
         average_checkpoints(run, 3, tmp_path / "new")
     assert not (tmp_path / "new").exists()
+
+
+def test_average_rejects_a_renamed_checkpoint(run, tmp_path):
+    path = (run.folder / "model_3.pt").rename(run.folder / "best.pt")
+    with pytest.raises(
+        ConfigError, match=r"best.pt: got a .* iteration 3; expected the name model_3"
+    ):
+        average_checkpoints(open_run(path), 2, tmp_path / "new")

@@ -119,21 +119,14 @@ def test_run_on_a_map_of_a_class_that_is_not_registered(tmp_path, task, mixed_ma
     assert (run.folder / MAP_FILE).read_text() == own  # to generate it where the class is
 
 
-@pytest.mark.parametrize(
-    ("robot", "noise_std", "is_kept"),
-    [
-        ("quadruped", 0.125, True),  # of the run
-        ("quadruped", tasks.get_task("quadruped").task.policy.init_noise_std, True),  # the default
-        ("quadruped", 0.25, False),
-        ("quadruped_map", tasks.get_task("quadruped_map").task.policy.init_noise_std, False),
-    ],
-)
-def test_noise_is_kept_unless_the_task_changes_it(tmp_path, task, robot, noise_std, is_kept):
-    trained = replace(task, policy=replace(task.policy, init_noise_std=0.125))
-    run = create_run(tmp_path / "run", trained, "quadruped", "plane")
-    policy = replace(task.policy, init_noise_std=noise_std)
-    other = replace(task, policy=policy, env=replace(task.env, episode_length_s=9.0))
-    assert parts_to_load(run, robot, "plane", other)["noise_std"] == is_kept
+def test_new_noise_is_the_task_s(tmp_path, task):
+    run = create_run(tmp_path / "run", task, "quadruped", "plane")
+    other = replace(task, policy=replace(task.policy, init_noise_std=0.125))
+    longer = replace(task, env=replace(task.env, episode_length_s=9.0))
+    loaded = [
+        parts_to_load(run, "quadruped", "plane", each)["noise_std"] for each in (other, longer)
+    ]
+    assert loaded == [False, True]
 
 
 def test_checkpoints_are_ordered_by_iteration(run):
