@@ -6,32 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import ConfigError, prefixed_errors
-from terrainkit_robots.checkpoint import (
-    check_state,
-    checkpoint_bytes,
-    policy_state,
-    read_checkpoint,
-)
-from terrainkit_robots.rl.run import (
-    MAP_FILE,
-    RUN_FILE,
-    TASK_FILE,
-    Run,
-    checkpoints,
-    last_checkpoint,
-    open_run,
-    write_run_folder,
-)
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.checkpoint import Checkpoint, check_state, policy_state, read_checkpoint
+from terrainkit_robots.policy.bundle import write_policy
+from terrainkit_robots.rl.run import Run, checkpoints, last_checkpoint
 
 
 def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
     """Write a run whose networks are the mean of the last checkpoints of another run.
 
     The checkpoints of one training differ in the terrain and the disturbances that they can handle,
-    even if their rewards are the same.
-    The new run has no training state: it can be evaluated and exported, and a new run can start
-    with its networks.
+    even if their rewards are the same. The new run has no training state: it can be evaluated and
+    exported, and a new run can start with its networks.
 
     Args:
         run: The run. Checkpoints after the selected one are not used.
@@ -57,33 +42,29 @@ def average_checkpoints(run: Run, number: int, folder: Path) -> Run:
             f"checkpoints: got {number}; expected at least 2; {run.folder} has {len(saved)} up to "
             f"iteration {last['iteration']}"
         )
-    used = dict(list(saved.items())[-number:])
-    states = [_read_like(path, last) for path in used.values()]
-    for name in ("actor_state_dict", "critic_state_dict"):
-        last[name] = _mean([state[name] for state in states], last[name])
-    paths = [run.folder / name for name in (TASK_FILE, SPEC_FILE, MAP_FILE)]
-    files = {path.name: path.read_bytes() for path in paths if path.is_file()}
-    files[RUN_FILE] = replace(run.info, averaged=tuple(used)).to_toml().encode()
-    files[f"model_{last['iteration']}.pt"] = checkpoint_bytes(last)
-    write_run_folder(folder, files)
-    return open_run(folder)
+    used = list(saved)[-number:]
+    states = [*(_read_like(saved[i], last) for i in used[:-1]), last]
+    mean = last.copy()
+    mean["actor_state_dict"] = _mean([state["actor_state_dict"] for state in states])
+    mean["critic_state_dict"] = _mean([state["critic_state_dict"] for state in states])
+    return write_policy(run, replace(run.info, averaged=tuple(used)), mean, folder)
 
 
-def _read_like(path: Path, other: Mapping[str, Any]) -> Mapping[str, Any]:
+def _read_like(path: Path, other: Checkpoint) -> Checkpoint:
     """Read a checkpoint; raise ConfigError unless its networks have the form of another's."""
     state = policy_state(read_checkpoint(path))
     with prefixed_errors(f"{path}: "):
-        for name in ("actor_state_dict", "critic_state_dict"):
-            check_state(name, state[name], other[name])
+        check_state("actor_state_dict", state["actor_state_dict"], other["actor_state_dict"])
+        check_state("critic_state_dict", state["critic_state_dict"], other["critic_state_dict"])
     return state
 
 
-def _mean(networks: Sequence[Mapping[str, Any]], last: Mapping[str, Any]) -> dict[str, Any]:
+def _mean(networks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the mean of each parameter; integers, such as numbers of samples, are the last's."""
     import torch
 
-    means = dict(last)
-    for name, value in last.items():
+    means = dict(networks[-1])
+    for name, value in means.items():
         if isinstance(value, torch.Tensor) and value.is_floating_point():
             values = torch.stack([network[name].double() for network in networks])
             means[name] = values.mean(0).to(value.dtype)
