@@ -43,6 +43,11 @@ class TerrainkitWarning(UserWarning):
     """Something was omitted or changed; the result is still valid."""
 
 
+def one_line(text: str) -> str:
+    """Return `text` on one line, without unprintable characters."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
 def is_built_in(item: Any) -> bool:
     """Return whether a class or function belongs to terrainkit."""
     packages = "terrainkit", "terrainkit_robots", "terrainkit_cli"

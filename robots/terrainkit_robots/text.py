@@ -48,11 +48,6 @@ def contrast(value: float, limit: float, spec: str) -> tuple[str, str]:
     return texts[0], re.sub(r"\.0+(?=%?$)", "", texts[1])
 
 
-def one_line(text: str) -> str:
-    """Return `text` on one line, without unprintable characters."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
-
-
 def free_name(name: str, used_names: Container[str]) -> str:
     """Return `name`, or the first of name_2, name_3, ... that is not taken."""
     free, number = name, 2

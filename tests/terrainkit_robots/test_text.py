@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit_robots.text import conjunction, contrast, count, free_name, names, numbers, one_line
+from terrainkit_robots.text import conjunction, contrast, count, free_name, names, numbers
 
 
 @pytest.mark.parametrize(
@@ -43,10 +43,6 @@ def test_numbers_have_no_negative_zero():
 
 def test_count_uses_plural():
     assert [count(n, "leg") for n in (0, 1, 2, 4000)] == ["0 legs", "1 leg", "2 legs", "4,000 legs"]
-
-
-def test_one_line_keeps_printable_characters():
-    assert one_line("a\n\t b\u202e ") == "a b"
 
 
 def test_free_name_appends_number():

@@ -15,11 +15,10 @@ from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
 
-from terrainkit.errors import listing
+from terrainkit.errors import listing, one_line
 from terrainkit.settings.text import closest_names, expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.xml.document import RobotFileError
-from terrainkit_robots.text import one_line
 
 _PACKAGE = "robot_descriptions"
 _SUFFIX = "_description"

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, ExportError
+from terrainkit.errors import ConfigError, ExportError, one_line
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import Frame, stream_frames
-from terrainkit_robots.text import one_line
 
 FloatArray = NDArray[np.floating[Any]]
 

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, one_line
 from terrainkit.feasibility.limits import RobotLimits
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import box_corners, collides
 from terrainkit_robots.spec.robot import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
-from terrainkit_robots.text import one_line
 
 STEP_UP = 0.4
 """Highest step up, in leg lengths. A leg folds to about half of its length, and the foot has to

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from terrainkit.errors import one_line
 from terrainkit_robots.spec.per_joint import match_joints
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, Provenance, RobotSpec
-from terrainkit_robots.text import one_line
 
 
 def with_provenance(spec: RobotSpec, derived: RobotSpec, file: str) -> RobotSpec:

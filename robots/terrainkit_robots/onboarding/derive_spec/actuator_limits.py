@@ -4,12 +4,12 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from terrainkit.errors import one_line
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.spec.column import Column, rounded
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance
-from terrainkit_robots.text import one_line
 
 if TYPE_CHECKING:
     from terrainkit_robots.simulation.gain import Gain

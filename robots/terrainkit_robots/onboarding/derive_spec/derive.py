@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, one_line
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.keyframe import is_standing_keyframe
 from terrainkit_robots.description.model import Joint
@@ -22,7 +22,7 @@ from terrainkit_robots.onboarding.derive_spec.foot_radius import foot_radius
 from terrainkit_robots.spec.column import Column, collect_provenance, rounded, rounded_length
 from terrainkit_robots.spec.name_patterns import by_pattern
 from terrainkit_robots.spec.robot_spec import Origin, Provenance, RobotSpec
-from terrainkit_robots.text import names, one_line
+from terrainkit_robots.text import names
 
 if TYPE_CHECKING:
     from terrainkit_robots.simulation.gain import Gain

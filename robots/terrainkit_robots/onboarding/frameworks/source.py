@@ -9,8 +9,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from string import Template
 
-from terrainkit.errors import ConfigError
-from terrainkit_robots.text import one_line
+from terrainkit.errors import ConfigError, one_line
 
 WIDTH = 88
 """Maximum line length, the default of ruff and black."""
