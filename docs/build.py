@@ -460,7 +460,7 @@ def draw_perception() -> None:
 def draw_robot(name: str) -> None:
     found = bundled.urdf_path(name)
     assert found is not None
-    views = render_robot(found.with_suffix(".xml"), size=(400, 340)).values()
+    views = dict(render_robot(found.with_suffix(".xml"), size=(400, 340))).values()
     pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in views]
     cv2.imwrite(str(PICTURES / f"{name}.png"), np.hstack(pictures))
 

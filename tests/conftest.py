@@ -1,11 +1,8 @@
 import contextlib
 import dataclasses
 import os
-import resource
 import socket
-import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +10,7 @@ from hypothesis import settings
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.files import child_process
+from terrainkit.files.child_process import ProcessLimits
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
 
 # Before torch is imported: its threads would otherwise spin while they wait for one another, which
@@ -118,24 +116,33 @@ def ray_down():
     return cast
 
 
+class ProcessStandIn:
+    """Calls a function as `ChildProcess` does, but in this process."""
+
+    def __init__(self, function, *arguments, limits=None):
+        self.limits = limits or ProcessLimits()
+        self.answers = function(iter(()), *arguments)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.answers.close()
+
+    def receive(self):
+        try:
+            return {name: np.asarray(array) for name, array in next(self.answers).items()}
+        except MemoryError:
+            memory = self.limits.memory / 2**30
+            raise child_process.ProcessError(f"needs more than {memory:g} GB of memory") from None
+        except Exception as error:
+            raise child_process.ProcessError(" ".join(str(error).split())) from None
+
+
 @pytest.fixture
 def import_in_process(monkeypatch):
     """Read files in this process: trimesh takes most of a second to import."""
-
-    def run(command, **_options):
-        try:
-            child_process.main(*command[-2:])
-        except SystemExit as error:
-            stderr = str(error.code).encode()
-            raise subprocess.CalledProcessError(1, command, stderr=stderr) from None
-
-    child = SimpleNamespace(
-        run=run,
-        TimeoutExpired=subprocess.TimeoutExpired,
-        CalledProcessError=subprocess.CalledProcessError,
-    )
-    monkeypatch.setattr(child_process, "subprocess", child)
-    monkeypatch.setattr(resource, "setrlimit", lambda *_: None)
+    monkeypatch.setattr(child_process, "ChildProcess", ProcessStandIn)
     yield
     if "mujoco" in sys.modules:  # the child process does not restore it
         sys.modules["mujoco"].set_mju_user_warning(None)

@@ -23,9 +23,14 @@ def worker_pool(jobs: int) -> "AbstractContextManager[Executor | None]":
 
 
 def _start_worker(plugins: "Sequence[Path]") -> None:
-    """Leave the reaction to Ctrl-C to the main process; end quietly on SIGTERM."""
+    """Leave the reaction to Ctrl-C to the main process; end quietly on SIGTERM, and with it."""
+    from multiprocessing import parent_process
+
+    from terrainkit.files.child_process import end_with_parent
     from terrainkit.terrain.plugin_file import load_plugin
 
+    if main_process := parent_process():
+        end_with_parent(main_process.is_alive)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if opencv := sys.modules.get("cv2"):

@@ -7,8 +7,6 @@ runs in a child process, one for each backend that is tried.
 import os
 import sys
 
-from terrainkit.files.child_process import import_path
-
 
 def backends() -> tuple[str, ...]:
     """Return the values of MUJOCO_GL to try, in order; an empty string is MuJoCo's default.
@@ -34,7 +32,6 @@ def child_environment(backend: str) -> dict[str, str]:
     # Rendering must not leave files in the user's home folder.
     variables.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
     variables.setdefault("__GL_SHADER_DISK_CACHE", "0")
-    variables["PYTHONPATH"] = import_path()
     return variables
 
 

@@ -33,7 +33,7 @@ def check_memory(
     """
     if needed <= MIN_CHECKED_BYTES:
         return
-    free = _free_memory()
+    free = free_memory()
     if needed > free:
         name, num_parts = parts
         num_fitting = num_parts * free // needed
@@ -44,7 +44,7 @@ def check_memory(
         )
 
 
-def _free_memory() -> int:
+def free_memory() -> int:
     """Return the memory that this process may still allocate [bytes]."""
     import psutil
 

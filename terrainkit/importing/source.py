@@ -138,7 +138,7 @@ def decode(
         HeightFileError: if the file cannot be decoded within the limits.
     """
     try:
-        return run_in_process(function, path, *arguments)
+        return run_in_process(function, path.absolute(), *arguments)
     except ProcessError as error:
         raise HeightFileError(f"{path}: cannot be read: {error}") from None
 

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import pytest
 
 from terrainkit_robots.gl_backend import backends, child_environment, installation_advice
@@ -36,16 +34,14 @@ def test_advice_without_request_names_packages():
     assert installation_advice().startswith("install EGL or OSMesa")
 
 
-def test_child_environment_has_a_backend_a_path_and_no_shader_cache(monkeypatch):
+def test_child_environment_has_a_backend_and_no_shader_cache(monkeypatch):
     monkeypatch.setenv("PYOPENGL_PLATFORM", "glx")
     monkeypatch.setenv("MUJOCO_GL", "glfw")
     monkeypatch.delenv("MESA_SHADER_CACHE_DISABLE", raising=False)
     monkeypatch.setenv("__GL_SHADER_DISK_CACHE", "1")
-    monkeypatch.setattr("sys.path", ["", "somewhere"])
     variables = child_environment("egl")
     assert "PYOPENGL_PLATFORM" not in variables
     assert variables["MUJOCO_GL"] == "egl"
     assert "MUJOCO_GL" not in child_environment("")
-    assert variables["PYTHONPATH"] == str(Path("somewhere").absolute())
     assert variables["MESA_SHADER_CACHE_DISABLE"] == "true"
     assert variables["__GL_SHADER_DISK_CACHE"] == "1"

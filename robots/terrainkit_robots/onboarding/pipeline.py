@@ -1,7 +1,6 @@
 """The onboarding pipeline: check a robot file, fix it, write its folder and verify the result."""
 
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -213,23 +212,30 @@ def _write_folder(
 ) -> OnboardResult:
     """Write the folder, and return the result with its verification, pictures and edited files."""
     from terrainkit_robots.onboarding.verify import verify
+    from terrainkit_robots.rendering.child_process import RenderError
+    from terrainkit_robots.rendering.robot_images import render_robot
 
     assert result.robot is not None
     edits = find_edits(target, files)
     with new_folder(target, overwrite=options.overwrite) as folder:
         options.on_step("simulating the standing pose")
         write_files(folder, files)
-        # The pictures are rendered by another process at the same time.
-        with ThreadPoolExecutor(1) as executor:
-            images_job = executor.submit(_render_images, folder, options.render_images)
-            stiffness = result.robot.spec.provenance.items()
-            is_soft = options.spec is None and (
-                options.gains == "train"
-                or any(k.startswith("stiffness") and p.origin == "declared" for k, p in stiffness)
-            )
-            verification = verify(result.report.facts, result.robot, folder, soft_gains=is_soft)
-            options.on_step("rendering pictures")
-        images, images_error = images_job.result()
+        # Another process renders the pictures at the same time.
+        rendering = render_robot(folder / MJCF) if options.render_images else None
+        stiffness = result.robot.spec.provenance.items()
+        is_soft = options.spec is None and (
+            options.gains == "train"
+            or any(k.startswith("stiffness") and p.origin == "declared" for k, p in stiffness)
+        )
+        verification = verify(result.report.facts, result.robot, folder, soft_gains=is_soft)
+        options.on_step("rendering pictures")
+        images: dict[str, bytes] = {}
+        images_error = "" if rendering else "disabled"
+        try:
+            for name, image in rendering or ():
+                images[f"report/{name}.png"] = image
+        except RenderError as error:
+            images, images_error = {}, str(error)
         write_files(folder, {**images, **edits})
         result = replace(
             result,
@@ -240,17 +246,3 @@ def _write_folder(
         )
         write_files(folder, {"report.md": report_markdown(result).encode()})
     return result
-
-
-def _render_images(folder: Path, enabled: bool) -> tuple[dict[str, bytes], str]:
-    """Return pictures by file name, and the reason if there are none."""
-    from terrainkit_robots.rendering.child_process import RenderError
-    from terrainkit_robots.rendering.robot_images import render_robot
-
-    if not enabled:
-        return {}, "disabled"
-    try:
-        images = render_robot(folder / MJCF)
-    except RenderError as error:
-        return {}, str(error)
-    return {f"report/{name}.png": data for name, data in images.items()}, ""

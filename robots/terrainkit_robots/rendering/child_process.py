@@ -1,27 +1,22 @@
 """Render frames in a child process, since a broken OpenGL library may crash or block a process."""
 
-import faulthandler
-import os
-import pickle
-import subprocess
-import sys
-import tempfile
-from collections.abc import Callable, Generator, Iterator
-from contextlib import suppress
-from pathlib import Path
+from collections.abc import Callable, Generator, Iterator, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import TerrainkitError
+from terrainkit.files.child_process import ChildProcess, ProcessError, ProcessLimits
 from terrainkit.settings.text import truncate
 from terrainkit_robots import gl_backend
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.text import one_line
 
 Frame = NDArray[np.uint8]  # an RGB image, shape (height, width, 3)
-FRAME_TIMEOUT = 120.0  # maximum time for a single frame [s]
+
+LIMITS = ProcessLimits(seconds=120.0, memory=None)
+"""Limits of a frame; drivers of graphics cards map more memory than there is."""
 
 
 class RenderError(TerrainkitError):
@@ -31,7 +26,7 @@ class RenderError(TerrainkitError):
 def stream_frames(
     render: Callable[..., Iterator[Frame]], inputs: Iterator[Any] | None = None
 ) -> Iterator[Frame]:
-    """Yield the frames that a picklable function renders in a child process.
+    """Start to render in a child process, and yield the frames of a picklable function.
 
     The backends of `gl_backend.backends()` are tried in order until one renders a frame.
 
@@ -42,79 +37,61 @@ def stream_frames(
     Raises:
         RenderError: if no backend works, a frame takes too long, or `render` raises this error.
     """
+
+    def start(backend: str) -> ChildProcess:
+        environment = gl_backend.child_environment(backend)
+        arguments = _frames, render, inputs is not None
+        return ChildProcess(*arguments, limits=LIMITS, environment=environment)
+
+    first, *others = gl_backend.backends()
+    child = start(first)  # now, and not when the first frame is requested
+    return _stream_frames(inputs, {first: lambda: child} | {b: partial(start, b) for b in others})
+
+
+def _stream_frames(
+    inputs: Iterator[Any] | None, processes: Mapping[str, Callable[[], ChildProcess]]
+) -> Iterator[Frame]:
+    """Yield the frames of the first process whose backend works, by name of the backend."""
     reasons: list[str] = []
-    for backend in gl_backend.backends():
-        reason = yield from _run_child(render, inputs, backend)
+    for backend, start in processes.items():
+        reason = yield from _run_child(start(), inputs)
         if not reason:
             return
-        reasons.append(f"{backend or 'default backend'}: {truncate(one_line(reason), 160)}")
+        reasons.append(f"{backend or 'default backend'}: {truncate(reason, 160)}")
     advice = gl_backend.installation_advice()
     raise RenderError(f"MuJoCo cannot render here ({'; '.join(reasons)}); {advice}")
 
 
-def _run_child(
-    render: Callable[..., Iterator[Frame]], inputs: Iterator[Any] | None, backend: str
-) -> Generator[Frame, None, str]:
+def _run_child(child: ChildProcess, inputs: Iterator[Any] | None) -> Generator[Frame, None, str]:
     """Yield frames, and return why the backend failed, or an empty string."""
-    command = [sys.executable, "-P", "-c", f"from {__name__} import main; main({FRAME_TIMEOUT})"]
-    environment, count = gl_backend.child_environment(backend), 0
-    # MuJoCo may write a log into its working directory, which is therefore a temporary one.
-    with tempfile.TemporaryDirectory(prefix="terrainkit-", ignore_cleanup_errors=True) as folder:
-        Path(folder, "request").write_bytes(pickle.dumps((render, inputs is not None)))
-        pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-        pipes["stderr"] = subprocess.DEVNULL
-        process = subprocess.Popen(command, env=environment, cwd=folder, **pipes)
+    count = 0
+    with child:
         try:
-            while isinstance(message := _next_message(process, inputs), np.ndarray):
-                yield message
+            while answer := _next_answer(child, inputs):
+                if "error" in answer:
+                    raise RenderError(str(answer["error"]))
+                yield answer["frame"]
                 count += 1
-        except (EOFError, pickle.UnpicklingError):
-            message = f"no frame within {FRAME_TIMEOUT:g} s or crash, exit code {process.wait()}"
-        finally:
-            process.kill()
-            process.communicate()
-    if isinstance(message, RenderError):
-        raise message
-    if message and count:  # another backend would start again with the first frame
-        raise RenderError(f"rendering failed after {count} frames: {one_line(message)}")
-    return str(message)
+        except ProcessError as error:
+            if count:  # another backend would start again with the first frame
+                raise RenderError(f"rendering failed after {count} frames: {error}") from None
+            return str(error)
+    return ""
 
 
-def _next_message(process: Any, inputs: Iterator[Any] | None) -> Any:
-    """Send the next input, if any, and return what the child process answers."""
+def _next_answer(child: ChildProcess, inputs: Iterator[Any] | None) -> dict[str, NDArray[Any]]:
     if inputs is not None:
-        with suppress(BrokenPipeError):  # a child that ended has written why
-            pickle.dump(next(inputs), process.stdin)
-            process.stdin.flush()
-    return pickle.load(process.stdout)
+        child.send(next(inputs))
+    return child.receive()
 
 
-def _received_inputs(timeout: float) -> Iterator[Any]:
-    """Yield the inputs from stdin, without a limit of the time until they arrive."""
-    with suppress(EOFError):
-        while True:
-            faulthandler.cancel_dump_traceback_later()
-            received = pickle.load(sys.stdin.buffer)
-            faulthandler.dump_traceback_later(timeout, exit=True)
-            yield received
-
-
-def main(timeout: float) -> None:
-    """Call the pickled function, and write its frames and then an error or "" to stdout."""
-    message: Any = ""
-    with os.fdopen(os.dup(1), "wb") as output:
-        os.dup2(2, 1)  # OpenGL libraries print to stdout
-        faulthandler.dump_traceback_later(timeout, exit=True)
-        try:
-            render, has_inputs = pickle.loads(Path("request").read_bytes())
-            with quiet_mujoco():
-                for frame in render(_received_inputs(timeout)) if has_inputs else render():
-                    faulthandler.cancel_dump_traceback_later()  # the reader may take its time
-                    pickle.dump(frame, output)
-                    output.flush()
-                    faulthandler.dump_traceback_later(timeout, exit=True)
-        except RenderError as error:
-            message = error
-        except Exception as error:  # OpenGL bindings raise errors of any type
-            message = f"{type(error).__name__}: {error}"
-        pickle.dump(message, output)
+def _frames(
+    received: Iterator[Any], render: Callable[..., Iterator[Frame]], takes_inputs: bool
+) -> Iterator[dict[str, Any]]:
+    """Yield each frame of `render`, and the message of its RenderError."""
+    try:
+        with quiet_mujoco():
+            for frame in render(received) if takes_inputs else render():
+                yield {"frame": frame}
+    except RenderError as error:
+        yield {"error": str(error)}

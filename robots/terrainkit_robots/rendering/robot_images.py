@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.errors import one_line
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import RenderError, stream_frames
 from terrainkit_robots.simulation.geoms import box_corners, lowest_point
-from terrainkit_robots.text import one_line
 
 DEFAULT_SIZE = (480, 420)  # [pixels]
 VIEWS = {"front": (180.0, -10.0), "side": (90.0, -10.0), "corner": (142.0, -24.0)}
@@ -22,8 +22,8 @@ FLOOR = "terrainkit_floor"
 MUJOCO_RGBA = np.array((0.5, 0.5, 0.5, 1))  # default color
 
 
-def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, bytes]:
-    """Return a PNG of each view of a robot, by the name of the view: front, side and corner.
+def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> Iterator[tuple[str, bytes]]:
+    """Start to render a robot, and yield name and PNG of each view: front, side and corner.
 
     The robot of the MJCF file is shown in its first keyframe, or in qpos0.
 
@@ -31,7 +31,7 @@ def render_robot(file: Path, size: tuple[int, int] = DEFAULT_SIZE) -> dict[str, 
         RenderError: if MuJoCo cannot render on this machine, or cannot render this robot.
     """
     images = stream_frames(partial(render_views, file.absolute(), size))
-    return {name: image.tobytes() for name, image in zip(VIEWS, images, strict=True)}
+    return ((name, image.tobytes()) for name, image in zip(VIEWS, images, strict=True))
 
 
 def render_views(file: Path, size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:

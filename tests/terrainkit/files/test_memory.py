@@ -17,7 +17,7 @@ def test_check_memory_rejects_large_work(needed):
 
 
 def test_check_memory_accepts_what_is_free_and_names_parts_that_fit(monkeypatch):
-    monkeypatch.setattr(memory, "_free_memory", lambda: 10**9)
+    monkeypatch.setattr(memory, "free_memory", lambda: 10**9)
     check_memory(10**9, "training")
     for parts, hint in ((100, "; num_envs 25 would fit"), (4, "; num_envs 1 would fit"), (3, "")):
         with pytest.raises(MemoryLimitError) as error:
@@ -26,7 +26,7 @@ def test_check_memory_accepts_what_is_free_and_names_parts_that_fit(monkeypatch)
 
 
 def test_check_memory_accepts_small_work(monkeypatch):
-    monkeypatch.setattr(memory, "_free_memory", lambda: 0)
+    monkeypatch.setattr(memory, "free_memory", lambda: 0)
     check_memory(1 << 28, "this test")
     with pytest.raises(MemoryLimitError):
         check_memory((1 << 28) + 1, "this test")

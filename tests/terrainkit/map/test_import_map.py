@@ -156,7 +156,7 @@ def test_import_fills_missing_heights(tmp_path, missing, expected):
 
 def test_import_of_too_many_samples_names_a_cell_that_fits(tmp_path, monkeypatch):
     monkeypatch.setattr(memory, "MIN_CHECKED_BYTES", 100_000)
-    monkeypatch.setattr(memory, "_free_memory", lambda: 120_000)
+    monkeypatch.setattr(memory, "free_memory", lambda: 120_000)
     # 2400 samples of 200 bytes are 4 times as much as is free: cells of 0.2 m, and some more.
     with pytest.raises(MemoryLimitError, match=r"map of 2400 samples .*; --cell 0\.21 would fit"):
         import_array(tmp_path, steps())

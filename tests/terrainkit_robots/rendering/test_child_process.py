@@ -4,8 +4,10 @@ from functools import partial
 from itertools import repeat
 
 import numpy as np
+import psutil
 import pytest
 
+from terrainkit.files.child_process import ProcessLimits
 from terrainkit_robots import gl_backend
 from terrainkit_robots.rendering import child_process
 from terrainkit_robots.rendering.child_process import RenderError, stream_frames
@@ -24,12 +26,12 @@ def backends(monkeypatch):
 
 def test_stream_frames_ignores_prints_of_libraries():
     # print() returns None, which is not an iterator of frames: the error arrives unharmed.
-    with pytest.raises(RenderError, match=r"egl: TypeError: .*; osmesa: "):
+    with pytest.raises(RenderError, match=r"egl: 'NoneType' object is not iterable; osmesa: "):
         list(stream_frames(partial(print, "x" * 100_000)))
 
 
 def test_stream_frames_reports_every_backend():
-    with pytest.raises(RenderError, match=r"\(egl: ValueError: .*; osmesa: .*\); install EGL"):
+    with pytest.raises(RenderError, match=r"\(egl: invalid literal .*; osmesa: .*\); install EGL"):
         list(stream_frames(partial(int, "one")))
     with pytest.raises(RenderError) as caught:
         list(stream_frames(partial(int, "\n long " * 1000)))
@@ -45,31 +47,23 @@ def test_stream_frames_reports_invalid_backend(monkeypatch):
 
 
 def test_stream_frames_reports_crash():
-    with pytest.raises(RenderError, match=r"egl: no frame within 120 s or crash, exit code 3"):
+    with pytest.raises(RenderError, match="egl: the process crashed, exit code 3"):
         list(stream_frames(partial(os._exit, 3)))
 
 
 def test_stream_frames_stops_slow_child(monkeypatch):
-    monkeypatch.setattr(child_process, "FRAME_TIMEOUT", 1.5)
-    start = time.monotonic()
-    with pytest.raises(RenderError, match=r"egl: no frame within 1\.5 s.*; osmesa: "):
+    monkeypatch.setattr(child_process, "LIMITS", ProcessLimits(seconds=1.5, memory=None))
+    with pytest.raises(RenderError, match=r"egl: takes more than 1\.5 s; osmesa: "):
         list(stream_frames(partial(time.sleep, 60)))
-    assert time.monotonic() - start < 30
 
 
-def test_stream_frames_closed_early_ends_child(monkeypatch):
-    processes = []
-    popen = child_process.subprocess.Popen
-    monkeypatch.setattr(
-        child_process.subprocess,
-        "Popen",
-        lambda *args, **options: processes.append(popen(*args, **options)) or processes[-1],
-    )
+def test_stream_frames_closed_early_ends_child():
     assert [frame.shape for frame in stream_frames(TWO_FRAMES)] == 2 * [(4, 6, 3)]
     frames = stream_frames(TWO_FRAMES)
     next(frames)
+    assert len(psutil.Process().children()) == 1
     frames.close()
-    assert [each.returncode is not None for each in processes] == [True, True]
+    assert psutil.Process().children() == []
 
 
 def test_stream_frames_sends_input_of_each_frame():
@@ -83,7 +77,7 @@ def test_stream_frames_sends_input_of_each_frame():
 
 
 def test_stream_frames_waits_for_inputs_without_limit(monkeypatch):
-    monkeypatch.setattr(child_process, "FRAME_TIMEOUT", 2.0)
+    monkeypatch.setattr(child_process, "LIMITS", ProcessLimits(seconds=2.0, memory=None))
     frames = stream_frames(FILLED, repeat(7))
     next(frames)
     time.sleep(2.5)

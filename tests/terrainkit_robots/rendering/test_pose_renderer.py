@@ -1,10 +1,10 @@
+import sys
 from unittest.mock import MagicMock, Mock
 
 import mujoco
 import numpy as np
 import pytest
 
-from terrainkit_robots.rendering import child_process
 from terrainkit_robots.rendering import pose_renderer as module
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rendering.child_process import RenderError
@@ -53,7 +53,7 @@ def test_close_can_be_repeated_and_render_starts_again(renderer):
 
 
 def test_render_raises_each_time_without_backend(renderer, monkeypatch):
-    monkeypatch.setattr(child_process.sys, "executable", "/bin/false")
+    monkeypatch.setattr(sys, "executable", "/bin/false")
     for _ in range(2):
         with pytest.raises(RenderError, match="cannot render here"):
             renderer.render(np.zeros(7))

@@ -31,7 +31,7 @@ def red(tmp_path_factory):
     file = tmp_path_factory.mktemp("robot") / "robot.xml"
     file.write_text(re.sub(r'(<material [^>]*rgba=)"[^"]*"', r'\1"1 0 0 1"', text))
     try:
-        pictures = render_robot(file, size=SIZE)
+        pictures = dict(render_robot(file, size=SIZE))
     except RenderError as error:
         pytest.skip(str(error))
     assert [each.name for each in file.parent.iterdir()] == ["robot.xml"]  # and no log
@@ -87,7 +87,7 @@ def test_render_robot_does_not_retry_after_rejected_model(tmp_path, monkeypatch)
     (tmp_path / "robot.xml").write_text(world(""))
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     with pytest.raises(RenderError, match=r"^robot\.xml has no geoms to render$"):
-        render_robot(tmp_path / "robot.xml")
+        dict(render_robot(tmp_path / "robot.xml"))
 
 
 def compiled(content):

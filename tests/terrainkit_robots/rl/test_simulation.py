@@ -150,7 +150,7 @@ def test_memory_estimate_matches_measurement(quadruped, monkeypatch):
 
 
 def test_check_env_memory_names_the_setting(quadruped, monkeypatch):
-    monkeypatch.setattr("terrainkit.files.memory._free_memory", lambda: 1 << 30)
+    monkeypatch.setattr("terrainkit.files.memory.free_memory", lambda: 1 << 30)
     task = Task(env=Env(num_envs=40_000), algorithm=Algorithm(symmetry=False))
     message = r"training with env\.num_envs 40000, 0\.\d+ MB each, needs .* GB of memory"
     with pytest.raises(MemoryLimitError, match=message) as caught:

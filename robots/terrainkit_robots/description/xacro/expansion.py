@@ -4,20 +4,16 @@ Xacro evaluates Python expressions, and macros may recurse. The child process (s
 limits on time and memory and returns text. ROS is not required: `PackageResolver` finds packages.
 """
 
-import json
 import os
 import re
-import signal
-import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import TerrainkitError
-from terrainkit.files.child_process import import_path
-from terrainkit_robots.description.xacro.process import ORIGIN
+from terrainkit.files.child_process import ChildProcess, ProcessError, ProcessLimits
+from terrainkit_robots.description.xacro.process import ORIGIN, expand
 
 MAX_SECONDS = 8.0
 """Time limit of an expansion [s]; large robots need half a second."""
@@ -73,51 +69,22 @@ def expand_xacro(
         "file": str(file.absolute()),
         "arguments": dict(arguments),
         "packages": {name: str(folder.absolute()) for name, folder in packages.items()},
-        "timeout": timeout,
         "max_memory": max_memory,
     }
-    try:
-        reply = json.loads(_run(json.dumps(request).encode(), timeout))
-    except ValueError:
-        raise XacroError(
-            f"xacro: the expansion needs more than {max_memory / 2**30:g} GiB of memory, or the "
-            "xacro package crashed"
-        ) from None
-    if "error" in reply:
-        location = reply["location"]
-        raise XacroError(reply["error"], location and (Path(location[0]), int(location[1])))
-    return Expansion(data=reply["xml"].encode(), files=tuple(map(Path, reply["files"])))
-
-
-def _run(request: bytes, timeout: float) -> bytes:
-    """Return the output of the child process.
-
-    It inherits no open file and imports from the same folders as this process, without the current
-    folder, which may contain the robot.
-    """
     environment = {k: value for k, value in os.environ.items() if not _SECRET_NAME.search(k)}
-    environment["PYTHONPATH"] = import_path()
-    with subprocess.Popen(
-        [sys.executable, "-P", "-m", "terrainkit_robots.description.xacro.process"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env=environment,
-        start_new_session=True,
-    ) as process:
-        try:
-            return process.communicate(request, timeout=timeout)[0]
-        except BaseException as error:
-            if hasattr(os, "killpg"):
-                os.killpg(process.pid, signal.SIGKILL)  # and processes that it started
-            else:
-                process.kill()
-            if isinstance(error, subprocess.TimeoutExpired):
-                raise XacroError(
-                    f"xacro: the expansion takes longer than {timeout:g} s; check macros and "
-                    "expressions for endless recursion"
-                ) from None
-            raise
+    limits = ProcessLimits(seconds=timeout, memory=max_memory)
+    try:
+        with ChildProcess(expand, request, limits=limits, environment=environment) as process:
+            reply = process.receive()
+    except ProcessError as error:
+        hint = "check macros and expressions for endless recursion"
+        raise XacroError(f"xacro: cannot be expanded: {error}; {hint}") from None
+    if "error" in reply:
+        location = reply["location"].tolist()
+        place = (Path(location[0]), int(location[1])) if location else None
+        raise XacroError(str(reply["error"]), place)
+    files = tuple(map(Path, reply["files"].tolist()))
+    return Expansion(data=reply["xml"].tobytes(), files=files)
 
 
 def pop_origin(element: Any, files: tuple[Path, ...]) -> tuple[Path, int] | None:

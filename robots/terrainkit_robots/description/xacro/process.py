@@ -1,4 +1,4 @@
-"""Expand a xacro file in a restricted process: a request on stdin, a reply on stdout.
+"""Expand a xacro file in a restricted process.
 
 The file is not trusted. Xacro removes Python's builtins from expressions, but there are ways around
 that, so names that lead to the interpreter are rejected. Writing, sockets and child processes are
@@ -6,7 +6,6 @@ blocked in the whole process before the first file is read.
 """
 
 import ast
-import json
 import os
 import stat
 import sys
@@ -17,6 +16,9 @@ from typing import Any
 from xml.dom import expatbuilder
 from xml.parsers import expat
 
+import numpy as np
+
+from terrainkit.files.sandbox import forbid_changes
 from terrainkit.settings.text import truncate
 from terrainkit_robots.description.package_resolver import PackageResolver
 
@@ -52,28 +54,14 @@ class _RejectedError(Exception):
     """Something that a xacro file is not allowed to do."""
 
 
-def main() -> None:
-    """Handle one request."""
-    request = json.load(sys.stdin)
-    _limit_resources(request["timeout"], request["max_memory"])
+def expand(_: Iterator[Any], request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the expanded file `xml` and the `files` that it includes, or `error` and `location`."""
+    forbid_changes()
     try:
-        reply = _expand(request)
+        yield _expand(request)
     except BaseException as error:  # expressions of the file may raise anything
-        reply = {"error": _error_message(error, request), "location": _error_location(error)}
-    sys.stdout.write(json.dumps(reply))
-    sys.stdout.flush()
-    os._exit(0)  # skips the cleanup of a huge document
-
-
-def _limit_resources(seconds: float, memory: int) -> None:
-    try:
-        import resource
-    except ImportError:  # Windows; the time limit of the caller applies
-        return
-    resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-    resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 2))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        location = list(map(str, _error_location(error) or ()))
+        yield {"error": _error_message(error, request), "location": np.array(location, str)}
 
 
 def _expand(request: Mapping[str, Any]) -> dict[str, Any]:
@@ -94,11 +82,12 @@ def _expand(request: Mapping[str, Any]) -> dict[str, Any]:
     os.chdir(file.parent)
     sys.addaudithook(_audit_hook)
     document = xacro.process_file(str(file), mappings=dict(request["arguments"]), verbosity=0)
-    text = document.documentElement.toxml()
+    text = document.documentElement.toxml().encode()
     if len(text) > _MAX_BYTES:
         raise _RejectedError(f"size of the expansion: more than {_MAX_BYTES // 2**20} MiB")
     read = [str(Path(name).absolute()) for name in xacro.all_includes]
-    return {"xml": text, "files": [*files, *(name for name in read if name not in files)]}
+    names = [*files, *(name for name in read if name not in files)]
+    return {"xml": np.frombuffer(text, np.uint8), "files": np.array(names, str)}
 
 
 # Restrictions
@@ -296,7 +285,3 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
         seen.add(id(error))
         yield error
         error = getattr(error, "exc", None) or error.__cause__ or error.__context__
-
-
-if __name__ == "__main__":
-    main()

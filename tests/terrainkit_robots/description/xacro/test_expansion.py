@@ -1,8 +1,6 @@
 """Xacro is expanded without ROS; what fails is told with its place, and nothing else is done."""
 
 import os
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -143,18 +141,7 @@ def test_broken_file_is_not_expanded(tmp_path):
 @pytest.mark.parametrize("value", ["${len(list(map(float, range(10**9))))}", "${10**10**10}"])
 def test_time_limit(value, tmp_path):
     error = failure(write(tmp_path, f'<link name="{value}"/>'), timeout=0.6, max_memory=2**40)
-    assert "longer than 0.6 s" in str(error)
-
-
-def test_time_limit_without_process_groups(tmp_path, monkeypatch):
-    waiting = tmp_path / "python"
-    waiting.write_text("#!/bin/sh\nexec sleep 20")
-    waiting.chmod(0o700)
-    monkeypatch.setattr(sys, "executable", str(waiting))
-    monkeypatch.delattr(os, "killpg")  # as on Windows
-    begin = time.monotonic()
-    assert "longer than 0.1 s" in str(failure(write(tmp_path, ""), timeout=0.1))
-    assert time.monotonic() < begin + 10
+    assert "takes more than 0.6 s" in str(error)
 
 
 @pytest.mark.parametrize("value", ["${len('a' * 10**9)}", "${'a' * 10**11}"])
