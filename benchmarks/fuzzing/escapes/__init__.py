@@ -1,0 +1,1 @@
+"""Inputs that try to leave the sandboxes of terrainkit."""
