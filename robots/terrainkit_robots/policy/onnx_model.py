@@ -1,14 +1,12 @@
 """Load and call an ONNX model of a stranger, which may loop forever or need any memory.
 
-It imports neither torch nor mujoco, since a child process calls `load_model` first.
+It imports neither torch nor mujoco, since a child process calls `run_model`.
 """
 
 import json
-from collections.abc import Sequence
-from contextlib import chdir
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -17,10 +15,7 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit.files.child_process import ProcessLimits
-
-LIMITS = ProcessLimits(seconds=30.0, memory=2 << 30)
-"""Limits of loading a model and of its first call. Later calls have the same time limit."""
+from terrainkit.files.sandbox import forbid_changes
 
 ARENA_SIZE = 1 << 30
 """Memory that the intermediate results of all models of a process may need [bytes]."""
@@ -28,33 +23,33 @@ ARENA_SIZE = 1 << 30
 _FLOATS = ("tensor(float)", "tensor(double)", "tensor(float16)")
 
 
-def load_model(data: bytes, folder: Path) -> dict[str, NDArray[np.uint8] | NDArray[np.int64]]:
-    """Return a model with its external data, after calling it once.
+def run_model(received: Iterator[Any], data: bytes, folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield what a model is, and then its actions; the function of a child process.
 
     Args:
+        received: For each step, observations of shape (n, k), and a mask of the robots whose state
+            is cleared first, shape (n,), or None.
         data: The ONNX file.
         folder: The folder of its external data.
 
-    Returns:
-        `model`, the file with its external data inside; `metadata`, a JSON object of texts;
-        `sizes`, the numbers of observations and actions; and `state`, number of layers and width
-        of each input with the state of a recurrent network, shape (k, 2).
+    Yields:
+        At first `sizes`, the numbers of observations and actions, and `metadata`, a JSON object of
+        texts. Then the `actions` of each step, shape (n, a).
 
     Raises:
-        ConfigError: If it is not a policy.
+        ConfigError: If it is not a policy, or fails.
     """
+    forbid_changes()
     try:
         parsed = onnx.load_model_from_string(data)
         onnx.load_external_data_for_model(parsed, str(folder))
-        model = parsed.SerializeToString()
         # onnx leaves the external data of sparse tensors to onnxruntime, which looks for it in the
-        # current folder.
-        with TemporaryDirectory() as empty, chdir(empty):
-            session = make_session(model)
+        # current folder, which is empty.
+        session = make_session(parsed.SerializeToString())
     except Exception as error:  # errors of onnx and onnxruntime have no common class
         raise ConfigError(f"not an ONNX file that can be loaded: {error}") from error
     num_obs, sizes = _input_sizes(session)
-    outputs = [each.type for each in session.get_outputs()]
+    outputs = [output.type for output in session.get_outputs()]
     if len(outputs) <= len(sizes) or outputs[0] not in _FLOATS:
         expected = f"expected actions of tensor(float), and {len(sizes)} states"
         raise ConfigError(f"got the outputs {listing(outputs)}; {expected}")
@@ -62,14 +57,18 @@ def load_model(data: bytes, folder: Path) -> dict[str, NDArray[np.uint8] | NDArr
     actions, *new = call_model(session, np.zeros((2, num_obs), np.float32), state)
     if len(actions) != 2 or actions.ndim != 2:
         raise ConfigError(f"got actions of shape {actions.shape}; expected (2, a) for two rows")
-    if (got := [each.shape for each in new]) != [each.shape for each in state]:
+    if (got := [part.shape for part in new]) != [part.shape for part in state]:
         raise ConfigError(f"got states of the shapes {got}; expected the shapes of the inputs")
     metadata = json.dumps(session.get_modelmeta().custom_metadata_map)
-    arrays = {"model": model, "metadata": metadata.encode()}
-    return {name: np.frombuffer(value, np.uint8) for name, value in arrays.items()} | {
-        "sizes": np.array([num_obs, actions.shape[1]]),
-        "state": np.array(sizes, np.int64).reshape(-1, 2),
-    }
+    yield {"sizes": [num_obs, actions.shape[1]], "metadata": metadata}
+    for obs, dones in received:
+        if state and state[0].shape[1] != len(obs):
+            state = make_state(sizes, len(obs))
+        elif dones is not None:
+            for part in state:
+                part[:, dones] = 0
+        actions, *state = call_model(session, obs, state)
+        yield {"actions": actions}
 
 
 def make_state(sizes: Sequence[Sequence[int]], count: int) -> list[NDArray[np.float32]]:
@@ -90,7 +89,6 @@ def call_model(
     session: onnxruntime.InferenceSession,
     obs: Any,
     state: Sequence[NDArray[np.float32]] = (),
-    options: Any = None,
 ) -> list[Any]:
     """Return the actions of a model, and its new state.
 
@@ -98,7 +96,6 @@ def call_model(
         session: The loaded model.
         obs: Observations, shape (n, k). They are passed row by row if the model takes a batch of 1.
         state: State of a recurrent network, each part of shape (layers, n, width).
-        options: onnxruntime's `RunOptions`; None for the defaults.
 
     Returns:
         Actions, shape (n, a), and the parts of the state.
@@ -112,7 +109,7 @@ def call_model(
     rows = [np.split(obs, count), *(np.split(part, count, axis=1) for part in state)]
     try:
         results = [
-            session.run(outputs, dict(zip(names, row, strict=True)), options)
+            session.run(outputs, dict(zip(names, row, strict=True)))
             for row in zip(*rows, strict=True)
         ]
         actions, *new = zip(*results, strict=True)

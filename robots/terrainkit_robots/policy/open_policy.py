@@ -12,7 +12,13 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning, prefixed_errors
+from terrainkit.errors import (
+    ConfigError,
+    ExportError,
+    TerrainkitWarning,
+    one_line,
+    prefixed_errors,
+)
 from terrainkit_robots.policy.contracts.contract import UNITREE, Contract, from_description
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, read_yaml
 from terrainkit_robots.policy.contracts.environment import make_spec
@@ -25,8 +31,7 @@ from terrainkit_robots.policy.export import (
     describe_policy,
     observation_order,
 )
-from terrainkit_robots.policy.onnx_policy import OnnxPolicy, one_line, read_file
-from terrainkit_robots.policy.torchscript import ScriptPolicy
+from terrainkit_robots.policy.policy_file import PolicyFile, read_file
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import get_task
@@ -91,7 +96,7 @@ def find_contract(path: Path, contract: Path | None = None) -> ForeignPolicy:
     Raises:
         ConfigError: If a file cannot be read, or there is no contract.
     """
-    policy = ScriptPolicy(path) if path.suffix == ".pt" else OnnxPolicy(path)
+    policy = PolicyFile(path)
     beside = path.with_name(JSON_FILE), path.with_name(YAML_FILE)
     for file in (contract,) if contract else (*beside, path.parent.parent / "params" / YAML_FILE):
         if contract or file.is_file():
@@ -119,7 +124,7 @@ def read_contract(found: ForeignPolicy, robot: Robot) -> Contract:
         try:
             return from_description(msgspec.json.decode(found.text, type=dict[str, Any]), UNITREE)
         except (msgspec.DecodeError, UnicodeError, LookupError, TypeError, ExportError) as error:
-            raise ConfigError(one_line(error)) from error
+            raise ConfigError(one_line(str(error))[:300]) from error
     if found.kind == "mjlab":
         return read_metadata(found.policy.metadata)
     return read_yaml(found.text, robot.spec.joint_order, qpos_order(robot))
@@ -146,7 +151,7 @@ def _open_description(found: ForeignPolicy, path: Path, robot: Robot, default: T
                         other = f"expected {expected[at]}, as in task and joints"
                     raise ConfigError(f"{at}: got {str(got)[:80]}; {other}")
     except (msgspec.DecodeError, UnicodeError, RecursionError, ConfigError) as error:
-        raise ConfigError(f"{found.source}: {one_line(error)}") from error
+        raise ConfigError(f"{found.source}: {one_line(str(error))[:300]}") from error
     sizes = built["observation"]["size"], env.num_actions
     if (policy.num_obs, policy.num_actions) != sizes:
         got = f"got {policy.num_obs} observations and {policy.num_actions} actions"
@@ -159,7 +164,7 @@ def _open_description(found: ForeignPolicy, path: Path, robot: Robot, default: T
 class _OrderedPolicy:
     """A policy that receives its observations in the order of exported ones."""
 
-    def __init__(self, policy: OnnxPolicy | ScriptPolicy, order: NDArray[np.int64]) -> None:
+    def __init__(self, policy: PolicyFile, order: NDArray[np.int64]) -> None:
         self.policy, self.__name__ = policy, policy.__name__
         self.num_obs, self.num_actions = policy.num_obs, policy.num_actions
         self._order = torch.from_numpy(order)
