@@ -59,18 +59,44 @@ def test_scripts_are_valid_bash():
         subprocess.run(["bash", "-n", script], check=True)
 
 
-# The hook of pre-commit.
+# A repository, and one with names that are options, commands of a log, or pathspecs of git.
+
+HOSTILE_LINK = f"trunk {'a' * 90} ::error::link ##[warning]link"
+"""Name of a link whose second half begins a line of the text report."""
+
+OPTIONS = (
+    "--output=../evil.xml",  # the folder `--output=..`
+    "--baseline=x.xml",
+    "--write-baseline",
+    "--help",
+    "-h",
+    "-",
+    "--diff",
+    "-o..",
+)
+"""Names of files that are words of a command line."""
+
+HOSTILE_NAMES = (
+    *OPTIONS,
+    "a\n::error::b.urdf",
+    "a\r::error::c.urdf",
+    "::warning::d.urdf",
+    "  ::notice::e.urdf",
+    "##[error]f.urdf",
+    "spaces  and 'quotes\".urdf",
+    "%0A::error::g%25.urdf",
+    "\u2028::error::\u6a5f.urdf",
+    f"{'long ' * 49}.urdf",
+    ":(exclude)h.urdf",
+    ":!i.urdf",
+    "$(touch evil) `touch evil`;.urdf",
+    "HEAD",
+)
 
 
-def test_hook_is_a_command_of_this_package():
-    (hook,) = HOOKS
-    assert hook["entry"] == "terrainkit check-robot --changed"
-    assert "changed" in CheckRobot.__dataclass_fields__
-    names = ["a.urdf", "b/c.urdf.xacro", "scene.xml", "hull.STL", "urdf/notes.md", "a.xmlx"]
-    assert [name for name in names if re.search(hook["files"], name)] == names[:4]
-
-
-# The action.
+def git(folder, *words):
+    identity = ("-c", "user.name=a", "-c", "user.email=a@localhost")
+    subprocess.run(["git", *identity, *words], cwd=folder, check=True, capture_output=True)
 
 
 @pytest.fixture
@@ -78,29 +104,155 @@ def repository(tmp_path):
     """Return a repository whose HEAD is the merge of a pull request that changes one robot."""
     folder = tmp_path / "repository"
     (folder / "robots").mkdir(parents=True)
-
-    def git(*words):
-        identity = ("-c", "user.name=a", "-c", "user.email=a@localhost")
-        subprocess.run(["git", *identity, *words], cwd=folder, check=True, capture_output=True)
-
-    git("init", "--initial-branch", "main")
+    git(folder, "init", "--initial-branch", "main")
     for name, mass in {"old bad": -1, "new": 1, "good": 1}.items():
         (folder / "robots" / f"{name}.urdf").write_text(BOX.format(name=name[:3], mass=mass))
-    git("add", ".")
-    git("commit", "--message", "first")
-    git("switch", "--create", "feature")
+    git(folder, "add", ".")
+    git(folder, "commit", "--message", "first")
+    git(folder, "switch", "--create", "feature")
     (folder / "robots/new.urdf").write_text(BOX.format(name="new", mass=-3))
-    git("commit", "--all", "--message", "second")
-    git("switch", "main")
-    git("merge", "--no-ff", "feature")
+    git(folder, "commit", "--all", "--message", "second")
+    merge(folder, "feature")
     return folder
+
+
+def merge(folder, branch):
+    git(folder, "switch", "main")
+    git(folder, "merge", "--no-ff", branch)
+
+
+@pytest.fixture
+def hostile(repository):
+    """Return a function that merges a pull request of robots with hostile names, of a mass [kg]."""
+
+    def build(mass, names=HOSTILE_NAMES):
+        git(repository, "switch", "--create", "hostile")
+        git(repository, "rm", "-r", "robots")
+        write_robots(repository, mass, names)
+        # A job that writes the file `changed` writes another one.
+        (repository / "changed").symlink_to("../evil")
+        git(repository, "add", ".")
+        git(repository, "commit", "--message", "third")
+        merge(repository, "hostile")
+        return repository
+
+    return build
+
+
+def write_robots(folder, mass, names):
+    """Write robots, a baseline that accepts nothing, and x.xml, which accepts a negative mass."""
+    robots = [*names, "robots/last.urdf"]
+    for path in (folder / name for name in robots):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(BOX.format(name="box", mass=mass).replace("trunk", HOSTILE_LINK))
+    accepted = {name: {"INR002": [HOSTILE_LINK]} for name in robots}
+    for name, entries in {"robots.baseline.json": {}, "x.xml": accepted}.items():
+        (folder / name).write_text(json.dumps({"version": 1, "robots": entries}))
+
+
+def contents(folder):
+    """Return the contents of all files, other than those of git and the step of the action."""
+    files = (path for path in folder.rglob("*") if path.is_file() and ".git" not in path.parts)
+    return {path: path.read_bytes() for path in files if not path.name.startswith("terrainkit.")}
+
+
+def commands(log):
+    """Return name, properties and text of the commands that GitHub's runner reads in a log.
+
+    As in ActionCommand.cs and ActionCommandManager.cs of actions/runner, but any name is a command.
+    """
+    found, token = [], None
+    for line in re.split(r"\r\n|\r|\n", log):
+        command = re.match(r"\s*::([^\s:]*)(.*?)::(.*)", line)
+        command = command or re.search(r"##\[([^\s\]]*)(.*?)\](.*)", line)
+        if command is None:
+            continue
+        name, _, text = command.groups()
+        if token is not None:
+            token = None if name == token else token
+        elif name == "stop-commands":
+            token = text
+        else:
+            found.append(command.groups())
+    assert token is None
+    return found
+
+
+# The hook of pre-commit.
+
+
+def test_hook_is_a_command_of_this_package():
+    (hook,) = HOOKS
+    assert hook["entry"] == "terrainkit check-robot --changed"
+    assert hook["args"] == ["--"]
+    assert "changed" in CheckRobot.__dataclass_fields__
+    names = ["a.urdf", "b/c.urdf.xacro", "scene.xml", "hull.STL", "urdf/notes.md", "a.xmlx"]
+    assert [name for name in names if re.search(hook["files"], name)] == names[:4]
+
+
+BASELINE = "--baseline=robots.baseline.json"
+
+
+def run_hook(files, **config):
+    """Run the hook: pre-commit joins `entry`, the `args` of the hook or the user, and the files."""
+    hook = HOOKS[0] | config
+    return main([*shlex.split(hook["entry"])[1:], *hook["args"], *files])
+
+
+@pytest.mark.parametrize("config", [{}, {"args": [BASELINE, "--"]}])
+@pytest.mark.parametrize(("mass", "code"), [(-1, 1), (1, 0)])
+@pytest.mark.parametrize("name", HOSTILE_NAMES)
+def test_hook_takes_no_name_for_an_option(tmp_path, monkeypatch, config, mass, code, name):
+    folder = tmp_path / "repository"
+    write_robots(folder, mass, [name])
+    before = contents(tmp_path)
+    monkeypatch.chdir(folder)
+    assert run_hook([name, "robots/last.urdf"], **config) == code
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("args", [[BASELINE], ["--baseline", "robots.baseline.json", "--strict"]])
+@pytest.mark.parametrize("name", HOSTILE_NAMES)
+def test_hook_rejects_names_of_options_after_args_without_dashes(
+    tmp_path, monkeypatch, capsys, args, name
+):
+    folder = tmp_path / "repository"
+    write_robots(folder, -1, [name])
+    before = contents(tmp_path)
+    monkeypatch.chdir(folder)
+    is_option = name in OPTIONS and name != "-"
+    assert run_hook([name, "robots/last.urdf"], args=args) == (2 if is_option else 1)
+    message = f"error: {name}: got an option that is also a file; expected -- between"
+    assert (message in capsys.readouterr().err) == is_option
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("args", [None, [BASELINE, "--"]])
+@pytest.mark.parametrize(("mass", "code"), [(-1, 1), (1, 0)])
+def test_hook_checks_hostile_names_in_pre_commit(hostile, tmp_path, args, mass, code):
+    folder = hostile(mass)
+    # The environments of other languages need a network.
+    hook = HOOKS[0] | {"language": "system"} | ({} if args is None else {"args": args})
+    (tmp_path / "hooks.yaml").write_text(
+        yaml.safe_dump({"repos": [{"repo": "local", "hooks": [hook]}]})
+    )
+    before = contents(tmp_path)
+    words = "run check-robot --all-files --verbose --config ../hooks.yaml"
+    command = f"{shlex.quote(sys.executable)} -m pre_commit {words}"
+    done = bash(command, folder, PRE_COMMIT_HOME=str(tmp_path / ".git" / "pre-commit"))
+    assert done.returncode == code, done.stdout
+    assert ("- exit code: 1\n" in done.stdout) == bool(code)
+    assert contents(tmp_path) == before
+
+
+# The action.
 
 
 @pytest.fixture
 def act(repository, tmp_path):
     """Run the step `check` as a runner does; return the process and the outputs of the step."""
     (step,) = (step for step in ACTION["runs"]["steps"] if step.get("id") == "check")
-    output = tmp_path / "output"
+    output = tmp_path / "terrainkit.output"
     words = {
         name: re.fullmatch(r"\$\{\{ inputs\.([\w-]+) \}\}", text)[1]
         for name, text in step["env"].items()
@@ -204,6 +356,7 @@ def test_action_finds_suffixes_in_capitals_or_no_robots(act, repository):
         ({"args": "--selekt INR002"}, "no option --selekt"),
         ({"args": "--ignore INR002=don't"}, "unmatched single quote"),
         ({"paths": ":(unknown)"}, "Invalid pathspec magic"),
+        ({"args": "--baseline"}, "--baseline: too few values"),
         ({"baseline": "none.json"}, "there is no file none.json"),
     ],
 )
@@ -211,7 +364,74 @@ def test_action_reports_invalid_inputs(act, inputs, message):
     done, outputs = act(**inputs)
     assert done.returncode > 0
     assert outputs == {}
-    assert message in done.stderr
+    assert message in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("event", "upload", "mass", "code"),
+    [
+        ("pull_request", "true", -1, 1),
+        ("pull_request", "false", -1, 1),
+        ("push", "true", -1, 1),
+        ("push", "false", -1, 1),
+        ("pull_request", "false", 1, 0),
+    ],
+)
+def test_action_log_has_no_commands_of_names(act, hostile, tmp_path, upload, event, mass, code):
+    hostile(mass)
+    before = contents(tmp_path)
+    inputs = {"upload-sarif": upload, "baseline": "robots.baseline.json"}
+    done, _ = act(event, args="--select INR002", **inputs)
+    assert done.returncode == code, done.stdout
+    assert contents(tmp_path) == before
+    assert commands(done.stderr) == []
+    robots = {name for name in HOSTILE_NAMES if name.endswith((".urdf", ".xml"))}
+    found = commands(done.stdout)
+    if upload == "true" or mass > 0:
+        assert found == []
+        return
+    assert {name for name, _, _ in found} == {"error"}
+    properties = [re.match(r" file=([^,]*),line=3,title=INR002 ", text)[1] for _, text, _ in found]
+    assert {unescape(name) for name in properties} == {*robots, "robots/last.urdf"}
+    assert all(unescape(text).startswith(f"mass of link {HOSTILE_LINK}") for _, _, text in found)
+
+
+@pytest.mark.parametrize("upload", ["true", "false"])
+def test_action_error_has_no_commands_of_names(act, hostile, upload):
+    folder = hostile(1)
+    (folder / "##[error]f").mkdir()
+    (folder / "robots").rename(folder / "##[error]f/robots")
+    (folder / "##[error]f/terrainkit.toml").write_text("[check-robot]\nselekt = 1\n")
+    done, _ = act(**{"upload-sarif": upload})
+    assert done.returncode == 2
+    assert "##[error]f/terrainkit.toml: config has no key" in done.stdout
+    assert commands(done.stdout) == commands(done.stderr) == []
+
+
+def unescape(text):
+    """Return a property or a text of a command, as the runner reads it."""
+    for escape, character in {"%0D": "\r", "%0A": "\n", "%3A": ":", "%2C": ","}.items():
+        text = text.replace(escape, character)
+    return text.replace("%25", "%")
+
+
+@pytest.mark.parametrize("upload", ["true", "false"])
+@pytest.mark.parametrize(("victim", "code"), [("$$", 137), ("$PPID", -9)])
+def test_action_that_is_ended_leaves_no_commands(act, tmp_path, upload, victim, code):
+    stub = tmp_path / "terrainkit/bin/terrainkit"
+    stub.parent.mkdir(parents=True)
+    stub.write_text(f"#!/bin/bash\nprintf '::error::name\\n##[error]'\nkill -KILL {victim}\n")
+    stub.chmod(0o755)
+    done, _ = act(**{"upload-sarif": upload})
+    assert done.returncode == code
+    assert commands(done.stdout) == commands(done.stderr) == []
+
+
+def test_action_stops_commands_with_another_token_in_each_run(act):
+    logs = [act("push", paths="robots/good.urdf")[0].stdout for _ in range(2)]
+    tokens = [re.search(r"^::stop-commands::([0-9a-f]{32})$", log, re.MULTILINE) for log in logs]
+    assert tokens[0][1] != tokens[1][1]
+    assert all(log.endswith(f"\n::{token[1]}::\n") for log, token in zip(logs, tokens, strict=True))
 
 
 # docs/ci.md.
@@ -248,10 +468,40 @@ def test_page_baseline_commands_write_the_example(repository, monkeypatch, capsy
     assert Path("robots.baseline.json").read_text() == example
 
 
-def test_page_job_of_gitlab_checks_changed_robots(repository):
+def run_job_of_gitlab(folder):
     job = yaml.safe_load(blocks("yaml")[2])["check-robot"]
-    (repository / "robots.baseline.json").write_text('{"version": 1, "robots": {}}')
     script = "\n".join(job["script"])
-    done = bash(script, repository, "-e", CI_MERGE_REQUEST_DIFF_BASE_SHA="HEAD^1")
+    return bash(script, folder, "-e", CI_MERGE_REQUEST_DIFF_BASE_SHA="HEAD^1")
+
+
+def test_page_job_of_gitlab_checks_changed_robots(repository):
+    (repository / "robots.baseline.json").write_text('{"version": 1, "robots": {}}')
+    done = run_job_of_gitlab(repository)
     assert done.returncode == 123, done.stderr  # xargs, of the exit code 1
     assert done.stdout.startswith("robots/new.urdf\n")
+
+
+@pytest.mark.parametrize(
+    ("names", "mass", "code"),
+    [(HOSTILE_NAMES, 1, 0), *((names, -1, 123) for names in (HOSTILE_NAMES, *zip(OPTIONS[:4])))],
+)
+def test_page_job_of_gitlab_takes_no_name_for_an_option(hostile, names, mass, code):
+    folder = hostile(mass, names)
+    before = contents(folder.parent)
+    done = run_job_of_gitlab(folder)
+    assert done.returncode == code, done.stderr
+    assert "robots/last.urdf" in done.stdout
+    assert contents(folder.parent) == before
+
+
+def test_page_baseline_commands_take_no_name_for_an_option(hostile):
+    folder = hostile(-1, [f"robots/{name.replace('/', '_')}.urdf" for name in HOSTILE_NAMES])
+    before = contents(folder.parent)
+    for command in blocks("sh")[0].splitlines():
+        done = bash(command, folder)
+        assert done.returncode == 0, done.stderr
+    after = contents(folder.parent)
+    recorded = json.loads(after.pop(folder / "robots.baseline.json"))["robots"]
+    assert len(recorded) == len(HOSTILE_NAMES) + 1
+    assert before.pop(folder / "robots.baseline.json")
+    assert after == before

@@ -122,8 +122,14 @@ def _run(arguments: list[str]) -> int:
 
 
 def _run_command(prog: str, command_class: "type[Command]", argv: list[str]) -> int:
-    from terrainkit_cli.parse import HELP, UsageError, format_help
+    from terrainkit.settings.text import truncate
+    from terrainkit_cli.parse import HELP, UsageError, format_help, is_option
 
+    # Names of files may come from `*.urdf` in a shell, or from a program that passes changed files.
+    for word in filter(is_option, [] if "--" in argv else argv):
+        if os.path.lexists(word):
+            expected = "expected -- between options and files"
+            raise UsageError(f"{truncate(word)}: got an option that is also a file; {expected}")
     if {*HELP} & {*takewhile(lambda word: word != "--", argv)}:
         options, doc = command_class.options(argv), command_class.__doc__ or ""
         render.help_page(format_help(prog, doc, options, render.width()))

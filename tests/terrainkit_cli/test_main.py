@@ -76,6 +76,19 @@ def test_invalid_input_is_one_line_on_stderr(rejected, tmp_path, words, message)
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("word", ["--help", "-o", "--output=a.npz", "--output_=b", "--none"])
+def test_name_of_a_file_is_no_option(terrainkit, rejected, tmp_path, word):
+    (tmp_path / word).symlink_to("nowhere")  # a link without target is a name, too
+    message = f"{word}: got an option that is also a file; expected -- between options and files"
+    for name in ("rule", "check-robot", "generate"):
+        assert rejected(name, word).startswith(message)
+    assert list(tmp_path.iterdir()) == [tmp_path / word]
+    # After `--`, the word is a file; before it, an option.
+    assert f"no rule '{word}'" in rejected("rule", "--", word)
+    if word == "--help":
+        assert terrainkit("rule", word, "--").stdout.startswith("usage: terrainkit rule")
+
+
 @pytest.mark.parametrize("command", ["train", "evaluate", "export", "play", "smoke-test"])
 def test_training_commands_name_the_missing_extra(rejected, monkeypatch, command):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
