@@ -334,6 +334,22 @@ def test_action_accepts_baseline_and_quoted_options(act, repository):
     assert results(outputs) == []
 
 
+def test_action_checks_the_robots_of_a_renamed_mesh(act, repository):
+    robot = BOX.format(name="mesh", mass=1)
+    shape = re.search(r"<(box|sphere)[^>]*/>", robot)[0]
+    (repository / "robots/mesh.urdf").write_text(robot.replace(shape, '<mesh filename="a.obj"/>'))
+    (repository / "robots/a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    git(repository, "add", ".")
+    git(repository, "commit", "--message", "mesh")
+    git(repository, "switch", "--create", "rename")
+    git(repository, "mv", "robots/a.obj", "robots/b.obj")
+    git(repository, "commit", "--message", "rename")
+    merge(repository, "rename")
+    done, outputs = act(args="--select MSH001")
+    assert done.returncode == 1, done.stdout
+    assert {file for _, file in results(outputs)} == {"robots/mesh.urdf"}
+
+
 def test_action_without_upload_prints_annotations(act):
     done, outputs = act(**{"upload-sarif": "false", "args": "--select INR002"})
     assert (done.returncode, outputs) == (1, {})
