@@ -98,7 +98,7 @@ class Generate(PluginCommand, ConfigCommand):
             raise ConfigError(f"--no-mesh: got {self.output}; expected a .npz file")
         samples = config.grid.shape[0] * config.grid.shape[1] if self.mesh else 0
         # Fail before generating.
-        export.check_export(self.output, samples, overwrite=self.overwrite)
+        export.check_export(self.output, samples, rows=config.rows, overwrite=self.overwrite)
         if bool(self.robot or self.limit) != bool(self.demand):
             raise ConfigError(
                 "--robot, --demand, --limit: expected --demand together with --robot or --limit"

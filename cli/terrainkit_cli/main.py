@@ -47,6 +47,9 @@ COMMAND_GROUPS = {
 COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module in group.items()}
 COMMANDS["completion"] = "completion_command"
 
+_BYTES_PER_JOB = 1 << 27
+"""Memory of a process that has imported SciPy [bytes]."""
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line, and return its exit code.
@@ -118,13 +121,15 @@ def _run(arguments: list[str]) -> int:
     if name not in COMMANDS:
         known = expected_names(name, COMMANDS)
         raise ConfigError(f"no command {truncate(repr(name))}; {known}")
-    return _run_command(f"terrainkit {name}", command(name), arguments[1:])
+    return _run_command(name, arguments[1:])
 
 
-def _run_command(prog: str, command_class: "type[Command]", argv: list[str]) -> int:
+def _run_command(name: str, argv: list[str]) -> int:
+    from terrainkit.files.memory import check_memory, limit_allocations
     from terrainkit.settings.text import truncate
     from terrainkit_cli.parse import HELP, UsageError, format_help, is_option
 
+    prog, command_class = f"terrainkit {name}", command(name)
     # Names of files may come from `*.urdf` in a shell, or from a program that passes changed files.
     for word in filter(is_option, [] if "--" in argv else argv):
         if os.path.lexists(word):
@@ -138,6 +143,11 @@ def _run_command(prog: str, command_class: "type[Command]", argv: list[str]) -> 
         parsed = command_class.parse(argv)
     except UsageError as error:
         raise UsageError(f"{error}; see {prog} --help") from None
+    if name in COMMAND_GROUPS["Terrain"]:
+        jobs = getattr(parsed, "jobs", 1)
+        if jobs > 1:
+            check_memory(jobs * _BYTES_PER_JOB, f"--jobs {jobs}", ("--jobs", jobs))
+        limit_allocations(jobs if jobs > 1 else 0)
     return parsed.run()
 
 

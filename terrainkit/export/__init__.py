@@ -53,11 +53,15 @@ def export_files(
     return (path, *files)
 
 
-def check_export(path: str | Path, samples: int, *, overwrite: bool = False) -> None:
-    """Raise the errors that are known before the map is generated: suffix, target, memory."""
+def check_export(path: str | Path, samples: int, *, rows: int = 0, overwrite: bool = False) -> None:
+    """Raise the errors that are known before the map is generated: suffix, target, memory.
+
+    With `rows`, the error about the memory says how many rows of the map would fit.
+    """
     exporter = get_exporter(Path(path))
     check_target(Path(path), overwrite=overwrite)
-    check_memory(samples * exporter.BYTES_PER_SAMPLE, f"writing {samples} samples to {path}")
+    what = f"writing {samples} samples to {path}"
+    check_memory(samples * exporter.BYTES_PER_SAMPLE, what, ("rows", rows))
 
 
 def get_exporter(path: Path) -> ModuleType:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".npz",)
-BYTES_PER_SAMPLE = 20
+BYTES_PER_SAMPLE = 22
 FORMAT_VERSION = 1
 
 MAX_FACES_PER_SAMPLE = 20

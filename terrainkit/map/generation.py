@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 Progress = Callable[[Iterator[tuple[int, int]], int], Iterator[tuple[int, int]]]
 """Wraps the iterator over the patches, given their number, to show a progress bar."""
 
+_BYTES_PER_SAMPLE = 5
+"""Peak memory of a sample, whose height takes 4 [bytes]."""
+
 _BYTES_PER_PATCH = 2000
 """Memory of the parameters, origin and difficulty of a patch [bytes]."""
 
@@ -65,14 +68,18 @@ def generate(
     grid = config.grid
     samples = grid.shape[0] * grid.shape[1]
     check_memory(
-        samples * 4 + config.rows * config.cols * _BYTES_PER_PATCH,
+        samples * _BYTES_PER_SAMPLE + config.rows * config.cols * _BYTES_PER_PATCH,
         f"a map of {grid.shape[0]} x {grid.shape[1]} samples",
+        ("rows", config.rows),
     )
-    builder = _MapBuilder(config)
     indices = itertools.product(range(config.rows), range(config.cols))
     places = progress(indices, config.rows * config.cols) if progress else indices
     with closing(_build_patches(config, column_types(config), executor)) as patches:
-        for (row, col), (terrain_type, patch) in zip(places, patches, strict=True):
+        # An executor forks now, before the map takes memory that each process would have.
+        first = next(patches)
+        builder = _MapBuilder(config)
+        built = itertools.chain([first], patches)
+        for (row, col), (terrain_type, patch) in zip(places, built, strict=True):
             builder.add(row, col, terrain_type, patch)
     terrain_map = builder.build()
     for text in _warnings(builder, terrain_map):

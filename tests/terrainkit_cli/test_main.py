@@ -89,6 +89,12 @@ def test_name_of_a_file_is_no_option(terrainkit, rejected, tmp_path, word):
         assert terrainkit("rule", word, "--").stdout.startswith("usage: terrainkit rule")
 
 
+def test_jobs_that_do_not_fit_in_memory_are_rejected(rejected, monkeypatch):
+    monkeypatch.setattr("terrainkit.files.memory.free_memory", lambda: 4 * 10**8)
+    message = "--jobs 9 needs 1.21 GB of memory; 0.40 GB free; --jobs 2 would fit"  # 9 * 2^27 bytes
+    assert message in rejected("generate -o a.npz --jobs 9")
+
+
 @pytest.mark.parametrize("command", ["train", "evaluate", "export", "play", "smoke-test"])
 def test_training_commands_name_the_missing_extra(rejected, monkeypatch, command):
     monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))

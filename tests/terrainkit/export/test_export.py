@@ -82,6 +82,6 @@ def test_export_rejects_heights_beyond_the_limit(terrain_map, tmp_path, suffix, 
 
 def test_check_export_counts_the_bytes_of_the_samples(monkeypatch, tmp_path):
     needed = []
-    monkeypatch.setattr(export, "check_memory", lambda size, what: needed.append((size, what)))
-    check_export(tmp_path / "a.png", 100)
-    assert needed == [(900, f"writing 100 samples to {tmp_path / 'a.png'}")]
+    monkeypatch.setattr(export, "check_memory", lambda *arguments: needed.append(arguments))
+    check_export(tmp_path / "a.png", 100, rows=7)
+    assert needed == [(900, f"writing 100 samples to {tmp_path / 'a.png'}", ("rows", 7))]
