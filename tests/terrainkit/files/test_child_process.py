@@ -84,7 +84,7 @@ def test_child_process_rejects_damaged_results(answer):
 
 def test_child_process_result_has_to_fit_in_memory(monkeypatch):
     monkeypatch.setattr(memory, "free_memory", lambda: 10**8)
-    with pytest.raises(MemoryLimitError, match=r"the result of a child process needs 0\.5 GB"):
+    with pytest.raises(MemoryLimitError, match=r"the result of a child process needs 0\.54 GB"):
         run_in_process(dict, [("a", np.zeros(1 << 26))])
 
 
