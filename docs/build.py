@@ -365,6 +365,7 @@ def pictures() -> dict[str, Callable[[], None]]:
         "built_stairs": draw_built_stairs,
         "quadruped": partial(draw_robot, "quadruped"),
         "quadruped_map": partial(draw_walk, "quadruped_map"),
+        "walk": draw_moving_walk,
     }
 
 
@@ -492,6 +493,12 @@ def draw_walk(policy: str) -> None:
     cv2.imwrite(str(PICTURES / f"{policy}.png"), np.hstack(shown))
 
 
+def draw_moving_walk() -> None:
+    from walk import write_walk  # imports torch
+
+    write_walk(PICTURES / "walk.webp")
+
+
 def written(name: str) -> str:
     path = DOCS / name
     return path.read_text() if path.exists() else ""
@@ -520,12 +527,12 @@ def main() -> int:
         "examples.md": examples_page(),
         "llms.txt": llms_text(),
     }
-    missing = [name for name in known if not (PICTURES / f"{name}.png").exists()]
+    missing = [name for name in known if not any(PICTURES.glob(f"{name}.*"))]
     if options == ["--check"]:
         stale = [n for n, text in pages.items() if words(written(n)) != words(text)]
         for problem, files in (
             ("out of date", stale),
-            ("missing", [f"pictures/{name}.png" for name in missing]),
+            ("missing", [f"pictures/{name}" for name in missing]),
         ):
             if files:
                 print(f"docs: {problem}: {', '.join(files)}; run python docs/build.py")

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -27,6 +28,12 @@ GAP = 0.5
 MARGIN = 12
 """Margin above and below the patches [pixels]."""
 
+TILE = 0.5
+"""Side of the tiles of a checkered ground [m]."""
+
+TILE_SHADE = 0.9
+"""Brightness of the darker tiles."""
+
 
 def render_patches(
     patches: list[Patch], width: int, cuts: Sequence[float] = ()
@@ -41,13 +48,13 @@ def render_patches(
         cuts: Height of each patch at which solids are cut off [m]; empty for no cut.
     """
     heights = cuts or [np.inf] * len(patches)
-    meshes = [_block(*each, k) for k, each in enumerate(zip(patches, heights, strict=True))]
+    meshes = [block(*each, k) for k, each in enumerate(zip(patches, heights, strict=True))]
     (frame,) = stream_frames(partial(_frames, meshes, (width, width)))
     used = np.flatnonzero((frame != frame[0, 0]).any(axis=(1, 2)))
     return frame[max(0, used[0] - MARGIN) : used[-1] + MARGIN]
 
 
-def _block(patch: Patch, cut: float, index: int) -> TriMesh:
+def block(patch: Patch, cut: float = np.inf, index: int = 0) -> TriMesh:
     """Return the ground of a patch as a block, with the solids, at place `index` of the row.
 
     Upright boxes are cut off at a height; higher ones are not shown.
@@ -74,32 +81,7 @@ def _with_thickness(mesh: TriMesh) -> TriMesh:
 def _frames(meshes: list[TriMesh], size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
     spec = mujoco.MjSpec()
     appearance.set_appearance(spec)
-    levels = np.linspace(*COLOR_RANGE, 512)
-    texture = spec.add_texture(
-        name="heights", type=mujoco.mjtTexture.mjTEXTURE_2D, width=512, height=2, nchannel=3
-    )
-    texture.data = np.tile(height_colors(levels), (2, 1)).astype(np.uint8).tobytes()
-    material = spec.add_material(name="heights", specular=0.1)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "heights"
-    low, high = COLOR_RANGE
-    for k, mesh in enumerate(meshes):
-        corners = mesh.vertices[mesh.triangles.ravel()]  # not shared, so that faces are flat
-        level = np.clip((corners[:, 2] - low) / (high - low), 0.001, 0.999)
-        spec.add_mesh(
-            name=f"patch{k}",
-            uservert=corners.ravel(),
-            userface=np.arange(len(corners)),
-            usertexcoord=np.column_stack([level, np.full(len(level), 0.5)]).ravel(),
-            userfacetexcoord=np.arange(len(corners)),
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-        )
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=f"patch{k}",
-            material="heights",
-            contype=0,
-            conaffinity=0,
-        )
+    add_meshes(spec, meshes)
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -114,3 +96,37 @@ def _frames(meshes: list[TriMesh], size: tuple[int, int]) -> Iterator[NDArray[np
     distance = 0.53 * float(np.linalg.norm((upper - lower)[:2])) / np.tan(half_angle)
     appearance.update_scene(renderer, data, target, distance, 45.0, -32.0)
     yield renderer.render()
+
+
+def add_meshes(spec: Any, meshes: list[TriMesh], *, checkered: bool = False) -> None:
+    """Add meshes to a `mujoco.MjSpec`, colored by height, and with tiles if they are checkered."""
+    low, high = COLOR_RANGE
+    colors = height_colors(np.linspace(low, high, 512))
+    texture = spec.add_texture(
+        name="heights", type=mujoco.mjtTexture.mjTEXTURE_2D, width=512, height=4, nchannel=3
+    )
+    rows = [colors, colors, TILE_SHADE * colors, TILE_SHADE * colors]
+    texture.data = np.array(rows).astype(np.uint8).tobytes()
+    material = spec.add_material(name="heights", specular=0.1)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "heights"
+    for k, mesh in enumerate(meshes):
+        triangles = mesh.vertices[mesh.triangles]  # corners are not shared, so that faces are flat
+        corners = triangles.reshape(-1, 3)
+        level = np.clip((corners[:, 2] - low) / (high - low), 0.001, 0.999)
+        tile = np.floor(triangles.min(axis=1) / TILE).astype(int)  # of both triangles of a cell
+        row = 0.125 + 0.75 * checkered * ((tile[:, 0] + tile[:, 1]) % 2)
+        spec.add_mesh(
+            name=f"patch{k}",
+            uservert=corners.ravel(),
+            userface=np.arange(len(corners)),
+            usertexcoord=np.column_stack([level, row.repeat(3)]).ravel(),
+            userfacetexcoord=np.arange(len(corners)),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"patch{k}",
+            material="heights",
+            contype=0,
+            conaffinity=0,
+        )
