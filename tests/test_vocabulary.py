@@ -1,10 +1,12 @@
-"""Reject retired names; docs/glossary.md has the terms to use instead."""
+"""Reject retired names and Sphinx markup; docs/glossary.md has the terms to use instead."""
 
 import ast
+import re
 import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
+SPHINX = re.compile(r":[a-z]+:`|\.\. [a-z]+::")
 RETIRED = tomllib.loads((ROOT / "tests/retired_names.toml").read_text())
 
 
@@ -32,3 +34,14 @@ def test_names_are_not_retired(tmp_path):
     assert not retired
     (tmp_path / "a.py").write_text("class Careers:\n    x: int\n    def _told(self, plot): ...\n")
     assert set(names(tmp_path / "a.py")) == {"a", "Careers", "x", "_told", "self", "plot"}
+
+
+def test_sources_have_no_sphinx_markup():
+    """The site and editors show docstrings as Markdown, in which it is noise."""
+    folders = ("terrainkit", "robots", "cli", "docs")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    marked = [str(path) for path in files if SPHINX.search(path.read_text(encoding="utf-8"))]
+    assert files
+    assert not marked
+    for markup in (":func:`run`", ".. math:: x"):
+        assert SPHINX.search(markup)

@@ -1,7 +1,7 @@
 """Parse the words of a command line into a command.
 
 A command is a dataclass. The annotation of a field states the type and range of an option, its
-docstring the help text, as in :class:`terrainkit.settings.schema.Config`.
+docstring the help text, as in `terrainkit.settings.schema.Config`.
 """
 
 import argparse

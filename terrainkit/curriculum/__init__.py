@@ -1,7 +1,7 @@
 """The terrain curriculum: which patch each environment is reset on.
 
 A sampler assigns a patch, its level (row) and column, to each environment, and learns from the
-progress of the episodes. :class:`CommandProgress` measures the progress along velocity commands.
+progress of the episodes. `CommandProgress` measures the progress along velocity commands.
 """
 
 from typing import Literal

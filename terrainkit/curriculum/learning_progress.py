@@ -30,7 +30,7 @@ class LearningProgressSampler(UniformSampler):
     """
 
     def __init__(self, rows: int, cols: int, num_envs: int, **options: Any) -> None:
-        """Assign the first patches; see :class:`PatchSampler`."""
+        """Assign the first patches; see `PatchSampler`."""
         super().__init__(rows, cols, num_envs, **options)
         self.fast, self.slow = np.zeros((2, rows, cols))
 

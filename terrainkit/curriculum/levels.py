@@ -27,8 +27,8 @@ def update_levels(
     Args:
         levels: Current levels, shape (n,).
         progress: Progress of each episode, 0 to 1, or NaN to ignore the episode, shape (n,). See
-            :class:`CommandProgress`, and for robots with goals
-            :meth:`terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
+            `CommandProgress`, and for robots with goals
+            `terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
         rows: Rows of the map.
         seed: Seed of the random rows. Pass a new one at each call, such as (seed, iteration).
         top_levels: Number of the last rows, over which environments that solve the last row are
@@ -50,7 +50,7 @@ def update_levels(
 
 
 class LevelSampler(PatchSampler):
-    """Move an environment up or down the rows of its column, by :func:`update_levels`.
+    """Move an environment up or down the rows of its column, by `update_levels`.
 
     The columns are distributed evenly and never change. From N. Rudin et al., Learning to Walk in
     Minutes Using Massively Parallel Deep Reinforcement Learning, 2021 (arXiv:2109.11978).
@@ -59,6 +59,6 @@ class LevelSampler(PatchSampler):
     def next_patches(
         self, levels: IntArray, columns: IntArray, progress: FloatArray, seed: tuple[int, int]
     ) -> tuple[IntArray, IntArray]:
-        """Return the levels after the rule; see :meth:`PatchSampler.next_patches`."""
+        """Return the levels after the rule; see `PatchSampler.next_patches`."""
         rows = len(self.statistics.visits)
         return update_levels(levels, progress, rows=rows, seed=seed), columns

@@ -33,7 +33,7 @@ class PrioritizedReplaySampler(UniformSampler):
     """
 
     def __init__(self, rows: int, cols: int, num_envs: int, **options: Any) -> None:
-        """Assign the first patches; see :class:`PatchSampler`."""
+        """Assign the first patches; see `PatchSampler`."""
         super().__init__(rows, cols, num_envs, **options)
         self.value = np.full((rows, cols), 0.5)
         self.score = np.full((rows, cols), np.nan)

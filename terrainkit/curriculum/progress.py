@@ -149,7 +149,7 @@ class CommandProgress:
         return {name: array.copy() for name, array in vars(self).items()}
 
     def load_state_dict(self, state: Any) -> None:
-        """Restore the arrays of :meth:`state_dict`.
+        """Restore the arrays of `state_dict`.
 
         Args:
             state: Arrays or tensors by name.

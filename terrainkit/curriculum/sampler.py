@@ -24,10 +24,10 @@ IntArray = NDArray[np.int64]
 class PatchSampler:
     """Assign a patch to each of n environments; this class never assigns another one.
 
-    A subclass overrides :meth:`next_patches`. All state is in numpy arrays. Arguments may be numpy
+    A subclass overrides `next_patches`. All state is in numpy arrays. Arguments may be numpy
     arrays, or tensors of torch on any device; what is returned is of the same kind. The same seed
     and the same episodes lead to the same patches, also if the sampler continues from a
-    :meth:`state_dict`.
+    `state_dict`.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class PatchSampler:
         max_init_level: int | None = None,
         seed: int = 0,
     ) -> None:
-        """Assign the first patches; see :func:`assign_levels`.
+        """Assign the first patches; see `assign_levels`.
 
         Args:
             rows: Rows of the map.
@@ -61,8 +61,8 @@ class PatchSampler:
         Args:
             env_ids: Environments whose episodes ended, shape (k,).
             progress: Progress of each episode: 0 to 1, where 1 is success, or NaN if the episode
-                says nothing about its patch, shape (k,). See :class:`CommandProgress`, and for
-                robots with goals :meth:`terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
+                says nothing about its patch, shape (k,). See `CommandProgress`, and for
+                robots with goals `terrainkit.curriculum.waypoints.Waypoints.of_episodes`.
             returns: Sum of the rewards of each episode, shape (k,); None if unknown.
 
         Returns:
@@ -113,13 +113,13 @@ class PatchSampler:
         return {**arrays, "updates": self._updates}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Continue from a :meth:`state_dict` of a sampler with the same map and seed.
+        """Continue from a `state_dict` of a sampler with the same map and seed.
 
         If the number of environments differs, the saved levels of each column are repeated or cut
         to its new number of environments.
 
         Args:
-            state: The arrays and the number of updates of :meth:`state_dict`.
+            state: The arrays and the number of updates of `state_dict`.
 
         Raises:
             ConfigError: if the state belongs to another map, or to another sampler.

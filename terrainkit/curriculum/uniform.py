@@ -29,7 +29,7 @@ class UniformSampler(PatchSampler):
     def next_patches(
         self, levels: IntArray, columns: IntArray, progress: FloatArray, seed: tuple[int, int]
     ) -> tuple[IntArray, IntArray]:
-        """Record the episodes and sample; see :meth:`PatchSampler.next_patches`."""
+        """Record the episodes and sample; see `PatchSampler.next_patches`."""
         rows, cols = self.statistics.visits.shape
         known = ~np.isnan(progress)
         self.record((levels * cols + columns)[known], (progress[known] >= 1).astype(np.float64))

@@ -43,7 +43,7 @@ _ELEVATION_UNIT = 1e-4
 rescales the data to [0, 1], and the third value of `size` is the range in meters."""
 
 BYTES_PER_SAMPLE = 0
-"""Heightfields are written row by row; :func:`.decompose_boxes` checks the memory of boxes."""
+"""Heightfields are written row by row; `decompose_boxes` checks the memory of boxes."""
 
 _ROWS_PER_BAND = 256
 """Samples along x that are searched for slopes at a time."""
@@ -118,7 +118,7 @@ def export(terrain_map: "TerrainMap", path: Path, *, collision: Collision = "aut
 
 
 def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -> None:
-    """Write the map as MJCF to an open file; see :func:`export`."""
+    """Write the map as MJCF to an open file; see `export`."""
     model = make_model(terrain_map, collision)
     root = ET.Element("mujoco")
     custom = ET.SubElement(root, "custom")
@@ -235,7 +235,7 @@ def _shape(kind: str, row: NDArray[np.float32], size: list[int]) -> dict[str, An
 
 
 def make_model(terrain_map: "TerrainMap", collision: Collision) -> Model:
-    """Return the MuJoCo model of a map; see :func:`export`."""
+    """Return the MuJoCo model of a map; see `export`."""
     collision = convert("collision", collision, Collision)
     decomposition = collision_boxes(terrain_map, collision)
     heights = terrain_map.heights

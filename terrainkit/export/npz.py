@@ -46,7 +46,7 @@ _SOLIDS = {
     "solid_visible": "visible",
     "solid_patch": "patch",
 }
-"""Field of :class:`Solids` by key of the file."""
+"""Field of `Solids` by key of the file."""
 
 MAX_PATCH_RECORD_BYTES = 8192
 """Upper bound of the parameters of a patch as JSON [bytes]."""
@@ -105,7 +105,7 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
         path: The .npz file.
 
     Warns:
-        TerrainkitWarning: if classes of the user are not available; see :meth:`MapConfig.from_map`.
+        TerrainkitWarning: if classes of the user are not available; see `MapConfig.from_map`.
 
     Raises:
         MapFileError: if the file is missing, truncated, or not a map.

@@ -109,7 +109,7 @@ def assess_map(
 
 
 def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFeasibility:
-    """Return what a patch demands of a robot, as the patch (0, 0); see :func:`assess_map`.
+    """Return what a patch demands of a robot, as the patch (0, 0); see `assess_map`.
 
     Args:
         patch: The patch.

@@ -86,7 +86,7 @@ def _pairs(
     end_mask: NDArray[np.bool_],
     max_demand: float,
 ) -> Iterator[Edges]:
-    """Yield the gaps that may be useful, as if nothing was in between; see :func:`gap_edges`."""
+    """Yield the gaps that may be useful, as if nothing was in between; see `gap_edges`."""
     import cv2
 
     columns, floor = graph.columns, graph.columns.floor.reshape(-1)

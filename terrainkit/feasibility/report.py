@@ -112,7 +112,7 @@ def to_json(
 
 
 def routes(results: Sequence[PatchFeasibility]) -> list[Route]:
-    """Return the paths and blocking places for :func:`terrainkit.views.preview.write_preview`."""
+    """Return the paths and blocking places for `terrainkit.views.preview.write_preview`."""
     return [
         Route(
             points=each.path[:, :2],

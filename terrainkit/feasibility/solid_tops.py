@@ -95,7 +95,7 @@ class Tops:
             solids: The solids.
             widened: Distance by which each is widened [m], shape (n,).
             floor: Floors of the columns [m], shape (nx, ny, m).
-            crossings: The solids that the columns cross, as :meth:`SolidIndex.crossings` returns.
+            crossings: The solids that the columns cross, as `SolidIndex.crossings` returns.
         """
         line, solid, _, top = crossings
         floors = floor.reshape(-1, floor.shape[2])
@@ -244,7 +244,7 @@ def _sides(planes: FloatArray, xy: FloatArray) -> tuple[FloatArray, FloatArray, 
 def _disk_diameters(
     normal: FloatArray, offset: FloatArray, xy: FloatArray, max_size: float
 ) -> FloatArray:
-    """Return the diameters [m]; see :meth:`Tops.sizes` and :func:`_sides`."""
+    """Return the diameters [m]; see `Tops.sizes` and `_sides`."""
 
     def distances(center: FloatArray) -> FloatArray:
         away = offset + np.einsum("nkx,nx->nk", normal, center)

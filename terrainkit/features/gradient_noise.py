@@ -82,7 +82,7 @@ def fractal_noise(
 def unit_heights(
     grid: Grid, heights: NDArray[np.float64], platform: float, blend: float
 ) -> NDArray[np.float64]:
-    """Return :func:`fade_heights` with the largest absolute value scaled to 1."""
+    """Return `fade_heights` with the largest absolute value scaled to 1."""
     faded = fade_heights(grid, heights, platform, blend)
     return np.asarray(faded / max(np.abs(faded).max(), 1e-12))
 

@@ -70,7 +70,7 @@ def slot_centers(
     """Return a random x near the middle of each slot [m], shape (n,).
 
     Args:
-        edges: Edges of the slots [m], shape (n + 1,); see :meth:`Lane.slots`.
+        edges: Edges of the slots [m], shape (n + 1,); see `Lane.slots`.
         spacing: Minimum and maximum distance between two neighbors of the result [m].
         rng: Generator of the random numbers.
     """

@@ -63,7 +63,7 @@ def decompose_boxes(
     """Return the flat parts of the ground as boxes.
 
     A cell is flat if the ground is level in its whole square. Within a patch,
-    :func:`.decompose_rectangles` finds the boxes of a height, which may extend under higher ground.
+    `decompose_rectangles` finds the boxes of a height, which may extend under higher ground.
     Boxes of different patches that share a whole side are merged, and divided at `MAX_LENGTHS`
     unless that doubles their number. They are sorted by their centers, since MuJoCo's bounding
     volume hierarchy keeps this order for boxes with equal centers along an axis.

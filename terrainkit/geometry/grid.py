@@ -93,7 +93,7 @@ class Grid:
     def by_ring(
         self, inner: tuple[int, int], value: Callable[[NDArray[np.int64]], NDArray[np.floating]]
     ) -> NDArray[np.floating]:
-        """Return the value of the ring of each cell, shape `shape`; see :meth:`rings`.
+        """Return the value of the ring of each cell, shape `shape`; see `rings`.
 
         Args:
             inner: Cells of the centered block along x and y.

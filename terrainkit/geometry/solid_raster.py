@@ -20,7 +20,7 @@ _TILT = 1e-12
 class SolidRaster:
     """Bottom and top of the solids at each sample.
 
-    Looking up a point is a table access, while :class:`.SolidIndex` computes the intersection with
+    Looking up a point is a table access, while `SolidIndex` computes the intersection with
     each solid.
     """
 

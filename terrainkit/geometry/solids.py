@@ -21,7 +21,7 @@ MAX_HULL_VERTICES = 1000
 """Largest number of vertices of a convex hull."""
 
 _PER_SOLID = ("friction", "collides", "visible", "patch")
-"""The arrays of :class:`Solids` with one item for each solid."""
+"""The arrays of `Solids` with one item for each solid."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -29,7 +29,7 @@ class Solids:
     """Boxes, cylinders and convex hulls in the frame of the map.
 
     Arrays over all n solids list the boxes first, then the cylinders, then the hulls. Use
-    :func:`make_boxes`, :func:`make_cylinders` and :func:`make_hulls` to create solids.
+    `make_boxes`, `make_cylinders` and `make_hulls` to create solids.
     """
 
     boxes: NDArray[np.float32]
@@ -248,10 +248,10 @@ def make_cylinders(
         center: Centers [m], shape (n, 3) or (3,).
         radius: Radii [m], shape (n,) or ().
         length: Lengths along the axis [m], shape (n,) or ().
-        rpy: Roll, pitch and yaw [rad]; see :func:`make_boxes`.
-        friction: See :func:`make_boxes`.
-        collides: See :func:`make_boxes`.
-        visible: See :func:`make_boxes`.
+        rpy: Roll, pitch and yaw [rad]; see `make_boxes`.
+        friction: See `make_boxes`.
+        collides: See `make_boxes`.
+        visible: See `make_boxes`.
 
     Raises:
         ConfigError: if shapes do not match, a value is not finite, or a diameter or length is below
@@ -273,9 +273,9 @@ def make_hulls(
 
     Args:
         points: Points of each hull [m], shapes (k, 3).
-        friction: See :func:`make_boxes`.
-        collides: See :func:`make_boxes`.
-        visible: See :func:`make_boxes`.
+        friction: See `make_boxes`.
+        collides: See `make_boxes`.
+        visible: See `make_boxes`.
 
     Raises:
         ConfigError: if a hull has no volume, has too many vertices, or a value is not finite.

@@ -42,7 +42,7 @@ def surface_at(
 
     Between four samples without a wall the ground is two triangles that share the diagonal from
     (i, j) to (i + 1, j + 1), along which MuJoCo splits a cell as well. A quad with a wall is a fan
-    of triangles around its center; see :mod:`terrainkit.geometry.walls`. Beyond the outermost
+    of triangles around its center; see `terrainkit.geometry.walls`. Beyond the outermost
     samples the ground continues level.
 
     Args:
@@ -118,7 +118,7 @@ class WallTable:
     """The ground of the quads with walls, as two triangles for each quarter of a quad.
 
     Both triangles of a quarter join its corner and the center of the quad, and either the middle of
-    the edge along x or of the edge along y. This is the fan of :func:`surface_at`.
+    the edge along x or of the edge along y. This is the fan of `surface_at`.
     """
 
     number: NDArray[np.int32]

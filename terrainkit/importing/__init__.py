@@ -1,7 +1,7 @@
 """Import files of heights and meshes.
 
 Each module in this folder that defines `SUFFIXES` is a reader. Its function `read(path, options)`
-returns a :class:`~terrainkit.importing.source.Source`. :func:`terrainkit.import_map` makes a map of
+returns a `Source`. `terrainkit.import_map` makes a map of
 it.
 """
 

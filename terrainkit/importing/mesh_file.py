@@ -54,7 +54,7 @@ class MeshSource(VertexSource):
         return self.columns(x, y).top
 
     def columns(self, x: Array, y: Array) -> Columns:
-        """Return the surfaces at a grid of positions; see :class:`Columns`.
+        """Return the surfaces at a grid of positions; see `Columns`.
 
         Positions beyond the corners are moved half a step inside.
 

@@ -18,7 +18,7 @@ MAX_PIXELS = 1 << 28
 def pixels_raster(
     path: Path, pixels: NDArray[np.generic], reference: Georeference, options: ReadOptions
 ) -> Raster:
-    """Return the heights of pixels; see :func:`.make_raster`.
+    """Return the heights of pixels; see `make_raster`.
 
     Args:
         path: The file, for messages.

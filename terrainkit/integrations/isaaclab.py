@@ -102,11 +102,11 @@ def terrain_importer_cfg(
 
 
 class TerrainProgress(terrain_curriculum.TerrainProgress, ManagerTermBase):
-    """See :class:`terrainkit.integrations.terrain_curriculum.TerrainProgress`."""
+    """See `terrainkit.integrations.terrain_curriculum.TerrainProgress`."""
 
 
 class TerrainLevels(terrain_curriculum.TerrainLevels, ManagerTermBase):
-    """See :class:`terrainkit.integrations.terrain_curriculum.TerrainLevels`."""
+    """See `terrainkit.integrations.terrain_curriculum.TerrainLevels`."""
 
 
 def use_terrain_curriculum(
@@ -115,7 +115,7 @@ def use_terrain_curriculum(
     command_name: str = "base_velocity",
     sampler: SamplerName | None = "levels",
 ) -> None:
-    """Replace the terrain curriculum of a task by a sampler of :mod:`terrainkit.curriculum`.
+    """Replace the terrain curriculum of a task by a sampler of `terrainkit.curriculum`.
 
     It also works with the terrain of Isaac Lab's generator. The progress of a robot is measured
     along its commands, in every step. Robots that solve the last level stay on the last levels. The
@@ -195,7 +195,7 @@ def _require_contacts(terrain_map: TerrainMap, *, is_heightfield: bool) -> None:
 
 @configclass
 class MapGeneratorCfg(TerrainGeneratorCfg):
-    """Configuration of :class:`MapGenerator`."""
+    """Configuration of `MapGenerator`."""
 
     class_type: type = MapGenerator
 

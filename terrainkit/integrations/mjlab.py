@@ -49,7 +49,7 @@ def terrain_entity_cfg(
     Args:
         path: Path of a .npz file. mjlab writes its configuration to a file, so a map itself is not
             accepted.
-        collision: Geometry that robots collide with; see :func:`terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
         max_init_terrain_level: Highest initial level; None for the last row.
 
     Raises:
@@ -97,7 +97,7 @@ def use_terrain_curriculum(
     command_name: str = "twist",
     sampler: SamplerName | None = "levels",
 ) -> None:
-    """Replace the terrain curriculum of a task by a sampler of :mod:`terrainkit.curriculum`.
+    """Replace the terrain curriculum of a task by a sampler of `terrainkit.curriculum`.
 
     It also works with the terrain of mjlab's generator. The progress of a robot is measured along
     its commands, in every step. Robots that solve the last level stay on the last levels. The mean
@@ -121,7 +121,7 @@ def use_terrain_curriculum(
 def import_terrain(
     cfg: TerrainGeneratorCfg, *, options: ImportOptions | None = None
 ) -> ImportedMap:
-    """Return a map of the terrain that mjlab generates; see :func:`import_terrain_mesh`.
+    """Return a map of the terrain that mjlab generates; see `import_terrain_mesh`.
 
     The map has the coordinates of mjlab, and one column for each sub-terrain in curriculum mode.
 

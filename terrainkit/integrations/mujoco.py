@@ -28,7 +28,7 @@ def make_spec(
 
     Args:
         source: Map, or path of a .npz file.
-        collision: Geometry that robots collide with; see :func:`terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
     """
     import mujoco
 
@@ -82,7 +82,7 @@ def add_map(
     Args:
         spec: Specification of a robot or scene.
         source: Map, or path of a .npz file.
-        collision: Geometry that robots collide with; see :func:`terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
     """
     frame = spec.worldbody.add_frame()
     spec.attach(make_spec(source, collision=collision), frame=frame, prefix="terrain/")

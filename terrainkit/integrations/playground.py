@@ -36,7 +36,7 @@ def write_scene(
         source: Map, or path of a .npz file.
         path: Target.
         assets: Contents of the files that the scene refers to; the result needs them, too.
-        collision: Geometry that robots collide with; see :func:`terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
         num_contacts: Maximum number of contacts that MJX keeps in each step for each kind of pair,
             such as sphere and heightfield. Without a limit, MJX tests every pair of geoms.
 

@@ -61,7 +61,7 @@ class TerrainProgress:
 
 
 class TerrainLevels:
-    """Curriculum term that assigns patches with a sampler of :mod:`terrainkit.curriculum`.
+    """Curriculum term that assigns patches with a sampler of `terrainkit.curriculum`.
 
     The term returns the mean level, and by terrain the mean level and the success, and the success
     by level. The success is the share of the episodes that crossed their patch, as a running mean.

@@ -130,7 +130,7 @@ class MapConfig(Config):
     def from_table(
         cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
     ) -> Self:
-        """Return the config that a TOML table describes; see :meth:`Config.from_table`."""
+        """Return the config that a TOML table describes; see `Config.from_table`."""
         terrains = table.get("terrains", [{}])
         is_list = isinstance(terrains, list)
         if not is_list or not all(isinstance(t, Mapping | SubTerrain) for t in terrains):
@@ -171,7 +171,7 @@ class MapConfig(Config):
         return config
 
     def to_toml(self) -> str:
-        """Return the config as TOML with comments; see :meth:`Config.to_toml`."""
+        """Return the config as TOML with comments; see `Config.to_toml`."""
         return self._text or super().to_toml()
 
     @property

@@ -20,7 +20,7 @@ _Map = TypeVar("_Map", bound=TerrainMap)
 
 
 def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None) -> _Map:
-    """Return a map with other heights or solids; see :meth:`TerrainMap.edited`.
+    """Return a map with other heights or solids; see `TerrainMap.edited`.
 
     Args:
         terrain_map: The map, which is not changed.

@@ -68,7 +68,7 @@ def import_curriculum(
 
     Each file is one patch, cropped at its center to the size of the smallest file. With
     `options.patch_size`, it is as many patches as fit. The patches are sorted by
-    :func:`.measured_difficulty`, row by row. The map does not depend on the order of the paths.
+    `measured_difficulty`, row by row. The map does not depend on the order of the paths.
 
     A patch is shifted, so that the median height of its outermost samples is 0, and its heights
     fade to 0 there. The border is flat. The mode is custom: each file is a sub-terrain of the map,

@@ -47,7 +47,7 @@ class ImportedMap:
 def import_map(path: str | Path, options: ImportOptions | None = None) -> ImportedMap:
     """Return the map of a file of heights or a mesh.
 
-    The difficulty of a patch is its rank by :func:`.measured_difficulty`, from 0 for the easiest to
+    The difficulty of a patch is its rank by `measured_difficulty`, from 0 for the easiest to
     1 for the hardest; the patches stay where they are in the file.
 
     Args:
@@ -227,7 +227,7 @@ def assemble_map(
         config: Configuration of the map.
         heights: Heights of the map [m].
         solids: Solids of the map.
-        spawns: Spawn positions of each patch, as :func:`.place_spawns` returns them.
+        spawns: Spawn positions of each patch, as `place_spawns` returns them.
         terrain_types: Sub-terrain of each patch, shape (rows, cols).
         friction: Friction coefficients of the ground on the samples of the map; None for the
             default.

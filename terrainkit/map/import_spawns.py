@@ -36,7 +36,7 @@ def place_spawns(
         heights: Heights of the map [m].
         solids: Solids of the map.
         spawn_xy: Preferred spawn position of each patch, shape (rows, cols, 2) [m].
-        relax: As of :func:`relaxed_config`.
+        relax: As of `relaxed_config`.
 
     Returns:
         The config, and the positions and headings of each patch as an object array of shape

@@ -88,7 +88,7 @@ def terrain_and_difficulty(
 
     Args:
         config: The configuration of the map.
-        columns: Result of :func:`column_types` for `config`.
+        columns: Result of `column_types` for `config`.
         row: Index along x.
         col: Index along y.
 
@@ -109,7 +109,7 @@ def patch_rng(config: MapConfig, terrain: Terrain, row: int, col: int) -> "np.ra
     """Return the random number generator of the terrain on patch (row, col).
 
     It depends on the seed and the patch only. In mode curriculum, all rows of a column share it for
-    terrains with :attr:`~terrainkit.terrain.Terrain.has_column_seed`.
+    terrains with `has_column_seed`.
     """
     is_column = config.mode == "curriculum" and terrain.has_column_seed
     entropy: Any = [config.seed, col] if is_column else [config.seed, row, col]

@@ -11,12 +11,10 @@ MAX_STEP_HEIGHT = 0.5
 
 
 def measured_difficulty(heights: NDArray[np.float32], cell: float, start: float) -> float:
-    r"""Return the difficulty of the ground of a patch [m]: 0 for flat ground.
+    """Return the difficulty of the ground of a patch [m]: 0 for flat ground.
 
-    .. math:: H = \operatorname{mean}_{p, \delta} \min(|h(p + \delta) - h(p)|, L)
-                + \operatorname{mean}_p \min(|h(p) - h_0|, L)
-
-    over all samples p and steps :math:`\delta` along x and y of up to `STEP_LENGTH`, with
+    It is the mean of `min(|h(p + d) - h(p)|, L)` over all samples p and steps d along x and y of up
+    to `STEP_LENGTH`, plus the mean of `min(|h(p) - start|, L)` over all samples, with
     L = `MAX_STEP_HEIGHT`. The first term measures slopes, risers and edges within one step. The
     second measures the height to climb and the depth of holes. The measure is our own.
 

@@ -106,7 +106,7 @@ class Patch:
 
     spawn_offset: float = 0.0
     """Largest offset along x or y of the origin from the spawn that the terrain prefers [m]. It is
-    known for a patch that has just been built; :meth:`TerrainMap.patch` returns 0."""
+    known for a patch that has just been built; `TerrainMap.patch` returns 0."""
 
     @property
     def origin(self) -> NDArray[np.float32]:
@@ -291,7 +291,7 @@ def find_origin(
     solids: Solids,
     position: tuple[float, float],
 ) -> tuple[float, float, float]:
-    """Return the spawn origin of a patch [m]; see :func:`.find_spawn`.
+    """Return the spawn origin of a patch [m]; see `find_spawn`.
 
     Args:
         config: The config of the map.

@@ -64,7 +64,7 @@ def flattest_tolerance(
     solids: Solids,
     position: tuple[float, float],
 ) -> float | None:
-    """Return a `spawn_tolerance` with which :func:`find_spawn` finds an origin.
+    """Return a `spawn_tolerance` with which `find_spawn` finds an origin.
 
     It is what the flattest free disk around the center of a cell needs. In a patch that is too
     small for such disks, it is what the disk around the preferred position needs.

@@ -66,7 +66,7 @@ class TerrainMap:
     """Difficulty of each patch, 0 to 1, shape (rows, cols)."""
 
     parameters: NDArray[np.object_]
-    """:class:`~terrainkit.map.patch.PatchParameters` of each patch, shape (rows, cols)."""
+    """`PatchParameters` of each patch, shape (rows, cols)."""
 
     solids: Solids
     """Solids of all patches."""
@@ -169,7 +169,7 @@ class TerrainMap:
     def mesh(self, *, merged: bool = True, closed: bool = False) -> "TriMesh":
         """Return the ground and the solids that collide as a triangle mesh.
 
-        The ground comes first; see :mod:`terrainkit.geometry.mesh`.
+        The ground comes first; see `terrainkit.geometry.mesh`.
 
         Args:
             merged: Merge coplanar faces of the ground; otherwise two triangles per cell.
@@ -186,14 +186,14 @@ class TerrainMap:
         return concatenate_meshes(chain([ground], meshes)) if self.solids.collides.any() else ground
 
     def ground_mesh(self, *, merged: bool = True) -> "TriMesh":
-        """Return the ground as a triangle mesh, without the solids; see :meth:`mesh`."""
+        """Return the ground as a triangle mesh, without the solids; see `mesh`."""
         from terrainkit.geometry.mesh import full_mesh, merged_mesh
 
         make_mesh = merged_mesh if merged else full_mesh
         return make_mesh(self.heights, self.grid, self.config.wall_threshold)
 
     def boxes(self) -> "BoxDecomposition":
-        """Return the level ground as boxes; see :mod:`terrainkit.geometry.box_decomposition`."""
+        """Return the level ground as boxes; see `terrainkit.geometry.box_decomposition`."""
         from terrainkit.geometry.box_decomposition import decompose_boxes
 
         threshold, edges = self.config.wall_threshold, self.config.patch_edges
@@ -232,7 +232,7 @@ class TerrainMap:
         return self.grid.lower[0] + self.grid.cell / 2, self.grid.lower[1] + self.grid.cell / 2
 
     def patch(self, row: int, col: int) -> Patch:
-        """Return patch (row, col); :func:`terrainkit.make_patch` builds one without a map.
+        """Return patch (row, col); `terrainkit.make_patch` builds one without a map.
 
         Raises:
             IndexError: if there is no such patch.
@@ -255,7 +255,7 @@ class TerrainMap:
     def edited(self, *, heights: ArrayLike | None = None, solids: Solids | None = None) -> Self:
         """Return the map with other heights or solids, as a map of mode custom.
 
-        Such a map is not compared with its config by :func:`terrainkit.map.validate.validate`, and
+        Such a map is not compared with its config by `terrainkit.map.validate.validate`, and
         cannot be generated from it. Spawn positions and goals follow the height of the ground.
         Where a spawn position is no longer flat and free, all spawn positions of its patch are
         placed again.
@@ -274,7 +274,7 @@ class TerrainMap:
         return edit_map(self, heights, solids)
 
     def assign(self, num_envs: int, max_init_level: int | None = None, seed: int = 0) -> Assignment:
-        """Assign patches to `num_envs` environments; see :mod:`terrainkit.curriculum`.
+        """Assign patches to `num_envs` environments; see `terrainkit.curriculum`.
 
         The environments of a patch are distributed over its spawn positions.
 
@@ -301,16 +301,16 @@ class TerrainMap:
         )
 
     def resample_columns(self, levels: Any, columns: Any, *, seed: Seed) -> Any:
-        """Return other columns at a reset; see :func:`terrainkit.curriculum.resample_columns`."""
+        """Return other columns at a reset; see `terrainkit.curriculum.resample_columns`."""
         return resample_columns(levels, columns, self.terrain_types, seed=seed)
 
     def update_levels(self, levels: Any, progress: Any, *, seed: Seed, top_levels: int = 3) -> Any:
-        """Return the levels after an episode; see :func:`terrainkit.update_levels`."""
+        """Return the levels after an episode; see `terrainkit.update_levels`."""
         rows = len(self.difficulty)
         return update_levels(levels, progress, rows=rows, seed=seed, top_levels=top_levels)
 
     def save(self, path: "str | Path", *, overwrite: bool = False, **options: Any) -> "Path":
-        """Write the map in the format of the suffix of `path`; see :mod:`terrainkit.export`."""
+        """Write the map in the format of the suffix of `path`; see `terrainkit.export`."""
         from terrainkit.export import export_files
 
         return export_files(self, path, overwrite=overwrite, **options)[0]

@@ -28,7 +28,7 @@ _POINTS_AT_ONCE = 16_384
 
 
 class Heights(Protocol):
-    """Anything with heights, such as a :class:`HeightfieldSurface`."""
+    """Anything with heights, such as a `HeightfieldSurface`."""
 
     def height(self, x: Floats, y: Floats, z: Any = ..., *, scan: bool = ...) -> Floats:
         """Return the height at points [m]."""
@@ -114,7 +114,7 @@ class HeightScan:
         """Prepare a scan of k = len(x) len(y) points; the index along y is the last one.
 
         Args:
-            surface: A map, or anything with heights, such as :func:`exact_surface`, which several
+            surface: A map, or anything with heights, such as `exact_surface`, which several
                 scans can share.
             x: Points ahead of the robot [m].
             y: Points to the left of the robot [m].
@@ -128,7 +128,7 @@ class HeightScan:
         self.offsets = points.astype(np.float32)
 
     def points(self, position: Any, yaw: Any) -> tuple[Any, Any, Any]:
-        """Return x, y and z of the points on the surface [m], shape (n, k) each; see :meth:`below`.
+        """Return x, y and z of the points on the surface [m], shape (n, k) each; see `below`.
 
         Args:
             position: Positions of the robots [m], shape (n, 3).

@@ -68,7 +68,7 @@ class MapErrors:
     """A height scan of n robots with errors.
 
     Each robot has its own drift and delay. Random numbers depend on the seed, the number of calls
-    of :meth:`below` and the robot, and not on which other robots are reset.
+    of `below` and the robot, and not on which other robots are reset.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class MapErrors:
             scan: The scan without errors.
             options: The sizes of the errors.
             num_envs: Number of robots.
-            dt: Time between two calls of :meth:`below` [s].
+            dt: Time between two calls of `below` [s].
             rays: Rays on the same map; required for the occlusion.
             seed: Seed of all random numbers.
 
@@ -119,7 +119,7 @@ class MapErrors:
         self._delay[ids], self._age[ids], self._drift[ids] = delays[ids], 0, 0.0
 
     def below(self, position: Any, yaw: Any) -> Any:
-        """Return the heights that robots measure, once per step; see :meth:`HeightScan.below`.
+        """Return the heights that robots measure, once per step; see `HeightScan.below`.
 
         Args:
             position: Positions of the robots [m], shape (n, 3).

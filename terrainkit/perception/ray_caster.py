@@ -65,7 +65,7 @@ class RayCaster:
             position: Positions of the sensors [m], shape (n, 3).
             quat: Orientations of the sensors (w, x, y, z), shape (n, 4).
             directions: Directions in the frame of the sensor, shape (..., 3), such as
-                :func:`depth_directions` or :func:`lidar_directions`.
+                `depth_directions` or `lidar_directions`.
             max_distance: Largest distance [m].
 
         Returns:

@@ -29,7 +29,7 @@ class VoxelGrid:
         """Prepare the grid.
 
         Args:
-            surface: A map, or its :func:`exact_surface`.
+            surface: A map, or its `exact_surface`.
             x: Centers of the voxels ahead of the robot [m].
             y: Centers to the left of the robot [m].
             z: Centers above the robot [m].

@@ -86,7 +86,7 @@ class Config:
 
     @classmethod
     def from_toml(cls, text: str, default: Self | None = None) -> Self:
-        """Return the config that TOML text describes, as :meth:`from_table` does.
+        """Return the config that TOML text describes, as `from_table` does.
 
         Args:
             text: The TOML text.
@@ -103,7 +103,7 @@ class Config:
 
     @classmethod
     def load(cls, path: "str | Path", default: Self | None = None) -> Self:
-        """Return the config in the TOML file `path`, as :meth:`from_table` does.
+        """Return the config in the TOML file `path`, as `from_table` does.
 
         Args:
             path: The TOML file.
@@ -134,7 +134,7 @@ class Config:
         return {name: getattr(self, name) for name in field_types(kind)}
 
     def to_toml(self) -> str:
-        """Return the config as TOML with comments; :meth:`from_toml` restores it.
+        """Return the config as TOML with comments; `from_toml` restores it.
 
         Raises:
             ConfigError: if it has a file name that is not UTF-8, as TOML must be.

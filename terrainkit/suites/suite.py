@@ -53,7 +53,7 @@ class Suite:
     the defaults."""
 
     sha256: str
-    """:func:`suite_hash` of the map."""
+    """`suite_hash` of the map."""
 
 
 def suite_names() -> tuple[str, ...]:
@@ -80,8 +80,8 @@ def generate_suite(
 
     Args:
         name: Name of the suite.
-        progress: See :func:`terrainkit.generate`.
-        executor: See :func:`terrainkit.generate`.
+        progress: See `terrainkit.generate`.
+        executor: See `terrainkit.generate`.
 
     Returns:
         The map.

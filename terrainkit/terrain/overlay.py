@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 class Overlay(Parameterized, Config, ABC):
     """A change to the patches of any terrain.
 
-    An overlay is a frozen dataclass with the method :meth:`apply`. Its fields are declared like a
-    terrain's. Unlike a terrain, it may hold ranges (easy, hard), as its defaults do: :meth:`at`
+    An overlay is a frozen dataclass with the method `apply`. Its fields are declared like a
+    terrain's. Unlike a terrain, it may hold ranges (easy, hard), as its defaults do: `at`
     interpolates them.
     """
 

@@ -78,7 +78,7 @@ class Parameter:
 
     @cached_property
     def limit(self) -> float:
-        """Largest number that :meth:`is_plain` accepts; negative if the value is not a number."""
+        """Largest number that `is_plain` accepts; negative if the value is not a number."""
         if self.choices or isinstance(self.easy, str | tuple):
             return -1.0
         return MAX_VALUE if isinstance(self.easy, float) else MAX_COUNT
@@ -266,7 +266,7 @@ def convert_range(
 ) -> Value | tuple[Value, Value]:
     """Return `value`, which may be a range (easy, hard), as the type of the parameter.
 
-    A list becomes a tuple. The arguments are the same as in :func:`convert_parameter`.
+    A list becomes a tuple. The arguments are the same as in `convert_parameter`.
 
     Raises:
         ConfigError: if a value has another type or is out of range, or a range is not allowed.

@@ -13,7 +13,7 @@ _WORD_START = re.compile("(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 @dataclass(frozen=True, kw_only=True)
 class Parameterized:
-    """A frozen dataclass whose fields are declared with :mod:`terrainkit.terrain.parameter`."""
+    """A frozen dataclass whose fields are declared with `terrainkit.terrain.parameter`."""
 
     @classmethod
     def kind(cls) -> str:
@@ -21,7 +21,7 @@ class Parameterized:
         return _snake_case(cls.__name__)
 
     def declarations(self) -> dict[str, Parameter]:
-        """Return the declarations of the values of :meth:`requested`, by name."""
+        """Return the declarations of the values of `requested`, by name."""
         kind: Any = type(self)
         return dict(parameters_of(kind))
 

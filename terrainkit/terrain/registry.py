@@ -118,7 +118,7 @@ def register_terrain(terrain: _Terrain) -> _Terrain:
 
 
 def register_overlay(overlay: _Overlay) -> _Overlay:
-    """Register an overlay class, as :func:`register_terrain` does a terrain.
+    """Register an overlay class, as `register_terrain` does a terrain.
 
     Raises:
         ConfigError: if it is not an overlay, or another overlay has the name.

@@ -27,7 +27,7 @@ class SubTerrain(Config):
     """A terrain type of a map.
 
     It is an entry of the map's configuration: a terrain with its parameters. In Python, `terrain`
-    may be a subclass of :class:`~terrainkit.terrain.Terrain`, which is registered and replaced by
+    may be a subclass of `Terrain`, which is registered and replaced by
     its name. The classes of `overlays` are registered, too.
 
     Raises:
@@ -178,7 +178,7 @@ class SubTerrain(Config):
 class UnavailableSubTerrain(SubTerrain):
     """A sub-terrain of a map file whose class, or the class of a part of it, is not available.
 
-    Its patches are in the file. Whatever needs the class raises :class:`ConfigError`. `parameters`
+    Its patches are in the file. Whatever needs the class raises `ConfigError`. `parameters`
     has all other keys of its table, such as `overlays`.
     """
 

@@ -25,17 +25,13 @@ from terrainkit.terrain.patch_geometry import checked_heights
 
 @dataclass(frozen=True, kw_only=True)
 class Terrain(Parameterized, ABC):
-    r"""A type of ground with fixed parameters.
+    """A type of ground with fixed parameters.
 
-    A terrain is a frozen dataclass with the method :meth:`heights`, and :meth:`solids` and
-    :meth:`goals` where it has any. It does not depend on a difficulty: :meth:`at` interpolates
-    every range,
-
-    .. math:: p(d) = (1 - d)\, p_\text{easy} + d\, p_\text{hard},
-
-    and returns a terrain with plain numbers. Fields are declared with the functions of
-    :mod:`terrainkit.terrain.parameter`; the docstring of a field is its help text. A terrain that
-    is constructed directly takes the hard end of each range by default.
+    A terrain is a frozen dataclass with the method `heights`, and `solids` and `goals` where it has
+    any. It does not depend on a difficulty d: `at` interpolates every range, as
+    `(1 - d) * easy + d * hard`, and returns a terrain with plain numbers. Fields are declared with
+    the functions of `terrainkit.terrain.parameter`; the docstring of a field is its help text. A
+    terrain that is constructed directly takes the hard end of each range by default.
     """
 
     has_column_seed: ClassVar[bool] = False
@@ -46,7 +42,7 @@ class Terrain(Parameterized, ABC):
     """
 
     has_random_heights: ClassVar[bool] = True
-    """Whether :meth:`heights` takes random numbers. Where it does not, maps pass None: creating a
+    """Whether `heights` takes random numbers. Where it does not, maps pass None: creating a
     generator takes as long as a small patch."""
 
     def __post_init__(self) -> None:
@@ -132,7 +128,7 @@ class Terrain(Parameterized, ABC):
 
         Take random numbers only from `rng`. Sample first and scale afterward, so that the pattern
         stays the same at every difficulty. Leave a flat disk where a robot can be spawned; see
-        :mod:`terrainkit.map.spawn`.
+        `terrainkit.map.spawn`.
 
         Args:
             grid: Grid of the patch.
@@ -150,7 +146,7 @@ class Terrain(Parameterized, ABC):
         Args:
             grid: Grid of the patch; solids must not extend beyond it.
             heights: Heights of the ground [m], shape `grid.shape`.
-            rng: Generator in the same state as in :meth:`goals`, so that both can start by sampling
+            rng: Generator in the same state as in `goals`, so that both can start by sampling
                 the same layout.
         """
         return Solids.empty()
@@ -169,7 +165,7 @@ class Terrain(Parameterized, ABC):
     ) -> NDArray[np.floating]:
         """Return the goals in their order; by default none.
 
-        The arguments are the same as in :meth:`solids`.
+        The arguments are the same as in `solids`.
 
         Returns:
             x, y, z [m] and heading [rad], shape (k, 4). A z of NaN is the height of the ground.

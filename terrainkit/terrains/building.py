@@ -102,7 +102,7 @@ class Building(FlatTerrain, Stairway):
     """Length of the flat start along x [m]."""
 
     def flight(self, grid: Grid) -> Flight:
-        """Return the description of a flight; see :class:`Stairway`."""
+        """Return the description of a flight; see `Stairway`."""
         self._bounds(grid)
         below = max(_SLAB, self.riser + _WAIST)
         return Flight(

@@ -113,7 +113,7 @@ class Course(Lane):
 
     @classmethod
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
-        """Return the course at `difficulty`, with its elements; see :meth:`Terrain.at`."""
+        """Return the course at `difficulty`, with its elements; see `Terrain.at`."""
         course = super().at(difficulty, values)
         elements = []
         for k, element in enumerate(course.elements):

@@ -73,7 +73,7 @@ class Imported(Terrain):
 
     @classmethod
     def at(cls, difficulty: float, values: Mapping[str, Value | Range] | None = None) -> Self:
-        """Return the terrain at `difficulty`, 0 to 1; see :meth:`Terrain.at`."""
+        """Return the terrain at `difficulty`, 0 to 1; see `Terrain.at`."""
         if values and "solids" in values:
             raise ConfigError(
                 "imported.solids: the heights of a patch are scaled and fade to 0, which solids "

@@ -38,7 +38,7 @@ class OpenStairs(FlatTerrain, Lane, Stairway):
     """Length of the flat strip at each end along x [m]."""
 
     def flight(self, grid: Grid) -> Flight:
-        """Return the description of a flight; see :class:`Stairway`."""
+        """Return the description of a flight; see `Stairway`."""
         first, last, number = self._stairs(grid)
         top = last - first - 2 * number * self.tread
         return Flight(

@@ -53,7 +53,7 @@ class SpiralStairs(FlatTerrain, Stairway):
         return x, grid.center[1] - (self.column + self.radius) / 2
 
     def flight(self, grid: Grid) -> Flight:
-        """Return the description of the stairs, which have no landing; see :class:`Stairway`."""
+        """Return the description of the stairs, which have no landing; see `Stairway`."""
         _, angle = self._stairs(grid)
         above = math.floor(2 * math.pi / (angle[1] - angle[0]) + 1e-9)  # treads of a turn
         return Flight(

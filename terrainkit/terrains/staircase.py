@@ -77,7 +77,7 @@ class Staircase(FlatTerrain, Stairway):
     """Length of the flat start along x [m]."""
 
     def flight(self, grid: Grid) -> Flight:
-        """Return the description of a flight; see :class:`Stairway`."""
+        """Return the description of a flight; see `Stairway`."""
         depth = self._width if self.shape in ("quarter_turn", "winders") else self.landing
         return Flight(
             riser=self.riser,

@@ -41,7 +41,7 @@ class Stairs(Stairway):
         return grid.lower[0] + grid.length(grid.cells(self.landing)) / 2, grid.center[1]
 
     def flight(self, grid: Grid) -> Flight:
-        """Return the description of a flight; see :class:`Stairway`."""
+        """Return the description of a flight; see `Stairway`."""
         landing, width = grid.cells(self.landing), grid.cells(self.step_width)
         free = grid.shape[0] - 2 * landing  # cells between the landings
         if free < width:

@@ -46,7 +46,7 @@ class StairsTurning(Stairway):
         return grid.lower[0] + start / 2, grid.lower[1] + grid.length(y)
 
     def flight(self, grid: Grid) -> Flight:
-        """Return the description of a flight; see :class:`Stairway`."""
+        """Return the description of a flight; see `Stairway`."""
         landing = grid.length(grid.cells(self.landing))
         return Flight(
             riser=self.riser,

@@ -94,7 +94,7 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
 
 
 class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArray]):
-    """n robots with the task of :class:`TaskEnv`, simulated together.
+    """n robots with the task of `TaskEnv`, simulated together.
 
     An environment is reset in the step that ends its episode: `infos["final_obs"]` has the last
     observations of the episodes, and `infos["_final_obs"]` says which episodes ended.
@@ -115,7 +115,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
         task: Task | None = None,
         render_mode: str | None = None,
     ) -> None:
-        """Build the simulations; see :class:`TaskEnv`."""
+        """Build the simulations; see `TaskEnv`."""
         self.render_mode, self.num_envs = render_mode, num_envs
         self.env = make_episode_env(robot, terrain, task, num_envs, render_mode)
         self.metadata = self.metadata | {"render_fps": round(1 / self.env.cfg.dt)}
@@ -140,7 +140,7 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
         return observations, rewards, dones & ~truncated, truncated, infos
 
     def render(self) -> tuple[Frame, ...] | None:
-        """Return an image of each robot, or None without a render mode; see :class:`TaskEnv`."""
+        """Return an image of each robot, or None without a render mode; see `TaskEnv`."""
         return self.env.render(self.env.sim.qpos)
 
     def close_extras(self, **kwargs: Any) -> None:
@@ -225,7 +225,7 @@ def make_episode_env(
     num_envs: int,
     render_mode: str | None,
 ) -> EpisodeEnv:
-    """Return the environment of a task, as an :class:`EpisodeEnv`."""
+    """Return the environment of a task, as an `EpisodeEnv`."""
     own = (task or get_task(robot).task).env_class
     kind = type(own.__name__, (EpisodeEnv, own), {}) if own else EpisodeEnv
     return kind(robot, terrain, task, num_envs, render_mode)

@@ -18,7 +18,7 @@ except ModuleNotFoundError as error:
 
 
 class Sb3VecEnvWrapper(VecMonitor):
-    """A :class:`TaskVectorEnv` as a `VecEnv` of Stable-Baselines3.
+    """A `TaskVectorEnv` as a `VecEnv` of Stable-Baselines3.
 
     An environment is reset in the step that ends its episode. The info of that step has the last
     observation as `terminal_observation`, `TimeLimit.truncated`, and the statistics of a
@@ -31,7 +31,7 @@ class Sb3VecEnvWrapper(VecMonitor):
 
 
 class _TaskVecEnv(VecEnv):
-    """A :class:`TaskVectorEnv` as a `VecEnv`, without statistics."""
+    """A `TaskVectorEnv` as a `VecEnv`, without statistics."""
 
     def __init__(self, env: TaskVectorEnv) -> None:
         self.env = env
@@ -73,11 +73,11 @@ class _TaskVecEnv(VecEnv):
         self.env.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute of the :class:`TaskVectorEnv`, once for each index."""
+        """Return an attribute of the `TaskVectorEnv`, once for each index."""
         return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of the :class:`TaskVectorEnv`, which all environments share.
+        """Set an attribute of the `TaskVectorEnv`, which all environments share.
 
         Raises:
             ConfigError: If an environment is not among the indices.
@@ -90,7 +90,7 @@ class _TaskVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method of the :class:`TaskVectorEnv` once, and return its result per index."""
+        """Call a method of the `TaskVectorEnv` once, and return its result per index."""
         result = getattr(self.env, method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
 

@@ -23,7 +23,7 @@ def check_robot(
     """Return what the lint rules find in a robot file.
 
     Args:
-        path: A URDF, xacro or MJCF file, or the name of a robot; see :func:`find_robot`.
+        path: A URDF, xacro or MJCF file, or the name of a robot; see `find_robot`.
         settings: Selected rules, ROS packages and xacro arguments. By default they are read from
             the nearest terrainkit.toml or pyproject.toml in the folder of the file or above it;
             for a name, in the working directory or above it.

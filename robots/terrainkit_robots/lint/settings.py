@@ -60,7 +60,7 @@ class Settings(Config):
     def from_table(
         cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
     ) -> Self:
-        """Return the settings of a TOML table; see :meth:`Config.from_table`."""
+        """Return the settings of a TOML table; see `Config.from_table`."""
         values = dict(table)
         if isinstance(select := table.get("select"), str):
             values["select"] = [word.strip() for word in select.split(",") if word.strip()]

@@ -106,7 +106,7 @@ def onboard(
     meshes, report.md and the requested framework configurations.
 
     Args:
-        path: A URDF, xacro or MJCF file, or the name of a robot; see :func:`find_robot`.
+        path: A URDF, xacro or MJCF file, or the name of a robot; see `find_robot`.
         output: The folder to write. By default it has the robot's name and is created in the
             working directory.
         options: The options.

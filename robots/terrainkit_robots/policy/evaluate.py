@@ -101,7 +101,7 @@ class EvaluationResult:
 def evaluate(
     spec: PolicySpec, config: EvaluationConfig | None = None, progress: Progress = lambda _: None
 ) -> EvaluationResult:
-    """Evaluate a policy: of a run, an ONNX file (:func:`.open_policy`), or any function.
+    """Evaluate a policy: of a run, an ONNX file (`open_policy`), or any function.
 
     The same seed gives the same result, bit for bit.
 

@@ -22,7 +22,7 @@ Policy = Callable[[TensorDict], torch.Tensor]
 
 
 def load_policy(spec: PolicySpec, env: LeggedEnv) -> Policy:
-    """Return a policy for `env`; see :func:`load_actor` for the policy of a run.
+    """Return a policy for `env`; see `load_actor` for the policy of a run.
 
     Args:
         spec: The policy: a run, or a function of the observations.

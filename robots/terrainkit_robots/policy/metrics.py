@@ -14,7 +14,7 @@ class RolloutMetrics:
     """Metrics of all robots, or of a group with the same command, terrain or level.
 
     Errors are averaged over the measured steps of each robot, then over robots. They are None if no
-    robot was measured. The metrics of the gait (:mod:`.gait`) only include robots that are
+    robot was measured. The metrics of the gait (`gait`) only include robots that are
     commanded to move, and are None if there are no such robots.
 
     Attributes:
@@ -25,7 +25,7 @@ class RolloutMetrics:
         parameter: Parameter of the terrain that is its dimension, such as step_height.
         value: Realized value of that parameter on the patches of the group [m], or value of the
             disturbance `condition`.
-        condition: Name of the disturbance of the group (:mod:`.margins`), or nominal.
+        condition: Name of the disturbance of the group (`margins`), or nominal.
         unit: Unit of the disturbance; x for a factor.
         robots: Number of robots.
         falls: Number of robots that fell.

@@ -91,7 +91,7 @@ def open_policy(
 
 
 def find_contract(path: Path, contract: Path | None = None) -> ForeignPolicy:
-    """Load a policy, and find its contract; see :func:`open_policy`.
+    """Load a policy, and find its contract; see `open_policy`.
 
     Raises:
         ConfigError: If a file cannot be read, or there is no contract.

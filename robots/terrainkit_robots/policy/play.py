@@ -49,7 +49,7 @@ def play(
 ) -> PlayResult:
     """Roll out a policy, and record a video.
 
-    On a plane the robots walk in formation; :func:`demo_commands` are the default commands. On a
+    On a plane the robots walk in formation; `demo_commands` are the default commands. On a
     map there is one robot per patch, and the video follows some `robots` in turn.
 
     Args:
@@ -127,7 +127,7 @@ def make_play_env(
         config: Settings of the rollout.
 
     Returns:
-        The environment, and commands for :func:`command_schedule`.
+        The environment, and commands for `command_schedule`.
     """
     if not is_plane(spec, config.terrain):
         return make_eval_env(spec, config, max_patch_envs=1)

@@ -109,7 +109,7 @@ class EvaluationRollout:
         Args:
             policy: Function from observations to actions.
             seconds: Duration [s].
-            commands: Commands; see :func:`command_schedule`.
+            commands: Commands; see `command_schedule`.
             progress: Called after each step with the completed fraction, 0 to 1.
             stop_early: Whether to stop once every robot has fallen or crossed half a patch.
         """
@@ -180,7 +180,7 @@ class EvaluationRollout:
 
         Args:
             mask: Mask of the robots, shape (n,).
-            **key: Fields of :class:`RolloutMetrics` that define the group.
+            **key: Fields of `RolloutMetrics` that define the group.
         """
         tried = self.crossed | self.falls | (self.commanded_distance >= self.half_patch)
         crossed = self.crossed[mask & tried]
@@ -198,7 +198,7 @@ class EvaluationRollout:
         )
 
     def _gait_metrics(self, mask: BoolArray) -> dict[str, Any]:
-        """Return the gait of the robots in a mask, as fields of :class:`RolloutMetrics`."""
+        """Return the gait of the robots in a mask, as fields of `RolloutMetrics`."""
         scene, motion = self.env.scene, self.motion.of(mask)
         moved = motion.steps > 0
         if not moved.any():
@@ -226,7 +226,7 @@ class EvaluationRollout:
         }
 
     def contacts(self) -> dict[str, str]:
-        """Return the contacts that :class:`EvaluationResult` has."""
+        """Return the contacts that `EvaluationResult` has."""
         forward, left, yaw = self.last_commands.T
         robot = int((forward - np.abs(left) - np.abs(yaw)).argmax())
         steps = round(DIAGRAM_TIME / self.env.cfg.dt)

@@ -182,7 +182,7 @@ def measure(
         progress: Called with the completed fraction of the columns, 0 to 1.
 
     Raises:
-        ConfigError: see :class:`Crossing`.
+        ConfigError: see `Crossing`.
         MemoryLimitError: if the simulations would not fit in memory.
     """
     rows, cols = terrain_map.difficulty.shape

@@ -204,7 +204,7 @@ def measure_limits(
         progress: Called with the completed fraction of the rounds, 0 to 1.
 
     Raises:
-        ConfigError: see :class:`Crossing`.
+        ConfigError: see `Crossing`.
         MemoryLimitError: if the simulations would not fit in memory.
     """
     tests = limit_tests(limits)

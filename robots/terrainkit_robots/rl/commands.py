@@ -206,7 +206,7 @@ class Gait:
             moving: Which robots are commanded to move, shape (n,).
 
         Returns:
-            `gait_phase`, shape (n, 2), and `swing_phase`, shape (n, f), of a :class:`State`.
+            `gait_phase`, shape (n, 2), and `swing_phase`, shape (n, f), of a `State`.
         """
         phase = np.outer(time, [1 / self.period]) if self.period else np.zeros((len(time), 1))
         # Sine and cosine have no jump at the end of the period, unlike the phase itself.

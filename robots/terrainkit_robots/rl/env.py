@@ -34,7 +34,7 @@ from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 
 
 def make_env(task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> "LeggedEnv":
-    """Return the environment of a task: of its `env_class`, or of :class:`LeggedEnv`.
+    """Return the environment of a task: of its `env_class`, or of `LeggedEnv`.
 
     Raises:
         ConfigError: If task, robot and terrain do not fit together.

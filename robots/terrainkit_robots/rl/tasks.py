@@ -72,7 +72,7 @@ def load_task_file(path: str | Path) -> RegisteredTask:
     """Execute a Python file that registers a task, once, and return the task.
 
     Args:
-        path: The file, which calls :func:`register_task` once.
+        path: The file, which calls `register_task` once.
 
     Raises:
         ConfigError: if there is no such file, or it registers no task or several.
@@ -96,7 +96,7 @@ def robot_and_task(robot: str, path: Path | None) -> tuple[str, Task | None]:
 
     Args:
         robot: Name or folder of the robot; empty for the robot of the file.
-        path: A file for :func:`load_task_file`; None for the task of the robot.
+        path: A file for `load_task_file`; None for the task of the robot.
 
     Returns:
         Name or folder of the robot, and the task of the file.

@@ -38,7 +38,7 @@ class Ground(ABC):
     def height(
         self, x: FloatArray, y: FloatArray, z: FloatArray | float = np.inf, *, scan: bool = False
     ) -> FloatArray:
-        """Return the height at points [m]; see :meth:`HeightfieldSurface.height`."""
+        """Return the height at points [m]; see `HeightfieldSurface.height`."""
         if self.surface is None:
             return np.zeros(np.broadcast_shapes(x.shape, y.shape), np.float32)
         return self.surface.height(x, y, z, scan=scan)

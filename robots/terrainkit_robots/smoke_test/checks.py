@@ -111,7 +111,7 @@ def smoke_test(
 def run_checks(
     robot: Robot, task: Task, samples: int, progress: Progress = lambda _: None
 ) -> SmokeTestResult:
-    """Check whether a robot can be trained for a task on a plane; see :func:`smoke_test`."""
+    """Check whether a robot can be trained for a task on a plane; see `smoke_test`."""
     name, expected = "environment initializes", "no error"
     task = replace(task, commands=replace(task.commands, waypoints=False))  # a plane has no goals
     algorithm = replace(task.algorithm, num_mini_batches=1)  # a few robots allow no more

@@ -41,7 +41,7 @@ def max_matches(pattern: str, max_length: int) -> int:
     """Return an upper bound on the number of ways in which a pattern can match a name.
 
     Args:
-        pattern: A pattern that :func:`compile_pattern` accepts.
+        pattern: A pattern that `compile_pattern` accepts.
         max_length: Number of characters of the longest name.
 
     Raises:

@@ -215,7 +215,7 @@ class RobotSpec(Config):
     def from_table(
         cls, table: Mapping[str, Any], default: Self | None = None, path: str = ""
     ) -> Self:
-        """Return the spec that a TOML table describes; see :meth:`Config.from_table`."""
+        """Return the spec that a TOML table describes; see `Config.from_table`."""
         version = table.get("format_version", "nothing")
         if version != FORMAT_VERSION or isinstance(version, bool):
             raise ConfigError(f"format_version: got {version}; expected {FORMAT_VERSION}")
@@ -223,7 +223,7 @@ class RobotSpec(Config):
         return super().from_table(values, default, path)
 
     def to_toml(self) -> str:
-        """Return the spec as TOML with comments; :meth:`from_toml` restores it."""
+        """Return the spec as TOML with comments; `from_toml` restores it."""
         docs, values, tables = field_docs(RobotSpec), [], []
         for name, value in self.to_table().items():
             about = "".join(f"# {line}\n" for line in textwrap.wrap(docs[name], LINE_LENGTH - 2))

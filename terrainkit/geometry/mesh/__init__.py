@@ -1,7 +1,7 @@
 """The surface as triangles, including walls.
 
-There are three meshes of the same surface: :func:`full_mesh` has two triangles per cell,
-:func:`merged_mesh` merges coplanar faces, and :func:`closed_mesh` makes a watertight solid of
+There are three meshes of the same surface: `full_mesh` has two triangles per cell,
+`merged_mesh` merges coplanar faces, and `closed_mesh` makes a watertight solid of
 either. Faces are counterclockwise seen from above, and every interior edge is shared by exactly two
 faces, also between large merged faces and small ones.
 """

@@ -56,7 +56,7 @@ class Rectangles:
 
     @classmethod
     def along_x(cls, tilted: Mask) -> Self:
-        """Return rows of quads that slope along y only, like :meth:`along_y`."""
+        """Return rows of quads that slope along y only, like `along_y`."""
         rows = cls.along_y(tilted.T)
         return cls(i0=rows.j0, i1=rows.j1, j0=rows.i0, j1=rows.i1)
 

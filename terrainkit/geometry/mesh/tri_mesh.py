@@ -39,7 +39,7 @@ class TriMesh:
         """Return the directed edges that belong to only one face, shape (n, 2).
 
         Args:
-            numbers: Result of :meth:`edge_numbers`, if it is known.
+            numbers: Result of `edge_numbers`, if it is known.
         """
         numbers = self.edge_numbers() if numbers is None else numbers
         differs = np.ones(len(numbers) + 1, dtype=bool)

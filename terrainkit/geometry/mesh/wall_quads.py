@@ -3,7 +3,7 @@
 The faces of a quad depend only on which of its edges are walls and on the order of the heights at
 its center. They are listed once for each of these cases, in the quad's own vertex numbers:
 
-- 0 to 3: the corners, as in :mod:`terrainkit.geometry.walls`;
+- 0 to 3: the corners, as in `terrainkit.geometry.walls`;
 - 4 + 2 k and 5 + 2 k: the midpoint of wall k, on the side of its first and its second corner;
 - 12 to 15: the vertices on a vertical line at the center, from the lowest to the highest;
 - 16 to 19: the vertices on a second line, where four walls meet between two high corners.

@@ -32,7 +32,7 @@ _SOURCES = {"absolute_dof_pos": "dof_pos", "grid_height_scan": "height_scan"}
 class ContractEnv:
     """Part of an environment before a `LeggedEnv`: its policy gets raw terms, without scales.
 
-    :class:`ContractPolicy` scales and orders them. The history is terrainkit's: whole observations,
+    `ContractPolicy` scales and orders them. The history is terrainkit's: whole observations,
     the newest first. Several contracts with the same simulation share the robots in equal parts.
     """
 
