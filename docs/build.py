@@ -21,7 +21,8 @@ from tempfile import TemporaryDirectory
 import cv2
 import numpy as np
 import yaml
-from gallery import render_patches
+from gallery import render_map, render_patches
+from numpy.typing import NDArray
 
 import terrainkit
 from terrainkit.errors import ConfigError, listing
@@ -359,6 +360,7 @@ def pictures() -> dict[str, Callable[[], None]]:
         **{name: partial(draw_paper, name) for name in paper_names()},
         "building": draw_building,
         "map": draw_map,
+        "map_3d": draw_map_3d,
         "feasibility": partial(draw_feasibility, "quadruped"),
         "parkour_course": draw_courses,
         "perception": draw_perception,
@@ -372,6 +374,16 @@ def pictures() -> dict[str, Callable[[], None]]:
 def draw_map() -> None:
     terrain_map = terrainkit.generate(MapConfig())
     write_preview(terrain_map, PICTURES / "map.png", width=820, overwrite=True)
+
+
+def draw_map_3d() -> None:
+    terrain_map = terrainkit.generate(MapConfig(border=1.0))
+    write_picture("map_3d", render_map(terrain_map, width=1000))
+
+
+def write_picture(name: str, picture: NDArray[np.uint8]) -> None:
+    bgr = cv2.cvtColor(picture, cv2.COLOR_RGB2BGR)
+    cv2.imwrite(str(PICTURES / f"{name}.png"), bgr, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
 def draw_terrain(name: str) -> None:
@@ -415,8 +427,7 @@ def draw_patches(
         )
         for terrain, difficulty in terrains
     ]
-    picture = cv2.cvtColor(render_patches(patches, width=800, cuts=cuts), cv2.COLOR_RGB2BGR)
-    cv2.imwrite(str(PICTURES / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    write_picture(name, render_patches(patches, width=800, cuts=cuts))
 
 
 def draw_paper(name: str) -> None:
@@ -425,10 +436,7 @@ def draw_paper(name: str) -> None:
     terrains = tuple(dataclasses.replace(each, proportion=1.0) for each in paper.terrains)
     size = {"rows": 3, "cols": len(terrains), "border": 1.0, "seed": SEED}
     config = MapConfig(**{**paper.map, **size}, terrains=terrains)
-    picture = cv2.cvtColor(
-        render_preview(terrainkit.generate(config), width=820), cv2.COLOR_RGB2BGR
-    )
-    cv2.imwrite(str(PICTURES / f"{name}.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    write_picture(name, render_preview(terrainkit.generate(config), width=820))
 
 
 def draw_courses() -> None:

@@ -12,6 +12,7 @@ from terrainkit.geometry.mesh import closed_mesh, full_mesh
 from terrainkit.geometry.mesh.solid_mesh import concatenate_meshes, solid_meshes
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.map.patch import Patch
+from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.views.preview import height_colors
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import stream_frames
@@ -49,7 +50,29 @@ def render_patches(
     """
     heights = cuts or [np.inf] * len(patches)
     meshes = [block(*each, k) for k, each in enumerate(zip(patches, heights, strict=True))]
-    (frame,) = stream_frames(partial(_frames, meshes, (width, width)))
+    return render_meshes(meshes, width, 45.0, 0.53)
+
+
+def render_map(terrain_map: TerrainMap, width: int) -> NDArray[np.uint8]:
+    """Return an RGB picture of a map, shape (height, width, 3); y is away from the camera."""
+    mesh = terrain_map.mesh()
+    heights = np.maximum(mesh.vertices[:, 2:], 2 * MIN_HEIGHT)  # below the stairs
+    vertices = np.hstack([mesh.vertices[:, :2], heights]).astype(np.float32)
+    return render_meshes([TriMesh(vertices=vertices, triangles=mesh.triangles)], width, 82.0, 0.49)
+
+
+def render_meshes(
+    meshes: list[TriMesh], width: int, azimuth: float, scale: float
+) -> NDArray[np.uint8]:
+    """Return an RGB picture of meshes without the sky above and below.
+
+    Args:
+        meshes: The meshes.
+        width: Width of the picture [pixels].
+        azimuth: Azimuth of the camera [deg].
+        scale: Width that the camera sees at the center, as a part of twice the meshes' diagonal.
+    """
+    (frame,) = stream_frames(partial(_frames, meshes, (width, width), azimuth, scale))
     used = np.flatnonzero((frame != frame[0, 0]).any(axis=(1, 2)))
     return frame[max(0, used[0] - MARGIN) : used[-1] + MARGIN]
 
@@ -78,7 +101,9 @@ def _with_thickness(mesh: TriMesh) -> TriMesh:
     return TriMesh(vertices=vertices, triangles=mesh.triangles)
 
 
-def _frames(meshes: list[TriMesh], size: tuple[int, int]) -> Iterator[NDArray[np.uint8]]:
+def _frames(
+    meshes: list[TriMesh], size: tuple[int, int], azimuth: float, scale: float
+) -> Iterator[NDArray[np.uint8]]:
     spec = mujoco.MjSpec()
     appearance.set_appearance(spec)
     add_meshes(spec, meshes)
@@ -91,10 +116,9 @@ def _frames(meshes: list[TriMesh], size: tuple[int, int]) -> Iterator[NDArray[np
     renderer = appearance.make_renderer(model, size, extent)
     renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 0
     target = (lower + upper) / 2
-    # The row is nearly as wide as the field of view at this distance.
     half_angle = np.radians(appearance.FIELD_OF_VIEW / 2)
-    distance = 0.53 * float(np.linalg.norm((upper - lower)[:2])) / np.tan(half_angle)
-    appearance.update_scene(renderer, data, target, distance, 45.0, -32.0)
+    distance = scale * float(np.linalg.norm((upper - lower)[:2])) / np.tan(half_angle)
+    appearance.update_scene(renderer, data, target, distance, azimuth, -32.0)
     yield renderer.render()
 
 
