@@ -10,11 +10,14 @@ import ast
 import dataclasses
 import inspect
 import os
+import pty
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
+from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -23,6 +26,8 @@ import numpy as np
 import yaml
 from gallery import render_map, render_patches
 from numpy.typing import NDArray
+from rich.console import Console
+from rich.text import Text
 
 import terrainkit
 from terrainkit.errors import ConfigError, listing
@@ -361,6 +366,7 @@ def pictures() -> dict[str, Callable[[], None]]:
         "building": draw_building,
         "map": draw_map,
         "map_3d": draw_map_3d,
+        "check_robot": draw_check_robot,
         "feasibility": partial(draw_feasibility, "quadruped"),
         "parkour_course": draw_courses,
         "perception": draw_perception,
@@ -472,6 +478,48 @@ def draw_robot(name: str) -> None:
     views = dict(render_robot(found.with_suffix(".xml"), size=(400, 340))).values()
     pictures = [cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR) for png in views]
     cv2.imwrite(str(PICTURES / f"{name}.png"), np.hstack(pictures))
+
+
+def draw_check_robot() -> None:
+    """Draw a terminal in which check-robot finds two mistakes in a file and fixes them."""
+    found = bundled.urdf_path("quadruped")
+    assert found is not None
+    text = found.read_text().replace('axis xyz="0 1 0"', 'axis xyz="0 2 0"', 1)
+    console = Console(record=True, width=100, file=StringIO())
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "my_robot.urdf").write_text(text.replace('izz="3.29e-05"', 'izz="0.03"', 1))
+        for options in ("", " --unsafe-fixes"):
+            command = f"check-robot my_robot.urdf{options}"
+            console.print(f"[bold]$ terrainkit {command}[/]", highlight=False)
+            output = terminal_output(command.split(), folder)
+            console.print(Text.from_ansi(shortened(output)), end="\n\n")
+    svg = console.export_svg(title="terrainkit check-robot", unique_id="check-robot")
+    # Without the comment, and the fonts that browsers would load from another host.
+    picture = re.sub(r"@font-face \{.*?\}\s*|<!--.*?-->\s*", "", svg, flags=re.DOTALL)
+    (PICTURES / "check_robot.svg").write_text(picture)
+
+
+def terminal_output(arguments: list[str], folder: str) -> str:
+    """Return what a command prints on a terminal with colors, in a folder."""
+    environment = os.environ | {"COLUMNS": "100", "TERM": "xterm-256color"}
+    environment["PYTHONPATH"] = os.pathsep.join(sys.path)
+    terminal, output = pty.openpty()
+    command = [sys.executable, "-m", "terrainkit_cli.main", *arguments]
+    streams = {"stdout": output, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, **streams, env=environment, cwd=folder):
+        os.close(output)
+        text = b""
+        with suppress(OSError), open(terminal, "rb", buffering=0) as reader:  # noqa: PTH123
+            while part := reader.read(1000):
+                text += part
+    return text.decode().replace("\r\n", "\n")
+
+
+def shortened(report: str) -> str:
+    """Return a report without the facts after the legs, and the notes after the first."""
+    report = re.sub(r"(legs .*?\n).*?\n\n", r"\1  ...\n\n", report, count=1, flags=re.DOTALL)
+    note = r"^\S*note\S* .*\n"
+    return re.sub(f"({note})({note})+", r"\1...\n", report, flags=re.MULTILINE)
 
 
 def draw_feasibility(name: str) -> None:
