@@ -18,6 +18,12 @@ from tests.robots import BOX
 
 ROOT = Path(__file__).parent.parent
 WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
+PERMISSIONS = {
+    "release.yml": {"publish": {"id-token": "write"}},
+    "docs.yml": {"deploy": {"id-token": "write", "pages": "write"}},
+}
+"""Permissions of the jobs of a workflow, besides reading the repository."""
+
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text())
 HOOKS = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
 PATH = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -38,7 +44,7 @@ def test_workflow_has_scripts_that_exist_and_least_permissions(workflow):
     assert document["permissions"] == {"contents": "read"}
     jobs = document["jobs"].items()
     granted = {name: job["permissions"] for name, job in jobs if "permissions" in job}
-    assert granted in ({}, {"publish": {"id-token": "write"}})
+    assert granted == PERMISSIONS.get(workflow.name, {})
     pinned = re.compile(r"\./|[\w./-]+@(v\d+|release/v\d+|[0-9a-f]{40})")
     assert all(pinned.fullmatch(step.get("uses", "./")) for step in steps(workflow))
 

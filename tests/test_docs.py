@@ -5,6 +5,13 @@ import re
 from pathlib import Path
 
 import pytest
+import yaml
+
+import terrainkit
+import terrainkit.curriculum
+import terrainkit.feasibility
+import terrainkit.perception
+import terrainkit_robots
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -42,3 +49,37 @@ def test_links_lead_to_files_and_headings(page):
         target = page.parent / path if path else page
         assert target.exists(), path
         assert not anchor or anchor in _anchors(target), f"{path}#{anchor}"
+
+
+def _nav_pages(entry):
+    """Yield the files in an entry of the navigation of the site."""
+    for value in entry.values():
+        if isinstance(value, str):
+            yield value
+        else:
+            for child in value:
+                yield from _nav_pages(child)
+
+
+def test_site_has_a_link_to_each_page():
+    nav = yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"]
+    linked = [page for entry in nav for page in _nav_pages(entry)]
+    assert sorted(linked) == sorted(page.name for page in DOCS.glob("*.md"))
+
+
+@pytest.mark.parametrize(
+    "package",
+    [
+        terrainkit,
+        terrainkit.curriculum,
+        terrainkit.feasibility,
+        terrainkit.perception,
+        terrainkit_robots,
+    ],
+    ids=lambda package: package.__name__,
+)
+def test_api_pages_have_each_public_name(package):
+    texts = [page.read_text() for page in DOCS.glob("api*.md")]
+    documented = {line.rpartition(".")[2] for text in texts for line in text.splitlines()}
+    assert package.__all__
+    assert set(package.__all__) - documented == set()
