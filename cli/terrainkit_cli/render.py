@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
+_CONTROL = re.compile("[\\0-\\x08\\x0b-\\x1f\\x7f-\\x9f\\u202a-\\u202e\\u2066-\\u2069]")
+"""Control characters besides tab and newline, and marks of the writing direction."""
+
 BAR_DELAY = 0.5
 """Time after which a progress bar appears [s]."""
 
@@ -56,7 +59,7 @@ def _print(text: str, end: str = "\n") -> None:
     What is left may be writing its files.
     """
     try:
-        print(text, end=end)
+        print(_escape_control(text), end=end)
     except BrokenPipeError:
         drop_stdout()
 
@@ -94,7 +97,8 @@ def error(message: str) -> None:
 
 def _print_message(message: str) -> None:
     with suppress(OSError):  # such as from a closed terminal
-        print(f"terrainkit: {_relative_paths(message)}", file=sys.stderr, flush=True)
+        text = _escape_control(_relative_paths(message))
+        print(f"terrainkit: {text}", file=sys.stderr, flush=True)
 
 
 def _relative_paths(text: str) -> str:
@@ -104,6 +108,11 @@ def _relative_paths(text: str) -> str:
     except OSError:  # it has been removed
         return text
     return re.sub(rf"(?<![\w./~-]){folder}/(?=[\w.])", "", text)
+
+
+def _escape_control(text: str) -> str:
+    """Return a text without what a terminal interprets; names in files of strangers may have it."""
+    return _CONTROL.sub(lambda match: ascii(match[0])[1:-1], text)
 
 
 def _escape_unknown() -> None:

@@ -9,6 +9,8 @@ import json
 import math
 import os
 import pickle
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,8 +19,9 @@ import textwrap
 import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from threading import Thread, Timer
 from typing import Any, Self
@@ -29,8 +32,14 @@ from numpy.typing import NDArray
 from terrainkit.errors import TerrainkitError, one_line
 from terrainkit.files.memory import MIN_CHECKED_BYTES, check_memory, free_memory
 
-_MAX_HEADER = 1 << 20
+_MAX_HEADER = 1 << 18
 """Largest header of an answer, with the names, types and shapes of its arrays [bytes]."""
+
+_KIND = re.compile(r"[<>|][biufcSU][1-9]\d{0,8}")
+"""Types of the arrays of an answer. numpy also reads types of any size, and of objects."""
+
+_START_SECONDS = 120.0
+"""Time limit of the imports [s]: torch takes seconds, and more where the disk is slow."""
 
 _POLL_TIME = 0.5
 """Time between two looks at the parent process [s]."""
@@ -94,6 +103,7 @@ class ChildProcess:
             environment: Environment variables; None for those of this process.
         """
         self._limits, self._is_late = limits or ProcessLimits(), False
+        self._is_ready = False
         if self._limits.memory is not None:
             memory = max(min(self._limits.memory, free_memory()), MIN_CHECKED_BYTES)
             self._limits = replace(self._limits, memory=memory)
@@ -103,16 +113,16 @@ class ChildProcess:
             "PYTHONPATH": os.pathsep.join(str(Path(p).absolute()) for p in sys.path if p),
             "OPENBLAS_NUM_THREADS": "1",
         }
-        folder = tempfile.TemporaryDirectory(prefix="terrainkit-", ignore_cleanup_errors=True)
+        folder = tempfile.mkdtemp(prefix="terrainkit-")
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", f"from {__name__} import main; main({os.getpid()})"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             env={**(os.environ if environment is None else environment), **variables},
-            cwd=folder.name,
+            cwd=folder,
         )
-        self.close = weakref.finalize(self, _end, self._process, folder)
+        self.close = weakref.finalize(self, _end, self._process, folder, os.getpid())
         """End the process."""
         self.send((function, arguments, self._limits))
 
@@ -126,10 +136,11 @@ class ChildProcess:
 
     def send(self, value: Any) -> None:
         """Send a value, which is pickled, to the iterator of the function."""
-        assert self._process.stdin is not None
-        with suppress(BrokenPipeError):  # `receive` tells why the process ended
-            pickle.dump(value, self._process.stdin)
-            self._process.stdin.flush()
+        stream = self._process.stdin
+        assert stream is not None
+        with self._time_limit(), suppress(BrokenPipeError):  # `receive` tells why it ended
+            pickle.dump(value, stream)
+            stream.flush()
 
     def receive(self) -> dict[str, NDArray[Any]]:
         """Return the next arrays of the function by name; no arrays if it has ended.
@@ -138,28 +149,43 @@ class ChildProcess:
             ProcessError: if the function fails, crashes, or exceeds a limit.
             MemoryLimitError: if the arrays do not fit in memory.
         """
-        timer = Timer(self._limits.seconds, self._end_late)
-        timer.daemon = True
-        timer.start()
+        if not self._is_ready:
+            self._read()
+            self._is_ready = True
+        return self._read()
+
+    def _read(self) -> dict[str, NDArray[Any]]:
         try:
-            return _read_arrays(self._process.stdout)
+            with self._time_limit():
+                return _read_arrays(self._process.stdout, self._limits.memory)
         except TerrainkitError:
             raise
         except EOFError:
             raise ProcessError(self._why_it_ended()) from None
         except Exception as error:  # of what a process sends that a file has taken over
             raise ProcessError(f"the result cannot be read: {one_line(str(error))}") from None
+
+    @contextmanager
+    def _time_limit(self) -> Iterator[None]:
+        """Kill the process if the block takes too long."""
+
+        def end_late() -> None:
+            self._is_late = True
+            self._process.kill()
+
+        timer = Timer(self._limits.seconds if self._is_ready else _START_SECONDS, end_late)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield
         finally:
             timer.cancel()
-
-    def _end_late(self) -> None:
-        self._is_late = True
-        self._process.kill()
 
     def _why_it_ended(self) -> str:
         code = self._process.wait()
         if self._is_late:
-            return f"takes more than {self._limits.seconds:g} s"
+            seconds = self._limits.seconds if self._is_ready else _START_SECONDS
+            return f"takes more than {seconds:g} s"
         if code == -getattr(signal, "SIGXCPU", 0):
             return f"takes more than {self._limits.cpu_seconds} s of CPU time"
         return f"the process crashed, exit code {code}"
@@ -187,15 +213,20 @@ def _call_once(_: Iterator[Any], function: Callable[..., Any], *arguments: Any) 
     yield function(*arguments)
 
 
-def _end(process: "subprocess.Popen[bytes]", folder: "tempfile.TemporaryDirectory[str]") -> None:
-    process.kill()
-    with suppress(BrokenPipeError):  # of input that was not read
-        process.communicate()
-    folder.cleanup()
+def _end(process: "subprocess.Popen[bytes]", folder: str, owner: int) -> None:
+    if os.getpid() == owner:  # and not a copy that was forked
+        process.kill()
+        with suppress(BrokenPipeError):  # of input that was not read
+            process.communicate()
+        shutil.rmtree(folder, ignore_errors=True)
 
 
-def _read_arrays(stream: Any) -> dict[str, NDArray[Any]]:
+def _read_arrays(stream: Any, memory: int | None) -> dict[str, NDArray[Any]]:
     """Return the arrays of a message.
+
+    Args:
+        stream: Where to read.
+        memory: Largest size of all arrays [bytes]; None for the free memory.
 
     Raises:
         EOFError: if the process has ended.
@@ -208,12 +239,16 @@ def _read_arrays(stream: Any) -> dict[str, NDArray[Any]]:
     header = json.loads(line)
     if isinstance(header, str):
         raise ProcessError(textwrap.shorten(one_line(header), 200, placeholder="..."))
-    kinds = {name: (np.dtype(kind), tuple(shape)) for name, (kind, shape) in header.items()}
-    if any(kind.hasobject for kind, _ in kinds.values()):
-        raise TypeError("got an array of objects")
-    size = sum(kind.itemsize * math.prod(shape) for kind, shape in kinds.values())
+    sizes = {}
+    for name, (kind, shape) in header.items():
+        if not _KIND.fullmatch(kind) or not all(type(k) is int and k >= 0 for k in shape):
+            raise ValueError(f"got an array of type {kind[:20]}")
+        sizes[name] = np.dtype(kind).itemsize * math.prod(shape)
+    size = sum(sizes.values())
+    if memory is not None and size > memory:
+        raise ValueError(f"got {size} bytes")
     check_memory(size, "the result of a child process")
-    arrays = {name: np.empty(shape, kind) for name, (kind, shape) in kinds.items()}
+    arrays = {name: np.empty(shape, kind) for name, (kind, shape) in header.items()}
     for array in arrays.values():
         data = memoryview(_as_bytes(array).data)
         while data:
@@ -221,6 +256,8 @@ def _read_arrays(stream: Any) -> dict[str, NDArray[Any]]:
             if not count:
                 raise EOFError
             data = data[count:]
+        if array.dtype.kind == "U" and (array.reshape(-1).view(np.uint32) > sys.maxunicode).any():
+            raise ValueError("got an array of text with other numbers")
     return arrays
 
 
@@ -270,7 +307,7 @@ def main(parent: int) -> None:
         parent: Number of the parent process.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C ends the parent
-    end_with_parent(lambda: os.getppid() == parent)
+    end_with_parent(partial(_is_running, parent))
     received, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     null = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
@@ -278,6 +315,7 @@ def main(parent: int) -> None:
     limits = ProcessLimits()
     try:
         function, arguments, limits = pickle.load(received)
+        _write_header(answers, {})  # ready
         limits.apply()
         for arrays in function(_received_values(received), *arguments):
             _write_arrays(answers, arrays)
@@ -286,6 +324,14 @@ def main(parent: int) -> None:
         _write_header(answers, f"needs more than {(limits.memory or 0) / 2**30:.2g} GB of memory")
     except Exception as error:
         _write_header(answers, one_line(str(error)) or type(error).__name__)
+
+
+def _is_running(parent: int) -> bool:
+    if os.name == "posix":
+        return os.getppid() == parent  # otherwise, another process has adopted this one
+    import psutil  # on Windows, the number of the parent does not change
+
+    return bool(psutil.pid_exists(parent))
 
 
 def _received_values(stream: Any) -> Iterator[Any]:

@@ -32,7 +32,10 @@ def load_policy(spec: PolicySpec, env: LeggedEnv) -> Policy:
         ConfigError: If the spec has no policy, or its policy is for another robot or task.
     """
     if (policy := spec.policy) is not None:
-        return _Function(policy)
+        function = _Function(policy)
+        if function.reset is not None:  # it may have the state of another evaluation
+            function.reset(torch.ones(env.num_envs, dtype=torch.bool))
+        return function
     if not isinstance(spec, Run):
         raise ConfigError("policy: got none; expected a run, or a function of the observations")
     return load_actor(spec, env)

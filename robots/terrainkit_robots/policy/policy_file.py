@@ -20,6 +20,10 @@ LIMITS = ProcessLimits(seconds=30.0, memory=2 << 30)
 """Limits of loading a policy, and of each call."""
 
 
+_ERRORS = (ProcessError, LookupError, TypeError, ValueError, msgspec.MsgspecError)
+"""Errors of a call, and of answers of a process that a file has taken over."""
+
+
 class PolicyFile:
     """A policy in an ONNX or TorchScript file, from observations (n, k) to actions (n, a).
 
@@ -30,25 +34,25 @@ class PolicyFile:
         """Load a file, and call it once.
 
         Args:
-            path: The file; TorchScript ends with `.pt`.
+            path: The file; TorchScript ends with `.pt`, or is a zip file.
 
         Raises:
             ConfigError: If the file is not a policy.
         """
         self.__name__, data = path.name, read_file(path)
         self._dones: BoolArray | None = None
-        if path.suffix == ".pt":
+        if path.suffix == ".pt" or data.startswith(b"PK"):
             self._process = ChildProcess(run_script, data, limits=LIMITS)
         else:
             folder = path.parent.absolute()
             self._process = ChildProcess(run_model, data, folder, limits=LIMITS)
         try:
             loaded = self._process.receive()
-        except ProcessError as error:
+            self.num_obs, self.num_actions = loaded["sizes"].astype(np.int64).tolist()
+            self.metadata = msgspec.json.decode(str(loaded["metadata"]), type=dict[str, str])
+        except _ERRORS as error:
             self._process.close()
             raise ConfigError(f"{path} is not a policy: {error}") from error
-        self.num_obs, self.num_actions = loaded["sizes"].tolist()
-        self.metadata = msgspec.json.decode(str(loaded["metadata"]), type=dict[str, str])
 
     def __call__(self, obs: torch.Tensor) -> FloatArray:
         """Return actions (n, a) for observations (n, k).
@@ -59,14 +63,20 @@ class PolicyFile:
         self._process.send((obs.numpy(force=True).astype(np.float32), self._dones))
         self._dones = None
         try:
-            return self._process.receive()["actions"]
-        except ProcessError as error:
+            actions = self._process.receive()["actions"]
+        except _ERRORS as error:
             raise ConfigError(f"{self.__name__}: {error}") from error
+        if actions.shape != (len(obs), self.num_actions) or actions.dtype.kind != "f":
+            got = f"got actions of shape {actions.shape} and type {actions.dtype}"
+            raise ConfigError(f"{self.__name__}: {got}; expected {len(obs), self.num_actions}")
+        return actions
 
     def reset(self, dones: torch.Tensor) -> None:
         """Clear the state of robots before the next step, a mask of shape (n,)."""
-        mask = dones.numpy(force=True).astype(bool)
-        self._dones = mask if self._dones is None else self._dones | mask
+        mask: BoolArray = dones.numpy(force=True).astype(bool)
+        if self._dones is not None and self._dones.shape == mask.shape:
+            mask |= self._dones  # the policy has not been called since
+        self._dones = mask
 
 
 def read_file(path: Path) -> bytes:

@@ -57,11 +57,11 @@ OPERATORS = frozenset(_OPERATORS.split())
 
 _LANGUAGE = """
 abs Constant data device DictConstruct dtype GetAttr If is_cpu is_cuda is_nested layout
-ListConstruct ListUnpack Loop max min NumToTensor RaiseException requires_grad SetAttr shape
+ListConstruct ListUnpack Loop max min NumToTensor Print RaiseException requires_grad SetAttr shape
 TupleConstruct TupleIndex TupleSlice TupleUnpack type unchecked_cast Uninitialized
 """
 LANGUAGE = frozenset(_LANGUAGE.split())
-"""Nodes of the language, without calls that are not inlined, `print` and `fork`."""
+"""Nodes of the language, without `fork` and calls that are not inlined. Prints are discarded."""
 
 
 def run_script(received: Iterator[Any], data: bytes) -> Iterator[dict[str, Any]]:
@@ -109,7 +109,8 @@ def checked_archive(data: bytes) -> bytes:
             if size > MAX_UNPACKED_SIZE:
                 raise ConfigError(f"got {size} bytes, unpacked; expected a smaller network")
             content = {name: archive.read(name) for name in archive.namelist()}
-        constants = (data for name, data in content.items() if name.endswith("/constants.pkl"))
+        # torch finds names in capitals, too.
+        constants = (content[name] for name in content if name.lower().endswith("/constants.pkl"))
         names = sorted({name for data in constants for name in _classes(data)})
         if objects := [name for name in names if not TENSOR_CLASSES.fullmatch(name)]:
             raise ConfigError(f"got constants of {listing(objects)}; expected tensors")

@@ -17,7 +17,14 @@ from terrainkit.files.child_process import (
     ProcessLimits,
     run_in_process,
 )
-from tests.child_functions import answer_with, double, folder_content, num_threads, spin
+from tests.child_functions import (
+    answer_once,
+    answer_with,
+    double,
+    folder_content,
+    num_threads,
+    spin,
+)
 
 pytestmark = pytest.mark.usefixtures("real_child")
 
@@ -61,7 +68,7 @@ def test_child_process_failure_is_one_line(function, arguments, limits, reason):
 
 
 def test_child_process_result_is_read_without_pickle():
-    with pytest.raises(ProcessError, match=r"^the result cannot be read: got an array of objects"):
+    with pytest.raises(ProcessError, match=r"^the result cannot be read: got an array of type \|O"):
         run_in_process(dict, [("a", np.array([print], dtype=object))])
 
 
@@ -72,6 +79,12 @@ def test_child_process_result_is_read_without_pickle():
         b'{"a": ["|O", [1]]}\n01234567',
         b'{"a": ["<f8", [1, "2"]]}\n',
         b'{"a": 3}\n',
+        b'{"a": ["<f8", [true]]}\n',
+        b'{"a": ["V0", [300000000]]}\n',
+        b'{"a": ["(1,1)f8", [1]]}\n',
+        b'{"a": ["<U0", [300000000]]}\n',
+        b'{"a": ["<U1", [1]]}\n\xff\xff\xff\xff',
+        b'{"a": ["<f8", [1000000000000000]]}\n',
         b"[\n",
         b"\xff\n",
         b"3\n",
@@ -86,6 +99,26 @@ def test_child_process_result_has_to_fit_in_memory(monkeypatch):
     monkeypatch.setattr(memory, "free_memory", lambda: 10**8)
     with pytest.raises(MemoryLimitError, match=r"the result of a child process needs 0\.54 GB"):
         run_in_process(dict, [("a", np.zeros(1 << 26))])
+
+
+def test_child_process_that_does_not_read_is_ended():
+    """`send` blocks once the pipe is full."""
+    with ChildProcess(answer_once, limits=ProcessLimits(seconds=1.0)) as process:
+        assert process.receive()["value"] == 1
+        process.send(np.zeros(1 << 20))
+        with pytest.raises(ProcessError, match=r"^takes more than 1 s$"):
+            process.receive()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="not on Windows")
+def test_child_process_is_not_ended_by_a_fork():
+    with ChildProcess(double) as process:
+        if not (number := os.fork()):
+            process.close()
+            os._exit(0)
+        os.waitpid(number, 0)
+        process.send(np.float32(1))
+        assert process.receive()["value"] == 2
 
 
 def test_child_process_answers_what_it_receives():

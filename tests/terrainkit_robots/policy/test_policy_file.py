@@ -23,6 +23,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import load_terrain
+from tests.child_functions import odd_policy
 
 SMALL = Task(env=Env(num_threads=1))
 SHORT = EvaluationConfig(num_envs=3, seconds=0.3, command=(0.5, 0.0, 0.2))
@@ -348,3 +349,72 @@ def test_files_that_cannot_be_read_are_rejected(mine, tmp_path):
     make_onnx(mine)
     with pytest.raises(ConfigError, match=r"no policy\.json or deploy\.yaml beside it"):
         open_policy(mine, "quadruped")
+
+
+def test_evaluation_starts_without_the_state_of_another(trained):
+    masks = []
+
+    class Stand:
+        __name__ = "stand"
+
+        def __call__(self, obs):
+            return np.zeros((len(obs), 12))
+
+        def reset(self, dones):
+            masks.append(dones.tolist())
+
+    evaluate(replace(trained, policy=Stand()), SHORT)
+    assert masks[0] == [True] * SHORT.num_envs
+
+
+SIZES = {"sizes": [47, 12], "metadata": "{}"}
+
+
+@pytest.mark.parametrize(
+    "first",
+    [
+        {},
+        {"sizes": [47], "metadata": "{}"},
+        {"sizes": ["a", "b"], "metadata": "{}"},
+        {"sizes": 3, "metadata": "{}"},
+        {"sizes": [47, 12]},
+        {"sizes": [47, 12], "metadata": "["},
+        {"sizes": [47, 12], "metadata": [1, 2]},
+        {"sizes": [47, 12], "metadata": '{"a": 3}'},
+    ],
+)
+def test_odd_first_answer_is_an_error(tmp_path, monkeypatch, first):
+    monkeypatch.setattr(policy_file, "run_model", partial(odd_policy, first=first, second={}))
+    with pytest.raises(ConfigError, match=r"mine\.onnx is not a policy: "):
+        PolicyFile(make_onnx(tmp_path / "mine.onnx"))
+
+
+@pytest.mark.parametrize(
+    "second",
+    [
+        {},
+        {"other": np.zeros((2, 12))},
+        {"actions": np.zeros((1, 12))},
+        {"actions": np.zeros(24)},
+        {"actions": np.zeros((2, 12), int)},
+        {"actions": np.full((2, 12), "a")},
+    ],
+)
+def test_odd_answer_is_an_error(tmp_path, monkeypatch, second):
+    monkeypatch.setattr(policy_file, "run_model", partial(odd_policy, first=SIZES, second=second))
+    policy = PolicyFile(make_onnx(tmp_path / "mine.onnx"))
+    with pytest.raises(ConfigError, match=r"^mine\.onnx: "):
+        policy(torch.zeros(2, 47))
+
+
+def test_reset_is_for_the_environment_of_the_next_call(tmp_path):
+    """`check-policy` uses a policy in environments with different numbers of robots."""
+    policy = PolicyFile(make_onnx(tmp_path / "mine.onnx"))
+    policy.reset(torch.tensor([True, False]))
+    policy.reset(torch.tensor([False, True, False]))
+    assert policy(torch.zeros(3, 47)).shape == (3, 12)
+
+
+def test_type_of_a_file_is_found_by_its_content(exported, tmp_path):
+    shutil.copy(exported / "policy.pt", tmp_path / "policy.jit")
+    assert PolicyFile(tmp_path / "policy.jit").num_actions == 12

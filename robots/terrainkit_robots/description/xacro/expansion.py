@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from terrainkit.errors import TerrainkitError
+from terrainkit.errors import TerrainkitError, one_line
 from terrainkit.files.child_process import ChildProcess, ProcessError, ProcessLimits
+from terrainkit.settings.text import truncate
 from terrainkit_robots.description.xacro.process import ORIGIN, expand
 
 MAX_SECONDS = 8.0
@@ -76,15 +77,15 @@ def expand_xacro(
     try:
         with ChildProcess(expand, request, limits=limits, environment=environment) as process:
             reply = process.receive()
-    except ProcessError as error:
+        xml, files = reply["xml"].tobytes(), tuple(map(Path, reply["files"].tolist()))
+        message, location = str(reply["error"]), reply["location"].tolist()
+        place = (Path(location[0]), int(location[1])) if location else None
+    except (ProcessError, LookupError, TypeError, ValueError) as error:
         hint = "check macros and expressions for endless recursion"
         raise XacroError(f"xacro: cannot be expanded: {error}; {hint}") from None
-    if "error" in reply:
-        location = reply["location"].tolist()
-        place = (Path(location[0]), int(location[1])) if location else None
-        raise XacroError(str(reply["error"]), place)
-    files = tuple(map(Path, reply["files"].tolist()))
-    return Expansion(data=reply["xml"].tobytes(), files=files)
+    if message:
+        raise XacroError(truncate(one_line(message), 1000), place)
+    return Expansion(data=xml, files=files)
 
 
 def pop_origin(element: Any, files: tuple[Path, ...]) -> tuple[Path, int] | None:

@@ -55,13 +55,15 @@ class _RejectedError(Exception):
 
 
 def expand(_: Iterator[Any], request: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """Yield the expanded file `xml` and the `files` that it includes, or `error` and `location`."""
+    """Yield the expanded file `xml` and its `files`, or an `error` and its `location`."""
     forbid_changes()
+    reply: dict[str, Any] = {"xml": [], "files": [], "error": "", "location": []}
     try:
-        yield _expand(request)
+        reply |= _expand(request)
     except BaseException as error:  # expressions of the file may raise anything
-        location = list(map(str, _error_location(error) or ()))
-        yield {"error": _error_message(error, request), "location": np.array(location, str)}
+        reply["error"] = _error_message(error, request)
+        reply["location"] = list(map(str, _error_location(error) or ()))
+    yield reply
 
 
 def _expand(request: Mapping[str, Any]) -> dict[str, Any]:
@@ -87,7 +89,7 @@ def _expand(request: Mapping[str, Any]) -> dict[str, Any]:
         raise _RejectedError(f"size of the expansion: more than {_MAX_BYTES // 2**20} MiB")
     read = [str(Path(name).absolute()) for name in xacro.all_includes]
     names = [*files, *(name for name in read if name not in files)]
-    return {"xml": np.frombuffer(text, np.uint8), "files": np.array(names, str)}
+    return {"xml": np.frombuffer(text, np.uint8), "files": names}
 
 
 # Restrictions
