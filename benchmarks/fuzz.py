@@ -1,10 +1,12 @@
 """Read damaged and hostile files with the commands of terrainkit, and print what they must not do.
 
 python benchmarks/fuzz.py [--minutes N | --inputs N] [--seed N] [--only SURFACE ...]
+python benchmarks/fuzz.py --keep FOLDER ...
 
 Each input is read in a forked process with limits of time and memory. A command has to succeed, or
-print one error and leave no file. An audit hook reports code that is executed and files that are
-written elsewhere. The first input of each kind of failure is minimized and kept in .fuzz/.
+print one error, and leave neither files nor processes. An audit hook reports code that is executed
+and files that are written elsewhere. The first input of each kind of failure is minimized and kept
+in .fuzz/; --keep copies what is needed of such a folder to the corpus, which is read first.
 """
 
 import argparse
@@ -24,7 +26,15 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from fuzzing.forked import KINDS, Failure, run_forked
-from fuzzing.surfaces import FILE, Surface, load_surfaces, prepare, prepare_seed
+from fuzzing.surfaces import (
+    CORPUS,
+    FILE,
+    Surface,
+    load_surfaces,
+    num_listed,
+    prepare,
+    prepare_seed,
+)
 
 KEPT = Path(__file__).parents[1] / ".fuzz"
 """Folder of the inputs that failed."""
@@ -49,12 +59,14 @@ class Fuzzer:
         self.seeds = FILE.with_name("seeds") / surface.name
         for k, line in enumerate(surface.seeds):
             failure = run_forked(folder / f"seed_{k}", partial(prepare_seed, self.seeds, line))
-            if failure and failure.kind != "files":
-                raise RuntimeError(f"{surface.name}: {line}: {failure.line}")
+            printed = (folder / f"seed_{k}/stderr").read_text()
+            if (failure and failure.kind != "files") or "terrainkit: error" in printed:
+                raise RuntimeError(f"{surface.name}: {line}: {failure}: {printed}")
             self.seeds = folder / f"seed_{k}" / "work"
 
     def run(self, seconds: float, inputs: int) -> None:
-        """Read inputs for some time, and at least a number of them."""
+        """Read inputs for some time, and at least a number of them and the ones that are listed."""
+        inputs = max(inputs, num_listed(self.surface))
         end, number = time.monotonic() + seconds, os.cpu_count() or 1
         with ProcessPoolExecutor(number, get_context("fork")) as pool:
             while (missing := inputs - self.num_tried) > 0 or time.monotonic() < end:
@@ -115,6 +127,16 @@ def minimize(data: bytes, fails: Callable[[bytes], bool], seconds: float) -> byt
     return data
 
 
+def keep_in_corpus(folder: Path) -> None:
+    """Copy the command and the damaged file of a folder of .fuzz to the corpus."""
+    target = CORPUS / folder.parent.name / folder.name
+    path = Path("work", json.loads((folder / "command").read_text())["path"])
+    (target / path).parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy(folder / "command", target)
+    if (folder / path).is_file():
+        shutil.copy(folder / path, target / path)
+
+
 def _signature(failure: Failure) -> str:
     return failure.kind + re.sub(r"[\d.]+|/\S*|'[^']*'", "", failure.line)[:60]
 
@@ -145,9 +167,14 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10)
     parser.add_argument("--inputs", type=int, help="of each surface, in place of --minutes")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--keep", nargs="+", type=Path, help="folders of .fuzz")
     surfaces = {surface.name: surface for surface in load_surfaces()}
     parser.add_argument("--only", nargs="+", choices=surfaces, default=list(surfaces))
     options = parser.parse_args()
+    if options.keep:
+        for folder in options.keep:
+            keep_in_corpus(folder)
+        return 0
     os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported
     chosen = [surfaces[name] for name in options.only]
     lines = [f"{'surface':14}{'tried':>6}" + "".join(f"{kind:>10}" for kind in KINDS)]

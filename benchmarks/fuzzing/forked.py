@@ -1,6 +1,7 @@
 """Run a command in a forked process with limits, and judge what it did.
 
-A command may write to its working folder and its temporary folder.
+A command may write to its working folder and its temporary folder. Native code writes without
+events of Python, so the folders are listed as well; a decoy of the home folder is among them.
 """
 
 import json
@@ -10,21 +11,29 @@ import resource
 import signal
 import sys
 import tempfile
-import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-KINDS = ("traceback", "hang", "memory", "files", "executed", "output", "accepted")
-"""Kinds of failures. Files are left or written elsewhere, output is not of terrainkit, and accepted
-is damage that changes the content of an archive with checksums."""
+from fuzzing.processes import adopt_orphans, children, kill, kill_orphans, wait
+
+_KINDS = "traceback hang memory files executed processes output accepted"
+KINDS = tuple(_KINDS.split())
+"""Kinds of failures. Files are left or written elsewhere, processes outlive the command, output is
+not of terrainkit or controls the terminal, and accepted is a result that a check of the surface
+rejects, such as a file whose checksums are wrong."""
 
 SECONDS = 20
-"""Limit of the CPU time of each process [s]. The limit of the wall-clock time is six times this."""
+"""Limit of the CPU time of each process [s]."""
+
+_WALL_CLOCK = 8
+"""Limit of the wall-clock time relative to that of the CPU time. Child processes of a command have
+limits of 120 s, which have to act first."""
 
 MEMORY = 2 << 30
 """Memory above an idle command's that counts as a failure [bytes]."""
@@ -41,6 +50,18 @@ _OWN = re.compile(
 _CHANGES = {"os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.symlink", "os.link"}
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 _OUR_LINE = re.compile(r"terrainkit: |iteration \d+/\d+: ")
+_CONTROL = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e]|^::\w+", re.MULTILINE)
+"""Controls a terminal, or is a command for the runner of a workflow."""
+
+_MAX_OUTPUT = 1 << 20
+"""Output that is judged [bytes]."""
+
+_OF_LIBRARIES = re.compile(r"/\.ses$|/home/\.cache(/Microsoft.*)?$")
+"""Paths that onnxruntime writes."""
+
+_FOLDERS = ("work", "tmp", "home")
+_HEARS_SIGNALS = 124
+"""Exit code of a command that reaches its limit of time in Python code."""
 _TOO_LARGE = re.compile(r"out of memory|needs more than (?:[3-9]|\d\d)\S* GB of memory")
 _NUM_ERRORS = {0: (0,), 1: (0, 1)}
 """Numbers of error lines by exit code; one for others."""
@@ -63,6 +84,9 @@ class Command:
     path: Path = Path()
     """The damaged file."""
 
+    run: Callable[[list[str]], int] | None = None
+    """Runs the words and returns an exit code; None for the command line."""
+
     check: Callable[[], str] = str
     """Called after a success: returns why the input should have been rejected, or nothing."""
 
@@ -71,38 +95,45 @@ def run_forked(folder: Path, prepare: Callable[[], Command]) -> Failure | None:
     """Run a command in a forked process; return what it did that it must not do.
 
     Args:
-        folder: A new folder for `work`, `tmp` and what the process printed.
+        folder: A new folder for `work`, `tmp`, `home` and what the process printed.
         prepare: Called in `work` by the forked process: returns the command.
     """
-    for name in ("work", "tmp"):
+    for name in _FOLDERS:
         (folder / name).mkdir(parents=True)
-    end = time.monotonic() + 6 * SECONDS
+    adopt_orphans()
+    known = children(os.getpid())
     if not (child := os.fork()):
         _run_and_exit(folder, prepare)
-    pid, status, usage = os.wait4(child, os.WNOHANG)
-    while not pid and time.monotonic() < end:
-        time.sleep(0.002)
-        pid, status, usage = os.wait4(child, os.WNOHANG)
+    if not (ended := wait(child, _WALL_CLOCK * SECONDS)):
+        waits = " ".join(children(child).values()) or "no child process"
+        (folder / "waits").write_text(f"waits for {waits}")
+        os.kill(child, signal.SIGXCPU)
+        ended = wait(child, 3) or kill(child)
+    orphans = kill_orphans(known)
     with suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
-    if not pid:
-        _, status, usage = os.wait4(child, 0)
+    status, usage = ended
     kibibytes = usage.ru_maxrss - int((folder / "memory").read_text())
     found = _failures(folder, os.waitstatus_to_exitcode(status), kibibytes / 2**20)
+    found = chain(found, (("processes", line) for line in orphans))
     return next((Failure(kind, line) for kind, line in found if line), None)
 
 
 def _failures(folder: Path, code: int, gigabytes: float) -> Iterator[tuple[str, str]]:
     """Yield kinds of failures, and lines that are empty if there is none."""
-    lines = (folder / "stderr").read_text(errors="replace").splitlines() or [""]
+    lines = _read(folder / "stderr").splitlines() or [""]
     last, errors = lines[-1], sum(line.startswith("terrainkit: error: ") for line in lines)
+    waits = (folder / "waits").read_text() if (folder / "waits").exists() else "it computes"
+    printed = [*lines, *_read(folder / "stdout").split("\n")]
     for line in (folder / "audit").read_text(errors="replace").splitlines():
         yield line.partition(" ")[0], line
-    yield "hang", f"ended by {-code}" * (code in (-signal.SIGXCPU, -signal.SIGKILL))
+    yield "hang", f"deaf to signals; {waits}" * (code in (-signal.SIGXCPU, -signal.SIGKILL))
+    yield "hang", f"in Python code; {waits}" * (code == _HEARS_SIGNALS)
     is_large = gigabytes > MEMORY / 2**30 or _TOO_LARGE.search(last)
     yield "memory", f"{gigabytes:.1f} GB; {last}" * bool(is_large)
     yield "traceback", f"exit code {code}: {last}" * (code not in (0, 1, 2))
     yield from (("output", line) for line in lines if not _OUR_LINE.match(line))
+    yield from (("output", repr(line)) for line in printed if _CONTROL.search(line))
     yield (
         "output",
         f"exit code {code}, {errors} errors" * (errors not in _NUM_ERRORS.get(code, (1,))),
@@ -111,6 +142,11 @@ def _failures(folder: Path, code: int, gigabytes: float) -> Iterator[tuple[str, 
     for line in set(_listing(folder)).difference(before):
         is_output = code != 2 and line.startswith("'work/out")
         yield "files", f"exit code {code}: changed {line}" * (not is_output)
+
+
+def _read(path: Path) -> str:
+    with path.open("rb") as file:
+        return file.read(_MAX_OUTPUT).decode(errors="replace")
 
 
 def _run_and_exit(folder: Path, prepare: Callable[[], Command]) -> NoReturn:
@@ -141,23 +177,25 @@ def _run(folder: Path, prepare: Callable[[], Command]) -> int:
     log = {"words": command.words, "path": str(command.path)}
     (folder / "command").write_text(json.dumps(log))
     (folder / "before").write_text("\n".join(_listing(folder)))
+    os.environ["HOME"] = str(folder / "home")
+    signal.signal(signal.SIGXCPU, lambda *_: os._exit(_HEARS_SIGNALS))
     address_space = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
     resource.setrlimit(resource.RLIMIT_AS, (address_space + _ADDRESS_SPACE,) * 2)
     sys.addaudithook(_audit_hook(folder, 99))
-    code = main(command.words)
+    code = (command.run or main)(command.words)
     reason = command.check() if code == 0 else ""
     os.write(99, f"accepted {reason}\n".encode() if reason else b"")
     return code
 
 
 def _listing(folder: Path) -> list[str]:
-    """Return a line with the name of each path in work and tmp, and the times of the files."""
-    paths = [path for name in ("work", "tmp") for path in (folder / name).rglob("*")]
+    """Return a line with the name of each path in the folders, and the times of the files."""
+    paths = [path for name in _FOLDERS for path in (folder / name).rglob("*")]
     return [
         f"{str(path.relative_to(folder))!a} {path.is_dir() or path.lstat().st_mtime_ns}"
         for path in paths
-        if path.name != ".ses"  # of onnxruntime
+        if not _OF_LIBRARIES.search(str(path))
     ]
 
 

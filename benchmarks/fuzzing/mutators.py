@@ -85,7 +85,11 @@ def edit_state(data: bytes, rng: Random) -> bytes:
     import torch
 
     tensors = torch.full((3,), math.nan), torch.zeros(()), torch.empty(1).expand(10**6, 10**6)
-    state, result = torch.load(io.BytesIO(data), weights_only=True), io.BytesIO()
+    result = io.BytesIO()
+    try:
+        state = torch.load(io.BytesIO(data), weights_only=True)
+    except RuntimeError:
+        return edit_code(data, rng)
     torch.save(edit_tree(state, rng, [*_VALUES, *tensors, torch.zeros(0, 4) * 1j]), result)
     return result.getvalue()
 
@@ -106,6 +110,26 @@ def edit_archive(data: bytes, rng: Random) -> bytes:
     with zipfile.ZipFile(result, "w", method, compresslevel=1) as file:
         for each in members:
             file.writestr(*each)
+    return result.getvalue()
+
+
+def edit_code(data: bytes, rng: Random) -> bytes:
+    """Write the code of a TorchScript archive, half of the times of an escape, in another way."""
+    from fuzzing.escapes.torchscript import ESCAPES
+
+    if rng.random() < 0.5:
+        data = rng.choice(list(ESCAPES.values())).archive("../home/written", 141, 12)
+    with zipfile.ZipFile(io.BytesIO(data)) as file:
+        members = {name: file.read(name) for name in file.namelist()}
+    name = rng.choice([each for each in members if each.lower().endswith(".py")])
+    ends = [each.end() for each in re.finditer(rb"\w+|\.", members[name])]
+    for at in sorted(rng.choices(ends, k=rng.choice((1, 3, 30))), reverse=True):
+        spaces = rng.choice((b" ", b"\t", b"\\\n", b"  "))
+        members[name] = members[name][:at] + spaces + members[name][at:]
+    result = io.BytesIO()
+    with zipfile.ZipFile(result, "w") as file:
+        for member in members.items():
+            file.writestr(*member)
     return result.getvalue()
 
 

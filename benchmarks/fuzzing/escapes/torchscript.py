@@ -1,8 +1,7 @@
 """TorchScript policies that do more than compute actions; torchscript.toml lists them.
 
-Each one is a policy from 8 observations to 3 actions, so that only a check of its code, or the
-limits of a sandbox, can refuse it. benchmarks/verify_escapes.py shows that each has its effect in
-plain torch.
+Each one is a policy of any robot, so that only a check of its code, or the limits of a sandbox, can
+refuse it. benchmarks/verify_escapes.py shows that each has its effect in plain torch.
 """
 
 import importlib.util
@@ -33,7 +32,7 @@ _CODE = "code/__torch__.py"
 class Escape:
     """A TorchScript archive that does more than compute actions.
 
-    `PATH` in its text is the file that it writes.
+    In its text, `PATH` is the file that it writes, and `NUM_OBS` and `NUM_ACTIONS` are its sizes.
     """
 
     effect: str
@@ -63,11 +62,18 @@ class Escape:
     was_refused: bool = False
     """Whether a search of the text for calls refused it, which was the check before this list."""
 
-    def archive(self, path: Path | str) -> bytes:
-        """Return the TorchScript archive that writes to `path`, if it writes."""
+    def archive(self, path: Path | str, num_obs: int = 8, num_actions: int = 3) -> bytes:
+        """Return the archive.
+
+        Args:
+            path: What it writes, if it writes.
+            num_obs: Number of observations of its policy.
+            num_actions: Number of actions.
+        """
+        values = {"PATH": str(path), "NUM_OBS": str(num_obs), "NUM_ACTIONS": str(num_actions)}
         if self.module:
-            return _pack(_compiled(self.module.replace("PATH", str(path))))
-        files = dict(_harmless())
+            return _pack(_compiled(_replace(self.module, values)))
+        files = dict(_harmless(num_obs, num_actions))
         end = "    weight = self.weight\n"
         head, tail = files[_CODE].decode().split(end)
         inserted = "".join(f"    {line}\n" for line in self.body.splitlines())
@@ -75,9 +81,8 @@ class Escape:
         code = self.before + head + inserted + end + tail + methods
         if self.file != _CODE:
             files["code/harmless.py"] = files.pop(_CODE)
-        for word, part, times in self.repeat:
-            code = code.replace(word, part * times)
-        files[self.file] = code.replace("PATH", str(path)).encode()
+        values |= {word: part * times for word, part, times in self.repeat}
+        files[self.file] = _replace(code, values).encode()
         for old, new in self.replace:
             for name, data in files.items():
                 if name == self.file or name.endswith(".pkl"):
@@ -91,12 +96,12 @@ def load_escapes() -> dict[str, Escape]:
 
 
 class Policy(torch.nn.Module):
-    """A harmless policy, from 8 observations to 3 actions."""
+    """A harmless policy."""
 
-    def __init__(self) -> None:
+    def __init__(self, num_obs: int, num_actions: int) -> None:
         super().__init__()
-        self.weight = torch.nn.Parameter(torch.full((3, 8), 0.1))
-        self.bias = torch.nn.Parameter(torch.zeros(3))
+        self.weight = torch.nn.Parameter(torch.full((num_actions, num_obs), 0.1))
+        self.bias = torch.nn.Parameter(torch.zeros(num_actions))
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return the actions."""
@@ -107,8 +112,8 @@ Policy.__module__ = "__main__"  # torch calls it __torch__.Policy
 
 
 @cache
-def _harmless() -> dict[str, bytes]:
-    return _saved(Policy())
+def _harmless(num_obs: int, num_actions: int) -> dict[str, bytes]:
+    return _saved(Policy(num_obs, num_actions))
 
 
 @cache
@@ -134,6 +139,12 @@ def _saved(policy: torch.nn.Module) -> dict[str, bytes]:
     with zipfile.ZipFile(data) as archive:
         names = [name for name in archive.namelist() if not name.endswith(".debug_pkl")]
         return {name.partition("/")[2]: archive.read(name) for name in names}
+
+
+def _replace(text: str, values: dict[str, str]) -> str:
+    for word, value in values.items():
+        text = text.replace(word, value)
+    return text
 
 
 def _pack(files: dict[str, bytes]) -> bytes:
