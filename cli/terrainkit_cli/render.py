@@ -174,6 +174,11 @@ class Steps:
         if self._status is not None:
             self._status.update(step)
 
+    def stop(self) -> None:
+        """Show no step any more."""
+        if self._status is not None:
+            self._status.stop()
+
     def bar(self, items: Iterable[_T], total: int, *, of: str) -> Iterator[_T]:
         """Yield `items`, with a progress bar in place of the step."""
         if self._status is None:

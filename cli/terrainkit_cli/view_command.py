@@ -38,7 +38,7 @@ from terrainkit_cli.training_extra import require_training
 if TYPE_CHECKING:
     import viser
 
-DEMO_POLICY = "quadruped_map"
+DEMO_POLICY = "quadruped_hard"
 """The bundled policy that the demo shows."""
 
 Kind = Literal["map", "robot", "run"]
@@ -65,28 +65,41 @@ class ViewerCommand(Command):
     port: Annotated[int, Meta(ge=1, le=65535)] = 8080
     """Port that the server listens on; the next free one if it is in use."""
 
-    def serve(self, show: "Show", title: str, *, browser: bool = False) -> int:
+    def serve(
+        self, show: "Show", title: str, *, ground: "Show | None" = None, browser: bool = False
+    ) -> int:
         """Serve a scene until the command is interrupted.
 
         Args:
             show: The function that fills the scene.
             title: What the scene shows, for the message with the address.
+            ground: A function that fills a part of the scene which pages show at once.
             browser: Whether to open the page.
         """
-        from terrainkit.views.viewer_server import viewer_server
+        with render.steps() as steps:
+            steps.update("starting the viewer")
+            from terrainkit.views.viewer_server import viewer_server
 
-        with viewer_server(self.host, self.port) as server:
-            with render.steps() as steps:
+            with viewer_server(self.host, self.port) as server:
+                if ground is not None:
+                    steps.update("building the ground")
+                    ground(server)
+                    self._announce(server, title, browser=browser)
                 steps.update(f"loading {title}")
-                run = getattr(show(server), "run", wait)
-            host = f"[{self.host}]" if ":" in self.host else self.host
-            address = f"http://{host}:{server.get_port()}"
-            with suppress(KeyboardInterrupt, Terminated):
-                render.result(f"{address} shows {title}; Ctrl+C ends it")
-                if browser:
-                    open_page(address)
-                run()
+                with suppress(KeyboardInterrupt, Terminated):
+                    run = getattr(show(server), "run", wait)
+                    steps.stop()
+                    if ground is None:
+                        self._announce(server, title, browser=browser)
+                    run()
         return 0
+
+    def _announce(self, server: "viser.ViserServer", title: str, *, browser: bool) -> None:
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        address = f"http://{host}:{server.get_port()}"
+        render.result(f"{address} shows {title}; Ctrl+C ends it")
+        if browser:
+            open_page(address)
 
     def check_address(self) -> None:
         """Check that the server can listen on the host: viser would wait forever.
@@ -107,10 +120,10 @@ class ViewerCommand(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(ViewerCommand):
-    """Walk the bundled quadruped over a map, live in the browser.
+    """Walk the bundled quadruped over stairs, gaps and slopes, live in the browser.
 
-    The policy walks in MuJoCo over the map that it was trained on. Sliders set its commands, the
-    level and the terrain. Without a display, the command prints the address only.
+    The policy walks in MuJoCo along a course that becomes harder. Sliders set its commands and its
+    level. Without a display, the command prints the address only.
     """
 
     browser: bool = True
@@ -120,7 +133,26 @@ class Demo(ViewerCommand):
         """Serve the view of the policy until the command is interrupted."""
         require_training("viser", "websockets", extra="demo")
         self.check_address()
-        return self.serve(open_policy(DEMO_POLICY), "the walking quadruped", browser=self.browser)
+        scene = _DemoScene()
+        title = "the walking quadruped"
+        return self.serve(scene.show_robot, title, ground=scene.show_ground, browser=self.browser)
+
+
+class _DemoScene:
+    """The scene of the demo. The ground comes first, since torch takes seconds to import."""
+
+    def show_ground(self, server: "viser.ViserServer") -> None:
+        from terrainkit_robots.rl.terrain import load_terrain
+        from terrainkit_robots.viewer.ground_scene import DEMO_MAP, show_ground
+
+        self.terrain = str(DEMO_MAP)
+        self.ground = show_ground(server, load_terrain(self.terrain))
+
+    def show_robot(self, server: "viser.ViserServer") -> object:
+        from terrainkit_robots.rl.run import open_run
+        from terrainkit_robots.viewer.show_policy import PolicyView
+
+        return PolicyView(server, open_run(DEMO_POLICY), self.terrain, self.ground)
 
 
 @dataclass(frozen=True, kw_only=True)

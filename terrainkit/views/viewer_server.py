@@ -96,6 +96,9 @@ def viewer_server(host: str, port: int) -> Iterator[viser.ViserServer]:
             raise RuntimeError(f"viser {viser.__version__} does not call websockets' serve")
         handles = server.gui._gui_input_handle_from_uuid
         server.gui.configure_theme(show_share_button=False)
+        # Without a GPU, a browser takes 15 s for the light of viser's environment map.
+        server.scene.configure_environment_map(None)
+        server.scene.add_light_ambient("/ambient_light", intensity=1.5)
         with warnings.catch_warnings():  # a browser can leave at any time
             warnings.filterwarnings("ignore", "Queued a .* on a closed connection")
             yield server

@@ -95,6 +95,17 @@ def test_demo_opens_the_page_only_on_a_display(terrainkit, opened, monkeypatch):
     assert [run.stdout.partition(" shows ")[0]] == opened
 
 
+@pytest.mark.usefixtures("opened")
+def test_demo_serves_the_ground_before_it_loads_the_policy(terrainkit, monkeypatch):
+    def fail(*_, **__):
+        raise ConfigError("no policy")
+
+    monkeypatch.setattr("terrainkit_robots.rl.run.open_run", fail)
+    run = terrainkit("demo")
+    assert run.returncode == 2
+    assert re.match(r"http://localhost:\d+ shows the walking quadruped", run.stdout)
+
+
 def test_demo_without_its_packages_names_the_extra(rejected, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     assert rejected("demo").startswith("missing packages: viser; run: pip install '.[demo]'")

@@ -1,11 +1,11 @@
 """Show a policy that walks live in MuJoCo, with sliders for its commands, in the browser."""
 
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from terrainkit.views.viewer import FIELD_OF_VIEW, show_map
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.policy.evaluate import EvaluationConfig
@@ -13,7 +13,8 @@ from terrainkit_robots.policy.load import load_policy, single_torch_thread
 from terrainkit_robots.policy.play import demo_commands, make_play_env
 from terrainkit_robots.policy.rollout import rollout
 from terrainkit_robots.rl.run import PolicySpec
-from terrainkit_robots.rl.terrain import MapGround
+from terrainkit_robots.transforms import FloatArray, quat_to_yaw, wrap_to_pi
+from terrainkit_robots.viewer.ground_scene import look_at, show_ground
 from terrainkit_robots.viewer.robot_scene import RobotScene
 
 if TYPE_CHECKING:
@@ -27,15 +28,19 @@ _FRAME_TIME = 0.04
 
 _POINT_COLOR = (255, 200, 0)
 
-_CAMERA_OFFSET = np.array([-1.5, -2.5, 1.5])
-"""Position of the camera relative to the robot [m]."""
+_EDGE = 0.5
+"""Distance from the edge of the map at which the robot is reset [m]."""
 
 
 class PolicyView:
     """A robot that a policy walks on the terrain of its training, in the scene of a server."""
 
     def __init__(
-        self, server: "viser.ViserServer", run: PolicySpec, terrain: str | None = None
+        self,
+        server: "viser.ViserServer",
+        run: PolicySpec,
+        terrain: str | None = None,
+        ground: "viser.SceneNodeHandle | None" = None,
     ) -> None:
         """Load the policy, and add the terrain, the robot and the controls.
 
@@ -43,6 +48,7 @@ class PolicyView:
             server: The server.
             run: The policy, such as a run.
             terrain: Terrain as `load_terrain` takes it; None for the terrain of the training.
+            ground: Node of this terrain, if `show_ground` has added it to the scene.
 
         Raises:
             ConfigError: If the run has no policy, or one of another robot; if the terrain cannot be
@@ -51,17 +57,12 @@ class PolicyView:
         config = EvaluationConfig(
             seconds=_MAX_SECONDS, terrain=terrain, num_envs=1, command=(0.0, 0.0, 0.0)
         )
+        start = replace(run.task.init_state, yaw=0.0)  # along x, where the levels rise
+        run = replace(run, task=replace(run.task, init_state=start))
         self.env, _ = make_play_env(run, config)
         self._policy = load_policy(run, self.env)
         self._server = server
-        ground = self.env.terrain
-        if isinstance(ground, MapGround):
-            self.ground: viser.SceneNodeHandle = show_map(server, ground.terrain_map)
-        else:
-            server.scene.set_up_direction("+z")
-            self.ground = server.scene.add_grid(
-                "/map", infinite_grid=True, cell_size=0.5, section_size=5.0
-            )
+        self.ground = ground or show_ground(server, self.env.terrain)
         self.robot = RobotScene(server, Facts(load_robot(run.robot.mjcf)))
         model = self.env.scene.model
         self._addresses = {
@@ -71,11 +72,10 @@ class PolicyView:
         self._points = server.scene.add_point_cloud(
             "/height_points", np.zeros((1, 3)), _POINT_COLOR, point_size=0.02, visible=False
         )
+        self._reset()
         self._anchor = self.env.sim.qpos[0, :3].copy()  # of the robot in the scene, if followed
         self.update_robot()
-        server.initial_camera.fov = FIELD_OF_VIEW
-        server.initial_camera.look_at = self.robot.base.position
-        server.initial_camera.position = self.robot.base.position + _CAMERA_OFFSET
+        look_at(server, self.robot.base.position)
 
     def _add_controls(self, gui: Any) -> None:
         commands, terrain = self.env.cfg.commands, self.env.terrain
@@ -135,19 +135,38 @@ class PolicyView:
     def step(self) -> None:
         """Simulate one control step, unless the view is paused; reset first if requested."""
         env = self.env
-        if self._reset_requested:
-            self._reset_requested = False
-            column = self.column.value.partition(":")[0]
-            env.curriculum.levels[:] = min(self.level.value, len(env.terrain.terrain_names) - 1)
-            env.curriculum.columns[:] = int(column)
-            env.reset()
-            self.falls.value = "0"
+        position = env.sim.qpos[0, :2]
+        lower, upper = np.add(env.terrain.lower, _EDGE), np.subtract(env.terrain.upper, _EDGE)
+        if self._reset_requested or (position < lower).any() or (position > upper).any():
+            self._reset()
         if self.paused.value:
             return
         command = np.array([[slider.value for slider in self.commands]], np.float32)
-        for _, fell in rollout(env, self._policy, [command]):
+        for _, fell in rollout(env, self._policy, [self._with_heading(command)]):
             if fell.any():
                 self.falls.value = str(int(self.falls.value) + 1)
+                self._heading = self._yaw()
+
+    def _reset(self) -> None:
+        """Reset the robot to the selected patch."""
+        env, self._reset_requested = self.env, False
+        env.curriculum.levels[:] = min(self.level.value, len(env.terrain.terrain_names) - 1)
+        env.curriculum.columns[:] = int(self.column.value.partition(":")[0])
+        env.reset()
+        self.falls.value = "0"
+        self._heading = self._yaw()
+
+    def _yaw(self) -> float:
+        return float(quat_to_yaw(self.env.sim.qpos[0, 3:7]))
+
+    def _with_heading(self, command: FloatArray) -> FloatArray:
+        """Return a command that keeps the heading on a map, unless it turns."""
+        if command[0, 2] or self.env.terrain.is_plane:
+            self._heading = self._yaw()
+        else:
+            error = wrap_to_pi(np.array(self._heading - self._yaw()))
+            command[0, 2] = self.env.cfg.commands.heading_stiffness * error
+        return command
 
     def update_robot(self) -> None:
         """Send the pose of the robot to the browser.

@@ -7,6 +7,8 @@ import pytest
 
 from terrainkit_robots.policy.play import demo_commands
 from terrainkit_robots.rl.run import open_run
+from terrainkit_robots.transforms import quat_to_yaw
+from terrainkit_robots.viewer.ground_scene import DEMO_MAP
 from terrainkit_robots.viewer.show_policy import PolicyView
 from tests.viewer_client import CAMERA, connect_to, send, update, wait_for
 
@@ -157,3 +159,38 @@ def test_ground_moves_under_the_robot_only_while_it_is_followed(server, shown, v
         send(client, update(shown["follow the robot"], True))
         wait_for(lambda: view.follow.value)
         wait_for(lambda: np.allclose(walk(), CAMERA["look_at"]))
+
+
+@pytest.fixture
+def demo(server):
+    return PolicyView(server, open_run("quadruped_hard"), terrain=str(DEMO_MAP))
+
+
+def test_demo_crosses_the_first_level_along_x_without_a_fall(demo):
+    (start, *_), (end, *_) = demo.env.terrain.env_origins[:2, 0]
+    for _ in range(1000):  # 20 s
+        demo.step()
+    assert end > start + 9
+    assert demo.env.sim.qpos[0, 0] > end
+    assert demo.falls.value == "0"
+
+
+def test_robot_keeps_the_heading_that_the_user_turns_it_to(shown, demo):
+    shown["yaw [rad/s]"].value = 0.5
+    for _ in range(100):  # 2 s
+        demo.step()
+    heading = quat_to_yaw(demo.env.sim.qpos[0, 3:7])
+    assert 0.6 < heading < 1.4
+    shown["yaw [rad/s]"].value = 0.0
+    shown["forward [m/s]"].value = 0.4
+    for _ in range(50):  # 1 s
+        demo.step()
+    assert quat_to_yaw(demo.env.sim.qpos[0, 3:7]) == pytest.approx(heading, abs=0.15)
+
+
+def test_robot_is_reset_at_the_edge_of_the_map_and_has_not_fallen(demo):
+    demo.step()
+    demo.env.sim.qpos[0, 0] = demo.env.terrain.upper[0] - 0.4
+    demo.step()
+    assert demo.env.sim.qpos[0, 0] < 2.0
+    assert demo.falls.value == "0"
