@@ -37,7 +37,11 @@ def atomic_write(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
     try:
         # On the same file system as the target, so that moving is a rename.
         with _new_parents(path), temporary_folder(path.parent) as folder:
-            yield folder / name  # the suffix may select the format
+            try:
+                yield folder / name  # the suffix may select the format
+            except ExportError as error:  # of another file that the block writes
+                reason = str(error).replace(str(folder), str(path.parent))
+                raise ExportError(reason) from error
             if name != path.name:
                 (folder / name).rename(folder / path.name)
             written = sorted(folder.iterdir())

@@ -23,6 +23,9 @@ SCAN_X = tuple(round(-0.8 + 0.1 * k, 1) for k in range(17))
 SCAN_Y = tuple(round(-0.5 + 0.1 * k, 1) for k in range(11))
 """Points of a height scan to the left of the robot [m], as in legged_gym."""
 
+MAX_VALUE = 1e6
+"""Largest number that is given [m, rad]: float32 resolves 6 cm there."""
+
 _POINTS_AT_ONCE = 16_384
 """Points that are looked up at once, so that their arrays stay in the cache."""
 
@@ -55,16 +58,19 @@ def exact_surface(terrain_map: TerrainMap) -> HeightfieldSurface:
     )
 
 
-def to_floats(name: str, values: Any, shape: Sequence[int | None]) -> NDArray[Any]:
+def to_floats(
+    name: str, values: Any, shape: Sequence[int | None], largest: float = MAX_VALUE
+) -> NDArray[Any]:
     """Return finite numbers as an array.
 
     Args:
         name: What the values are, for the errors.
         values: An array, list or tensor of torch.
         shape: Expected shape; None for any size.
+        largest: Largest size of a value.
 
     Raises:
-        ConfigError: if the shape is wrong, or a value is not a finite number.
+        ConfigError: if the shape is wrong, or a value is not finite or above `largest`.
     """
     array = to_numpy(name, values)
     sizes = zip(array.shape, shape, strict=False)
@@ -73,8 +79,8 @@ def to_floats(name: str, values: Any, shape: Sequence[int | None]) -> NDArray[An
         raise ConfigError(f"{name}: got shape {array.shape}; expected ({expected})")
     if array.dtype.kind not in "fiu":
         raise ConfigError(f"{name}: got values of {array.dtype}; expected finite numbers")
-    if not np.isfinite(array).all():
-        raise ConfigError(f"{name}: got a value that is not finite; expected finite numbers")
+    if not (np.abs(array, dtype=np.float64) <= largest).all():  # NaN is not, either
+        raise ConfigError(f"{name}: got a value that is not finite, or above {largest:g}")
     return array
 
 

@@ -18,6 +18,9 @@ from terrainkit.perception.height_scan import to_floats, to_number
 _RAYS_AT_ONCE = 16_384
 """Rays that are cast at once, so that their arrays stay in the cache."""
 
+_MAX_LENGTH = 1e300
+"""Largest component of a direction, which may have any length."""
+
 _MAX_PIXELS = 100_000
 """Largest number of pixels in a row or column of an image, and of rays per channel of a lidar."""
 
@@ -55,7 +58,7 @@ class RayCaster:
             ConfigError: if a shape is wrong, a value is not finite, or a direction is 0.
         """
         starts = to_floats("origins", origins, [None, 3]).astype(np.float64)
-        given = to_floats("directions", directions, [len(starts), 3])
+        given = to_floats("directions", directions, [len(starts), 3], _MAX_LENGTH)
         return like(self._cast(starts, _units(given), max_distance), origins)
 
     def sense(self, position: Any, quat: Any, directions: Any, max_distance: float = 10.0) -> Any:
@@ -79,7 +82,9 @@ class RayCaster:
         starts = to_floats("position", position, [None, 3]).astype(np.float64)
         turns = rotation_matrices(_units(to_floats("quat", quat, [len(starts), 4])))
         shape = np.shape(directions)[:-1]
-        pattern = _units(to_floats("directions", directions, [*shape, 3]).reshape(-1, 3))
+        pattern = _units(
+            to_floats("directions", directions, [*shape, 3], _MAX_LENGTH).reshape(-1, 3)
+        )
         result = np.empty((len(starts), len(pattern)), np.float32)
         size = max(1, _RAYS_AT_ONCE // max(1, len(pattern)))
         for k in range(0, len(starts), size):

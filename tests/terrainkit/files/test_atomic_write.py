@@ -94,6 +94,19 @@ def test_atomic_write_replaces_file_and_sidecar_only_with_overwrite(target, exis
     assert contents(target.parent) == {"map.npz": "new", "map.json": "{}"}
 
 
+def test_atomic_write_error_of_a_sidecar_has_the_path_of_the_user(tmp_path):
+    """Such as a picture beside a report on a full disk."""
+    target = tmp_path / "report.json"
+
+    def write():
+        with atomic_write(target) as temporary, atomic_write(temporary.with_suffix(".png")):
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(ExportError) as caught:
+        write()
+    assert str(caught.value) == f"cannot write {tmp_path / 'report.png'}: No space left on device"
+
+
 def test_atomic_write_keeps_file_created_meanwhile(target):
     with pytest.raises(ExportError, match="exists"):
         write(target, then=lambda _: target.write_text("other"))

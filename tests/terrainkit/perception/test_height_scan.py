@@ -57,7 +57,10 @@ def test_tensors_give_tensors(step_map):
     [
         ([[0, 0]], [0], r"position: got shape \(1, 2\); expected \(n, 3\)"),
         ([[0, 0, 0]], [0, 0], r"yaw: got shape \(2,\); expected \(1\)"),
-        ([[0, 0, np.nan]], [0], "position: got a value that is not finite; expected finite"),
+        ([[1e300, 0, 0]], [0], r"position: got a value that is not finite, or above 1e\+06"),
+        ([[0, -1.1e6, 0]], [0], "position: got a value"),
+        ([[0, 0, 0]], [1e18], "yaw: got a value"),
+        ([[0, 0, np.nan]], [0], "position: got a value that is not finite"),
         ([["a", "b", "c"]], [0], "position: got values of <U1; expected finite numbers"),
     ],
 )
