@@ -7,7 +7,8 @@ map, `curriculum.png` (success and visits of the patches at the end of training)
 
 import hashlib
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.metadata import version
@@ -30,7 +31,7 @@ from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
-CURRICULUM_FILE = "curriculum.png"
+CURRICULUM_FILE, LOCK_FILE = "curriculum.png", ".lock"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,6 +122,29 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         files[MAP_FILE] = map_config.to_toml()
     write_run_folder(folder, {name: text.encode() for name, text in files.items()})
     return open_run(folder)
+
+
+@contextmanager
+def run_lock(folder: Path) -> Iterator[None]:
+    """Hold the lock of a run, so that no other process trains in its folder.
+
+    Raises:
+        ConfigError: If another process holds it.
+    """
+    from filelock import FileLock, Timeout
+
+    lock = FileLock(folder / LOCK_FILE)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        hint = "wait until it ends, or choose another folder"
+        raise ConfigError(f"{folder}: another process trains in this folder; {hint}") from None
+    except (NotImplementedError, OSError):  # some network file systems have no locks
+        pass
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def write_run_folder(folder: Path, files: Mapping[str, bytes]) -> None:

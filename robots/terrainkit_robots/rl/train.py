@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -49,7 +50,8 @@ def train(
         number of completed iterations, and the policy.
 
     Raises:
-        ConfigError: If the arguments do not fit together, or training diverges.
+        ConfigError: If the arguments do not fit together, training diverges, or another process
+            trains in the folder.
         MemoryLimitError: If the environments do not fit in memory.
         ExportError: If the folder exists, or the disk is full.
     """
@@ -81,7 +83,10 @@ def train(
     runner = LeggedRunner(
         env, device=device, progress_callback=progress_callback, should_stop=should_stop
     )
+    locks = ExitStack()
     try:
+        if continued and runner.is_main_process:  # before its last checkpoint is read
+            locks.enter_context(run.run_lock(continued.folder))
         _load(runner, resume, parts)
         completed, total = runner.current_learning_iteration, task.runner.max_iterations
         if completed >= total:
@@ -89,6 +94,8 @@ def train(
             raise ConfigError(f"runner.max_iterations: got {total}; {expected}")
         if runner.is_main_process:
             runner.folder = run.prepare_run_folder(folder, robot, terrain, task, continued)
+            if not continued:
+                locks.enter_context(run.run_lock(runner.folder))
             start_callback(runner)
         # Resets of a new run would otherwise all time out in the same step.
         runner.learn(total - completed, init_at_random_ep_len=not env.steps_since_reset.any())
@@ -99,6 +106,7 @@ def train(
             raise
         raise _name_last_checkpoint(error, runner.folder) from error
     finally:
+        locks.close()
         if torch.distributed.is_available() and torch.distributed.is_initialized():
             torch.distributed.destroy_process_group()
     return runner

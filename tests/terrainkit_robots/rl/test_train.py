@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import pytest
 import torch
+from filelock import FileLock, Timeout
 
 import terrainkit
 from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
@@ -104,6 +105,28 @@ def test_tensorboard_has_each_iteration_once_after_a_crash(task, tmp_path):
     tags = curves.Tags()["scalars"]
     assert {"Episode/rew_tracking_lin_vel", "Train/mean_reward", "Loss/value"} <= set(tags)
     assert [event.step for event in curves.Scalars("Loss/value")] == [1, 2, 3, 4]
+
+
+def test_one_process_trains_in_a_folder(task, tmp_path, run_after):
+    run = run_after(0, 1)
+    before = {path: path.read_bytes() for path in run.iterdir()}
+    longer = with_iterations(task, 5)
+    with FileLock(run / ".lock"), pytest.raises(ConfigError, match="another process trains in th"):
+        train("quadruped", "plane", longer, resume=open_run(run))
+    assert {path: path.read_bytes() for path in run.iterdir() if path.name != ".lock"} == {
+        path: data for path, data in before.items() if path.name != ".lock"
+    }
+    held = []
+
+    def is_locked(runner):
+        with pytest.raises(Timeout):
+            FileLock(runner.folder / ".lock").acquire(timeout=0)
+        held.append(runner.folder)
+
+    train("quadruped", "plane", longer, resume=open_run(run), start_callback=is_locked)
+    train("quadruped", "plane", longer, folder=tmp_path / "new", start_callback=is_locked)
+    assert held == [run, tmp_path / "new"]
+    FileLock(run / ".lock").acquire(timeout=0)  # a run that has ended holds none
 
 
 def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path, run_after):
