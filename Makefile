@@ -1,4 +1,4 @@
-.PHONY: test lowest pythons check format bench fuzz mutate docs wheel site browser integrations workflows
+.PHONY: test lowest pythons check format bench fuzz mutate docs demo-page wheel site browser integrations workflows
 
 test:          ## all tests
 	python -m pytest
@@ -27,6 +27,9 @@ mutate:        ## plant changes and print which of them the tests notice; ARGS="
 
 docs:          ## write the generated docs, and draw the pictures that are missing
 	python docs/build.py
+
+demo-page:     ## a recorded walk in .site/demo.html, which a browser opens from the file
+	python docs/demo_page.py .site/demo.html
 
 wheel:         ## the wheel that pip installs
 	python -m pip wheel --no-deps --wheel-dir dist .

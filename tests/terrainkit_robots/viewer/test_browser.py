@@ -1,9 +1,11 @@
 """The pages in a browser, which takes long without a GPU; `make browser` runs it."""
 
+import importlib.util
 import math
 import os
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -129,3 +131,18 @@ def other_server():
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield counts
         server.shutdown()
+
+
+def test_demo_page_shows_the_walk_from_a_file(tmp_path):
+    script = Path(__file__).parents[3] / "docs/demo_page.py"
+    spec = importlib.util.spec_from_file_location("demo_page", script)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    file = tmp_path / "demo.html"
+    file.write_text(module.demo_page(seconds=4.0))
+    assert file.stat().st_size < 5e6
+    with open_page(file.as_uri()) as page:
+        page.wait_for("document.querySelector('canvas') !== null")
+        shown = wait_for_picture(page)
+        wait_for_picture(page, other=shown)
+        assert page.errors == []
