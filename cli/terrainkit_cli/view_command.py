@@ -66,14 +66,14 @@ class ViewerCommand(Command):
     """Port that the server listens on; the next free one if it is in use."""
 
     def serve(
-        self, show: "Show", title: str, *, ground: "Show | None" = None, browser: bool = False
+        self, show: "Show", title: str, *, show_first: "Show | None" = None, browser: bool = False
     ) -> int:
         """Serve a scene until the command is interrupted.
 
         Args:
             show: The function that fills the scene.
             title: What the scene shows, for the message with the address.
-            ground: A function that fills a part of the scene which pages show at once.
+            show_first: A function that fills the part of the scene that pages show at once.
             browser: Whether to open the page.
         """
         with render.steps() as steps:
@@ -81,15 +81,15 @@ class ViewerCommand(Command):
             from terrainkit.views.viewer_server import viewer_server
 
             with viewer_server(self.host, self.port) as server:
-                if ground is not None:
+                if show_first is not None:
                     steps.update("building the ground")
-                    ground(server)
+                    show_first(server)
                     self._announce(server, title, browser=browser)
                 steps.update(f"loading {title}")
                 with suppress(KeyboardInterrupt, Terminated):
                     run = getattr(show(server), "run", wait)
                     steps.stop()
-                    if ground is None:
+                    if show_first is None:
                         self._announce(server, title, browser=browser)
                     run()
         return 0
@@ -135,7 +135,9 @@ class Demo(ViewerCommand):
         self.check_address()
         scene = _DemoScene()
         title = "the walking quadruped"
-        return self.serve(scene.show_robot, title, ground=scene.show_ground, browser=self.browser)
+        return self.serve(
+            scene.show_robot, title, show_first=scene.show_ground, browser=self.browser
+        )
 
 
 class _DemoScene:

@@ -22,18 +22,18 @@ _ROBOT_HEIGHT = 0.3
 """Height above the ground that the camera looks at before there is a robot [m]."""
 
 
-def show_ground(server: "viser.ViserServer", ground: Ground) -> "viser.SceneNodeHandle":
+def show_ground(server: "viser.ViserServer", terrain: Ground) -> "viser.SceneNodeHandle":
     """Add the ground to the scene, seen from behind the place where the robot is spawned.
 
     Returns:
         The node that moves the ground.
     """
-    if isinstance(ground, MapGround):
-        node: viser.SceneNodeHandle = show_map(server, ground.terrain_map)
+    if isinstance(terrain, MapGround):
+        node: viser.SceneNodeHandle = show_map(server, terrain.terrain_map)
     else:
         server.scene.set_up_direction("+z")
         node = server.scene.add_grid("/map", infinite_grid=True, cell_size=0.5, section_size=5.0)
-    first_row = ground.env_origins[0]
+    first_row = terrain.env_origins[0]
     look_at(server, first_row[len(first_row) // 2] + [0.0, 0.0, _ROBOT_HEIGHT])
     return node
 

@@ -40,7 +40,7 @@ class PolicyView:
         server: "viser.ViserServer",
         run: PolicySpec,
         terrain: str | None = None,
-        ground: "viser.SceneNodeHandle | None" = None,
+        terrain_node: "viser.SceneNodeHandle | None" = None,
     ) -> None:
         """Load the policy, and add the terrain, the robot and the controls.
 
@@ -48,7 +48,7 @@ class PolicyView:
             server: The server.
             run: The policy, such as a run.
             terrain: Terrain as `load_terrain` takes it; None for the terrain of the training.
-            ground: Node of this terrain, if `show_ground` has added it to the scene.
+            terrain_node: Node of this terrain, if `show_ground` has added it to the scene.
 
         Raises:
             ConfigError: If the run has no policy, or one of another robot; if the terrain cannot be
@@ -62,7 +62,7 @@ class PolicyView:
         self.env, _ = make_play_env(run, config)
         self._policy = load_policy(run, self.env)
         self._server = server
-        self.ground = ground or show_ground(server, self.env.terrain)
+        self.ground = terrain_node or show_ground(server, self.env.terrain)
         self.robot = RobotScene(server, Facts(load_robot(run.robot.mjcf)))
         model = self.env.scene.model
         self._addresses = {
