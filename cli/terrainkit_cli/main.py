@@ -2,10 +2,12 @@
 
 import importlib
 import os
+import re
 import signal
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -47,6 +49,9 @@ COMMAND_GROUPS = {
 COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module in group.items()}
 COMMANDS["completion"] = "completion_command"
 
+_OUT_OF_MEMORY = re.compile("allocate memory|start new thread|failed to map segment")
+"""Errors of torch, of threads and of shared libraries under a small limit of the memory."""
+
 _BYTES_PER_JOB = 1 << 27
 """Memory of a process that has imported SciPy [bytes]."""
 
@@ -82,7 +87,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         render.error(str(error))
         return 2
     except MemoryError:
-        render.error("out of memory; use a smaller map or larger cells")
+        render.error("out of memory; use fewer environments, a smaller map or larger cells")
         return 2
     except BrokenPipeError:  # the reader is gone, as in `terrainkit list | head -1`
         render.drop_stdout()
@@ -148,7 +153,19 @@ def _run_command(name: str, argv: list[str]) -> int:
         if jobs > 1:
             check_memory(jobs * _BYTES_PER_JOB, f"--jobs {jobs}", ("--jobs", jobs))
         limit_allocations(jobs if jobs > 1 else 0)
-    return parsed.run()
+    with _memory_errors():
+        return parsed.run()
+
+
+@contextmanager
+def _memory_errors() -> Iterator[None]:
+    """Raise MemoryError for the errors of packages that run out of memory."""
+    try:
+        yield
+    except (RuntimeError, ImportError) as error:
+        if _OUT_OF_MEMORY.search(str(error)):
+            raise MemoryError from error
+        raise
 
 
 def _print_overview() -> None:

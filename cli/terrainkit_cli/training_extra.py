@@ -4,9 +4,13 @@ import importlib.util
 import os
 
 from terrainkit.errors import ConfigError, install_command
+from terrainkit.files.memory import check_address_space
 
 _PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "mujoco.batch")
 """Packages that training imports; MuJoCo has `batch` since version 3.17."""
+
+_ADDRESS_SPACE = 1_300_000_000
+"""Addresses that the packages need [bytes]; with fewer, some of them end the process."""
 
 
 def require_training(*packages: str, extra: str = "train") -> None:
@@ -18,9 +22,11 @@ def require_training(*packages: str, extra: str = "train") -> None:
 
     Raises:
         ConfigError: if a package is missing.
+        MemoryLimitError: if torch cannot be imported in the address space (`ulimit -v`).
     """
     missing = [name for name in (*_PACKAGES, *packages) if importlib.util.find_spec(name) is None]
     if missing:
         raise ConfigError(f"missing packages: {', '.join(missing)}; run: {install_command(extra)}")
+    check_address_space(_ADDRESS_SPACE, "importing torch and MuJoCo")
     # Busy-waiting threads of torch slow the physics down. torch reads this when it is imported.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

@@ -57,6 +57,27 @@ def check_memory(
         )
 
 
+def check_address_space(needed: int, what: str) -> None:
+    """Raise an error if the limit of the address space of this process is too small.
+
+    Args:
+        needed: Addresses that the work needs [bytes].
+        what: Name of the work in the error.
+
+    Raises:
+        MemoryLimitError: if `needed` exceeds the limit.
+    """
+    with suppress(ImportError):  # Windows
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        if 0 <= limit < needed:
+            got = f"the limit is {limit / 1e9:.2f} GB"
+            raise MemoryLimitError(
+                f"{what} needs an address space of {needed / 1e9:.2f} GB; {got} (ulimit -v)"
+            )
+
+
 def free_memory() -> int:
     """Return the memory that this process may still allocate [bytes]."""
     import psutil

@@ -2,7 +2,9 @@ import importlib.util
 import io
 import os
 import re
+import resource
 import signal
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
@@ -224,3 +226,26 @@ def test_train_requires_the_package_of_the_logger(train, tmp_path, capsys, monke
 def test_only_the_first_process_prints_the_result(capsys):
     train_command._print_result(SimpleNamespace(folder=None), None, None)
     assert capsys.readouterr().out == ""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the limits are of Linux")
+@pytest.mark.parametrize(
+    ("limit", "words", "message"),
+    [
+        (10**9, (), "needs an address space of 1.30 GB; the limit is 1.00 GB (ulimit -v)"),
+        (2 * 10**9, ("--num-envs", "4096"), "error: "),
+    ],
+)
+def test_train_in_a_small_address_space_is_one_line(tmp_path, limit, words, message):
+    command = [sys.executable, "-m", "terrainkit_cli.main", "train", "quadruped", *words]
+    done = subprocess.run(
+        [*command, "--max-iterations", "1", "--log-dir", str(tmp_path / "run")],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    errors = [line for line in done.stderr.splitlines() if "training quadruped" not in line]
+    assert done.returncode == 2, done.stderr
+    assert len(errors) == 1
+    assert message in errors[0]
