@@ -11,6 +11,7 @@ import resource
 import signal
 import sys
 import tempfile
+import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator
@@ -28,12 +29,11 @@ KINDS = tuple(_KINDS.split())
 not of terrainkit or controls the terminal, and accepted is a result that a check of the surface
 rejects, such as a file whose checksums are wrong."""
 
-SECONDS = 20
-"""Limit of the CPU time of each process [s]."""
+SECONDS = 35
+"""Limit of the CPU time of a command with its child processes, which may compute for 30 s [s]."""
 
-_WALL_CLOCK = 8
-"""Limit of the wall-clock time relative to that of the CPU time. Child processes of a command have
-limits of 120 s, which have to act first."""
+_WALL_CLOCK, _MAX_WAIT = 4, 3
+"""Limit of the wall-clock time, and time from which waiting is a failure, relative to SECONDS."""
 
 MEMORY = 2 << 30
 """Memory above an idle command's that counts as a failure [bytes]."""
@@ -104,18 +104,23 @@ def run_forked(folder: Path, prepare: Callable[[], Command]) -> Failure | None:
     known = children(os.getpid())
     if not (child := os.fork()):
         _run_and_exit(folder, prepare)
+    start = time.monotonic()
     if not (ended := wait(child, _WALL_CLOCK * SECONDS)):
         waits = " ".join(children(child).values()) or "no child process"
         (folder / "waits").write_text(f"waits for {waits}")
         os.kill(child, signal.SIGXCPU)
         ended = wait(child, 3) or kill(child)
+    wall_clock = time.monotonic() - start
     orphans = kill_orphans(known)
     with suppress(ProcessLookupError):
         os.killpg(child, signal.SIGKILL)
     status, usage = ended
     kibibytes = usage.ru_maxrss - int((folder / "memory").read_text())
-    found = _failures(folder, os.waitstatus_to_exitcode(status), kibibytes / 2**20)
-    found = chain(found, (("processes", line) for line in orphans))
+    found = chain(
+        _failures(folder, os.waitstatus_to_exitcode(status), kibibytes / 2**20),
+        _slow(wall_clock, usage.ru_utime + usage.ru_stime),
+        (("processes", line) for line in orphans),
+    )
     return next((Failure(kind, line) for kind, line in found if line), None)
 
 
@@ -142,6 +147,12 @@ def _failures(folder: Path, code: int, gigabytes: float) -> Iterator[tuple[str, 
     for line in set(_listing(folder)).difference(before):
         is_output = code != 2 and line.startswith("'work/out")
         yield "files", f"exit code {code}: changed {line}" * (not is_output)
+
+
+def _slow(wall_clock: float, cpu: float) -> Iterator[tuple[str, str]]:
+    """Yield whether a command ended only by the limits of its child processes."""
+    is_slow = cpu > SECONDS or wall_clock > _MAX_WAIT * SECONDS
+    yield "hang", f"ends after {wall_clock:.0f} s, of which it computes {cpu:.0f} s" * is_slow
 
 
 def _read(path: Path) -> str:

@@ -62,10 +62,10 @@ class Surface:
     """Commands that read a damaged file, by pattern of its name; `{}` is the file."""
 
     hostile: list[dict[str, Any]] = field(default_factory=list)
-    """Inputs that are always tried: `file`, `text`, and `repeat`, which follows `times` times. With
-    `find`, the text replaces the first such part of the file. The text of an ONNX file is in the
-    syntax of `onnx.parser`; what is found in it becomes bytes that are no text. `link` and `pipe`
-    make a link or a named pipe, `escape` a TorchScript escape; `beside` has further files."""
+    """Inputs that are always tried: `file`, `text`, `repeat`, which follows `times` times, and `end`.
+    With `find`, the text replaces the first such part of the file. The text of an ONNX file is in
+    the syntax of `onnx.parser`; what is found in it becomes bytes that are no text. `link` and
+    `pipe` make a link or a named pipe, `escape` a TorchScript escape; `beside` has more files."""
 
     has_plugins: bool = False
     """Whether the folder is a folder of Python packages."""
@@ -195,6 +195,7 @@ def _write_hostile(path: Path, entry: dict[str, Any]) -> None:
     with path.open("wb") as target:
         target.write(data)
         target.writelines(entry["repeat"].encode() for _ in range(entry.get("times", 0)))
+        target.write(entry.get("end", "").encode())
 
 
 def _mutate(path: Path, rng: Random) -> bool:
