@@ -62,7 +62,7 @@ class Surface:
     """Commands that read a damaged file, by pattern of its name; `{}` is the file."""
 
     hostile: list[dict[str, Any]] = field(default_factory=list)
-    """Inputs that are always tried: `file`, `text`, `repeat`, which follows `times` times, and `end`.
+    """Inputs that are always tried: `file`, `text`, `repeat`, which follows `times` times, `end`.
     With `find`, the text replaces the first such part of the file. The text of an ONNX file is in
     the syntax of `onnx.parser`; what is found in it becomes bytes that are no text. `link` and
     `pipe` make a link or a named pipe, `escape` a TorchScript escape; `beside` has more files."""

@@ -5,7 +5,6 @@ It imports neither torch nor mujoco, since a child process calls `run_model`.
 
 import json
 from collections.abc import Iterator, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,6 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, listing
 from terrainkit.files.sandbox import forbid_changes
-
-ARENA_SIZE = 1 << 30
-"""Memory that the intermediate results of all models of a process may need [bytes]."""
 
 _FLOATS = ("tensor(float)", "tensor(double)", "tensor(float16)")
 
@@ -77,11 +73,9 @@ def make_state(sizes: Sequence[Sequence[int]], count: int) -> list[NDArray[np.fl
 
 
 def make_session(model: bytes) -> onnxruntime.InferenceSession:
-    """Return a session on the CPU, with one thread and limited memory."""
-    _register_arena()
+    """Return a session on the CPU, with one thread."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads, options.log_severity_level = 1, 4
-    options.add_session_config_entry("session.use_env_allocators", "1")
     return onnxruntime.InferenceSession(model, options, providers=["CPUExecutionProvider"])
 
 
@@ -101,7 +95,7 @@ def call_model(
         Actions, shape (n, a), and the parts of the state.
 
     Raises:
-        ConfigError: If the model fails, or needs too much memory.
+        ConfigError: If the model fails.
     """
     names = [each.name for each in session.get_inputs()]
     outputs = [each.name for each in session.get_outputs()[: len(names)]]
@@ -115,9 +109,7 @@ def call_model(
         actions, *new = zip(*results, strict=True)
         return [np.concatenate(actions), *(np.concatenate(part, axis=1) for part in new)]
     except Exception as error:  # errors of onnxruntime have no common class
-        reason = f"fails: {error}"
-        if "BFCArena" in reason:
-            reason = f"needs more than {ARENA_SIZE / 2**30:g} GB of memory"
+        reason = "needs too much memory" if "bfc_arena" in str(error) else f"fails: {error}"
         raise ConfigError(reason) from error
 
 
@@ -140,12 +132,3 @@ def _input_sizes(session: onnxruntime.InferenceSession) -> tuple[int, list[tuple
 
 def _is_batch(size: Any) -> bool:
     return size == 1 or not isinstance(size, int)
-
-
-@cache
-def _register_arena() -> None:
-    cpu = onnxruntime.OrtMemoryInfo(
-        "Cpu", onnxruntime.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, onnxruntime.OrtMemType.DEFAULT
-    )
-    limit = onnxruntime.OrtArenaCfg({"max_mem": ARENA_SIZE})
-    onnxruntime.create_and_register_allocator(cpu, limit)
