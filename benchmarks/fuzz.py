@@ -65,8 +65,8 @@ class Fuzzer:
             self.seeds = folder / f"seed_{k}" / "work"
 
     def run(self, seconds: float, inputs: int) -> None:
-        """Read inputs for some time, and at least a number of them and the ones that are listed."""
-        inputs = max(inputs, num_listed(self.surface))
+        """Read a number of inputs, or for some time, but all that are listed."""
+        inputs = inputs or num_listed(self.surface)
         end, number = time.monotonic() + seconds, os.cpu_count() or 1
         with ProcessPoolExecutor(number, get_context("fork")) as pool:
             while (missing := inputs - self.num_tried) > 0 or time.monotonic() < end:

@@ -209,13 +209,13 @@ def test_kept_input_is_read_first(tmp_path, monkeypatch, surfaces):
 
 
 def test_pipes_and_links_are_made_beside_a_scene(tmp_path, monkeypatch, surfaces):
-    surface, made = _surface(surfaces, "imports"), {}
+    surface, made = _surface(surfaces, "scenes"), {}
     for index, entry in enumerate(surface.hostile):
         if not {"beside", "pipe"} & entry.keys():
             continue
         (tmp_path / str(index)).mkdir()
         monkeypatch.chdir(tmp_path / str(index))
-        surfaces.prepare(surface, surfaces.FILE.with_name("seeds") / "imports", 0, index)
+        surfaces.prepare(surface, surfaces.FILE.with_name("seeds") / "scenes", 0, index)
         made |= {path.name: path.is_fifo() for path in Path().iterdir() if not path.is_file()}
     pipes = dict.fromkeys(("pipe.stl", "pipe.png", "pipe.xml", "scene.xml"), True)
     assert made == pipes | {"zero.stl": False, "zero.xml": False}

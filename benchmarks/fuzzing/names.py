@@ -44,12 +44,15 @@ def _compare(line: str) -> str:
 
     if main(line.split()):
         return ""
+    expected: set[str] = set()
+    for path in Path("out_2").rglob("*.*"):
+        expected |= _code(path)
     for path in sorted(Path("out").rglob("*.*")):
         try:
-            parts = _code(path) - _code("out_2" / path.relative_to("out"))
-            added = [part for part in parts if _ROBOT not in part.lower()]
+            parts = _code(path)
         except Exception as error:  # of parsers
             return f"{path} cannot be parsed: {error!r:.200}"
+        added = [part for part in parts - expected if _ROBOT not in part.lower()]
         if added:
             return f"{path}: the name adds {added}"
     return ""

@@ -62,10 +62,11 @@ class Surface:
     """Commands that read a damaged file, by pattern of its name; `{}` is the file."""
 
     hostile: list[dict[str, Any]] = field(default_factory=list)
-    """Inputs that are always tried: `file`, `text`, `repeat`, which follows `times` times, `end`.
-    With `find`, the text replaces the first such part of the file. The text of an ONNX file is in
-    the syntax of `onnx.parser`; what is found in it becomes bytes that are no text. `link` and
-    `pipe` make a link or a named pipe, `escape` a TorchScript escape; `beside` has more files."""
+    """Inputs that are tried before random ones: `file`, `text`, `repeat`, which follows `times`
+    times, and `end`. With `find`, the text replaces the first such part of the file. The text of an
+    ONNX file is in the syntax of `onnx.parser`; what is found in it becomes bytes that are no text.
+    `link` and `pipe` make a link or a named pipe, `escape` a TorchScript escape; `beside` has more
+    files."""
 
     has_plugins: bool = False
     """Whether the folder is a folder of Python packages."""
@@ -89,7 +90,7 @@ def corpus(surface: Surface) -> list[Path]:
 
 
 def num_listed(surface: Surface) -> int:
-    """Return the number of inputs that are always tried, before random ones."""
+    """Return the number of inputs that are tried before random ones."""
     return len(corpus(surface)) + len(surface.hostile)
 
 
