@@ -8,8 +8,11 @@ import subprocess
 import sys
 import time
 import zipfile
+from fnmatch import fnmatch
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from random import Random
 from xml.etree import ElementTree
 
@@ -219,6 +222,29 @@ def test_pipes_and_links_are_made_beside_a_scene(tmp_path, monkeypatch, surfaces
         made |= {path.name: path.is_fifo() for path in Path().iterdir() if not path.is_file()}
     pipes = dict.fromkeys(("pipe.stl", "pipe.png", "pipe.xml", "scene.xml"), True)
     assert made == pipes | {"zero.stl": False, "zero.xml": False}
+
+
+def test_every_suffix_of_import_has_a_seed(surfaces):
+    from terrainkit import importing
+
+    tried = set()
+    for surface in (_surface(surfaces, "imports"), _surface(surfaces, "scenes")):
+        names = [path.name for path in (ROOT / "benchmarks/fuzzing/seeds" / surface.name).iterdir()]
+        names += [line.split()[-1] for line in surface.seeds]
+        names += [entry["file"] for entry in surface.files]
+        matched = [name for name in names if any(fnmatch(name, key) for key in surface.commands)]
+        tried |= {Path(name).suffix for name in matched}
+    modules = iter_modules(importing.__path__, f"{importing.__name__}.")
+    readers = [import_module(module.name) for module in modules]
+    suffixes = {suffix for reader in readers for suffix in getattr(reader, "SUFFIXES", ())}
+    same_reader = {".jpeg", ".dt1", ".dt2"}
+    assert suffixes - tried == same_reader
+
+
+def test_kept_inputs_are_small(surfaces):
+    kept = [path for path in surfaces.CORPUS.rglob("*") if path.is_file()]
+    assert kept
+    assert [path for path in kept if path.stat().st_size > 20_000] == []
 
 
 # Escapes of TorchScript.
