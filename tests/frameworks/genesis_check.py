@@ -1,27 +1,24 @@
 """Run the block of docs/integrations.md in Genesis on the CPU; `make integrations` runs it."""
 
 import os
-import re
 import sys
 import time
 from importlib.metadata import version
-from pathlib import Path
 
 import genesis as gs
 import numpy as np
 import torch
+from pages import page_block
 from parkour import CONFIG, RADIUS, ball_starts, rest_error
 
 import terrainkit
 from terrainkit.integrations.genesis import add_map
 
-page = (Path(__file__).parents[2] / "docs/integrations.md").read_text()
-(block,) = re.findall(r"```python\n(import genesis.*?)```", page, re.DOTALL)
 os.chdir(sys.argv[1])
 terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save("map.npz", overwrite=True)
 names: dict = {}
-exec(block, names)
+exec(page_block("integrations.md", "import genesis as gs"), names)
 
 ball, terrain = names["ball"], names["terrain"]
 positions = ball.get_pos().cpu().numpy().astype(float)

@@ -4,6 +4,7 @@ Needs the wheel of Isaac Lab without its dependencies; `make integrations` runs 
 """
 
 import importlib.util
+import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -27,10 +28,10 @@ import isaaclab.sim  # noqa: E402
 import isaaclab.terrains.terrain_importer  # noqa: E402
 from isaaclab.terrains import TerrainGenerator  # noqa: E402
 from isaaclab.terrains.config.rough import ROUGH_TERRAINS_CFG  # noqa: E402
+from pages import page_block  # noqa: E402
 from parkour import CONFIG  # noqa: E402
 
 import terrainkit  # noqa: E402
-from terrainkit.importing import import_terrain_mesh  # noqa: E402
 from terrainkit.integrations.isaaclab import terrain_importer_cfg  # noqa: E402
 from terrainkit.map.validate import validate  # noqa: E402
 
@@ -68,13 +69,9 @@ print(f"Isaac Lab {version('isaaclab')}: levels move, origins on the ground; sim
 # The reverse: a terrain of Isaac Lab's generator as a map.
 cfg = ROUGH_TERRAINS_CFG.replace(curriculum=True, num_rows=4, num_cols=6, border_width=2.0, seed=1)
 generator = TerrainGenerator(cfg)
-found = import_terrain_mesh(
-    generator.terrain_mesh.vertices,
-    generator.terrain_mesh.faces,
-    generator.terrain_origins,
-    patch_size=cfg.size,
-    border=cfg.border_width,
-).terrain_map
+os.chdir(sys.argv[1])
+exec(page_block("integrations.md", "generator.terrain_mesh"), {"generator": generator, "cfg": cfg})
+found = terrainkit.TerrainMap.load("isaaclab.npz")
 assert found.difficulty.shape == (4, 6)
 assert not (issues := validate(found)), issues
 lower, upper = (np.array(each) for each in (found.grid.lower, found.grid.upper))

@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import importlib
+import os
 import re
 import subprocess
 import sys
@@ -36,15 +37,17 @@ from isaaclab.sim import (
 from isaaclab.utils import configclass
 from isaaclab_newton.physics import MJWarpSolverCfg, NewtonCfg, NewtonCollisionPipelineCfg
 from isaaclab_tasks.core.velocity import mdp, velocity_env_cfg
+from pages import page_block
 from parkour import CONFIG, RADIUS, ball_starts, rest_error
 
 import terrainkit
 from terrainkit.geometry.box_decomposition import neighborhood
-from terrainkit.integrations.isaaclab import terrain_importer_cfg, use_terrain_curriculum
+from terrainkit.integrations.isaaclab import terrain_importer_cfg
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 
 folder = Path(sys.argv[1])
+os.chdir(folder)
 
 
 @configclass
@@ -142,7 +145,7 @@ def environment(terrain, use_mujoco_contacts=False, use_curriculum=False):
     """Make the environment on a terrain."""
     cfg = env_cfg(terrain, use_mujoco_contacts)
     if use_curriculum:
-        use_terrain_curriculum(cfg)
+        exec(page_block("integrations.md", "use_terrain_curriculum(env"), {"env_cfg": cfg})
     with launch_simulation(cfg=cfg, launcher_args=argparse.Namespace(device="cpu", headless=True)):
         env = ManagerBasedRLEnv(cfg)
         yield env
@@ -202,7 +205,11 @@ def make_map(*names, **options):
 
 # Isaac Lab's own terms on a heightfield.
 ground = make_map("stairs", "pit", "slope", "rough")
-terrain = terrain_importer_cfg(ground.save(folder / "map.npz"), max_init_terrain_level=1)
+ground.save("map.npz")
+cfg = env_cfg(None, use_mujoco_contacts=False)
+exec(page_block("integrations.md", "env_cfg.scene.terrain"), {"env_cfg": cfg})
+terrain = cfg.scene.terrain
+terrain.max_init_terrain_level = 1
 terrain.terrain_generator.num_rows = 5  # as in play mode
 center = np.array([*ground.grid.center, 0.0])
 with environment(terrain) as env:
@@ -256,6 +263,15 @@ for group in ("actions", "commands", "curriculum", "events", "observations", "re
 agent = config.__doc__.split("rsl_rl_cfg_entry_point")[1].split('"')[2]
 module, _, made = f"{config.velocity_env_cfg.__package__}{agent}".partition(":")
 assert hasattr(importlib.import_module(module), made)
+
+# A mesh file, as in isaaclab.md.
+ground.save("scan.stl")
+exec(page_block("isaaclab.md", "from terrainkit import import_map"), {"env_cfg": cfg})
+scan = terrainkit.TerrainMap.load("scan.npz")
+with environment(cfg.scene.terrain) as env:
+    found = np.asarray(env.scene.terrain.terrain_origins, float).reshape(3)
+    np.testing.assert_allclose(found, scan.env_origins[0, 0] - [*scan.grid.center, 0.0], atol=1e-4)
+print("a mesh file is the terrain")
 
 # Balls at rest on a heightfield and on a mesh, with both contact pipelines.
 starts = flat_starts(ground)

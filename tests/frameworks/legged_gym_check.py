@@ -6,6 +6,7 @@ rsl_rl 1.0.2 is the folder rsl_rl beside it.
 
 import ast
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from checkouts import FOLDER, compare, copy_checkout, export_map, run_command, terrainkit_command
+from pages import page_block
 
 HERE = Path(__file__).parent
 
@@ -44,3 +46,16 @@ subprocess.run([sys.executable, example], cwd=checkout, check=True)
 options = "--task=quad --headless --sim_device=cpu --rl_device=cpu --num_envs=8 --max_iterations=2"
 run_command(f"python {example} {options}", checkout, *modules)
 print(f"{example.name}: 2 iterations")
+
+# The steps of docs/integrations.md; the page has the checkout in the folder legged_gym.
+steps = page_block("integrations.md", "cp terrain.py terrain.npz")
+for step in steps.replace("legged_gym/", f"{checkout.name}/", 1).splitlines():
+    if step.startswith("terrainkit "):
+        terrainkit_command(*shlex.split(step, comments=True)[1:])
+    else:
+        subprocess.run(step, shell=True, cwd=FOLDER, check=True)
+with (envs / "__init__.py").open("a") as file:
+    file.write("\n" + page_block("integrations.md", "legged_robot.Terrain = "))
+train, _, _ = page_block("integrations.md", "train.py --task=a1").partition("  #")
+run_command(f"{train} {options.replace('--task=quad --headless', '')}", checkout, *modules)
+print("the steps of docs/integrations.md: 2 iterations of a1")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from checkouts import FOLDER, compare, copy_checkout, export_map, run_command, terrainkit_command
+from pages import page_block
 
 FOOT_RADIUS = 0.022
 """Radius of the feet of the bundled quadruped [m]."""
@@ -15,11 +16,13 @@ checkout = copy_checkout("LEGGEDGYM_EX")
 robot = ("quadruped", "--name", "quad", "--gains", "train", "--no-pictures")
 out = terrainkit_command("onboard", *robot, "--config", "leggedgym_ex")
 *steps, train = out.partition("train it in the folder of LeggedGym-Ex with:\n")[2].splitlines()
+page = page_block("onboarding.md", "SIMULATOR=genesis").replace("my_dog", "quad")
+assert all(step.strip().replace(f"{FOLDER}", "..") in page for step in (*steps, train))
 for step in (*steps, f"{train} --cpu --num_envs 8 --max_iterations 2"):
     run_command(step, checkout)
 print("trained with the printed commands")
 
-terrain_map = export_map(checkout / "legged_gym/envs/quad")
+terrain_map = export_map(checkout / "legged_gym/envs")
 script = Path(__file__).with_name("leggedgym_ex_map.py")
 run_command(f"python {script} quad {FOLDER / 'seen.npz'}", checkout, SIMULATOR="genesis")
 seen = np.load(FOLDER / "seen.npz")

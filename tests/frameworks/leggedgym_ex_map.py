@@ -1,21 +1,20 @@
 """Train a task of LeggedGym-Ex on a map, and save what its simulator sees: NAME OUTPUT.npz.
 
-It runs in the folder of LeggedGym-Ex, with terrain.py in the folder of the robot.
+It runs in the folder of LeggedGym-Ex, with terrain.py in its folder of environments.
 """
 
-import importlib
 import sys
 
 import genesis as gs
 import numpy as np
 import torch
 from legged_gym.envs import *  # noqa: F403  the tasks
-from legged_gym.simulator import genesis_simulator
 from legged_gym.utils import get_args, task_registry
+from pages import page_block
 
 name, output = sys.argv[1:]
 sys.argv[1:] = [f"--task={name}", "--headless", "--cpu", "--num_envs=8"]
-genesis_simulator.Terrain = importlib.import_module(f"legged_gym.envs.{name}.terrain").Terrain
+exec(page_block("integrations.md", "genesis_simulator.Terrain = "))
 cfg = task_registry.get_cfgs(name)[0]
 cfg.terrain.mesh_type, cfg.terrain.curriculum = "heightfield", True
 cfg.terrain.measure_heights, cfg.terrain.max_init_terrain_level = True, 1

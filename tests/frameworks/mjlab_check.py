@@ -1,6 +1,7 @@
 """Run a map with solids in mjlab's rough task. Needs mjlab; `make integrations` runs it."""
 
 import os
+import shlex
 import subprocess
 import sys
 import time
@@ -13,23 +14,28 @@ import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.sensor import RayCastSensor
-from mjlab.tasks.registry import load_env_cfg
 from mjlab.terrains import TerrainGenerator
 from mjlab.terrains.config import ROUGH_TERRAINS_CFG
+from pages import page_block
 from parkour import CONFIG
 
 import terrainkit
-from terrainkit.integrations.mjlab import import_terrain, terrain_entity_cfg
+from terrainkit.integrations.mjlab import import_terrain
 from terrainkit.integrations.mujoco import make_spec
 from terrainkit.map.validate import validate
+from terrainkit_robots.description import bundled
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 
-path = Path(sys.argv[1]) / "map.npz"
+folder = Path(sys.argv[1])
+os.chdir(folder)
 terrain_map = terrainkit.generate(CONFIG)
-terrain_map.save(path)
+terrain_map.save("map.npz")
 
-cfg = load_env_cfg("Mjlab-Velocity-Rough-Unitree-Go1")
+names: dict = {}
+exec(page_block("integrations.md", "terrain_entity_cfg"), names)
+cfg = names["cfg"]
 cfg.scene.num_envs, cfg.episode_length_s = 16, 0.4
-cfg.scene.terrain = terrain_entity_cfg(path, max_init_terrain_level=2)
+cfg.scene.terrain.max_init_terrain_level = 2
 cfg.events["reset_base"].params["pose_range"] = {}  # robots that stay at the origin move down
 env = ManagerBasedRlEnv(cfg, device="cpu")
 env.reset()
@@ -68,7 +74,6 @@ for name, sensor in env.scene.sensors.items():
 print(f"mjlab {version('mjlab')}: {off.sum()} of 200 rays off by more than 1 mm, next to walls")
 
 # The example of the documentation: as a program, and as a plug-in of mjlab's own `train`.
-folder = path.parent
 example = Path(__file__).parents[2] / "docs/examples/mjlab_terrain.py"
 plug_in = folder / "mjlab_terrain-0.1.0.dist-info"
 plug_in.mkdir()
@@ -87,6 +92,16 @@ for command, variables in (
     assert "Learning iteration 1/2" in train.stdout, train.stderr
     assert "terrain_progress" in train.stdout
 print(f"{example.name}: 2 iterations, as a program and as a plug-in")
+
+# The tasks of an onboarded robot, with the commands of the documentation.
+options = OnboardOptions(frameworks=("mjlab",), render_images=False)
+onboard(bundled.urdf_path("quadruped"), folder / "for_mjlab", options)
+for line in page_block("onboarding.md", "for_mjlab/mjlab_config.py").splitlines():
+    words = [*shlex.split(line)[1:], "--env.scene.num-envs", "4", "--agent.max-iterations", "2"]
+    words += ["--gpu-ids", "None", "--agent.logger", "tensorboard"]
+    train = subprocess.run([sys.executable, *words], capture_output=True, text=True)
+    assert "Learning iteration 1/2" in train.stdout, train.stderr
+    print(line)
 
 
 def mjlab_terrain(cfg):
@@ -118,6 +133,8 @@ assert ratio <= 1.0, times
 print(f"make_spec: {times[0]:.3f} s, {ratio:.2f} of the time of mjlab's generator")
 
 # The reverse: a terrain of mjlab's generator as a map.
+exec(page_block("integrations.md", "import_terrain(ROUGH"), {})
+assert not (issues := validate(terrainkit.TerrainMap.load("mjlab.npz"))), issues
 cfg = replace(ROUGH_TERRAINS_CFG, seed=1, curriculum=True, num_rows=4, border_width=2.0)
 found = import_terrain(cfg).terrain_map
 assert found.patch_names[0].tolist() == list(cfg.sub_terrains)

@@ -6,6 +6,7 @@ import jax
 import mujoco
 import numpy as np
 from mujoco import mjx
+from pages import page_block
 from parkour import CONFIG, RADIUS, ball_starts, rest_error
 
 import terrainkit
@@ -18,10 +19,9 @@ ball = spec.worldbody.add_body()
 ball.add_freejoint()
 ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0, 0])
 add_map(spec, terrain_map)
-# MJX tests every pair of geoms in each step unless these limit them to the nearest.
-for name in ("max_geom_pairs", "max_contact_points"):
-    spec.add_numeric(name=name, data=[8])
-model = mjx.put_model(spec.compile())
+names = {"spec": spec}
+exec(page_block("integrations.md", "mjx.put_model"), names)
+model = names["mjx_model"]
 data = mjx.make_data(model)
 qpos = np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (16, 1))
 qpos[:, :3] = starts

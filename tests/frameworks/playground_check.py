@@ -6,7 +6,6 @@ robots do not collide with; here the meshes of mjlab's wheel replace them.
 
 import importlib.util
 import os
-import re
 import shutil
 import sys
 import time
@@ -24,18 +23,17 @@ meshes = package("mujoco_playground") / "external_deps/mujoco_menagerie/unitree_
 if not meshes.exists():
     shutil.copytree(package("mjlab") / "asset_zoo/robots/unitree_go1/xmls/assets", meshes)
 
+from pages import page_block  # noqa: E402
 from parkour import CONFIG  # noqa: E402
 
 import terrainkit  # noqa: E402
 
-page = (Path(__file__).parents[2] / "docs/integrations.md").read_text()
-(block,) = re.findall(r"```python\n(import jax.*?)```", page, re.DOTALL)
 os.chdir(sys.argv[1])
 terrain_map = terrainkit.generate(CONFIG)
 terrain_map.save("map.npz", overwrite=True)
 names: dict = {}
 start = time.process_time()
-exec(block, names)
+exec(page_block("integrations.md", "import jax"), names)
 cpu = time.process_time() - start
 print(f"Playground {version('playground')}: compiled and ran 50 steps in {cpu:.0f} s of CPU time")
 

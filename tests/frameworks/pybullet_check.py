@@ -1,18 +1,24 @@
 """Drop balls on maps in PyBullet. Needs pybullet; `make integrations` runs it."""
 
+import os
+import sys
+
 import numpy as np
 import pybullet
+from pages import page_block
 from parkour import RADIUS, ball_starts, rest_error
 
 import terrainkit
-from terrainkit.integrations.pybullet import add_map
 
+os.chdir(sys.argv[1])
 for preset in ("legged_gym", "parkour"):
     config = terrainkit.MapConfig(rows=4, cols=10, patch_size=(8.0, 6.0), border=5.0, preset=preset)
     terrain_map = terrainkit.generate(config)
-    client = pybullet.connect(pybullet.DIRECT)
+    terrain_map.save("map.npz", overwrite=True)
+    names: dict = {}
+    exec(page_block("integrations.md", "import pybullet"), names)
+    client, body = names["client"], names["body"]
     pybullet.setGravity(0, 0, -9.81)
-    body = add_map(terrain_map, client=client)
     assert pybullet.getDynamicsInfo(body, -1)[1] == config.static_friction
     lower, upper = (np.array(each) for each in (terrain_map.grid.lower, terrain_map.grid.upper))
     xy = np.random.default_rng(0).uniform(lower + 0.3, upper - 0.3, (200, 2))

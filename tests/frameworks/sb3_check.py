@@ -1,5 +1,6 @@
 """Train with Stable-Baselines3 and record videos. `make integrations` runs it."""
 
+import os
 import re
 import subprocess
 import sys
@@ -9,10 +10,12 @@ from pathlib import Path
 
 import gymnasium
 import numpy as np
+from pages import page_block
 from stable_baselines3.common.env_checker import check_env
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecVideoRecorder
 
+import terrainkit
 from terrainkit_robots.integrations.gymnasium import TaskVectorEnv
 from terrainkit_robots.integrations.stable_baselines3 import Sb3VecEnvWrapper
 
@@ -44,6 +47,15 @@ for _ in range(8):
     vec_env.step(np.zeros((2, 12), np.float32))
 vec_env.close()
 assert len(list(folder.glob("*/*.mp4"))) == 2
+
+os.chdir(folder)
+terrain_map = terrainkit.generate(terrainkit.MapConfig(rows=4, cols=10, border=1.0))
+terrain_map.save("map.npz")
+names: dict = {}
+exec(page_block("integrations.md", "import PPO"), names)
+assert names["env"].env.env.terrain.terrain_map.grid == terrain_map.grid
+assert names["model"].num_timesteps == 64 * 24
+print("trained on a map")
 
 script = root / "docs/examples/stable_baselines3_ppo.py"
 command = [sys.executable, script, "--samples", "310000", "--save", folder / "quadruped.zip"]

@@ -1,14 +1,15 @@
 """Drop balls on a map in MuJoCo Warp and Newton on the CPU; `make integrations` runs it."""
 
+import os
 import sys
 from importlib.metadata import version
-from pathlib import Path
 
 import mujoco
 import mujoco_warp
 import newton
 import numpy as np
 import warp
+from pages import page_block
 from parkour import CONFIG, RADIUS, ball_starts, rest_error
 
 import terrainkit
@@ -23,9 +24,11 @@ ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[RADIUS, 0, 0])
 add_map(spec, terrain_map)
 model = spec.compile()
 with warp.ScopedDevice("cpu"):
-    warp_model = mujoco_warp.put_model(model)
+    names = {"model": model}
     # A ball can touch the ground and a solid; a foot on a heightfield has up to 50 contacts.
-    data = mujoco_warp.make_data(model, nworld=16, nconmax=64, njmax=256)
+    block = page_block("integrations.md", "import mujoco_warp")
+    exec(block.replace("nworld=4096", "nworld=16"), names)
+    warp_model, data = names["warp_model"], names["data"]
     positions = np.tile(np.float32([0, 0, 0, 1, 0, 0, 0]), (16, 1))
     positions[:, :3] = starts
     data.qpos.assign(positions)
@@ -35,10 +38,11 @@ with warp.ScopedDevice("cpu"):
 assert error < 5e-3, error
 print(f"MuJoCo Warp {version('mujoco-warp')}: all balls within {error * 1e3:.1f} mm")
 
-path = terrain_map.save(Path(sys.argv[1]) / "map.xml")
+os.chdir(sys.argv[1])
+terrain_map.save("map.xml")
 with warp.ScopedDevice("cpu"):
-    builder = newton.ModelBuilder()
-    builder.add_mjcf(str(path))
+    exec(page_block("integrations.md", "import newton"), names)
+    builder = names["builder"]
     for start in starts:
         body = builder.add_body(xform=warp.transform(start.tolist(), warp.quat_identity()))
         builder.add_shape_sphere(body, radius=RADIUS)

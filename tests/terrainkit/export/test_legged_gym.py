@@ -12,6 +12,7 @@ import pytest
 import terrainkit as tk
 from terrainkit.errors import ExportError
 from terrainkit.export.legged_gym import MODULE, heights_at_corners, x_edges
+from tests.frameworks.pages import page_block
 
 
 def make_cfg(mesh_type="trimesh", **values):
@@ -179,6 +180,17 @@ def test_add_trimesh_passes_flat_buffers(load):
         "dynamic_friction": 1.0,
         "restitution": 0.0,
     }
+
+
+@pytest.mark.usefixtures("gymapi")
+def test_block_of_the_page_adds_both_surfaces_to_isaac_gym(load, monkeypatch):
+    terrain_map = make_map("stairs")
+    monkeypatch.setitem(sys.modules, "terrain", load(terrain_map))
+    names = {"gym": MagicMock(), "sim": "sim"}
+    exec(page_block("integrations.md", "add_trimesh"), names)
+    names["gym"].add_triangle_mesh.assert_called_once()
+    names["gym"].add_heightfield.assert_called_once()
+    np.testing.assert_array_equal(names["origins"], terrain_map.env_origins)
 
 
 @pytest.mark.usefixtures("gymapi")
