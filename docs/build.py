@@ -1,12 +1,14 @@
-"""Build the generated docs: pages, llms.txt and pictures.
+"""Build the generated docs: pages, llms.txt, pictures and the outputs of the notebook.
 
 python docs/build.py              write the texts, and draw the pictures that are missing
 python docs/build.py NAME...      also draw these pictures again, such as `wave`
 python docs/build.py --pictures   also draw every picture again
+python docs/build.py --notebook   also run the notebook, and keep its outputs
 python docs/build.py --check      exit with 1 if a text is out of date or a picture is missing
 """
 
 import ast
+import base64
 import dataclasses
 import inspect
 import os
@@ -22,6 +24,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import cv2
+import nbclient
+import nbformat
 import numpy as np
 import yaml
 from gallery import render_map, render_patches
@@ -279,7 +283,8 @@ def config_page() -> str:
         "# Configuration files\n",
         NOTE,
         "The keys of each TOML file. An unknown key or an invalid value is an error that names it.",
-        'The string "none" stands for no value.\n',
+        'The string "none" stands for no value.',
+        "[Names of legged_gym](legged_gym_names.md) compares the settings of a training.\n",
     ]
     for title, config in CONFIGS.items():
         parts += [f"## {title}\n", f"{inspect.getdoc(config).splitlines()[0]}\n"]
@@ -327,7 +332,8 @@ def examples_page() -> str:
 
 EXAMPLES = """Each example is a program of at most 90 lines. It runs as it is, in any folder, and
 writes its files to that folder. In a clone: `python docs/examples/generate_map.py`.
-The tests run all examples.
+The tests run the eight that need only terrainkit as they are, and the tasks of `gait_commands` and
+`teacher_student`; `make integrations` runs those of frameworks, each in its framework.
 [terrainkit.ipynb](examples/terrainkit.ipynb) is a notebook, in which a map is shown as a picture.
 """
 
@@ -555,6 +561,27 @@ def draw_moving_walk() -> None:
     write_walk(PICTURES / "walk.webp")
 
 
+def write_notebook() -> None:
+    """Run the notebook, and keep its outputs; the pictures become small JPEGs."""
+    path = DOCS / "examples/terrainkit.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    info = notebook.metadata.language_info
+    with TemporaryDirectory() as folder:
+        nbclient.NotebookClient(notebook, kernel_name="python3").execute(cwd=folder)
+    notebook.metadata.language_info = info  # without the version of Python
+    for cell in notebook.cells:
+        cell.metadata.pop("execution", None)  # times
+        for output in cell.get("outputs", ()):
+            if picture := output.data.pop("image/png", None):
+                data = np.frombuffer(base64.b64decode(picture), np.uint8)
+                image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+                size = (640, round(640 / image.shape[1] * image.shape[0]))
+                image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+                _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 75])
+                output.data["image/jpeg"] = base64.b64encode(jpeg.tobytes()).decode()
+    nbformat.write(notebook, path)
+
+
 def written(name: str) -> str:
     path = DOCS / name
     return path.read_text() if path.exists() else ""
@@ -567,12 +594,10 @@ def words(text: str) -> list[str]:
 
 def main() -> int:
     options, known = sys.argv[1:], pictures()
-    names = [] if options in (["--check"], ["--pictures"]) else options
+    names = [] if options in (["--check"], ["--notebook"], ["--pictures"]) else options
     if unknown := set(names) - set(known):
-        print(
-            f"got {listing(sorted(unknown))}; expected --check, --pictures or {listing(known)}",
-            file=sys.stderr,
-        )
+        expected = f"expected --check, --notebook, --pictures or {listing(known)}"
+        print(f"got {listing(sorted(unknown))}; {expected}", file=sys.stderr)
         return 2
     pages = {
         "terrains.md": terrains_page(),
@@ -597,6 +622,8 @@ def main() -> int:
         (DOCS / name).write_text(text)
     for name in known if options == ["--pictures"] else {*missing, *names}:
         known[name]()
+    if options == ["--notebook"]:
+        write_notebook()
     return 0
 
 
