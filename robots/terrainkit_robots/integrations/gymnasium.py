@@ -35,7 +35,7 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
 
     Observations and rewards are defined by the task; an episode is truncated when its time is over.
     The observations are the policy's, without the privileged observations of the critic. The action
-    space is as large as `normalization.clip_actions` of the task, 100 by default; set it to a few
+    space is as large as `normalization.clip_actions` of the task, 10 by default; set it to a few
     units for algorithms that scale their actions to the space, such as SAC.
     """
 
