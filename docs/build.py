@@ -378,8 +378,7 @@ def pictures() -> dict[str, Callable[[], None]]:
         "perception": draw_perception,
         "built_stairs": draw_built_stairs,
         "quadruped": partial(draw_robot, "quadruped"),
-        "quadruped_map": partial(draw_walk, "quadruped_map"),
-        "walk": draw_moving_walk,
+        "walk": draw_walk,
     }
 
 
@@ -537,25 +536,7 @@ def draw_feasibility(name: str) -> None:
     write_preview(terrain_map, picture, width=820, overwrite=True, routes=routes(results))
 
 
-def draw_walk(policy: str) -> None:
-    """Record a policy on stairs, and write three frames side by side."""
-    up = terrainkit.SubTerrain(terrain="pyramid_stairs", parameters={"inverted": True})
-    stairs = terrainkit.MapConfig(
-        rows=1, cols=1, border=4, mode="selected", selected_difficulty=0.56, terrains=(up,)
-    )
-    with TemporaryDirectory() as folder:
-        ground, video = Path(folder) / "stairs.npz", Path(folder) / "walk.mp4"
-        terrainkit.generate(stairs).save(ground)
-        command = [sys.executable, "-m", "terrainkit_cli.main", "play", policy, "--seconds", "8"]
-        command += ["--terrain", ground, "--num-envs", "1", "--command", "0.75", "0", "0"]
-        subprocess.run([*command, "-o", video, "--size", "400", "340"], check=True)
-        film = cv2.VideoCapture(str(video))
-        moments = [film.read()[1] for _ in range(int(film.get(cv2.CAP_PROP_FRAME_COUNT)))]
-    shown = [moments[int(part * len(moments))] for part in (0.3, 0.5, 0.7)]
-    cv2.imwrite(str(PICTURES / f"{policy}.png"), np.hstack(shown))
-
-
-def draw_moving_walk() -> None:
+def draw_walk() -> None:
     from walk import write_walk  # imports torch
 
     write_walk(PICTURES / "walk.webp")
