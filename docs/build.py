@@ -1,31 +1,25 @@
-"""Build the generated docs: pages, llms.txt, pictures and the outputs of the notebook.
+"""Build the generated docs: pages, llms.txt and pictures.
 
 python docs/build.py              write the texts, and draw the pictures that are missing
 python docs/build.py NAME...      also draw these pictures again, such as `wave`
 python docs/build.py --pictures   also draw every picture again
-python docs/build.py --notebook   also run the notebook, and keep its outputs
 python docs/build.py --check      exit with 1 if a text is out of date or a picture is missing
 """
 
 import ast
-import base64
 import dataclasses
 import inspect
 import os
-import pty
 import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from functools import partial
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import cv2
-import nbclient
-import nbformat
 import numpy as np
 import yaml
 from gallery import render_map, render_patches
@@ -496,7 +490,7 @@ def draw_check_robot() -> None:
         for options in ("", " --unsafe-fixes"):
             command = f"check-robot my_robot.urdf{options}"
             console.print(f"[bold]$ terrainkit {command}[/]", highlight=False)
-            output = terminal_output(command.split(), folder)
+            output = terminal_output(command, folder)
             console.print(Text.from_ansi(shortened(output)), end="\n\n")
     svg = console.export_svg(title="terrainkit check-robot", unique_id="check-robot")
     # Without the comment, and the fonts that browsers would load from another host.
@@ -504,20 +498,14 @@ def draw_check_robot() -> None:
     (PICTURES / "check_robot.svg").write_text(picture)
 
 
-def terminal_output(arguments: list[str], folder: str) -> str:
-    """Return what a command prints on a terminal with colors, in a folder."""
+def terminal_output(command: str, folder: str) -> str:
+    """Return what a command of terrainkit prints on a terminal with colors, in a folder."""
     environment = os.environ | {"COLUMNS": "100", "TERM": "xterm-256color"}
     environment["PYTHONPATH"] = os.pathsep.join(sys.path)
-    terminal, output = pty.openpty()
-    command = [sys.executable, "-m", "terrainkit_cli.main", *arguments]
-    streams = {"stdout": output, "stderr": subprocess.DEVNULL}
-    with subprocess.Popen(command, **streams, env=environment, cwd=folder):
-        os.close(output)
-        text = b""
-        with suppress(OSError), open(terminal, "rb", buffering=0) as reader:  # noqa: PTH123
-            while part := reader.read(1000):
-                text += part
-    return text.decode().replace("\r\n", "\n")
+    line = f"{sys.executable} -m terrainkit_cli.main {command} 2>/dev/null"
+    terminal = ["script", "--quiet", "--command", line, "/dev/null"]  # of util-linux
+    done = subprocess.run(terminal, env=environment, cwd=folder, capture_output=True, check=False)
+    return done.stdout.decode().replace("\r\n", "\n")
 
 
 def shortened(report: str) -> str:
@@ -542,27 +530,6 @@ def draw_walk() -> None:
     write_walk(PICTURES / "walk.webp")
 
 
-def write_notebook() -> None:
-    """Run the notebook, and keep its outputs; the pictures become small JPEGs."""
-    path = DOCS / "examples/terrainkit.ipynb"
-    notebook = nbformat.read(path, as_version=4)
-    info = notebook.metadata.language_info
-    with TemporaryDirectory() as folder:
-        nbclient.NotebookClient(notebook, kernel_name="python3").execute(cwd=folder)
-    notebook.metadata.language_info = info  # without the version of Python
-    for cell in notebook.cells:
-        cell.metadata.pop("execution", None)  # times
-        for output in cell.get("outputs", ()):
-            if picture := output.data.pop("image/png", None):
-                data = np.frombuffer(base64.b64decode(picture), np.uint8)
-                image = cv2.imdecode(data, cv2.IMREAD_COLOR)
-                size = (640, round(640 / image.shape[1] * image.shape[0]))
-                image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-                _, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 75])
-                output.data["image/jpeg"] = base64.b64encode(jpeg.tobytes()).decode()
-    nbformat.write(notebook, path)
-
-
 def written(name: str) -> str:
     path = DOCS / name
     return path.read_text() if path.exists() else ""
@@ -575,9 +542,9 @@ def words(text: str) -> list[str]:
 
 def main() -> int:
     options, known = sys.argv[1:], pictures()
-    names = [] if options in (["--check"], ["--notebook"], ["--pictures"]) else options
+    names = [] if options in (["--check"], ["--pictures"]) else options
     if unknown := set(names) - set(known):
-        expected = f"expected --check, --notebook, --pictures or {listing(known)}"
+        expected = f"expected --check, --pictures or {listing(known)}"
         print(f"got {listing(sorted(unknown))}; {expected}", file=sys.stderr)
         return 2
     pages = {
@@ -603,8 +570,6 @@ def main() -> int:
         (DOCS / name).write_text(text)
     for name in known if options == ["--pictures"] else {*missing, *names}:
         known[name]()
-    if options == ["--notebook"]:
-        write_notebook()
     return 0
 
 

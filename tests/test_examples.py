@@ -134,9 +134,11 @@ def test_notebook_runs_and_shows_maps(tmp_path, monkeypatch):
     kept = list(map(outputs_of, notebook.cells))
     assert [count for count, _ in kept if count] == list(range(1, 7))
     nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3").execute(cwd=tmp_path)
-    assert list(map(outputs_of, notebook.cells)) == kept, "run python docs/build.py --notebook"
+    assert list(map(outputs_of, notebook.cells)) == kept, (
+        "run jupyter execute --inplace docs/examples/terrainkit.ipynb"
+    )
     assert str(kept).count("'image'") == 2
-    assert (EXAMPLES / "terrainkit.ipynb").stat().st_size < 200_000
+    assert (EXAMPLES / "terrainkit.ipynb").stat().st_size < 300_000
 
 
 def outputs_of(cell):

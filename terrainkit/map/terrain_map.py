@@ -84,7 +84,7 @@ class TerrainMap:
         names = ", ".join(self.terrain_names)
         return f"<TerrainMap {rows} x {cols} patches, {self.heights.shape} samples: {names}>"
 
-    def _repr_png_(self) -> bytes:
+    def _repr_jpeg_(self) -> bytes:
         """Return the preview, which notebooks display."""
         from terrainkit.views.preview import notebook_preview
 

@@ -94,7 +94,7 @@ def test_preview_divides_long_maps_to_fit_a_screen(rows, cols, axis, parts):
 
 @pytest.mark.parametrize(("rows", "cols"), [(1, 40), (40, 1), (3, 3)])
 def test_map_in_a_notebook_is_a_picture_of_limited_size(rows, cols):
-    data = map_of(FLAT, rows=rows, cols=cols, border=20.0)._repr_png_()
+    data = map_of(FLAT, rows=rows, cols=cols, border=20.0)._repr_jpeg_()
     picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR)
     assert 700 <= max(picture.shape) <= ABOVE + 1000 + BELOW + 250
 
