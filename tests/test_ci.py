@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shlex
 import subprocess
 import sys
 import tomllib
@@ -12,7 +11,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from terrainkit_cli.main import main
 from terrainkit_cli.robot_commands import CheckRobot
 from tests.robots import BOX
 
@@ -473,21 +471,6 @@ def test_page_shows_hook_action_and_job():
     assert len(job["check-robot"]["script"]) == 2
     listed = re.findall(r"^\| `([\w-]+)` \| (?:`(.*?)`)? ?\|", PAGE, re.MULTILINE)
     assert dict(listed) == {name: each["default"] for name, each in ACTION["inputs"].items()}
-
-
-def test_page_baseline_commands_write_the_example(repository, monkeypatch, capsys):
-    monkeypatch.chdir(repository)
-    for path in Path("robots").iterdir():
-        path.unlink()
-    Path("robots/arm.urdf").write_text(
-        BOX.format(name="arm", mass=-1).replace("trunk", "upper_link")
-    )
-    (commands,), (example,) = blocks("sh"), blocks("json")
-    for line in commands.splitlines():
-        words = shlex.split(line.replace("robots/*.urdf", "robots/arm.urdf"))
-        assert main(words[1:]) == 0
-    assert "1 finding accepted in robots.baseline.json" in capsys.readouterr().out
-    assert Path("robots.baseline.json").read_text() == example
 
 
 def run_job_of_gitlab(folder):

@@ -1,4 +1,7 @@
-"""The generated pages of the docs have the defaults, names and limits of the code; links work."""
+"""The generated pages of the docs have the defaults, names and limits of the code; links work.
+
+test_docs_session.py runs the blocks of the pages.
+"""
 
 import importlib.util
 import re
@@ -12,9 +15,10 @@ import terrainkit.curriculum
 import terrainkit.feasibility
 import terrainkit.perception
 import terrainkit_robots
+from terrainkit_cli.main import main
+from tests.frameworks.pages import DOCS, ROOT, page_blocks
+from tests.robots import QUADRUPED
 
-ROOT = Path(__file__).parents[1]
-DOCS = ROOT / "docs"
 PAGES = [*ROOT.glob("*.md"), *DOCS.rglob("*.md"), *(ROOT / "benchmarks").rglob("*.md")]
 
 
@@ -83,3 +87,37 @@ def test_api_pages_have_each_public_name(package):
     documented = {line.rpartition(".")[2] for text in texts for line in text.splitlines()}
     assert package.__all__
     assert set(package.__all__) - documented == set()
+
+
+def test_readme_is_short_and_has_two_setup_commands():
+    text = (ROOT / "README.md").read_text()
+    (part,) = re.findall(r"<!-- set-up -->(.*?)<!-- /set-up -->", text, re.DOTALL)
+    assert re.findall(r"```sh\n(.*?)```", part, re.DOTALL) == [
+        "pip install . && terrainkit generate --rows 10 --cols 10 -o map.npz\n",
+        'pip install -e ".[dev]" && python -m pytest\n',
+    ]
+    assert len(text.splitlines()) <= 150
+
+
+def test_index_lists_all_pages():
+    """The pages of packages of the API are listed on api.md."""
+    pages = {path.name for path in DOCS.glob("*.md") if not path.name.startswith("api_")}
+    listed = set(re.findall(r"\]\((\w+\.md)\)", (DOCS / "index.md").read_text()))
+    assert listed | {"index.md"} >= pages
+
+
+def test_suppressions_of_the_check_robot_page_work(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    blocks = dict(page_blocks("check_robot.md"))
+    axis = '<axis xyz="0 2 0"/>\n'
+    text = QUADRUPED.read_text().replace('<axis xyz="0 1 0"/>\n', axis, 1)
+    asked = ["check-robot", "my_robot.urdf", "--select", "JNT005", "--strict"]
+    Path("my_robot.urdf").write_text(text)
+    assert main(asked) == 1
+    Path("my_robot.urdf").write_text(text.replace(axis, blocks["xml"]))
+    assert main(asked) == 0
+    assert "the parser normalizes it" in capsys.readouterr().out
+    Path("my_robot.urdf").write_text(text)
+    Path("pyproject.toml").write_text(blocks["toml"])
+    assert main(asked) == 0
+    assert "our parser normalizes axes" in capsys.readouterr().out

@@ -1,0 +1,320 @@
+"""Type the blocks of each page into a shell and a Python session, from top to bottom.
+
+Each page starts in an empty folder, as a reader without files does. A block whose first line is a
+comment with the name of a file is that file. A block of text is what a command before it prints;
+`...` stands for any text. The blocks of frameworks run in tests/frameworks, which names them with
+`page_block("PAGE.md", "TEXT")`.
+"""
+
+import ast
+import os
+import re
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import tomllib
+import warnings
+from enum import Enum
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from terrainkit import TerrainkitWarning
+from terrainkit.terrain import registry
+from terrainkit_cli.main import main
+from tests.frameworks.pages import DOCS, ROOT, page_blocks
+
+pytest.importorskip("torch", reason="the extra `train` is not installed")
+
+from terrainkit_robots.rl import tasks
+
+SHELL = ("sh", "bash")
+PAGES = [
+    page
+    for page in ("README.md", *sorted(path.name for path in DOCS.glob("*.md")))
+    if {"python", *SHELL} & {language for language, _ in page_blocks(page)}
+]
+
+
+class Reason(Enum):
+    """Why a block runs nowhere."""
+
+    DOWNLOADS = "it clones repositories of several GB"
+    INSTALLS = "it installs a framework; tests/frameworks/run.py installs the same packages"
+
+
+EXEMPT = {
+    ("field_robots.md", "git clone"): Reason.DOWNLOADS,
+    ("isaaclab.md", "pip install isaaclab"): Reason.INSTALLS,
+    ("integrations.md", "pip install mjlab"): Reason.INSTALLS,
+}
+"""The blocks that run nowhere, by page and a text in them."""
+
+NEVER_EXEMPT = ("README", "index", "importing", "onboarding", "training", "exported_policy")
+"""Pages that newcomers read first."""
+
+FRAMEWORK_TESTS = (
+    *(ROOT / "tests/frameworks").glob("*.py"),
+    ROOT / "tests/terrainkit/export/test_legged_gym.py",
+)
+FRAMEWORK_BLOCKS = [
+    found
+    for path in FRAMEWORK_TESTS
+    for found in re.findall(r'page_block\(\s*"(\S+?)",\s*"([^"]+)"\s*\)', path.read_text())
+]
+"""The blocks that run in the tests of a framework, by page and a text in them."""
+
+FRAMEWORK_PAGES = ("integrations.md", "isaaclab.md", "onboarding.md")
+
+QUICK = "--max-iterations 2 --runner.save-interval 1 --num-envs 4 --env.num-threads 1"
+REPLACED = (
+    # Trainings and evaluations take minutes or hours. The last value of an option counts.
+    (r"^(terrainkit|torchrun .*) train .*", rf"\g<0> {QUICK}"),
+    (r"^terrainkit average .*", r"\g<0> --checkpoints 2"),
+    (r"^terrainkit evaluate (?!.*--suite).*", r"\g<0> --seconds 2.1 --num-envs 2"),
+    (r"^terrainkit evaluate .*--suite.*", r"\g<0> --repetitions 1"),
+    (r"^terrainkit play .*", r"\g<0> --seconds 0.1 --num-envs 2 --size 64 64"),
+    (r"^terrainkit smoke-test .*", r"\g<0> --samples 500"),
+    (r"^python policy/run_policy.py.*", r"\g<0> --seconds 0.1"),
+    (r"EvaluationConfig\(seconds=20\)", "EvaluationConfig(seconds=2.1, num_envs=2)"),
+    # Large maps and suites take tens of seconds.
+    (r"--suite basics-1\b", "--suite map.npz"),
+    (r"^terrainkit suite generate \S+", "terrainkit generate --preset stairs --rows 1 --cols 4"),
+    (r"--preset all --rows 3 --cols 62", "--preset stairs --rows 1 --cols 4"),
+    (r"--preset parkour -o", "--preset parkour --rows 1 --cols 7 -o"),
+    (r"--robot quadruped --demand \S+ -o courses.npz", "--rows 1 --cols 1 -o courses.npz"),
+    # CI has two processors.
+    (r"ProcessPoolExecutor\(8\)", "ProcessPoolExecutor(2)"),
+    (r"Client\(n_workers=2\)", "Client(processes=False, dashboard_address=None)"),
+    # Another program may use the default port.
+    (r"^torchrun --nproc", "torchrun --standalone --nproc"),
+    # There is no display.
+    (r" --viewer\b", ""),
+    # These would clone the repository of the robot.
+    (r"\bgo2(_mj)?_description\b", "quadruped"),
+    # This is the run of pytest.
+    (r"^python -m pytest$", "python -m pytest --version"),
+)
+"""What is typed in place of parts of the pages: patterns and their replacements."""
+
+FINDS = ("check-robot", "check-policy", "feasibility")
+"""Commands whose exit code is 1 if they find something."""
+
+SERVES = ("demo", "view")
+"""Commands that run until they are ended."""
+
+AFTERWARD = {
+    "README.md": (
+        "m.config.rows == 6 and len(start.levels) == len(levels) == 4096",
+        "Path('my_biped/robot.toml').exists()",
+        "Path('policy/policy.onnx').exists()",
+    ),
+    "check_robot.md": ("Path('robots.sarif').exists()",),
+    "ci.md": ("Path('robots.baseline.json').read_text() == block('json')",),
+    "importing.md": (
+        "len(imported.terrain_map.solids) > 0",
+        "m.heights.shape == heights.shape",
+        "np.allclose(np.unique(np.load('classes.npz')['ground_friction']), [0.1, 0.5, 0.9])",
+    ),
+    "integrations.md": (
+        "name == 'stepping_stones' and x[0] == m.first_sample[0]",
+        "abs(m.height(spawn[:2]) - spawn[2]) < 1e-3",
+        # The ball of 0.1 m lies on the ground.
+        "abs(data.qpos[2] - 0.1 - m.height(data.qpos[:2])) < 0.01",
+        "model.nbody > 13 and model.nhfield == 1",  # the map and a robot
+        "env.env.terrain.terrain_map.grid == m.grid",
+        "observations.shape[0] == 16 and np.isfinite(observations).all()",
+    ),
+    "onboarding.md": (
+        "kp['FL_hip_joint'] == 60.0",
+        "len([*Path('quadruped').glob('*_config.py')]) == 2",  # mjlab and legged_gym
+    ),
+    "perception.md": (
+        "heights.shape == ceilings.shape == (40, 187)",
+        "depth.shape == (40, 36, 64)",
+        "occupied.shape == (40, 17, 11, 11)",
+        "0.04 < np.isnan(measured).mean() < 0.3",
+    ),
+    "python_api.md": (
+        "result.verification.is_stable",
+        "terrain_map.terrain_names == ('side_step',)",
+        "(share == 1).all()",  # robots followed their commands over half of a patch
+    ),
+}
+"""Expressions that are true after a page, with the names of its Python session."""
+
+
+def blocks_of_pages():
+    """Return the shell and Python blocks of all pages, as pairs of page and text."""
+    blocks = ((page, *found) for page in PAGES for found in page_blocks(page))
+    return [(page, block) for page, language, block in blocks if language in (*SHELL, "python")]
+
+
+def test_at_most_a_tenth_of_the_blocks_runs_nowhere():
+    blocks = blocks_of_pages()
+    elsewhere = [*EXEMPT, *FRAMEWORK_BLOCKS]
+    for page, text in elsewhere:
+        assert sum(name == page and text in block for name, block in blocks) == 1, (page, text)
+    assert len(EXEMPT) <= len(blocks) / 10
+    assert not {page.removesuffix(".md") for page, _ in EXEMPT} & set(NEVER_EXEMPT)
+    assert {page for page, _ in FRAMEWORK_BLOCKS} <= set(FRAMEWORK_PAGES)
+
+
+def test_each_replacement_is_for_a_line_of_a_page():
+    lines = [line for _, block in blocks_of_pages() for line in commands(block, replaced=())]
+    for pattern, _ in REPLACED:
+        assert any(re.search(pattern, line) for line in lines), pattern
+
+
+def test_blocks_import_what_the_adapters_define():
+    text = "\n".join(block for _, block in blocks_of_pages())
+    imports = re.findall(r"^from (terrainkit\.integrations\.\w+) import (.+)$", text, re.MULTILINE)
+    assert len(imports) == 9, "count the import of the new adapter here"
+    for module, names in imports:
+        path = ROOT / f"{module.replace('.', '/')}.py"
+        defined = {getattr(node, "name", "") for node in ast.parse(path.read_text()).body}
+        assert set(names.split(", ")) <= defined, module
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Type in an empty folder, whose modules Python finds."""
+    for name in ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    terrainkit = programs / "terrainkit"
+    terrainkit.write_text(f'#!/bin/sh\nexec {sys.executable} -m terrainkit_cli.main "$@"\n')
+    terrainkit.chmod(0o755)
+    path = os.pathsep.join([str(programs), str(Path(sys.executable).parent), os.environ["PATH"]])
+    monkeypatch.setenv("PATH", path)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(str(ROOT / part) for part in PACKAGES))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    monkeypatch.setenv("COLUMNS", "100")
+    (tmp_path / "page").mkdir()
+    monkeypatch.chdir(tmp_path / "page")
+    monkeypatch.syspath_prepend(tmp_path / "page")
+
+
+PACKAGES = ("", "robots", "cli")
+"""Folders of the packages in the repository."""
+
+
+@pytest.fixture
+def forget(monkeypatch):
+    """Forget the tasks, terrains and modules of a page."""
+    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
+    modules = set(sys.modules)
+    yield
+    registry._get.cache_clear()
+    tasks.load_task_file.cache_clear()
+    for name in set(sys.modules) - modules:
+        if "/page/" in (getattr(sys.modules[name], "__file__", None) or ""):
+            del sys.modules[name]
+
+
+def replace(text, replaced=REPLACED):
+    for pattern, replacement in replaced:
+        text = re.sub(pattern, replacement, text)
+    return text
+
+
+def commands(block, replaced=REPLACED):
+    """Return the commands of a shell block."""
+    for line in block.replace("\\\n", " ").splitlines():
+        line = re.sub(r"(^|\s)#.*", "", line).strip()
+        yield from (replace(command, replaced) for command in line.split(" && ") if command)
+
+
+def check_pip_install(words):
+    """Check that what is installed exists; .ci/readme and the jobs of CI install it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    (target,) = (word for word in words if not word.startswith("-"))
+    path, _, extras = target.rstrip("]").partition("[")
+    assert path == ".", target
+    assert set(filter(None, extras.split(","))) <= set(project["optional-dependencies"]), target
+
+
+def serve(words):
+    """Start a command that serves a page, and end it when it has printed the address."""
+    with socket.create_server(("localhost", 0)) as free:  # other tests may start at port 8080
+        port = str(free.getsockname()[1])
+    with subprocess.Popen(
+        [sys.executable, "-m", "terrainkit_cli.main", *words, "--port", port],
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        line = process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+    assert line.startswith(f"http://localhost:{port} shows "), line
+    assert process.returncode == 0
+    return line
+
+
+def type_command(command, capsys):
+    """Run a command, and return what it prints."""
+    words = [
+        name
+        for word in shlex.split(command)
+        for name in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
+    ]
+    if words[:2] == ["pip", "install"]:
+        check_pip_install(words[2:])
+        return ""
+    if words[0] == "terrainkit" and words[1] in SERVES:
+        return serve(words[1:])
+    # This process has imported the plug-in as a module.
+    if words[0] != "terrainkit" or "--plugin" in words:
+        done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{command}: {done.stderr}"
+        return done.stdout
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", TerrainkitWarning)
+        code = main(words[1:])  # a process takes seconds to import torch
+    printed = capsys.readouterr()
+    assert code == 0 or (code == 1 and words[1] in FINDS), f"{command}: {printed.err}"
+    return printed.out
+
+
+def type_python(block, title, names, capsys):
+    """Run a block in a Python session, and return what it prints."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TerrainkitWarning)
+        exec(compile(replace(block), title, "exec"), names)
+    return capsys.readouterr().out
+
+
+def is_shown(text, printed):
+    """Return whether a text was printed; spaces do not count."""
+    parts = [re.escape(" ".join(part.split())) for part in text.split("...")]
+    return re.search(" ?.*? ?".join(parts), " ".join(printed.split())) is not None
+
+
+@pytest.mark.usefixtures("folder", "forget")
+@pytest.mark.parametrize("page", PAGES)
+def test_blocks_run_from_top_to_bottom(page, capsys):
+    names, printed, failures = {"__name__": "__main__"}, "", []
+    for number, (language, block) in enumerate(page_blocks(page), start=1):
+        title = f"{page}, block {number} ({language})"
+        if any(name == page and text in block for name, text in (*EXEMPT, *FRAMEWORK_BLOCKS)):
+            continue
+        try:
+            if file := re.match(r"# (\w+\.\w+)\n", block):
+                Path(file[1]).write_text(block)
+            elif language in SHELL:
+                for command in commands(block):
+                    printed += type_command(command, capsys)
+            elif language == "python":
+                printed += type_python(block, title, names, capsys)
+            elif language == "text" and printed:
+                assert is_shown(block, printed), f"not printed; printed was:\n{printed}"
+        except Exception as error:
+            failures.append(f"{title}: {type(error).__name__}: {error}")
+    assert not failures, "\n".join(failures)
+    names |= {"Path": Path, "np": np, "block": dict(page_blocks(page)).get}
+    for expression in AFTERWARD.get(page, ()):
+        assert eval(expression, names), expression
