@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from terrainkit_cli.main import main
 from terrainkit_cli.robot_commands import CheckRobot
 from tests.robots import BOX
 
