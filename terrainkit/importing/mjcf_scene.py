@@ -4,13 +4,16 @@ Unlike MuJoCo's rays, faces have every surface below each other, and closed bodi
 """
 
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from terrainkit.errors import HeightFileError, listing
+from terrainkit.files.child_process import ProcessLimits
 from terrainkit.importing.mesh_file import MeshSource, make_mesh_source
+from terrainkit.importing.mjcf_text import read_text
 from terrainkit.importing.options import ReadOptions
 from terrainkit.importing.source import Array, decode, warn
 
@@ -19,14 +22,11 @@ SUFFIXES = (".xml",)
 PLANE_MARGIN = 2.0
 """Width of an infinite plane around the other geoms [m]."""
 
-_UNUSED = (
-    *("keys", "sensors", "actuators", "equalities", "tendons", "pairs", "excludes", "tuples"),
-    *("skins", "lights", "cameras", "sites", "materials", "textures"),
-)
-"""Elements other than ground, which may refer to removed bodies or missing files."""
+_BYTES_PER_STEP = 1 << 20
+"""Size of files for which MuJoCo may take 10 s and a quarter of a gigabyte more."""
 
-_SECTIONS = 128
-"""Sides of a cylinder of n sides: for a radius of 1 m, the error is 0.3 mm."""
+_MANY_GEOMS = (1000, 5000)
+"""Numbers of geoms beyond which curved ones get half as many sides, and half as many again."""
 
 
 def read(path: Path, options: ReadOptions) -> MeshSource:
@@ -45,7 +45,10 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     Raises:
         HeightFileError: if MuJoCo cannot compile the scene, or nothing in it is fixed.
     """
-    arrays = decode(_read_scene, path)
+    scene = read_text(path)
+    steps = scene.num_bytes // _BYTES_PER_STEP
+    limits = ProcessLimits(seconds=min(20.0 + 10 * steps, 120.0), memory=min(4 + steps, 32) << 28)
+    arrays = decode(_read_scene, path, scene.text, scene.models, limits=limits)
     if not len(arrays["faces"]):
         raise HeightFileError(
             f"{path}: got a scene without ground; expected geoms that collide in the world body"
@@ -56,46 +59,58 @@ def read(path: Path, options: ReadOptions) -> MeshSource:
     return make_mesh_source(path, arrays, options)
 
 
-def _read_scene(path: Path) -> dict[str, Any]:
+def _read_scene(_: Path, text: str, models: dict[str, bytes]) -> dict[str, Any]:
     import mujoco
-    import trimesh
 
     mujoco.set_mju_user_warning(lambda _: None)  # it would write MUJOCO_LOG.TXT
-    spec = mujoco.MjSpec.from_file(str(path))
-    moving = [
-        body
-        for body in spec.worldbody.bodies
-        if any(each.joints for each in (body, *body.find_all("body")))
-    ]
-    geoms = [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)]
-    for each in (*moving, *geoms):
-        spec.delete(each)
-    # What only robots and pictures need, which may be missing.
+    spec = mujoco.MjSpec.from_string(text, include=models or None)
+    world = spec.worldbody
+
+    @cache
+    def root(body: Any) -> Any:
+        return body if body == world or body.parent == world else root(body.parent)
+
+    moving = {root(joint.parent): None for joint in spec.joints}
+    for joint in spec.joints:  # what they weigh may be left out
+        joint.parent.mass, joint.parent.inertia = 1.0, np.ones(3)
+        joint.parent.explicitinertial = True
+    used = set()
     for geom in spec.geoms:
-        geom.material = ""
-    for kind in _UNUSED:
-        for each in list(getattr(spec, kind)):
-            spec.delete(each)
-    used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
+        is_ground = (geom.contype or geom.conaffinity) and root(geom.parent) not in moving
+        geom.group = int(is_ground)
+        geom.contype = geom.conaffinity = 0  # no convex hulls
+        if is_ground:
+            used |= {geom.meshname, geom.hfieldname}
+        else:  # its files may be missing
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, np.ones(3)
+            geom.meshname = geom.hfieldname = ""
     for asset in [*spec.meshes, *spec.hfields]:
         if asset.name not in used:
             spec.delete(asset)
+    for mesh in spec.meshes:
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # also of what is not closed
     model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    meshes = [(np.empty((0, 3)), np.empty((0, 3), np.int64)), *_geom_meshes(model, data)]
-    vertices, faces = trimesh.util.append_faces(*zip(*meshes, strict=True))
-    moving_names = np.array([body.name for body in moving], dtype=str)
-    return {"vertices": vertices, "faces": faces, "moving": moving_names, "unit": 1.0}
+    meshes = [(np.empty((0, 3)), np.empty((0, 3), np.int32)), *_geom_meshes(model, data)]
+    vertices, faces = [mesh[0] for mesh in meshes], [mesh[1] for mesh in meshes]
+    starts = np.cumsum([0, *map(len, vertices)], dtype=np.int32)
+    return {
+        "vertices": np.concatenate(vertices),
+        "faces": np.concatenate([mesh + start for mesh, start in zip(faces, starts, strict=False)]),
+        "moving": np.array([body.name for body in moving], dtype=str),
+        "unit": 1.0,
+    }
 
 
 def _geom_meshes(model: Any, data: Any) -> Iterator[tuple[Array, Any]]:
     """Yield the vertices and faces of each geom in the frame of the world, planes last."""
     from mujoco import mjtGeom as Geom
 
-    shapes = _unit_shapes()
+    shapes = _unit_shapes(level=4 - sum(model.ngeom > number for number in _MANY_GEOMS))
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-    for k in np.argsort(model.geom_type == Geom.mjGEOM_PLANE, kind="stable").tolist():
+    order = np.argsort(model.geom_type == Geom.mjGEOM_PLANE, kind="stable")
+    for k in order[model.geom_group[order] == 1].tolist():
         kind, size, asset = Geom(model.geom_type[k]), model.geom_size[k], model.geom_dataid[k]
         place, axes = data.geom_xpos[k], data.geom_xmat[k].reshape(3, 3)
         if kind == Geom.mjGEOM_PLANE:
@@ -108,7 +123,7 @@ def _geom_meshes(model: Any, data: Any) -> Iterator[tuple[Array, Any]]:
         elif asset >= 0:
             start, first = model.mesh_vertadr[asset], model.mesh_faceadr[asset]
             vertices = model.mesh_vert[start : start + model.mesh_vertnum[asset]].astype(float)
-            faces = model.mesh_face[first : first + model.mesh_facenum[asset]].astype(np.int64)
+            faces = model.mesh_face[first : first + model.mesh_facenum[asset]]
         else:
             name, radii = _SHAPES[kind.name]
             vertices, faces = shapes[name]
@@ -131,16 +146,22 @@ _SHAPES = {
 """Unit shape of a type of geom, and its elements of `size` along x, y and z."""
 
 
-def _unit_shapes() -> dict[str, tuple[Array, Any]]:
-    """Return the vertices and faces of shapes with half size 1."""
+def _unit_shapes(level: int) -> dict[str, tuple[Array, Any]]:
+    """Return the vertices and faces of shapes with half size 1.
+
+    At level 4, a cylinder has 128 sides: for a radius of 1 m, the error is 0.3 mm.
+    """
     from trimesh import creation
 
     meshes = {
         "box": creation.box((2.0, 2.0, 2.0)),
-        "cylinder": creation.cylinder(1.0, 2.0, sections=_SECTIONS),
-        "sphere": creation.icosphere(4),
+        "cylinder": creation.cylinder(1.0, 2.0, sections=8 << level),
+        "sphere": creation.icosphere(level),
     }
-    return {name: (mesh.vertices, np.asarray(mesh.faces)) for name, mesh in meshes.items()}
+    return {
+        name: (np.array(mesh.vertices), mesh.faces.astype(np.int32))
+        for name, mesh in meshes.items()
+    }
 
 
 def _plane(place: Array, normal: Array, lower: Array, upper: Array) -> tuple[Array, Any]:
@@ -160,7 +181,7 @@ def _hfield(model: Any, asset: int) -> tuple[Array, Any]:
     y, x = np.meshgrid(
         np.linspace(-size[1], size[1], rows), np.linspace(-size[0], size[0], cols), indexing="ij"
     )
-    a = (np.arange(rows - 1)[:, None] * cols + np.arange(cols - 1)).ravel()
+    a = (np.arange(rows - 1)[:, None] * cols + np.arange(cols - 1)).ravel().astype(np.int32)
     b, c, d = a + 1, a + cols + 1, a + cols
     faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
     return np.column_stack([x.ravel(), y.ravel(), z]), faces

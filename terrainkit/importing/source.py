@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning, install_command
-from terrainkit.files.child_process import ProcessError, run_in_process
+from terrainkit.files.child_process import ProcessError, ProcessLimits, run_in_process
 from terrainkit.files.suffix import find_module
 from terrainkit.importing.options import Missing, ReadOptions
 
@@ -125,7 +125,10 @@ def check_file(path: Path) -> None:
 
 
 def decode(
-    function: Callable[..., Mapping[str, Any]], path: Path, *arguments: Any
+    function: Callable[..., Mapping[str, Any]],
+    path: Path,
+    *arguments: Any,
+    limits: ProcessLimits | None = None,
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays that a decoder reads in a child process.
 
@@ -133,12 +136,13 @@ def decode(
         function: The decoder, a function of a module.
         path: The file.
         *arguments: Further arguments of the decoder.
+        limits: Limits of the child process; None for the defaults.
 
     Raises:
         HeightFileError: if the file cannot be decoded within the limits.
     """
     try:
-        return run_in_process(function, path.absolute(), *arguments)
+        return run_in_process(function, path.absolute(), *arguments, limits=limits)
     except ProcessError as error:
         raise HeightFileError(f"{path}: cannot be read: {error}") from None
 
