@@ -188,7 +188,7 @@ def test_words_depend_on_seed_and_index_only(tmp_path, monkeypatch, surfaces, na
     words = [[surfaces.prepare(surface, tmp_path / "none", 3, index).words for index in range(20)]]
     words += [[surfaces.prepare(surface, tmp_path / "none", 3, index).words for index in range(20)]]
     assert words[0] == words[1]
-    assert len({tuple(each) for each in words[0]}) > 10
+    assert len({tuple(line) for line in words[0]}) > 10
 
 
 def test_kept_input_is_read_first(tmp_path, monkeypatch, surfaces):

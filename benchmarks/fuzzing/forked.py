@@ -36,7 +36,7 @@ _WALL_CLOCK, _MAX_WAIT = 4, 3
 """Limit of the wall-clock time, and time from which waiting is a failure, relative to SECONDS."""
 
 MEMORY = 2 << 30
-"""Memory above an idle command's that counts as a failure [bytes]."""
+"""Memory above an idle command's that counts as a failure, also of a child process [bytes]."""
 
 _ADDRESS_SPACE = 8 << 30
 

@@ -121,8 +121,8 @@ def edit_code(data: bytes, rng: Random) -> bytes:
         data = rng.choice(list(ESCAPES.values())).archive("../home/written", 141, 12)
     with zipfile.ZipFile(io.BytesIO(data)) as file:
         members = {name: file.read(name) for name in file.namelist()}
-    name = rng.choice([each for each in members if each.lower().endswith(".py")])
-    ends = [each.end() for each in re.finditer(rb"\w+|\.", members[name])]
+    name = rng.choice([path for path in members if path.lower().endswith(".py")])
+    ends = [token.end() for token in re.finditer(rb"\w+|\.", members[name])]
     for at in sorted(rng.choices(ends, k=rng.choice((1, 3, 30))), reverse=True):
         spaces = rng.choice((b" ", b"\t", b"\\\n", b"  "))
         members[name] = members[name][:at] + spaces + members[name][at:]

@@ -67,7 +67,7 @@ def _code(path: Path) -> set[str]:
         return {*_python(ast.parse(path.read_text()))}
     if path.suffix in (".xml", ".urdf"):
         elements = lxml.etree.parse(path).iter()
-        return {f"{each.tag} {sorted(each.attrib)}" for each in elements}
+        return {f"{element.tag} {sorted(element.attrib)}" for element in elements}
     read = {".toml": tomllib.loads, ".json": json.loads, ".yaml": yaml.safe_load}
     return {*_types(read[path.suffix](path.read_text()))} if path.suffix in read else set()
 
@@ -81,5 +81,5 @@ def _python(tree: ast.AST) -> Iterator[str]:
 def _types(value: Any) -> Iterator[str]:
     yield type(value).__name__
     if isinstance(value, dict | list):
-        for each in value.values() if isinstance(value, dict) else value:
-            yield from _types(each)
+        for part in value.values() if isinstance(value, dict) else value:
+            yield from _types(part)

@@ -79,7 +79,7 @@ def load_surfaces() -> list[Surface]:
         for name in surface.escapes:
             table = tomllib.loads(FILE.with_name("escapes").joinpath(f"{name}.toml").read_text())
             scripts = [{"file": "policy/policy.pt", "escape": escape} for escape in table]
-            names = [{"name": each} for each in table.get("names", [])]
+            names = [{"name": text} for text in table.get("names", [])]
             surface.hostile.extend(table.get("hostile", names or scripts))
     return surfaces
 

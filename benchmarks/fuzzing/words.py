@@ -25,7 +25,7 @@ def prepare_words(lines: list[str], rng: Random) -> Command:
         values = rng.choices(_ODD, k=max(0, number + rng.choice((0, 0, 0, 0, 1, -1))))
         if any(key in option.key for key in _WRITES):
             values = [f"out{value}" for value in values]
-        name = rng.choice([*option.names, *(each[:-1] for each in option.names), ""])
+        name = rng.choice([*option.names, *(word[:-1] for word in option.names), ""])
         joined = [f"{name}={values[0]}"] if values else []
         words += rng.choice(([name, *values], [name, *values], joined)) if name else values
     if rng.random() < 0.1:

@@ -86,7 +86,8 @@ class Escape:
         for old, new in self.replace:
             for name, data in files.items():
                 if name == self.file or name.endswith(".pkl"):
-                    files[name] = data.replace(old.encode("latin-1"), new.encode("latin-1"))
+                    new_data = _replace(new, values).encode("latin-1")
+                    files[name] = data.replace(old.encode("latin-1"), new_data)
         return _pack(files)
 
 

@@ -170,7 +170,7 @@ def test_robots_may_not_influence_each_other(save):
         PolicyFile(save(archive(Mixes())))
 
 
-# Escapes. Each was seen to write a file in plain torch (benchmarks/fuzzing/escapes/verify.py).
+# Escapes. Each was seen to write a file in plain torch (benchmarks/verify_escapes.py).
 
 
 @pytest.fixture
