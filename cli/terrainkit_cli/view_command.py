@@ -120,10 +120,10 @@ class ViewerCommand(Command):
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(ViewerCommand):
-    """Walk the bundled quadruped over stairs, gaps and slopes, live in the browser.
+    """Walk the bundled quadruped over a course, live in the browser.
 
-    The policy walks in MuJoCo along a course that becomes harder. Sliders set its commands and its
-    level. Without a display, the command prints the address only.
+    The policy walks in MuJoCo over stairs, gaps and slopes that become harder. Sliders set its
+    commands and its level. Without a display, the command prints the address only.
     """
 
     browser: bool = True
