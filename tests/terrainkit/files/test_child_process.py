@@ -159,12 +159,13 @@ def test_child_process_memory_is_at_most_the_free_memory(monkeypatch):
 
 
 def test_child_process_ends_when_it_is_closed_or_forgotten():
+    others = set(psutil.Process().children())  # of earlier tests, such as a resource tracker
     closed, forgotten = ChildProcess(double), ChildProcess(double)
-    assert len(psutil.Process().children()) == 2
+    assert len(set(psutil.Process().children()) - others) == 2
     closed.close()
-    assert len(psutil.Process().children()) == 1
+    assert len(set(psutil.Process().children()) - others) == 1
     del forgotten
-    assert psutil.Process().children() == []
+    assert set(psutil.Process().children()) <= others
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="not on Windows")

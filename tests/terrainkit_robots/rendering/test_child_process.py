@@ -58,12 +58,13 @@ def test_stream_frames_stops_slow_child(monkeypatch):
 
 
 def test_stream_frames_closed_early_ends_child():
+    others = set(psutil.Process().children())  # of earlier tests, such as a resource tracker
     assert [frame.shape for frame in stream_frames(TWO_FRAMES)] == 2 * [(4, 6, 3)]
     frames = stream_frames(TWO_FRAMES)
     next(frames)
-    assert len(psutil.Process().children()) == 1
+    assert len(set(psutil.Process().children()) - others) == 1
     frames.close()
-    assert psutil.Process().children() == []
+    assert set(psutil.Process().children()) <= others
 
 
 def test_stream_frames_sends_input_of_each_frame():
