@@ -145,6 +145,8 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
 
 
 def _is_running(pid: int) -> bool:
-    import psutil
-
+    try:
+        import psutil
+    except ModuleNotFoundError:  # the light installation leaves the files of killed processes
+        return True
     return bool(psutil.pid_exists(pid))

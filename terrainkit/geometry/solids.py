@@ -341,13 +341,19 @@ def quaternions(rotation: ArrayLike) -> NDArray[np.float64]:
     Returns:
         Quaternions (w, x, y, z), shape (n, 4).
     """
-    matrices = np.asarray(rotation, float)
-    if not len(matrices):
-        return np.empty((0, 4))
-    from scipy.spatial.transform import Rotation
-
-    xyzw = np.atleast_2d(Rotation.from_matrix(matrices).as_quat())
-    return xyzw[:, [3, 0, 1, 2]]
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(np.asarray(rotation, float), 0, -1)
+    products = np.array(  # of the components of 2 q
+        [
+            [1 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx],
+            [xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy],
+            [yx - xy, xz + zx, yz + zy, 1 - xx - yy + zz],
+        ]
+    )
+    # Each row is a multiple of q; the largest is the most exact.
+    largest = np.argmax(np.diagonal(products), axis=-1)
+    rows = products[largest, :, np.arange(len(largest))]
+    return np.asarray(rows / np.linalg.norm(rows, axis=-1, keepdims=True))
 
 
 def _make(

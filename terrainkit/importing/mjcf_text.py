@@ -11,8 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lxml import etree
-
 from terrainkit.errors import HeightFileError, prefixed_errors
 from terrainkit.importing.source import MAX_FILE_BYTES, check_file
 
@@ -59,7 +57,7 @@ def read_text(path: Path) -> MjcfText:
     with prefixed_errors(f"{path}: "):
         try:
             reader.scene.text, _ = reader.model(path, ())
-        except (etree.XMLSyntaxError, ValueError) as error:
+        except (SyntaxError, ValueError) as error:
             raise HeightFileError(f"cannot be read: {error}") from error
     return reader.scene
 
@@ -71,6 +69,8 @@ class _Reader:
 
     def model(self, path: Path, parents: tuple[Path, ...]) -> tuple[str, int]:
         """Return the text of a model, and its number of elements, copies included."""
+        from lxml import etree
+
         root = self._document(path, path.parent, parents)
         if root.tag != "mujoco":
             raise HeightFileError(f"got the root <{root.tag}>; expected <mujoco>")
@@ -89,6 +89,8 @@ class _Reader:
 
     def _document(self, path: Path, folder: Path, parents: tuple[Path, ...]) -> Any:
         """Return the root of a document, with the included documents in their places."""
+        from lxml import etree
+
         if path in parents:
             raise HeightFileError("got a file that includes itself")
         check_file(path)
