@@ -49,6 +49,15 @@ def test_workflow_has_scripts_that_exist_and_least_permissions(workflow):
     assert all(pinned.fullmatch(step.get("uses", "./")) for step in steps(workflow))
 
 
+def test_containers_run_the_commands_of_the_readme():
+    commands = re.findall(r"^pip install .* && .*$", (ROOT / "README.md").read_text(), re.MULTILINE)
+    text = (ROOT / ".devcontainer/devcontainer.json").read_text()
+    container = json.loads(re.sub(r"^//.*$", "", text, flags=re.MULTILINE))
+    assert f"RUN {commands[0]}\n" in (ROOT / "Dockerfile").read_text()
+    assert container["postCreateCommand"] == commands[1]
+    assert f"AS {container['build']['target']}\n" in (ROOT / "Dockerfile").read_text()
+
+
 def test_workflow_has_declared_python_versions():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     matrix = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())

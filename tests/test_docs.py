@@ -121,3 +121,13 @@ def test_suppressions_of_the_check_robot_page_work(tmp_path, monkeypatch, capsys
     Path("pyproject.toml").write_text(blocks["toml"])
     assert main(asked) == 0
     assert "our parser normalizes axes" in capsys.readouterr().out
+
+
+def test_pictures_and_policies_are_small():
+    """Each version of them stays in the history."""
+    limits = {"*.png": 1e6, "*.svg": 1e6, "*.webp": 2e6, "*.pt": 1e6}
+    files = {
+        path: limit for name, limit in limits.items() for path in ROOT.glob(f"[dr]o*/**/{name}")
+    }
+    assert files
+    assert [path for path, limit in files.items() if path.stat().st_size > limit] == []
