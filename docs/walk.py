@@ -109,6 +109,5 @@ def walk_frames(patch: Patch, poses: NDArray[np.float64]) -> Iterator[Frame]:
             data.qpos[:] = pose
             mujoco.mj_kinematics(model, data)
             mujoco.mj_camlight(model, data)
-            camera = DISTANCE, azimuth, ELEVATION
-            appearance.update_scene(renderer, data, target, *camera)
+            appearance.update_scene(renderer, data, target, DISTANCE, azimuth, ELEVATION)
             yield renderer.render()
