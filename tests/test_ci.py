@@ -4,9 +4,11 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -56,6 +58,36 @@ def test_containers_run_the_commands_of_the_readme():
     assert f"RUN {commands[0]}\n" in (ROOT / "Dockerfile").read_text()
     assert container["postCreateCommand"] == commands[1]
     assert f"AS {container['build']['target']}\n" in (ROOT / "Dockerfile").read_text()
+
+
+def test_api_check_finds_what_breaks(tmp_path):
+    for folder in ("terrainkit", "robots/terrainkit_robots", ".ci"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    changelog = tmp_path / "CHANGELOG.md"
+    changelog.write_text("### What breaks\n\n- `torques` is gone.\n\n### Added\n")
+    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b.c"]
+    for words in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "First"]):
+        subprocess.run([*git, *words], cwd=tmp_path, check=True)
+    for path, old, new in (
+        ("terrainkit/map/terrain_map.py", "def assign(self, num_envs", "def assign(self, num"),
+        ("terrainkit/perception/height_scan.py", "def below(", "def under("),
+        ("terrainkit/views/preview.py", "def render_preview(", "def render("),  # not public
+        ("terrainkit/__init__.pyi", "import Flight as Flight", "import Flight as _Flight"),
+        ("robots/terrainkit_robots/rl/rewards.py", "def torques(", "def torque("),
+        ("robots/terrainkit_robots/rl/rewards.py", "def collision(", "def collisions("),
+    ):
+        text = (tmp_path / path).read_text()
+        assert old in text
+        (tmp_path / path).write_text(text.replace(old, new, 1))
+    check = partial(subprocess.run, [sys.executable, ".ci/api"], cwd=tmp_path, text=True)
+    done = check(capture_output=True)
+    assert done.returncode == 1
+    found = re.findall(r"^\S+ ([\w.]+)", done.stdout, re.MULTILINE)
+    assert set(found[:-1]) == {"TerrainMap.assign", "HeightScan.below", "Flight", "collision"}
+    changelog.write_text(
+        "### What breaks\n\nassign, below, Flight, torques, collision\n\n### Added\n"
+    )
+    assert check(capture_output=True).returncode == 0
 
 
 def test_workflow_has_declared_python_versions():
