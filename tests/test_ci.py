@@ -70,6 +70,7 @@ def test_api_check_finds_what_breaks(tmp_path):
         subprocess.run([*git, *words], cwd=tmp_path, check=True)
     for path, old, new in (
         ("terrainkit/map/terrain_map.py", "def assign(self, num_envs", "def assign(self, num"),
+        ("terrainkit/map/config.py", "    rows: Count", "    lines: Count"),
         ("terrainkit/perception/height_scan.py", "def below(", "def under("),
         ("terrainkit/views/preview.py", "def render_preview(", "def render("),  # not public
         ("terrainkit/__init__.pyi", "import Flight as Flight", "import Flight as _Flight"),
@@ -82,11 +83,12 @@ def test_api_check_finds_what_breaks(tmp_path):
     check = partial(subprocess.run, [sys.executable, ".ci/api"], cwd=tmp_path, text=True)
     done = check(capture_output=True)
     assert done.returncode == 1
-    found = re.findall(r"^\S+ ([\w.]+)", done.stdout, re.MULTILINE)
-    assert set(found[:-1]) == {"TerrainMap.assign", "HeightScan.below", "Flight", "collision"}
-    changelog.write_text(
-        "### What breaks\n\nassign, below, Flight, torques, collision\n\n### Added\n"
-    )
+    assert {*re.findall(r"^\S+ ([\w.]+)", done.stdout, re.MULTILINE)[:-1]} == {
+        *("MapConfig.__init__", "MapConfig.rows", "TerrainMap.assign"),
+        *("HeightScan.below", "Flight", "collision"),
+    }
+    names = "MapConfig, rows, assign, below, Flight, torques, collision"
+    changelog.write_text(f"### What breaks\n\n{names}\n\n### Added\n")
     assert check(capture_output=True).returncode == 0
 
 
