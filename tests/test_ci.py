@@ -92,6 +92,23 @@ def test_api_check_finds_what_breaks(tmp_path):
     assert check(capture_output=True).returncode == 0
 
 
+@pytest.mark.parametrize(
+    ("subject", "code"),
+    [
+        ("Reject inverted limits", 0),
+        ("reject inverted limits", 1),
+        ("Reject inverted limits.", 1),
+        (f"R{71 * 'e'}", 0),
+        (f"R{72 * 'e'}", 1),
+        ("", 1),
+    ],
+)
+def test_subject_of_a_commit_is_checked(tmp_path, subject, code):
+    (tmp_path / "message").write_text(f"{subject}\n\nThe body may be longer.\n# a comment\n")
+    done = subprocess.run([ROOT / ".ci/subject", tmp_path / "message"], capture_output=True)
+    assert done.returncode == code
+
+
 def test_workflow_has_declared_python_versions():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     matrix = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text())

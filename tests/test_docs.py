@@ -121,3 +121,13 @@ def test_pictures_and_policies_are_small():
     }
     assert files
     assert [path for path, limit in files.items() if path.stat().st_size > limit] == []
+
+
+def test_sources_have_no_sphinx_markup():
+    """The site and editors show docstrings as Markdown, in which it is noise."""
+    markup = re.compile(r":[a-z]+:`|\.\. [a-z]+::")
+    folders = ("terrainkit", "robots", "cli", "docs")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    assert files
+    assert [str(path) for path in files if markup.search(path.read_text(encoding="utf-8"))] == []
+    assert all(markup.search(text) for text in (":func:`run`", ".. math:: x"))
