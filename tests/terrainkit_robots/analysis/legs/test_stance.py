@@ -18,10 +18,10 @@ from terrainkit_robots.analysis.legs.stance import (
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from tests import small_robots
-from tests.robots import BUNDLED
+from tests.robots import ROBOTS
 from tests.small_robots import ball, box, floating, joint, link
 
-every_robot = pytest.mark.parametrize("name", BUNDLED)
+every_robot = pytest.mark.parametrize("name", ROBOTS)
 
 
 @cache
