@@ -82,7 +82,7 @@ def _values(command: str, option: Option, prefix: str, **_: Any) -> list[str]:
     hint = parse_hint(option.annotation)
     kind = parse_hint(hint.args[0]).kind if hint.origin is tuple else hint.kind
     if kind in (bool, int, float) or get_origin(kind) is Literal:
-        return ["true", "false"] if kind is bool else [str(each) for each in get_args(kind)]
+        return ["true", "false"] if kind is bool else [str(argument) for argument in get_args(kind)]
     source = _NAMES.get(f"{command} {option.key}") or _NAMES.get(option.key)
     names = getattr(import_module(source[0]), source[1])() if source else ()
     found = [str(getattr(name, "code", name)) for name in names]

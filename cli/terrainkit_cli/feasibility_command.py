@@ -177,14 +177,14 @@ def solve_demand(
     solved = solve_ranges(config, derived.limits, ends, progress=progress, executor=executor)
     rows = [("terrain", "demand", f"ranges for {derived.robot}")]
     for terrain in solved:
-        for indent, each in [("", terrain), *(("  ", element) for element in terrain.elements)]:
-            ranges = [f"{name} {easy:g} to {hard:g}" for name, (easy, hard) in each.ranges.items()]
-            what = ", ".join(ranges) or ("" if each.elements else "unchanged")
-            span = " to ".join(map(demand_text, each.demand))
-            rows.append((indent + each.sub_terrain.name, span, what))
+        for indent, part in [("", terrain), *(("  ", element) for element in terrain.elements)]:
+            ranges = [f"{name} {easy:g} to {hard:g}" for name, (easy, hard) in part.ranges.items()]
+            what = ", ".join(ranges) or ("" if part.elements else "unchanged")
+            span = " to ".join(map(demand_text, part.demand))
+            rows.append((indent + part.sub_terrain.name, span, what))
     render.table(rows)
     render.result("")
-    return replace(config, terrains=tuple(each.sub_terrain for each in solved))
+    return replace(config, terrains=tuple(solution.sub_terrain for solution in solved))
 
 
 def print_impassable(
@@ -200,15 +200,15 @@ def print_impassable(
     render.result("")
     for text in crossed_texts(results):
         render.result(text)
-    blocked = [each for each in results if not each.is_passable]
+    blocked = [patch for patch in results if not patch.is_passable]
     if not blocked:
         render.result(f"\n{path}: {derived.robot} can cross {_patches(len(results))}")
         return 0
     render.result("")
-    for each in blocked[:MAX_LISTED]:
+    for item in blocked[:MAX_LISTED]:
         render.result(
-            f"patch ({each.row}, {each.col}), {each.terrain}: demand {demand_text(each.demand)}, "
-            f"{blocking_text(each, derived.limits)}"
+            f"patch ({item.row}, {item.col}), {item.terrain}: demand {demand_text(item.demand)}, "
+            f"{blocking_text(item, derived.limits)}"
         )
     if len(blocked) > MAX_LISTED:
         render.result(f"and {len(blocked) - MAX_LISTED} more")

@@ -135,9 +135,7 @@ class Generate(PluginCommand, ConfigCommand):
         overlays = tuple(map(_overlay, self.overlay))
         if not overlays:
             return config
-        terrains = [
-            replace(each, overlays=each.overlays + overlays) for each in config.sub_terrains
-        ]
+        terrains = (replace(old, overlays=old.overlays + overlays) for old in config.sub_terrains)
         return replace(config, terrains=tuple(terrains))
 
 

@@ -133,10 +133,10 @@ def write_model(terrain_map: "TerrainMap", file: TextIO, collision: Collision) -
         mesh = {"name": name, "vertex": vertices.ravel(), "inertia": "convex"}
         ET.SubElement(asset, "mesh", _as_text(mesh))
     world = ET.SubElement(root, "worldbody")
-    for each in model.geoms():
-        ET.SubElement(world, "geom", {"class": "terrain", **_as_text(each)})
-    for each in model.sites():
-        ET.SubElement(world, "site", {"name": each["name"], "class": "terrain", **_as_text(each)})
+    for geom in model.geoms():
+        ET.SubElement(world, "geom", {"class": "terrain", **_as_text(geom)})
+    for site in model.sites():
+        ET.SubElement(world, "site", {"name": site["name"], "class": "terrain", **_as_text(site)})
     # The elevation data are the larger part of the file, so they are not kept as one text.
     file.write('<?xml version="1.0" encoding="utf-8"?>\n<mujoco model="terrain">\n  <asset>\n')
     for name, (part, _) in model.hfields.items():
@@ -182,7 +182,7 @@ class Model:
 
     def hulls(self) -> dict[str, NDArray[np.float32]]:
         """Return the vertices of the mesh of each hull [m], shape (n, 3), by name."""
-        return {f"solid_{k}": each for k, each in enumerate(self.terrain_map.solids.hulls())}
+        return {f"solid_{k}": hull for k, hull in enumerate(self.terrain_map.solids.hulls())}
 
     def geoms(self) -> Iterator[dict[str, Any]]:
         """Yield the attributes of each geom: first of the ground, then of the solids."""
@@ -192,7 +192,7 @@ class Model:
         for name, (part, friction) in self.hfields.items():
             low = self.heights[_on_map(part, self.heights.shape)].min()
             grid = self.terrain_map.grid
-            middle = [((each.start + each.stop) / 2 - _MARGIN) * grid.cell for each in part]
+            middle = [((cells.start + cells.stop) / 2 - _MARGIN) * grid.cell for cells in part]
             pos = (*np.add(grid.lower, middle), low)
             yield {"type": "hfield", "hfield": name, "pos": pos} | self._friction(friction)
         solids = self.terrain_map.solids
@@ -254,9 +254,9 @@ def make_model(terrain_map: "TerrainMap", collision: Collision) -> Model:
         parts = _remaining_parts(terrain_map, decomposition)
         centers, half_sizes = decomposition.centers, decomposition.half_sizes
         boxes = list(zip(centers, half_sizes, decomposition.friction, strict=True))
-    split = [each for part in parts for each in _split_by_friction(terrain_map, part)]
+    split = [piece for part in parts for piece in _split_by_friction(terrain_map, part)]
     is_single = decomposition is None and len(split) == 1
-    hfields = {"terrain" if is_single else f"terrain_{k}": each for k, each in enumerate(split)}
+    hfields = {"terrain" if is_single else f"terrain_{k}": piece for k, piece in enumerate(split)}
     return Model(terrain_map=terrain_map, heights=heights, boxes=boxes, hfields=hfields)
 
 
@@ -293,10 +293,10 @@ def _part_edges(terrain_map: "TerrainMap") -> list[NDArray[np.int64]]:
 
     The first and the last patch include `_MARGIN` samples of the border.
     """
-    edges = [each + _MARGIN for each in terrain_map.config.patch_edges]
-    for each in edges:
-        each[0] -= _MARGIN
-        each[-1] += _MARGIN
+    edges = [lines + _MARGIN for lines in terrain_map.config.patch_edges]
+    for lines in edges:
+        lines[0] -= _MARGIN
+        lines[-1] += _MARGIN
     return edges
 
 
@@ -326,15 +326,15 @@ def _remaining_parts(terrain_map: "TerrainMap", decomposition: BoxDecomposition)
         for _, r0, r1, c0, c1 in merged.astype(int).tolist()
     ]
     max_length = max(_HFIELD_LENGTH / terrain_map.config.cell, _MIN_HFIELD_CELLS)
-    return [each for part in parts for each in _split_by_length(part, max_length)]
+    return [piece for part in parts for piece in _split_by_length(part, max_length)]
 
 
 def _split_by_length(part: _Part, max_length: float) -> list[_Part]:
     """Divide a part into equal parts of about `max_length`, which share samples where they meet."""
     spans = []
-    for each in part:
-        cells = each.stop - each.start - 1
-        lines = np.linspace(each.start, each.stop - 1, max(1, round(cells / max_length)) + 1)
+    for span in part:
+        cells = span.stop - span.start - 1
+        lines = np.linspace(span.start, span.stop - 1, max(1, round(cells / max_length)) + 1)
         spans.append([slice(a, b + 1) for a, b in itertools.pairwise(lines.astype(int).tolist())])
     x, y = spans
     return [(i, j) for i in x for j in y]
@@ -343,8 +343,8 @@ def _split_by_length(part: _Part, max_length: float) -> list[_Part]:
 def _on_map(part: _Part, shape: tuple[int, ...]) -> _Part:
     """Return the samples of a part that are on the map, counted on the map."""
     x, y = (
-        slice(max(each.start - _MARGIN, 0), min(each.stop - _MARGIN, size))
-        for each, size in zip(part, shape, strict=True)
+        slice(max(span.start - _MARGIN, 0), min(span.stop - _MARGIN, size))
+        for span, size in zip(part, shape, strict=True)
     )
     return x, y
 
@@ -358,14 +358,14 @@ def _split_by_friction(terrain_map: "TerrainMap", part: _Part) -> list[tuple[_Pa
     x, y = changes(friction), changes(friction.T)
     if len(x) == len(y) == 2:
         return [(part, float(friction[0, 0]))]
-    i, j = (each.ravel() for each in np.indices((len(x) - 1, len(y) - 1)))
+    i, j = (index.ravel() for index in np.indices((len(x) - 1, len(y) - 1)))
     values = friction[x[i], y[j]]
     for edges, samples in zip((x, y), part, strict=True):
         # The samples beyond the map have the friction of its edge.
         edges[1:-1] += max(_MARGIN - samples.start, 0)
         edges[-1] = samples.stop - samples.start
     merged = merge_boxes(np.column_stack([values, x[i], x[i + 1], y[j], y[j + 1]]))
-    first, last = ([each.start for each in part], [each.stop for each in part])
+    first, last = ([span.start for span in part], [span.stop for span in part])
     result = []
     for value, i0, i1, j0, j1 in merged.tolist():
         rows = slice(int(first[0] + i0), min(int(first[0] + i1) + 1, last[0]))
@@ -382,8 +382,8 @@ def _write_hfield(
     low = float(heights[_on_map(part, heights.shape)].min())
     # Samples beyond the map, where there is no border, have the height of its edge.
     x, y = (
-        np.clip(np.arange(each.start, each.stop) - _MARGIN, 0, size - 1)
-        for each, size in zip(part, heights.shape, strict=True)
+        np.clip(np.arange(span.start, span.stop) - _MARGIN, 0, size - 1)
+        for span, size in zip(part, heights.shape, strict=True)
     )
     size = format_numbers(*hfield_size(heights, part, cell))
     # MuJoCo's rows are along y, its columns along x.
@@ -409,7 +409,7 @@ def hfield_size(
     """
     samples = heights[_on_map(part, heights.shape)]
     units = max(int(_elevation_units(samples.max(), float(samples.min()))), 1)  # MuJoCo needs > 0
-    x, y = ((each.stop - each.start - 1) * cell / 2 for each in part)
+    x, y = ((span.stop - span.start - 1) * cell / 2 for span in part)
     return x, y, units * _ELEVATION_UNIT, THICKNESS
 
 
@@ -426,8 +426,8 @@ def hfield_elevation(heights: NDArray[np.float32], part: _Part) -> NDArray[np.in
     """
     samples = heights[_on_map(part, heights.shape)]
     beyond = [
-        (max(_MARGIN - each.start, 0), max(each.stop - _MARGIN - size, 0))
-        for each, size in zip(part, heights.shape, strict=True)
+        (max(_MARGIN - span.start, 0), max(span.stop - _MARGIN - size, 0))
+        for span, size in zip(part, heights.shape, strict=True)
     ]
     if any(map(any, beyond)):
         samples = np.pad(samples, beyond, mode="edge")

@@ -303,7 +303,7 @@ def _read_parameters(
     archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
-    names = [_parameter_names(each) for each in config.sub_terrains]
+    names = [_parameter_names(sub_terrain) for sub_terrain in config.sub_terrains]
     text = archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
     try:
         rows = msgspec.json.decode(text, type=list[list[_Record]])

@@ -105,7 +105,7 @@ class FootholdGraph:
             for node in (edge.start, edge.end)
         ]
         measured += _quantities(edge)
-        name, value = max(measured, key=lambda each: float(ratio(each[0], each[1], self.limits)[0]))
+        name, value = max(measured, key=lambda item: float(ratio(item[0], item[1], self.limits)[0]))
         return name, float(value[0])
 
 

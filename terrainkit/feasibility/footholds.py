@@ -77,8 +77,8 @@ def _with_tops(
     reach = math.ceil(max_size / columns.spacing) + 1
     kernel = np.ones((2 * reach + 1,) * 2, np.uint8)
     is_covered, is_joined = (
-        np.repeat(cv2.dilate(each.astype(np.uint8), kernel).reshape(-1) > 0, columns.floor.shape[2])
-        for each in (tops.is_covered, joined)
+        np.repeat(cv2.dilate(mask.astype(np.uint8), kernel).reshape(-1) > 0, columns.floor.shape[2])
+        for mask in (tops.is_covered, joined)
     )
     known = ~np.isnan(exact) & ~is_covered & ~(is_joined & (sizes > exact))
     return np.where(known, exact, sizes)
@@ -106,10 +106,10 @@ def _flat_steps(columns: Columns, steps: Edges, limits: RobotLimits) -> NDArray[
         # The steps one after the other across the smallest foothold.
         for _ in range(1, math.floor(limits.foothold / columns.spacing + 1e-9)):
             after = following[steps.end[chains[-1]]]
-            chains = [each[after >= 0] for each in (*chains, after)]
+            chains = [chain[after >= 0] for chain in (*chains, after)]
             rise = rise[after >= 0] + step[chains[-1]]
-            for each in chains:
-                is_rough[each[np.abs(rise) > edge]] = True
+            for chain in chains:
+                is_rough[chain[np.abs(rise) > edge]] = True
     return is_flat & ~is_rough
 
 

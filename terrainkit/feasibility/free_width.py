@@ -155,7 +155,8 @@ class FreeWidth:
                 i, j, active = i[is_open], j[is_open], active[is_open]
                 above, min_clearance = above[is_open], min_clearance[is_open]
                 # No later cell looks further back.
-                levels[cell.slope_start :] = [each[is_open] for each in levels[cell.slope_start :]]
+                later = levels[cell.slope_start :]
+                levels[cell.slope_start :] = [nodes[is_open] for nodes in later]
             if not len(active):
                 break
             levels.append(above)

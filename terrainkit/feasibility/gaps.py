@@ -224,7 +224,7 @@ def _with_width(graph: FootholdGraph, edges: Edges, max_demand: float) -> Edges:
     lines = list(_line(graph.columns, edges.start, edges.end))
     if not lines:
         return edges
-    i, j, inside = (np.concatenate(each) for each in zip(*lines, strict=True))
+    i, j, inside = (np.concatenate(parts) for parts in zip(*lines, strict=True))
     width = edges.width.copy()
     found = graph.free_width.at(i, j, level[inside], edges.clearance[inside])
     np.minimum.at(width, inside, found)

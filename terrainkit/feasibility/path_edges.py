@@ -36,7 +36,7 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
     while min(least, MAX_DEMAND) > searched:
         reach = least
         if least > MAX_DEMAND:
-            reach = next(each for each in _REACHES if each > searched)
+            reach = next(length for length in _REACHES if length > searched)
         is_usable = step_demand < reach
         components = Components.build(steps, is_usable, num_nodes)
         found, is_path = _search_gaps(graph, components, _below(graph, gaps, reach), segment, reach)

@@ -163,8 +163,8 @@ class Curbside(Lane):
         across = y + np.array([-outer, -inner, inner, outer])
         low, top = -self.gutter, self.curb
         return make_ramps(
-            [(0.0, each) for each in across[:-1]],
-            [(run, each) for each in across[1:]],
+            [(0.0, y) for y in across[:-1]],
+            [(run, y) for y in across[1:]],
             [(top, top, top, low), (low, top, top, low), (low, top, top, top)],
             floor=low,
         )

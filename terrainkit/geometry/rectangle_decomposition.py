@@ -103,7 +103,10 @@ def _maximal_rectangles(required: list[int], allowed: list[int]) -> Iterator[tup
 
 def _select(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
     """Return rectangles in greedy order, each with the cells that it was the first to cover."""
-    queue = [(-each.required.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
+    queue = [
+        (-candidate.required.bit_count(), -candidate.area, k)
+        for k, candidate in enumerate(candidates)
+    ]
     heapq.heapify(queue)
     selected = []
     while missing:

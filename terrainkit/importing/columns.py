@@ -83,7 +83,7 @@ def make_columns(vertices: Array, faces: NDArray[np.int64], x: Array, y: Array) 
     floor = top.copy()
     # The last of several gaps of a column is the lowest.
     ceiling[column[above]], floor[column[above]] = z[above], z[above + 1]
-    top, floor, ceiling = (each.reshape(len(x), len(y)) for each in (top, floor, ceiling))
+    top, floor, ceiling = (values.reshape(len(x), len(y)) for values in (top, floor, ceiling))
     sheets = _sheets(column, z, sign, depth, top.size).reshape(top.shape)
     return Columns(top=top, floor=floor, ceiling=ceiling, sheets=sheets)
 
@@ -132,9 +132,9 @@ def _intersections(
         count = np.maximum(end - first, 0) * (j1 - j0)
         within = np.flatnonzero(count)
         block = np.cumsum(count[within]) // _PAIRS_PER_BLOCK
-        for each in np.split(within, np.flatnonzero(np.diff(block)) + 1):
-            k, local = segment_indices(count[each])
-            triangle = each[k]
+        for triangles in np.split(within, np.flatnonzero(np.diff(block)) + 1):
+            k, local = segment_indices(count[triangles])
+            triangle = triangles[k]
             width = (j1 - j0)[triangle]
             i, j = first[triangle] + local // width, j0[triangle] + local % width
             inside, z = _cross(corners[triangle], sign[triangle], x[i], y[j])

@@ -70,9 +70,9 @@ def _coefficients(path: Path, values: NDArray[Any], options: ImportOptions) -> N
     table, hint = Path(options.friction_classes), Mapping[str, NonNegativeFloat]
     classes = convert(str(table), parse_toml(read_text(table)), hint)
     found, index = np.unique(values, return_inverse=True)
-    if unknown := [str(each) for each in found if str(each) not in classes]:
+    if unknown := [str(value) for value in found if str(value) not in classes]:
         raise ConfigError(
             f"{table}: got {listing(classes)}; {path} has the values {listing(unknown)} as well"
         )
-    coefficients = np.array([classes[str(each)] for each in found], dtype=np.float32)
+    coefficients = np.array([classes[str(value)] for value in found], dtype=np.float32)
     return np.asarray(coefficients[index.reshape(values.shape)])

@@ -63,7 +63,7 @@ class MeshSource(VertexSource):
             y: Positions along y [m], increasing and evenly spaced, shape (ny,).
         """
         inner, number = cover_positions((x, y), self.lower, self.upper)
-        aside = [each + _ASIDE * np.ptp(each[:2]) for each in inner]
+        aside = [lines + _ASIDE * np.ptp(lines[:2]) for lines in inner]
         found = make_columns(self.vertices, self.faces, *aside)
         if all(len(a) == len(b) for a, b in zip(inner, (x, y), strict=True)):
             return found
@@ -146,7 +146,7 @@ def _read_mesh(path: Path) -> dict[str, Any]:
         stated = _read_dae_asset(data)
     scene = trimesh.load(BytesIO(data), file_type=suffix[1:], force="scene", process=False)
     mesh = scene.to_mesh()
-    points = [np.asarray(each.vertices, float) for each in scene.geometry.values()]
+    points = [np.asarray(geometry.vertices, float) for geometry in scene.geometry.values()]
     return {
         "vertices": np.asarray(mesh.vertices, float),
         "faces": np.asarray(mesh.faces, np.int64),

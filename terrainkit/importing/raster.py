@@ -80,7 +80,7 @@ class Raster:
         """
         from scipy.ndimage import map_coordinates, uniform_filter
 
-        step = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in (x, y))
+        step = max(float(np.abs(np.diff(axis)).max(initial=0.0)) for axis in (x, y))
         widths = [
             2 * int(min(step / side / 2 + _ALIGNED, n)) + 1
             for side, n in zip(self.spacing, self.values.shape, strict=True)
@@ -91,12 +91,12 @@ class Raster:
                 (x, y), self.lower, self.spacing, self.values.shape, strict=True
             )
         ]
-        nearest = [np.rint(each) for each in index]
+        nearest = [np.rint(position) for position in index]
         is_aligned = all(
             np.abs(a - b).max() < _ALIGNED for a, b in zip(index, nearest, strict=True)
         )
         if is_aligned and widths == [1, 1]:
-            i, j = (each.astype(int) for each in nearest)
+            i, j = (position.astype(int) for position in nearest)
             return np.asarray(self.values[np.ix_(i, j)], dtype=float)
         grid = np.meshgrid(*index, indexing="ij")
 
@@ -194,7 +194,7 @@ def make_raster(
     sides = [n * length for n, length in zip(values.shape, spacing, strict=True)]
     known = heights[~np.isnan(heights)]
     if known.size and np.ptp(known) > _MAX_RELIEF * max(sides):
-        file_cell = " ".join(f"{111_000 * each:.6g}" for each in spacing)
+        file_cell = " ".join(f"{111_000 * step:.6g}" for step in spacing)
         warn(
             f"{path}: got {sides[0]:.6g} m x {sides[1]:.6g} m with heights over "
             f"{np.ptp(known):.4g} m; are they in centimeters (--scale 0.01), or positions in "

@@ -49,8 +49,8 @@ def _read_table(path: Path) -> dict[str, Any]:
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         stripped = (line.strip(" \r\n") for line in file)
         lines = [line for line in stripped if line and not line.startswith(_COMMENTS)]
-    found = ((k, each) for k, line in enumerate(lines[:_MAX_LINES]) for each in _delimiters(line))
-    start, delimiter = next((each for each in found if not _is_size(lines[each[0] :])), (0, ""))
+    found = ((k, mark) for k, line in enumerate(lines[:_MAX_LINES]) for mark in _delimiters(line))
+    start, delimiter = next((item for item in found if not _is_size(lines[item[0] :])), (0, ""))
     if not delimiter:
         raise ValueError("got text; expected a table of numbers")
     end = delimiter if lines[start].endswith(delimiter) else ""
@@ -84,7 +84,7 @@ def _delimiters(line: str) -> Iterator[str]:
     for delimiter in _DELIMITERS:
         cells = line.split(None if delimiter == " " else delimiter)
         with suppress(ValueError):
-            if not np.isnan([_float_or_nan(each) for each in cells]).all():
+            if not np.isnan([_float_or_nan(cell) for cell in cells]).all():
                 yield delimiter
 
 
@@ -99,7 +99,7 @@ def _cells(line: str) -> list[float]:
     delimiter = next(_delimiters(line), None)
     text = line.strip().removesuffix(delimiter or "")
     cells = text.split(None if delimiter == " " else delimiter) if delimiter else ()
-    return [_float_or_nan(each) for each in cells]
+    return [_float_or_nan(cell) for cell in cells]
 
 
 def _float_or_nan(text: str) -> float:

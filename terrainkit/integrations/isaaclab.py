@@ -145,7 +145,8 @@ class MapGenerator:
         """Configuration of the generator."""
 
         is_heightfield = all(
-            getattr(each, "convert_to_heightfield", False) for each in cfg.sub_terrains.values()
+            getattr(terrain, "convert_to_heightfield", False)
+            for terrain in cfg.sub_terrains.values()
         )
         _require_contacts(terrain_map, is_heightfield=is_heightfield)
         mesh, center = terrain_map.mesh(), np.array([*terrain_map.grid.center, 0.0])
@@ -163,12 +164,12 @@ class MapGenerator:
         points = {"init_pos": terrain_map.spawns, "target": terrain_map.goals}
         self.flat_patches = {
             name: torch.tensor(
-                pad_points(each[..., :3], terrain_map.env_origins) - center,
+                pad_points(poses[..., :3], terrain_map.env_origins) - center,
                 dtype=torch.float,
                 device=device,
             )
-            for name, each in points.items()
-            if each.shape[2]
+            for name, poses in points.items()
+            if poses.shape[2]
         }
         """Spawn positions and goals of each patch [m], shape (rows, cols, k, 3)."""
 

@@ -171,13 +171,12 @@ class MapColumnCfg(SubTerrainCfg):
             frame = spec.body("terrain").add_frame(pos=[-x, -y, 0.0])
             spec.attach(child, frame=frame, prefix="map/")
         corner = np.array([*terrain_map.config.patch_grid(row, self.column).lower, 0.0])
-        points = {
-            name: each[row, self.column] - corner for name, each in _point_sets(terrain_map).items()
-        }
+        sets = _point_sets(terrain_map)
+        points = {name: poses[row, self.column] - corner for name, poses in sets.items()}
         return TerrainOutput(
             origin=terrain_map.env_origins[row, self.column] - corner,
             geometries=[],
-            flat_patches={name: each[~np.isnan(each[:, 0])] for name, each in points.items()},
+            flat_patches={name: patch[~np.isnan(patch[:, 0])] for name, patch in points.items()},
         )
 
 
@@ -189,7 +188,7 @@ def _load(path: str) -> TerrainMap:
 def _point_sets(terrain_map: TerrainMap) -> dict[str, NDArray[np.float64]]:
     """Return the spawn positions and the goals, if any, shape (rows, cols, k, 3)."""
     points = {"spawn": terrain_map.spawns, "goal": terrain_map.goals}
-    return {name: each[..., :3].astype(float) for name, each in points.items() if each.shape[2]}
+    return {name: poses[..., :3].astype(float) for name, poses in points.items() if poses.shape[2]}
 
 
 def _with_narrow_border(terrain_map: TerrainMap) -> TerrainMap:
@@ -197,7 +196,7 @@ def _with_narrow_border(terrain_map: TerrainMap) -> TerrainMap:
     if removed <= 0:
         return terrain_map
     config = replace(terrain_map.config, border=_BORDER_CELLS * terrain_map.config.cell)
-    x, y = (each + removed * terrain_map.grid.cell for each in terrain_map.grid.lower)
+    x, y = (edge + removed * terrain_map.grid.cell for edge in terrain_map.grid.lower)
     inside = slice(removed, -removed)
     return replace(
         terrain_map,

@@ -55,10 +55,10 @@ def make_spec(
         # MuJoCo reads a memoryview twice as fast as an array.
         data = elevation.astype(np.float32).ravel().data
         spec.add_hfield(name=name, nrow=nrow, ncol=ncol, size=size, userdata=data)
-    for each in model.geoms():
-        spec.worldbody.add_geom(default, **_fields(each))
-    for each in model.sites():
-        spec.worldbody.add_site(default, **_fields(each))
+    for geom in model.geoms():
+        spec.worldbody.add_geom(default, **_fields(geom))
+    for site in model.sites():
+        spec.worldbody.add_site(default, **_fields(site))
     return spec
 
 
@@ -154,5 +154,6 @@ def _hfield_mesh(field: Any) -> "trimesh.Trimesh":
     vertices = np.stack([x, y, height * field.data.reshape(rows, columns)], axis=-1)
     k = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]
-    faces = np.concatenate([np.stack(each, -1).reshape(-1, 3) for each in ((a, b, c), (a, c, d))])
+    halves = ((a, b, c), (a, c, d))
+    faces = np.concatenate([np.stack(corners, -1).reshape(-1, 3) for corners in halves])
     return trimesh.Trimesh(vertices.reshape(-1, 3), faces, process=False)

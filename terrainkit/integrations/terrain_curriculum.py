@@ -77,7 +77,7 @@ class TerrainLevels:
 
         self.sampler.levels[:] = _numpy(terrain.terrain_levels)
         self.sampler.columns[:] = _numpy(terrain.terrain_types)
-        names = [each.split("#")[0] for each in terrain.cfg.terrain_generator.sub_terrains]
+        names = [sub_name.split("#")[0] for sub_name in terrain.cfg.terrain_generator.sub_terrains]
         self._names = np.array(names if len(names) == cols else ["terrain"] * cols)
 
     def __call__(self, env: Any, env_ids: Any, sampler: str | None) -> dict[str, float]:  # noqa: ARG002
@@ -109,8 +109,8 @@ class TerrainLevels:
             parts[name] = levels[of_terrain[self.sampler.columns]]
             parts[f"success/{name}"] = success[:, of_terrain]
         parts |= {f"success/level_{k}": row for k, row in enumerate(success)}
-        known = {name: each[~np.isnan(each)] for name, each in parts.items()}
-        return {name: float(each.mean()) for name, each in known.items() if each.size}
+        known = {name: values[~np.isnan(values)] for name, values in parts.items()}
+        return {name: float(values.mean()) for name, values in known.items() if values.size}
 
 
 def _ids(env: Any, env_ids: Any) -> NDArray[np.int64]:

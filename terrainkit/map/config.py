@@ -177,8 +177,8 @@ class MapConfig(Config):
     @property
     def problems(self) -> tuple[str, ...]:
         """Why classes of the sub-terrains are not available, without repetitions."""
-        found = (each for each in self.terrains if isinstance(each, UnavailableSubTerrain))
-        return tuple(dict.fromkeys(each.problem for each in found))
+        missing = (item for item in self.terrains if isinstance(item, UnavailableSubTerrain))
+        return tuple(dict.fromkeys(sub_terrain.problem for sub_terrain in missing))
 
     def to_table(self) -> dict[str, Any]:
         """Return the values that a TOML file holds: the preset or the sub-terrains, by key."""

@@ -142,7 +142,7 @@ class _MapBuilder:
             friction=self._friction,
             spawns=pad_poses(self._spawns),
             terrain_types=self._terrain_types,
-            terrain_names=tuple(each.name for each in self._config.sub_terrains),
+            terrain_names=tuple(sub_terrain.name for sub_terrain in self._config.sub_terrains),
             difficulty=self._difficulty,
             parameters=self._parameters,
             solids=Solids.concatenate(self._solids),
@@ -182,7 +182,7 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     Returns:
         Poses, shape (rows, cols, max k, 4), padded with NaN.
     """
-    lengths = {len(each) for each in poses.ravel().tolist()}
+    lengths = {len(goals) for goals in poses.ravel().tolist()}
     number = max(lengths)
     if len(lengths) == 1:
         return np.array(poses.tolist(), dtype=np.float32).reshape(*poses.shape, number, 4)

@@ -113,7 +113,7 @@ def import_curriculum(
         raise HeightFileError(f"skipped all files: {listing(skipped)}")
     if skipped:
         warnings.warn(f"skipped {listing(skipped)}", TerrainkitWarning, stacklevel=2)
-    filled = [each for each in patches if each.report.num_missing]
+    filled = [patch for patch in patches if patch.report.num_missing]
     if filled and options.missing == "nearest":
         warnings.warn(
             f"{len(filled)} of {len(patches)} patches have missing heights, such as "
@@ -138,12 +138,12 @@ def _find_files(paths: Sequence[str | Path]) -> list[Path]:
     readers, files = modules_by_suffix("terrainkit.importing"), set[Path]()
     for path in map(Path, paths):
         inside = sorted(path.iterdir()) if path.is_dir() else []
-        found = [each for each in inside if each.suffix.lower() in readers]
+        found = [file for file in inside if file.suffix.lower() in readers]
         if path.is_dir() and not found:
             raise HeightFileError(f"{path}: got no file to import; expected {listing(readers)}")
         # Other files of the same name belong to a file, such as the .mtl of an .obj.
-        stems = tuple(f"{each.stem}." for each in found)
-        if others := [each.name for each in inside if not each.name.startswith((*stems, "."))]:
+        stems = tuple(f"{file.stem}." for file in found)
+        if others := [file.name for file in inside if not file.name.startswith((*stems, "."))]:
             text = f"{path}: ignored what has no reader: {listing(others)}"
             warnings.warn(text, TerrainkitWarning, stacklevel=3)
         files |= {*found} if path.is_dir() else {path}
@@ -164,7 +164,7 @@ def _with_common_size(files: Sequence[Path], options: ImportOptions) -> ImportOp
         return options
     *sizes, cell = map(min, zip(*extents, strict=True))
     cell = options.cell or cell
-    x, y = (round(math.floor(each / cell + 1e-6) * cell, 9) for each in sizes)
+    x, y = (round(math.floor(size / cell + 1e-6) * cell, 9) for size in sizes)
     return replace(options, cell=cell, patch_size=options.patch_size or (x, y))
 
 
@@ -178,7 +178,7 @@ def _places(
     lower, extent = np.array(source.lower), np.subtract(source.upper, source.lower)
     counts = np.floor(extent / size + 1e-6).astype(int)
     if not counts.all():
-        text = " x ".join(f"{each:g} m" for each in extent)
+        text = " x ".join(f"{length:g} m" for length in extent)
         raise HeightFileError(f"{path}: got {text}; expected at least patch_size, {size} m")
     counts = np.ones_like(counts) if is_whole else counts
     samples = math.prod(counts * size) / (options.cell or step) ** 2
@@ -228,14 +228,14 @@ def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> TerrainMap:
         number = len(patches)
         raise ConfigError(f"rows, cols: got {rows} x {cols}; expected at most {number} patches")
     # Sorting is stable, and the files are sorted by name.
-    ordered = sorted(patches, key=lambda each: each.difficulty)
+    ordered = sorted(patches, key=lambda patch: patch.difficulty)
     kept = np.linspace(0, len(ordered) - 1, rows * cols).round().astype(int)
     chosen = [ordered[k] for k in kept]
     if len(chosen) < len(ordered):
         text = f"used {len(chosen)} of {len(ordered)} patches, at equal distances in their order"
         warnings.warn(text, TerrainkitWarning, stacklevel=3)
-    terrains, used, numbers = {}, {each.path for each in chosen}, Counter[str]()
-    for path in dict.fromkeys(each.path for each in patches if each.path in used):
+    terrains, used, numbers = {}, {patch.path for patch in chosen}, Counter[str]()
+    for path in dict.fromkeys(patch.path for patch in patches if patch.path in used):
         numbers[path.name] += 1  # files in several folders may have the same name
         name = path.name if numbers[path.name] == 1 else f"{path.name} ({numbers[path.name]})"
         terrains[path] = import_map.sub_terrain(path, name, options)
@@ -267,4 +267,4 @@ def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> TerrainMap:
     if cliffs := PatchEdges(terrain_map=made).cliffs():
         text = f"cliffs between patches: {cliffs_text(cliffs, made.patch_names)}"
         warnings.warn(text, TerrainkitWarning, stacklevel=3)
-    return replace(made, import_reports=tuple(each.report for each in chosen))
+    return replace(made, import_reports=tuple(patch.report for patch in chosen))

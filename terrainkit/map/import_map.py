@@ -234,7 +234,7 @@ def assemble_map(
     """
     size = (config.rows, config.cols)
     parameters, measured = np.empty(size, dtype=object), np.empty(size)
-    records = [each.at(0.0).requested() for each in config.sub_terrains]
+    records = [sub_terrain.at(0.0).requested() for sub_terrain in config.sub_terrains]
     for row, col in np.ndindex(size):
         record = records[terrain_types[row, col]]
         parameters[row, col] = PatchParameters(requested=record, realized=record)
@@ -250,7 +250,7 @@ def assemble_map(
         else friction,
         spawns=pad_poses(spawns),
         terrain_types=terrain_types,
-        terrain_names=tuple(each.name for each in config.sub_terrains),
+        terrain_names=tuple(sub_terrain.name for sub_terrain in config.sub_terrains),
         difficulty=(rank / max(1, rank.max())).astype(np.float32),
         parameters=parameters,
         solids=solids,

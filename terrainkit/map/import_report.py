@@ -161,8 +161,8 @@ def _grid_points(
         indices.append(np.arange(first, math.floor((high - begin[k]) / steps[k] + _EDGE) + 1))
     most = MAX_SAMPLES if isinstance(source, Raster) else MAX_POINTS
     stride = math.ceil(math.sqrt(len(indices[0]) * len(indices[1]) / most)) or 1
-    i, j = (each[::stride] for each in indices)
-    x, y = (begin[k] + each * steps[k] for k, each in enumerate((i, j)))
+    i, j = (index[::stride] for index in indices)
+    x, y = (begin[k] + number * steps[k] for k, number in enumerate((i, j)))
     length = max(1, _POINTS_PER_BLOCK // max(1, len(y)))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a cloud warned of stray points before
@@ -221,7 +221,7 @@ def _height_errors(
                 top, error = np.maximum(top, found), np.minimum(error, np.abs(z - found))
     index = (xy - terrain_map.first_sample) / terrain_map.grid.cell
     limit = np.array(heights.shape) - 1
-    first, last = (np.floor(index + each).astype(int) for each in (-_EDGE, _EDGE))
+    first, last = (np.floor(index + shift).astype(int) for shift in (-_EDGE, _EDGE))
     corners = [
         heights[tuple(np.clip(np.column_stack([i, j]), 0, limit).T)]
         for i in (first[:, 0], last[:, 0] + 1)

@@ -107,7 +107,7 @@ def relaxed_config(
     Raises:
         ConfigError: if a patch has no flat disk and `relax` is false.
     """
-    uneven = [patch for patch, each in tolerances.items() if each > config.spawn_tolerance]
+    uneven = [patch for patch, least in tolerances.items() if least > config.spawn_tolerance]
     if not uneven:
         return config
     worst, total = max(uneven, key=tolerances.__getitem__), len(tolerances)

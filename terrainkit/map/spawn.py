@@ -315,7 +315,7 @@ def _height_ranges(
     heights = np.ascontiguousarray(heights)
     low, high = heights[inside].copy(), heights[inside].copy()
     for n in set(width) - {0}:
-        rows = max(k for k, each in enumerate(width) if each == n)
+        rows = max(k for k, cells in enumerate(width) if cells == n)
         kernel = np.ones((2 * rows + 1, 2 * n - 1), dtype=np.uint8)
         np.minimum(low, cv2.erode(heights, kernel)[inside], out=low)
         np.maximum(high, cv2.dilate(heights, kernel)[inside], out=high)

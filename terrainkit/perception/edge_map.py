@@ -89,8 +89,8 @@ class EdgeMap:
         u, v = np.moveaxis(index - low, -1, 0)
         corner, flat = low[..., 0] * (limit[1] + 1) + low[..., 1], self.distances.reshape(-1)
         first, second = (
-            flat.take(each) * (1 - v) + flat.take(each + 1) * v
-            for each in (corner, corner + limit[1] + 1)
+            flat.take(start) * (1 - v) + flat.take(start + 1) * v
+            for start in (corner, corner + limit[1] + 1)
         )
         return like((first * (1 - u) + second * u).astype(np.float32), xy)
 

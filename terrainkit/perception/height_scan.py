@@ -130,7 +130,7 @@ class HeightScan:
         """
         self.surface = exact_surface(surface) if isinstance(surface, TerrainMap) else surface
         axes = (to_floats(name, values, [None]) for name, values in (("x", x), ("y", y)))
-        points = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")])
+        points = np.stack([coordinate.ravel() for coordinate in np.meshgrid(*axes, indexing="ij")])
         self.offsets = points.astype(np.float32)
 
     def points(self, position: Any, yaw: Any) -> tuple[Any, Any, Any]:

@@ -178,10 +178,10 @@ def _lattice_noise(x: Floats, y: Floats, side: float, seed: int) -> Floats:
     The integers of the square are hashed as in "Mark Jarzynski and Marc Olano, Hash Functions for
     GPU Rendering, 2020" (pcg2d).
     """
-    i, j = (np.floor(each / side).astype(np.int64).astype(np.uint32) for each in (x, y))
+    i, j = (np.floor(coordinate / side).astype(np.int64).astype(np.uint32) for coordinate in (x, y))
     i, j = (
-        (each + np.uint32(seed % 2**32)) * np.uint32(1664525) + np.uint32(1013904223)
-        for each in (i, j)
+        (index + np.uint32(seed % 2**32)) * np.uint32(1664525) + np.uint32(1013904223)
+        for index in (i, j)
     )
     for _ in range(2):
         i = i + j * np.uint32(1664525)

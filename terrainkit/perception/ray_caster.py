@@ -99,7 +99,7 @@ class RayCaster:
         to_number("max_distance", max_distance, 1e-6)
         result = np.empty(len(origins), np.float32)
         for k in range(0, len(origins), _RAYS_AT_ONCE):
-            starts, toward = (each[k : k + _RAYS_AT_ONCE] for each in (origins, directions))
+            starts, toward = (values[k : k + _RAYS_AT_ONCE] for values in (origins, directions))
             limits = np.full(len(starts), float(max_distance))
             ground = self._ground.cast(starts, toward, limits)
             found = self._solids.first_hits(starts, toward, ground)

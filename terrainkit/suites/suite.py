@@ -119,7 +119,7 @@ def suite_hash(terrain_map: "TerrainMap") -> str:
     arrays = {
         "heights": terrain_map.heights,
         "friction": terrain_map.friction,
-        **{f"solids.{each.name}": getattr(solids, each.name) for each in fields(solids)},
+        **{f"solids.{field.name}": getattr(solids, field.name) for field in fields(solids)},
         "spawns": terrain_map.spawns,
         "goals": terrain_map.goals,
     }

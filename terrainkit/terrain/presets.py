@@ -126,7 +126,7 @@ _PRESETS: dict[str, dict[str, Mapping[str, Any]]] = {
         "mixed_course": {
             **_COURSE,
             "proportion": 4.0,
-            "elements": [each for obstacles in _OBSTACLES.values() for each in obstacles],
+            "elements": [element for obstacles in _OBSTACLES.values() for element in obstacles],
         },
     },
 }
@@ -182,9 +182,9 @@ def get_preset(name: str) -> tuple[SubTerrain, ...]:
     if name in paper_names():
         return get_paper(name).terrains
     if name in _PRESETS:
-        return tuple(_sub_terrain(each, **values) for each, values in _PRESETS[name].items())
+        return tuple(_sub_terrain(key, **values) for key, values in _PRESETS[name].items())
     names = _all_names() if name == "all" else _EQUAL_PARTS[name]
-    return tuple(_sub_terrain(each) for each in names)
+    return tuple(_sub_terrain(sub_name) for sub_name in names)
 
 
 def _sub_terrain(

@@ -107,7 +107,7 @@ def parameter_texts(sub_terrain: SubTerrain) -> list[str]:
     declared, texts = parameters_of(sub_terrain.terrain_class), []
     for name, value in sub_terrain.parameters.items():
         if declared[name].table:
-            texts += [f"{each.terrain}.{text}" for each in value for text in parameter_texts(each)]
+            texts += [f"{part.terrain}.{text}" for part in value for text in parameter_texts(part)]
         elif isinstance(value, tuple) and not declared[name].is_vector:
             texts.append(f"{name}={':'.join(map(format_value, value))}")
         else:
