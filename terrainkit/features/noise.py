@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.geometry.grid import Grid
+from terrainkit.terrain import Terrain
 from terrainkit.terrain.parameter import Value
 
 STEP = 0.005
@@ -62,6 +63,37 @@ class ValueNoise:
         spacing = max(self.spacing, grid.cell)
         x, y = (max(1, math.floor(extent / spacing + 0.5 + 1e-9)) for extent in grid.size)
         return x, y
+
+
+class RoughGround(Terrain):
+    """The parent class of terrains with value noise around a flat platform.
+
+    It is no dataclass: a subclass declares the fields among its own, which keeps their order.
+    """
+
+    amplitude: float
+    """Largest height above or below the ground without noise [m]."""
+
+    step: float
+    """Step of the random heights [m]."""
+
+    spacing: float
+    """Distance between two random heights [m]."""
+
+    platform: float
+    """Side of the flat square at the center [m]."""
+
+    def realized(self, grid: Grid) -> dict[str, Value]:
+        """Return the realized parameters: whole steps, and whole intervals across the patch."""
+        return super().realized(grid) | self._noise().realized(grid)
+
+    def noise(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.float64]:
+        """Return the noise [m], which fades to 0 at the platform over one spacing."""
+        fade = grid.fade(grid.centered(self.platform), self.spacing)
+        return self._noise().heights(grid, rng) * fade
+
+    def _noise(self) -> ValueNoise:
+        return ValueNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
 
 
 def _interpolate(nodes: NDArray[np.float64], n: int) -> NDArray[np.float64]:
