@@ -32,7 +32,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.feasibility import assess_map
 from terrainkit.feasibility.report import routes
 from terrainkit.features.building_codes import Clause, clauses
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.perception import EdgeMap, RayCaster, depth_directions
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.schema import Config, field_keys, field_types, is_required

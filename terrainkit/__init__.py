@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from terrainkit.features.building_codes import check_flight
     from terrainkit.features.flight import Flight
     from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
-    from terrainkit.importing.options import ImportOptions
-    from terrainkit.map.config import MapConfig
+    from terrainkit.importing.import_options import ImportOptions
     from terrainkit.map.generation import generate
     from terrainkit.map.import_curriculum import import_curriculum
     from terrainkit.map.import_map import ImportedMap, import_map
     from terrainkit.map.import_report import ImportReport
+    from terrainkit.map.map_config import MapConfig
     from terrainkit.map.patch import Patch, make_patch
     from terrainkit.map.terrain_map import TerrainMap
     from terrainkit.map.terrain_mesh import import_terrain_mesh
@@ -72,8 +72,8 @@ _NAMES = {
     "features.building_codes": ("check_flight",),
     "features.flight": ("Flight",),
     "geometry.solids": ("Solids", "make_boxes", "make_cylinders", "make_hulls"),
-    "importing.options": ("ImportOptions",),
-    "map.config": ("MapConfig",),
+    "importing.import_options": ("ImportOptions",),
+    "map.map_config": ("MapConfig",),
     "map.generation": ("generate",),
     "map.import_curriculum": ("import_curriculum",),
     "map.import_map": ("ImportedMap", "import_map"),

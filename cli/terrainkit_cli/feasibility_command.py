@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ConfigError
-from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
@@ -133,7 +133,7 @@ def robot_limits(robot: str, limits: Sequence[str]) -> "DerivedLimits":
         ConfigError: if there is neither a robot nor a limit, there is no such robot, it has no
             legs, or a limit is invalid.
     """
-    from terrainkit.feasibility.limits import limit_overrides
+    from terrainkit.feasibility.crossing_limits import limit_overrides
     from terrainkit_robots.rl.tasks import get_task
     from terrainkit_robots.simulation.robot_limits import derive_limits
 

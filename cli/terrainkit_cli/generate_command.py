@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from terrainkit.errors import ConfigError
 from terrainkit.export.npz import read_config
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.terrain import registry
 from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, parameters_of

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from terrainkit import suites
 from terrainkit.errors import ConfigError
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.terrain.parameter import format_value
 from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render

@@ -16,8 +16,8 @@ from terrainkit.errors import ConfigError, MapFileError, TerrainkitWarning, is_b
 from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, check_solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.import_report import ImportReport
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import PatchParameters, Values
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.patch_geometry import MAX_GOALS

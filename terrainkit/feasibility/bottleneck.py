@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.edges import Edges
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 
 Segment = tuple[int, IntArray]
 """A piece of the path: a start node, and target nodes. The path ends at any of the targets."""

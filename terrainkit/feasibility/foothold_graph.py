@@ -10,13 +10,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray
 from terrainkit.feasibility.columns import Columns
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.edges import Edges, step_edges
 from terrainkit.feasibility.footholds import foothold_sizes
 from terrainkit.feasibility.free_width import FreeWidth
 from terrainkit.feasibility.gradient import gradient_of
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.node_arrays import FloatArray
 
 DIGITS = 6
 """Digits of a demand, so that a step of exactly the limit is not above it."""

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.columns import Columns
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.edges import Edges
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 from terrainkit.feasibility.solid_tops import Tops
 
 EDGE_FRACTION = 0.5

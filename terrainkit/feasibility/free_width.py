@@ -8,10 +8,10 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.columns import Columns
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.gradient import SLOPE_LENGTH
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 
 NUM_DIRECTIONS = 8
 """Number of directions in which the free width is measured."""

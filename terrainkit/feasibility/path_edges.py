@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from terrainkit.feasibility.arrays import FloatArray
 from terrainkit.feasibility.bottleneck import Segment, bottleneck
 from terrainkit.feasibility.components import Components
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
-from terrainkit.feasibility.gaps import gap_edges
+from terrainkit.feasibility.gap_edges import gap_edges
+from terrainkit.feasibility.node_arrays import FloatArray
 
 MAX_DEMAND = 2.0
 """Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""

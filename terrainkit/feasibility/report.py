@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from terrainkit.feasibility.assess import PatchFeasibility
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.views.preview import Route
 

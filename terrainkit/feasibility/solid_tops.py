@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 from terrainkit.geometry.free_space import CONTACT
 from terrainkit.geometry.solid_index import Crossings, half_spaces
 from terrainkit.geometry.solids import Solids, rotation_matrices

@@ -9,11 +9,11 @@ import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility.assess import assess_patch
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.grid import Grid
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch, build_patch
 from terrainkit.terrain.parameter import Parameter, Range, at_difficulty, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain

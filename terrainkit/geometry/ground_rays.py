@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.geometry.ground_surface import WallTable, on_triangle
 from terrainkit.geometry.ray_grid import NUDGE, Floats, RayGrid
-from terrainkit.geometry.surface import WallTable, on_triangle
 
 _LEVELS, _FACTOR = 4, 4
 """Number of sizes of squares, and their ratio."""

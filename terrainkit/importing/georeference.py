@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing.source import warn
+from terrainkit.importing.height_source import warn
 from terrainkit.settings.type_hint import MAX_VALUE, MIN_SIZE
 
 Transform = tuple[float, float, float, float, float, float]

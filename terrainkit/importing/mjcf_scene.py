@@ -12,10 +12,10 @@ import numpy as np
 
 from terrainkit.errors import HeightFileError, listing
 from terrainkit.files.child_process import ProcessLimits
-from terrainkit.importing.mesh_file import MeshSource, make_mesh_source
+from terrainkit.importing.height_source import Array, decode, warn
+from terrainkit.importing.import_options import ReadOptions
+from terrainkit.importing.mesh_source import MeshSource, make_mesh_source
 from terrainkit.importing.mjcf_text import read_text
-from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.source import Array, decode, warn
 
 SUFFIXES = (".xml",)
 

@@ -14,7 +14,7 @@ from typing import Any
 from lxml import etree
 
 from terrainkit.errors import HeightFileError, prefixed_errors
-from terrainkit.importing.source import MAX_FILE_BYTES, check_file
+from terrainkit.importing.height_source import MAX_FILE_BYTES, check_file
 
 MAX_ELEMENTS = 100_000
 """Most elements, copies included; MuJoCo needs seconds for this many."""

@@ -21,8 +21,8 @@ from terrainkit.geometry.solids import (
     make_boxes,
     make_hulls,
 )
-from terrainkit.importing.columns import MIN_GAP, Columns
-from terrainkit.importing.mesh_file import MeshSource
+from terrainkit.importing.mesh_columns import MIN_GAP, Columns
+from terrainkit.importing.mesh_source import MeshSource
 
 PARAMETERS = {**SEARCH, "threshold": 0.03, "max_convex_hull": 32}
 """Parameters of CoACD."""

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing.options import MAX_POSITION, ReadOptions
-from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import (
+from terrainkit.importing.height_source import (
     Array,
     Source,
     VertexSource,
@@ -20,6 +18,8 @@ from terrainkit.importing.source import (
     require,
     with_z_up,
 )
+from terrainkit.importing.import_options import MAX_POSITION, ReadOptions
+from terrainkit.importing.raster import Raster
 
 SUFFIXES = (".xyz", ".pcd", ".las", ".laz")
 

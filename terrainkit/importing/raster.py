@@ -11,9 +11,9 @@ from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.files.memory import check_memory
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.georeference import Georeference
+from terrainkit.importing.height_source import Array, fill_missing, open_source, warn
+from terrainkit.importing.import_options import Missing, ReadOptions
 from terrainkit.importing.nodata import find_nodata
-from terrainkit.importing.options import Missing, ReadOptions
-from terrainkit.importing.source import Array, fill_missing, open_source, warn
 from terrainkit.settings.type_hint import MAX_VALUE
 
 _BYTES_PER_VALUE = 40

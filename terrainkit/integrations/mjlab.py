@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum import SamplerName
 from terrainkit.errors import ExportError
-from terrainkit.export.mjcf import Collision
-from terrainkit.importing.options import ImportOptions
+from terrainkit.export.mjcf_map import Collision
+from terrainkit.importing.import_options import ImportOptions
 from terrainkit.integrations import column_names, missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
 from terrainkit.map.import_map import ImportedMap
@@ -49,7 +49,7 @@ def terrain_entity_cfg(
     Args:
         path: Path of a .npz file. mjlab writes its configuration to a file, so a map itself is not
             accepted.
-        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf_map.export`.
         max_init_terrain_level: Highest initial level; None for the last row.
 
     Raises:

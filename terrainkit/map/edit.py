@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.generation import pad_poses
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import find_origin, with_heading
 from terrainkit.map.spawn import find_spawn, is_on_floor, sample_spawns
 from terrainkit.map.terrain_map import TerrainMap

@@ -15,8 +15,8 @@ from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.files.memory import check_memory
 from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types, terrain_and_difficulty
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch, build_patch
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text
 from terrainkit.map.repeated_levels import repeated_levels

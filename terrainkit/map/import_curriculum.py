@@ -24,12 +24,12 @@ from terrainkit.files.memory import check_memory
 from terrainkit.files.suffix import modules_by_suffix
 from terrainkit.geometry.solids import Solids
 from terrainkit.importing.extent import check_length, check_samples
-from terrainkit.importing.options import ImportOptions
-from terrainkit.importing.source import Source, open_source
+from terrainkit.importing.height_source import Source, open_source
+from terrainkit.importing.import_options import ImportOptions
 from terrainkit.map import import_map
-from terrainkit.map.config import MapConfig
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.import_spawns import place_on_flattest, relaxed_config
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text
 from terrainkit.map.terrain_map import TerrainMap

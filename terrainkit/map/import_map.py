@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.geometry.solids import Solids
 from terrainkit.importing.extent import check_length, check_samples
-from terrainkit.importing.friction import read_friction
-from terrainkit.importing.mesh_file import MeshSource
-from terrainkit.importing.options import ImportOptions
+from terrainkit.importing.ground_friction import read_friction
+from terrainkit.importing.height_source import Source, fill_missing, open_source
+from terrainkit.importing.import_options import ImportOptions
+from terrainkit.importing.mesh_source import MeshSource
 from terrainkit.importing.overhangs import find_bodies, overhang_solids
-from terrainkit.importing.source import Source, fill_missing, open_source
-from terrainkit.map.config import MapConfig
 from terrainkit.map.edit import assign_solids
 from terrainkit.map.generation import pad_poses
 from terrainkit.map.import_report import ImportReport, make_report
 from terrainkit.map.import_spawns import place_spawns
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch import PatchParameters
 from terrainkit.map.terrain_map import TerrainMap

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.importing.columns import Columns
-from terrainkit.importing.mesh_file import MeshSource
+from terrainkit.importing.mesh_columns import Columns
+from terrainkit.importing.mesh_source import MeshSource
 from terrainkit.importing.raster import Raster
 
 if TYPE_CHECKING:
-    from terrainkit.importing.source import Source
+    from terrainkit.importing.height_source import Source
     from terrainkit.map.terrain_map import TerrainMap
 
 MAX_POINTS = 1 << 20

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.edit import patch_ground
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import find_origin, with_heading
 from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
 

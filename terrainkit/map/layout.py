@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from terrainkit.errors import ConfigError, TerrainkitWarning, listing
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.terrain import Terrain
 
 # The streams of random numbers of a patch are children of the seed sequence [seed, row, col], which

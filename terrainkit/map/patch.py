@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, plugin_errors, prefixed_errors
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import (
     OVERLAYS_STREAM,
     SOLIDS_STREAM,
@@ -23,6 +22,7 @@ from terrainkit.map.layout import (
     patch_rng,
     terrain_and_difficulty,
 )
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain import Terrain, registry
@@ -352,7 +352,7 @@ def _place_goals(config: MapConfig, name: str, geometry: PatchGeometry) -> NDArr
     """
     grid, goals = geometry.grid, geometry.goals.copy()
     if len(goals):
-        from terrainkit.geometry.surface import surface_at
+        from terrainkit.geometry.ground_surface import surface_at
 
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from terrainkit.geometry.free_space import CONTACT
 from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import Solids
-from terrainkit.geometry.surface import surface_at
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 
 _DISKS_PER_BLOCK = 4096
 """Disks that are compared with the solids at once."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum.arrays import like, to_numpy
 from terrainkit.errors import ConfigError
+from terrainkit.geometry.ground_surface import HeightfieldSurface, WallTable
 from terrainkit.geometry.solid_raster import SolidRaster
-from terrainkit.geometry.surface import HeightfieldSurface, WallTable
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import show
 

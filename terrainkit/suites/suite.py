@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, TerrainkitError, TerrainkitWarning
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.settings.text import expected_names
 
 if TYPE_CHECKING:

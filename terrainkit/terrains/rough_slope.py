@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.noise import STEP, RoughGround
+from terrainkit.features.value_noise import STEP, RoughGround
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import parameter
 from terrainkit.terrains.pyramid_slope import PyramidSlope

@@ -80,7 +80,7 @@ def compute_budget(terrain_map: "TerrainMap", foot_radius: float = 0.03) -> Budg
         ConfigError: if `foot_radius` is not above 0.
         MemoryLimitError: if an export of the map would not fit in memory.
     """
-    from terrainkit.export.mjcf import collision_boxes
+    from terrainkit.export.mjcf_map import collision_boxes
 
     contacts = foot_contacts(foot_radius, terrain_map.config.cell)
     sizes: dict[str, int | str] = {}

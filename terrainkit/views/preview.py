@@ -17,7 +17,7 @@ from terrainkit.views.preview_layout import ABOVE, BELOW, LEFT, RIGHT, Block, ma
 
 if TYPE_CHECKING:
     from terrainkit.geometry.mesh.tri_mesh import TriMesh
-    from terrainkit.map.config import MapConfig
+    from terrainkit.map.map_config import MapConfig
     from terrainkit.map.terrain_map import TerrainMap
 
 Picture = NDArray[np.uint8]

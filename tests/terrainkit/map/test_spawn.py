@@ -7,7 +7,7 @@ import pytest
 
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
 
 PLOT = Grid(shape=(40, 40), cell=0.1)

@@ -6,7 +6,7 @@ import pytest
 from terrainkit.feasibility import gaps as gaps_module
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
-from terrainkit.feasibility.gaps import gap_edges
+from terrainkit.feasibility.gap_edges import gap_edges
 from tests.limits import LIMITS, columns_of
 
 NARROW = replace(LIMITS, foothold=0.02, body_width=0.02)

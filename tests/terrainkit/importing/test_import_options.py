@@ -1,7 +1,7 @@
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.import_options import ReadOptions
 
 
 @pytest.mark.parametrize("values", [(0, 10), (-5.5, 5.5), (-1e6, 1e6)])

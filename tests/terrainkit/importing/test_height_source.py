@@ -5,8 +5,8 @@ import pytest
 import terrainkit
 from terrainkit import importing
 from terrainkit.errors import HeightFileError
-from terrainkit.importing import source
-from terrainkit.importing.source import check_file
+from terrainkit.importing import height_source
+from terrainkit.importing.height_source import check_file
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ from terrainkit.importing.source import check_file
     ],
 )
 def test_check_file_limits_the_size(tmp_path, monkeypatch, size, message):
-    monkeypatch.setattr(source, "MAX_FILE_BYTES", 100)
+    monkeypatch.setattr(height_source, "MAX_FILE_BYTES", 100)
     path = tmp_path / "a.stl"
     path.write_bytes(bytes(size))
     if message:

@@ -11,7 +11,7 @@ import pytest
 
 import terrainkit as tk
 from terrainkit.errors import ExportError
-from terrainkit.export.legged_gym import MODULE, heights_at_corners, x_edges
+from terrainkit.export.legged_gym_export import MODULE, heights_at_corners, x_edges
 from tests.frameworks.pages import page_block
 
 

@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from terrainkit.geometry.surface import HeightfieldSurface, SurfacePoints, surface_at
+from terrainkit.geometry.ground_surface import HeightfieldSurface, SurfacePoints, surface_at
 
 
 def quad(*corners):

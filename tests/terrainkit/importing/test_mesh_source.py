@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
-from terrainkit.importing import mesh_file, source
-from terrainkit.importing.mesh_file import read
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing import height_source, mesh_source
+from terrainkit.importing.import_options import ReadOptions
+from terrainkit.importing.mesh_source import read
 from tests.meshes import box
 
 
@@ -64,9 +64,9 @@ def test_gltf_data_beside_it_are_limited(tmp_path, monkeypatch):
         read(split_gltf(tmp_path, "c.bin"), ReadOptions())
     path = split_gltf(tmp_path, "a b.bin")
     size = (tmp_path / "a b.bin").stat().st_size
-    monkeypatch.setattr(source, "MAX_FILE_BYTES", size - 1)
+    monkeypatch.setattr(height_source, "MAX_FILE_BYTES", size - 1)
     with pytest.raises(HeightFileError, match=rf"a b\.bin: got {size} bytes"):
-        mesh_file._embed_buffers(path, path.read_bytes())
+        mesh_source._embed_buffers(path, path.read_bytes())
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def decoded(monkeypatch, tmp_path):
 
     def run(vertices, faces, **options):
         arrays = {"vertices": vertices, "faces": faces}
-        monkeypatch.setattr(mesh_file, "decode", lambda *_: arrays)
+        monkeypatch.setattr(mesh_source, "decode", lambda *_: arrays)
         return read(tmp_path / "a.ply", ReadOptions(**options))
 
     return run

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph, ratio
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 
 _MAX_PAIRS = 100_000
 """Pairs of nodes that are compared at once, to bound the memory."""

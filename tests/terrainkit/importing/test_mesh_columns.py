@@ -4,7 +4,7 @@ import trimesh
 
 from terrainkit.errors import HeightFileError
 from terrainkit.importing import columns as columns_module
-from terrainkit.importing.columns import make_columns
+from terrainkit.importing.mesh_columns import make_columns
 from tests.meshes import box
 
 

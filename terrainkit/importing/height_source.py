@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from terrainkit.errors import HeightFileError, TerrainkitWarning, install_command
 from terrainkit.files.child_process import ProcessError, ProcessLimits, run_in_process
 from terrainkit.files.suffix import find_module
-from terrainkit.importing.options import Missing, ReadOptions
+from terrainkit.importing.import_options import Missing, ReadOptions
 
 Array = NDArray[np.float64]
 

@@ -13,10 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing.columns import Columns, make_columns
-from terrainkit.importing.options import MAX_POSITION, ReadOptions
-from terrainkit.importing.point_cloud import make_point_source
-from terrainkit.importing.source import (
+from terrainkit.importing.height_source import (
     Array,
     Source,
     VertexSource,
@@ -26,6 +23,9 @@ from terrainkit.importing.source import (
     warn,
     with_z_up,
 )
+from terrainkit.importing.import_options import MAX_POSITION, ReadOptions
+from terrainkit.importing.mesh_columns import Columns, make_columns
+from terrainkit.importing.point_cloud import make_point_source
 
 SUFFIXES = (".obj", ".stl", ".ply", ".glb", ".gltf", ".dae")
 

@@ -24,10 +24,10 @@ from terrainkit.geometry.box_decomposition import (
     merge_boxes,
     neighborhood,
 )
+from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit.geometry.mesh.closed import THICKNESS
 from terrainkit.geometry.mesh.node_grid import NodeGrid
 from terrainkit.geometry.solid_raster import SolidRaster
-from terrainkit.geometry.surface import HeightfieldSurface
 from terrainkit.settings.text import format_numbers
 from terrainkit.settings.type_hint import convert
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from terrainkit.features.noise import ValueNoise
+from terrainkit.features.value_noise import ValueNoise
 from terrainkit.geometry.grid import Grid
 
 PLOT = Grid(shape=(60, 40), cell=0.1)

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.text import read
+from terrainkit.importing.import_options import ReadOptions
+from terrainkit.importing.text_table import read
 
 METER = ReadOptions(file_cell=1.0)
 

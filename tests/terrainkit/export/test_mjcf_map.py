@@ -8,7 +8,7 @@ import pytest
 from scipy.ndimage import binary_dilation
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit.export import mjcf
+from terrainkit.export import mjcf_map
 from terrainkit.geometry.walls import wall_edges
 from terrainkit.overlays.friction_patches import FrictionPatches
 from tests.rays import cast_rays
@@ -21,7 +21,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def written(terrain_map, collision="hfield"):
     file = io.StringIO()
-    mjcf.write_model(terrain_map, file, collision)
+    mjcf_map.write_model(terrain_map, file, collision)
     return ET.fromstring(file.getvalue())
 
 
@@ -106,9 +106,9 @@ def test_mjcf_heightfield_by_hand():
     assert geom.attrib == {"class": "terrain", "type": "hfield", "hfield": "terrain", "pos": pos}
     heights, inner = terrain_map.heights, (slice(3, 6), slice(2, 4))
     part = (slice(0, 8), slice(0, 7))
-    assert mjcf.hfield_elevation(heights, part)[::-1].tolist() == rows
-    assert mjcf.hfield_elevation(heights, inner).tolist() == [[200, 500, 0], [200, 500, 200]]
-    assert mjcf.hfield_size(heights, inner, 0.1) == pytest.approx((0.1, 0.05, 0.05, 1))
+    assert mjcf_map.hfield_elevation(heights, part)[::-1].tolist() == rows
+    assert mjcf_map.hfield_elevation(heights, inner).tolist() == [[200, 500, 0], [200, 500, 200]]
+    assert mjcf_map.hfield_size(heights, inner, 0.1) == pytest.approx((0.1, 0.05, 0.05, 1))
 
 
 def test_mjcf_level_border_is_boxes_around_the_heightfield():
@@ -170,7 +170,7 @@ def test_mjcf_auto_uses_up_to_100_boxes(number, is_boxes):
     """Every other row is a box, on one box below."""
     walls = np.zeros((number, 4))
     walls[::2] = 0.5
-    assert (mjcf.collision_boxes(plot(walls), "auto") is not None) == is_boxes
+    assert (mjcf_map.collision_boxes(plot(walls), "auto") is not None) == is_boxes
 
 
 def test_mjcf_auto_uses_twice_as_many_boxes_as_heightfields():
@@ -178,16 +178,16 @@ def test_mjcf_auto_uses_twice_as_many_boxes_as_heightfields():
     friction = np.full((106, 4), 0.8, np.float32)
     friction[::2] = 0.3
     striped = dataclasses.replace(terrain_map, friction=friction)
-    assert len(mjcf.collision_boxes(striped, "auto").centers) == 106
+    assert len(mjcf_map.collision_boxes(striped, "auto").centers) == 106
 
 
 @pytest.mark.parametrize("row", range(11))
 def test_mjcf_auto_finds_a_slope_between_any_two_rows(monkeypatch, row):
-    monkeypatch.setattr(mjcf, "_ROWS_PER_BAND", 4)
+    monkeypatch.setattr(mjcf_map, "_ROWS_PER_BAND", 4)
     heights = np.zeros((12, 4))
     heights[row + 1 :] = 0.05
-    assert mjcf.collision_boxes(plot(heights), "auto") is None
-    assert mjcf.collision_boxes(plot(10 * heights), "auto") is not None  # a wall
+    assert mjcf_map.collision_boxes(plot(heights), "auto") is None
+    assert mjcf_map.collision_boxes(plot(10 * heights), "auto") is not None  # a wall
 
 
 def course(*terrains, **config):
@@ -206,7 +206,7 @@ def course(*terrains, **config):
 
 def test_mjcf_hfields_cover_patches_with_slopes():
     terrain_map = course(*"SPSS", rows=1, patch_size=(4.0, 3.0), border=1.0)
-    model = mjcf.make_model(terrain_map, "boxes")
+    model = mjcf_map.make_model(terrain_map, "boxes")
     spans = [(x.start, x.stop, y.start, y.stop) for (x, y), _ in model.hfields.values()]
     # Columns 0, and 2 to 3. A part ends one sample beyond its patches, two in the border, and
     # counts from two samples before the map.
@@ -230,18 +230,18 @@ def test_mjcf_surface_has_boxes_and_the_heightfield_below_them():
     """Samples are lowered where boxes cover all cells around, which those at the slope do not."""
     heights = np.zeros((10, 4))
     heights[4:9], heights[9] = 0.05, 1.0
-    surface = mjcf.collision_surface(plot(heights), "boxes")
+    surface = mjcf_map.collision_surface(plot(heights), "boxes")
     lowered = [-0.5, -0.5, 0, 0, 0.05, 0.05, -0.5, -0.5, -0.5, -0.5]
     assert surface.heights[:, 1] == pytest.approx(lowered)
     tops = [0, 0, 0, -np.inf, -np.inf, 0.05, 0.05, 0.05, 0.05, 1.0]
     assert surface.box_top[:, 1] == pytest.approx(tops)
-    assert mjcf.collision_surface(plot(heights), "hfield").box_top is None
+    assert mjcf_map.collision_surface(plot(heights), "hfield").box_top is None
 
 
 @pytest.mark.parametrize(("scan", "heights"), [(False, [0.6, 0, 0.7]), (True, [0.6, 0.6, 0])])
 def test_mjcf_surface_has_solids_that_collide_or_are_visible(solid_map, scan, heights):
     """The board, the board that does not collide, and the hidden post."""
-    surface = mjcf.collision_surface(solid_map, "hfield")
+    surface = mjcf_map.collision_surface(solid_map, "hfield")
     x, y = np.array([1, 5, 2], np.float32), np.full(3, 6, np.float32)
     assert surface.height(x, y, scan=scan) == pytest.approx(heights)
 
@@ -361,7 +361,7 @@ def test_mjcf_splits_a_heightfield_where_the_friction_changes():
     friction = np.full((8, 3), 0.8, np.float32)
     friction[2:4, :2] = 0.25
     split = dataclasses.replace(terrain_map, friction=friction)
-    model = mjcf.make_model(split, "hfield")
+    model = mjcf_map.make_model(split, "hfield")
     parts = [
         (x.start, x.stop, y.start, y.stop, round(value, 3))
         for (x, y), value in model.hfields.values()

@@ -3,7 +3,7 @@ import re
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit.feasibility.limits import RobotLimits, limit_overrides
+from terrainkit.feasibility.crossing_limits import RobotLimits, limit_overrides
 from tests.limits import LIMITS
 
 VALUES = vars(LIMITS)

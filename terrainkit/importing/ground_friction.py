@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError, listing
+from terrainkit.importing.height_source import Array, Source, check_file
 from terrainkit.importing.image import read_image
-from terrainkit.importing.options import ImportOptions
+from terrainkit.importing.import_options import ImportOptions
 from terrainkit.importing.pixels import gray
-from terrainkit.importing.source import Array, Source, check_file
 from terrainkit.settings.toml_text import parse_toml, read_text
 from terrainkit.settings.type_hint import NonNegativeFloat, convert
 
