@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
     from terrainkit.importing.import_options import ImportOptions
     from terrainkit.map.generation import generate
-    from terrainkit.map.import_curriculum import import_curriculum
-    from terrainkit.map.import_map import ImportedMap, import_map
     from terrainkit.map.import_report import ImportReport
     from terrainkit.map.map_config import MapConfig
     from terrainkit.map.patch import Patch, make_patch
     from terrainkit.map.terrain_map import TerrainMap
-    from terrainkit.map.terrain_mesh import import_terrain_mesh
+    from terrainkit.map_import.import_curriculum import import_curriculum
+    from terrainkit.map_import.import_map import ImportedMap, import_map
+    from terrainkit.map_import.terrain_mesh import import_terrain_mesh
     from terrainkit.suites import Suite, generate_suite, get_suite, suite_hash, suite_names
     from terrainkit.terrain import parameter
     from terrainkit.terrain.overlay import Overlay
@@ -73,14 +73,14 @@ _NAMES = {
     "features.flight": ("Flight",),
     "geometry.solids": ("Solids", "make_boxes", "make_cylinders", "make_hulls"),
     "importing.import_options": ("ImportOptions",),
-    "map.map_config": ("MapConfig",),
     "map.generation": ("generate",),
-    "map.import_curriculum": ("import_curriculum",),
-    "map.import_map": ("ImportedMap", "import_map"),
     "map.import_report": ("ImportReport",),
+    "map.map_config": ("MapConfig",),
     "map.patch": ("Patch", "make_patch"),
     "map.terrain_map": ("TerrainMap",),
-    "map.terrain_mesh": ("import_terrain_mesh",),
+    "map_import.import_curriculum": ("import_curriculum",),
+    "map_import.import_map": ("ImportedMap", "import_map"),
+    "map_import.terrain_mesh": ("import_terrain_mesh",),
     "suites.suite": ("Suite", "generate_suite", "get_suite", "suite_hash", "suite_names"),
     "terrain": ("parameter",),
     "terrain.overlay": ("Overlay",),

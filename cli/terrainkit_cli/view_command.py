@@ -78,7 +78,7 @@ class ViewerCommand(Command):
         """
         with render.steps() as steps:
             steps.update("starting the viewer")
-            from terrainkit.views.viewer_server import viewer_server
+            from terrainkit.viewer.viewer_server import viewer_server
 
             with viewer_server(self.host, self.port) as server:
                 if show_first is not None:
@@ -221,7 +221,7 @@ class View(PluginCommand, ViewerCommand):
         return self.serve(show, self.source)
 
     def _load_map(self) -> "Show":
-        from terrainkit.views.viewer import show_map
+        from terrainkit.viewer.map_scene import show_map
 
         return partial(show_map, terrain_map=TerrainMap.load(self.source))
 

@@ -13,9 +13,9 @@ from terrainkit.export.mjcf_map import Collision
 from terrainkit.importing.import_options import ImportOptions
 from terrainkit.integrations import column_names, missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
-from terrainkit.map.import_map import ImportedMap
 from terrainkit.map.terrain_map import TerrainMap
-from terrainkit.map.terrain_mesh import import_terrain_mesh
+from terrainkit.map_import.import_map import ImportedMap
+from terrainkit.map_import.terrain_mesh import import_terrain_mesh
 
 try:
     import mujoco

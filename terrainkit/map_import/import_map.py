@@ -19,12 +19,13 @@ from terrainkit.importing.mesh_source import MeshSource
 from terrainkit.importing.overhangs import find_bodies, overhang_solids
 from terrainkit.map.edit import assign_solids
 from terrainkit.map.generation import pad_poses
-from terrainkit.map.import_report import ImportReport, make_report
-from terrainkit.map.import_spawns import place_spawns
+from terrainkit.map.import_report import ImportReport
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch import PatchParameters
 from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.map_import.differences import make_report
+from terrainkit.map_import.import_spawns import place_spawns
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.parameter import MAX_TEXT_LENGTH
 from terrainkit.terrain.sub_terrain import SubTerrain

@@ -26,13 +26,13 @@ from terrainkit.geometry.solids import Solids
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.height_source import Source, open_source
 from terrainkit.importing.import_options import ImportOptions
-from terrainkit.map import import_map
 from terrainkit.map.import_report import ImportReport
-from terrainkit.map.import_spawns import place_on_flattest, relaxed_config
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.measured_difficulty import measured_difficulty
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text
 from terrainkit.map.terrain_map import TerrainMap
+from terrainkit.map_import import import_map
+from terrainkit.map_import.import_spawns import place_on_flattest, relaxed_config
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.sub_terrain import SubTerrain
 

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 
 import terrainkit as tk
+from terrainkit.viewer.map_scene import FIELD_OF_VIEW, camera_position, show_map, triangle_colors
 from terrainkit.views.preview import MIN_SHADE, height_colors, shaded_relief
-from terrainkit.views.viewer import FIELD_OF_VIEW, camera_position, show_map, triangle_colors
 
 
 @pytest.fixture

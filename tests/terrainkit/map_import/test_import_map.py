@@ -10,8 +10,9 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError, MemoryLimitError
 from terrainkit.files import memory
 from terrainkit.importing import ImportOptions, import_map
-from terrainkit.map.import_report import ImportReport, _height_errors
+from terrainkit.map.import_report import ImportReport
 from terrainkit.map.validate import validate
+from terrainkit.map_import.differences import _height_errors
 from tests.meshes import box, save_bridge
 
 
@@ -390,7 +391,7 @@ def test_import_reports_what_resampling_to_squares_loses(tmp_path):
 
 
 def test_import_reports_single_samples_of_a_large_raster(tmp_path, monkeypatch):
-    monkeypatch.setattr("terrainkit.map.import_report.MAX_SAMPLES", 100)
+    monkeypatch.setattr("terrainkit.map_import.differences.MAX_SAMPLES", 100)
     heights = np.zeros((40, 40))
     heights[::4, ::4] = 0.05
     options = {"cell": 0.4, "slope_threshold": None, "spawn_tolerance": 0.1}

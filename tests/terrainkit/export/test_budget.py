@@ -6,7 +6,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit.views.budget import (
+from terrainkit.export.budget import (
     HFIELD_COST,
     MAX_CONTACTS,
     CollisionBudget,

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import pytest
 import viser
 
-from terrainkit.views.viewer_server import viewer_server
+from terrainkit.viewer.viewer_server import viewer_server
 from tests.viewer_client import CAMERA, connect_to, send, status_of, update, wait_for
 
 HOST_NAME = socket.gethostname()

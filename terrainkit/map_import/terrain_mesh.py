@@ -11,8 +11,8 @@ from terrainkit.errors import ConfigError
 from terrainkit.importing.extent import check_samples
 from terrainkit.importing.import_options import ImportOptions
 from terrainkit.importing.mesh_source import MeshSource
-from terrainkit.map.import_map import DEFAULT_CELL, ImportedMap, make_map, map_settings
 from terrainkit.map.map_config import MapConfig
+from terrainkit.map_import.import_map import DEFAULT_CELL, ImportedMap, make_map, map_settings
 from terrainkit.terrain.sub_terrain import SubTerrain
 
 DEFAULT_OPTIONS = ImportOptions(
