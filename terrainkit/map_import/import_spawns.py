@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.edit import patch_ground
 from terrainkit.map.map_config import MapConfig
-from terrainkit.map.patch import find_origin, with_heading
-from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
+from terrainkit.map.patch import with_heading
+from terrainkit.map.spawn import SpawnGround
 
 _NO_GOALS = np.empty((0, 4), dtype=np.float32)
 
@@ -77,17 +76,18 @@ def place_on_flattest(
     Raises:
         ConfigError: if the patch has no free disk.
     """
-    ground = patch_ground(config, heights, solids, *patch)
+    ground = SpawnGround.of_map(config, heights, solids, patch)
     # In single precision as in a map, so that an edit keeps the position.
     x, y = spawn_xy.astype(np.float32).tolist()
-    origin = find_spawn(config, *ground, (x, y))
+    origin = ground.find((x, y))
     if origin is None:
-        tolerance = flattest_tolerance(config, *ground, (x, y))
+        tolerance = ground.flattest_tolerance((x, y))
         if tolerance is not None:
             config = replace(config, spawn_tolerance=tolerance)
-        origin = find_origin(config, f"patch {patch}", *ground, (x, y))
+        ground = replace(ground, config=config)
+        origin = ground.find_origin(f"patch {patch}", (x, y))
     rng = partial(np.random.default_rng, [config.seed, *patch])
-    spawns = sample_spawns(config, *ground, origin, rng)
+    spawns = ground.sample(origin, rng)
     return with_heading(spawns, _NO_GOALS), config.spawn_tolerance
 
 
