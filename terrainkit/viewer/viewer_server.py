@@ -9,19 +9,16 @@ import math
 import re
 import socket
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
-from functools import partial
 from http import HTTPStatus
 from io import StringIO
 from typing import Annotated, Any
-from unittest.mock import patch
 
 import msgspec
 import viser
 import websockets.asyncio.server
 from msgspec import Meta
-from viser._messages import ViewerCameraMessage
 from websockets.asyncio.server import ServerConnection
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
@@ -44,6 +41,23 @@ _REFUSAL = (
 _DECODER = msgspec.msgpack.Decoder(
     dict[str, bool | _Number | str | tuple[_Number, ...] | dict[str, bool | _Number | str]]
 )
+
+_Vector = tuple[float, float, float]
+
+
+class _Camera(msgspec.Struct):
+    """The pose of a camera, which a browser sends to viser."""
+
+    wxyz: tuple[float, float, float, float]
+    position: _Vector
+    fov: float
+    near: float
+    far: float
+    image_height: int
+    image_width: int
+    look_at: _Vector
+    up_direction: _Vector
+
 
 _LOGGER = logging.getLogger(__name__)
 _LOGGER.addHandler(logging.NullHandler())  # websockets logs a traceback for each invalid request
@@ -79,21 +93,8 @@ def viewer_server(host: str, port: int) -> Iterator[viser.ViserServer]:
                 pass
             return message
 
-    # viser has no parameters for these options.
-    serve = partial(
-        websockets.asyncio.server.serve,
-        process_response=check,
-        create_connection=Connection,
-        logger=_LOGGER,
-    )
-    with (
-        redirect_stdout(StringIO()),  # a banner
-        patch.object(websockets.asyncio.server, "serve", wraps=serve) as hook,
-    ):
-        server = viser.ViserServer(host=host, port=port, verbose=False)
+    server = _start_server(host, port, check, Connection)
     try:
-        if not hook.called:
-            raise RuntimeError(f"viser {viser.__version__} does not call websockets' serve")
         handles = server.gui._gui_input_handle_from_uuid
         server.gui.configure_theme(show_share_button=False)
         # Without a GPU, a browser takes 15 s for the light of viser's environment map.
@@ -105,6 +106,38 @@ def viewer_server(host: str, port: int) -> Iterator[viser.ViserServer]:
     finally:
         with redirect_stdout(StringIO()):
             server.stop()
+
+
+def _start_server(
+    host: str, port: int, check: Callable[..., Response], connection: type[ServerConnection]
+) -> viser.ViserServer:
+    """Return a server of viser that checks requests and messages.
+
+    viser has no parameters for these options of websockets' `serve`, which it looks up when it
+    starts.
+
+    Raises:
+        RuntimeError: if viser starts its server in another way.
+    """
+    serve = websockets.asyncio.server.serve
+    is_used = False
+
+    def checked_serve(*arguments: Any, **options: Any) -> Any:
+        nonlocal is_used
+        is_used = True
+        options |= {"process_response": check, "create_connection": connection, "logger": _LOGGER}
+        return serve(*arguments, **options)
+
+    setattr(websockets.asyncio.server, "serve", checked_serve)  # noqa: B010 - its type is the class of websockets
+    try:
+        with redirect_stdout(StringIO()):  # a banner
+            server = viser.ViserServer(host=host, port=port, verbose=False)
+    finally:
+        setattr(websockets.asyncio.server, "serve", serve)  # noqa: B010
+    if not is_used:
+        server.stop()
+        raise RuntimeError(f"viser {viser.__version__} does not call websockets' serve")
+    return server
 
 
 def _allowed_hosts(host: str) -> re.Pattern[str]:
@@ -144,7 +177,7 @@ def _is_valid(message: bytes, handles: Mapping[str, Any]) -> bool:
     try:
         match _DECODER.decode(message):
             case {"type": "ViewerCameraMessage", **fields}:
-                camera = msgspec.convert(fields, ViewerCameraMessage)
+                camera = msgspec.convert(fields, _Camera)
                 distance = math.dist(camera.position, camera.look_at)
                 return min(distance, math.hypot(*camera.up_direction)) > _MIN_LENGTH
             case {"type": "GuiUpdateMessage", "uuid": str(uuid), "updates": dict(new)}:
