@@ -70,7 +70,8 @@ def _add_option(parser: argparse.ArgumentParser, command: str, option: Option) -
     if option.nargs == 0:
         parser.add_argument(*option.names, action="store_true", help=text)
         return
-    kind, names = "append" if option.is_repeated else "store", option.names or [option.key]
+    kind = "append" if option.is_repeated else "store"
+    names = option.names or [option.key]
     action: Any = parser.add_argument(*names, action=kind, nargs=option.nargs, help=text)
     action.completer = partial(_values, command, option)
 

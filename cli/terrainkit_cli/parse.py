@@ -149,9 +149,11 @@ def options_of(
         aliases: Second names of options by key.
         prefix: Beginning of the keys.
     """
-    kind, options = owner if isinstance(owner, type) else type(owner), []
+    kind = owner if isinstance(owner, type) else type(owner)
+    options = []
     for name, annotation in field_types(kind).items():
-        default, key = getattr(owner, name, MISSING), prefix + name
+        default = getattr(owner, name, MISSING)
+        key = prefix + name
         hint = parse_hint(annotation)
         if isinstance(default, Config):
             options += options_of(default, aliases, f"{key}.")
@@ -170,7 +172,8 @@ def _option(owner: Any, key: str, default: Any, annotation: Any, alias: str) -> 
     is_repeated = bool(extra.get("is_repeated"))
     nargs: int | Literal["*"] = 1
     if hint.kind is bool and not hint.is_optional:
-        names, nargs = [*names, f"--{section}{dot}no-{name}"], 0
+        names = [*names, f"--{section}{dot}no-{name}"]
+        nargs = 0
     elif hint.origin is tuple and not is_repeated:
         nargs = "*" if ... in hint.args or hint.is_optional else len(hint.args)
     return Option(
@@ -289,7 +292,8 @@ def format_help(prog: str, doc: str, options: Sequence[Option], width: int) -> s
     )
     sections: dict[str, Any] = {"": parser}
     for option in options:
-        section, text = option.key.rpartition(".")[0], option.help.replace("%", "%%")
+        section = option.key.rpartition(".")[0]
+        text = option.help.replace("%", "%%")
         if section not in sections:
             about = _fill(inspect.getdoc(option.owner) or "", width - 2)
             sections[section] = parser.add_argument_group(f"{section} options", about)

@@ -232,7 +232,8 @@ class View(PluginCommand, ViewerCommand):
         from terrainkit_robots.spec.robot_spec import RobotSpec
         from terrainkit_robots.viewer.show_robot import show_robot
 
-        path, spec = Path(self.source), None
+        path = Path(self.source)
+        spec = None
         if (path / SPEC_FILE).is_file():
             spec = path / SPEC_FILE
             path = path / RobotSpec.load(spec).urdf

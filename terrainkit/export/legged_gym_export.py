@@ -42,7 +42,8 @@ def export(terrain_map: "TerrainMap", path: Path) -> None:
         )
     require_one_friction(terrain_map, "a triangle mesh of Isaac Gym")
     require_whole_solids(terrain_map, "a triangle mesh of Isaac Gym")
-    config, mesh = terrain_map.config, terrain_map.mesh()
+    config = terrain_map.config
+    mesh = terrain_map.mesh()
     first_patch = np.array([*np.add(terrain_map.grid.lower, config.border), 0.0])
     tops = top_heights(terrain_map)
     arrays = {

@@ -468,7 +468,8 @@ def _border_boxes(
 
 def collision_surface(terrain_map: "TerrainMap", collision: Collision) -> HeightfieldSurface:
     """Return the surface that MuJoCo collides with."""
-    heights, tops = np.ascontiguousarray(terrain_map.heights), None
+    heights = np.ascontiguousarray(terrain_map.heights)
+    tops = None
     decomposition = collision_boxes(terrain_map, collision)
     if decomposition is not None:
         tops = np.where(decomposition.box_mask, heights, np.float32(-np.inf))

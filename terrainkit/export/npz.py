@@ -68,7 +68,8 @@ def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
         path: Target.
         mesh: Write the trimesh. `TerrainMap.mesh` builds it from the other arrays.
     """
-    config, trimesh = terrain_map.config, terrain_map.mesh() if mesh else None
+    config = terrain_map.config
+    trimesh = terrain_map.mesh() if mesh else None
     records = [[dataclasses.asdict(patch) for patch in row] for row in terrain_map.parameters]
     arrays = {
         "format_version": np.int64(FORMAT_VERSION),
@@ -113,7 +114,8 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
     """
     with open_archive(path) as archive:
         config = _read_config(archive)
-        size, grid = (config.rows, config.cols), config.grid
+        size = (config.rows, config.cols)
+        grid = config.grid
         for key, expected in (
             ("cell", config.cell),
             ("border", config.border),

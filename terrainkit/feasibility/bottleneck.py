@@ -110,7 +110,8 @@ def _reaches(
 
     # No sorting is needed: the edges stay in the order of the rows when some are left out.
     before = np.concatenate([[0], np.cumsum(mask)])[rows].astype(np.int32)
-    values, size = np.ones(int(before[-1])), len(rows) - 1
+    values = np.ones(int(before[-1]))
+    size = len(rows) - 1
     graph = csr_matrix((values, end[mask].astype(np.int32), before), shape=(size, size))
     reached = breadth_first_order(graph, start, return_predecessors=False)
     return bool(np.isin(targets, reached).any())

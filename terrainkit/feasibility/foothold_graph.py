@@ -61,7 +61,8 @@ class FootholdGraph:
             excluded: Nodes that no path may use, shape (nx, ny, m); None for none.
         """
         gradient = gradient_of(columns.floor, columns.spacing)
-        steps, free_width = step_edges(columns, gradient), FreeWidth.build(columns, limits)
+        steps = step_edges(columns, gradient)
+        free_width = FreeWidth.build(columns, limits)
         slope = gradient.slope(columns.spacing)
         quantities = {
             "slope": slope,

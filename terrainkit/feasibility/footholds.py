@@ -62,7 +62,8 @@ def _with_tops(
     """
     import cv2
 
-    solid, max_size = tops.solid.reshape(-1), 2 * limits.foothold
+    solid = tops.solid.reshape(-1)
+    max_size = 2 * limits.foothold
     on_solid = np.flatnonzero(solid >= 0)
     sizes[on_solid] = np.maximum(sizes[on_solid] - 2 * tops.widened[solid[on_solid]], 0.0)
     exact = np.full(len(sizes), np.nan)

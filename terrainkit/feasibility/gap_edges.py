@@ -62,19 +62,22 @@ def gap_edges(
             is_entered[components[parts[-1].end]] = True
             is_left = ~is_entered[components[pairs.end]]
             is_left[order] = False
-            pairs, number = pairs.select(is_left), number * _MORE
+            pairs = pairs.select(is_left)
+            number = number * _MORE
     return Edges.concatenate(parts)
 
 
 def _batches(parts: Iterable[Edges]) -> Iterator[Edges]:
     """Yield the edges of all parts in batches of at least `_MAX_PAIRS`, except for the last."""
-    batch, number = [], 0
+    batch = []
+    number = 0
     for part in parts:
         batch.append(part)
         number += len(part.start)
         if number >= _MAX_PAIRS:
             yield Edges.concatenate(batch)
-            batch, number = [], 0
+            batch = []
+            number = 0
     if batch:
         yield Edges.concatenate(batch)
 
@@ -108,7 +111,8 @@ def _pairs(
     offset = (((moves[:, :1] * ny + moves[:, 1:]) * m) + np.arange(m)).reshape(-1)
     gap = np.repeat(widths, m)
     i, j = columns.column(start)
-    place, size = ((i + n) * ny + j + n) * m, max(_MAX_PAIRS // max(len(offset), 1), 1)
+    place = ((i + n) * ny + j + n) * m
+    size = max(_MAX_PAIRS // max(len(offset), 1), 1)
     for first in range(0, len(start), size):
         end = node.reshape(-1)[place[first : first + size, None] + offset]
         which, move = np.nonzero(end >= 0)

@@ -28,7 +28,8 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
         step_demand: Demand of each step of the graph.
         segment: The segment. Without a path, all steps are returned.
     """
-    steps, num_nodes = graph.steps, graph.columns.floor.size
+    steps = graph.steps
+    num_nodes = graph.columns.floor.size
     gaps = steps.select(slice(0))
     # A lower bound of the demand of all gaps: the demand of cells that touch at a corner.
     searched = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap

@@ -140,7 +140,8 @@ def _solve(
     """Return the solved ranges of a sub-terrain, or of the element of a course, and the demands."""
     name = _table_name(part)
     solved_part = part if name is None else part.parameters[name][0]
-    ranges, grid = _ranges(solved_part), config.patch_grid(0, 0)
+    ranges = _ranges(solved_part)
+    grid = config.patch_grid(0, 0)
     cache: dict[tuple[float, float], float] = {}
 
     def demand_at(end: float, difficulty: float) -> float:

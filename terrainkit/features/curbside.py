@@ -129,7 +129,8 @@ class Curbside(Lane):
             ConfigError: if they do not fit.
         """
         edges, length = self.slot_edges(grid), self.strip
-        ramp, is_tree = rng.integers(len(edges) - 1), rng.random(len(edges) - 1) < self.trees
+        ramp = rng.integers(len(edges) - 1)
+        is_tree = rng.random(len(edges) - 1) < self.trees
         parts, blocks = [], []
         for k, (y0, y1) in enumerate(itertools.pairwise(edges)):
             y = (y0 + y1) / 2

@@ -127,7 +127,8 @@ def sample_floor_plan(
         if middle < y:
             rooms.append((edges[k], middle, edges[k + 1], y))
     array = np.array(rooms)
-    group, doors = np.arange(len(array)), []
+    group = np.arange(len(array))
+    doors = []
     # A room is connected to those before it, so that the doors form a tree, with some more doors.
     chances = rng.random((len(array), len(array), 2))
     for (a, b), line in _shared(array):

@@ -67,7 +67,8 @@ def _coefficients(path: Path, values: NDArray[Any], options: ImportOptions) -> N
     if options.friction_range:
         levels = np.linspace(*options.friction_range, np.iinfo(values.dtype).max + 1)
         return np.asarray(levels[values], dtype=np.float32)
-    table, hint = Path(options.friction_classes), Mapping[str, NonNegativeFloat]
+    table = Path(options.friction_classes)
+    hint = Mapping[str, NonNegativeFloat]
     classes = convert(str(table), parse_toml(read_text(table)), hint)
     found, index = np.unique(values, return_inverse=True)
     if unknown := [str(value) for value in found if str(value) not in classes]:

@@ -138,7 +138,8 @@ def _read_mesh(path: Path) -> dict[str, Any]:
     import trimesh
 
     # Without a path, trimesh opens no other files.
-    suffix, data = path.suffix.lower(), path.read_bytes()
+    suffix = path.suffix.lower()
+    data = path.read_bytes()
     stated = {"unit": 1.0, "up": "y"} if suffix in (".glb", ".gltf") else {}
     if suffix == ".gltf":
         data = _embed_buffers(path, data)

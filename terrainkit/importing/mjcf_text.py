@@ -107,7 +107,8 @@ class _Reader:
         )
         root = etree.fromstring(data, parser)
         for include in [*root.iter("include")]:
-            name, parent = include.get("file", ""), include.getparent()
+            name = include.get("file", "")
+            parent = include.getparent()
             file = folder / name if (folder / name).exists() else path.parent / name
             with prefixed_errors(f"{name}: "):
                 part = self._document(file, folder, (*parents, path))

@@ -61,7 +61,8 @@ class PointSource(VertexSource):
             Heights [m], shape (nx, ny), NaN in cells without points.
         """
         inner, number = cover_positions((x, y), self.lower, self.upper)
-        step, shape = x[1] - x[0] if len(x) > 1 else self.cell, tuple(map(len, inner))
+        step = x[1] - x[0] if len(x) > 1 else self.cell
+        shape = tuple(map(len, inner))
         edges = [np.append(lines - step / 2, lines[-1] + _BEYOND * step) for lines in inner]
         i, j = (np.searchsorted(edges[k], self.vertices[:, k], "right") - 1 for k in (0, 1))
         is_inside = (i >= 0) & (i < shape[0]) & (j >= 0) & (j < shape[1])

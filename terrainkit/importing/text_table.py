@@ -61,7 +61,8 @@ def _read_table(path: Path) -> dict[str, Any]:
             rows, delimiter=separator, comments=None, ndmin=2, converters=_float_or_nan
         )
     except ValueError as error:
-        reason, hint = str(error).partition("; use")[0], ""
+        reason = str(error).partition("; use")[0]
+        hint = ""
         if re.search("columns changed .* at row 2$", reason):
             hint = f"; delete the line {truncate(lines[start])!r} if it is no row of heights"
         raise ValueError(reason + hint) from None

@@ -68,7 +68,8 @@ def terrain_importer_cfg(
     terrain_map = TerrainMap.load(path)
     requirements.require_one_friction(terrain_map, "the mesh of Isaac Lab's terrain importer")
     requirements.require_whole_solids(terrain_map, "the mesh of Isaac Lab's terrain importer")
-    config, samples = terrain_map.config, max(terrain_map.heights.shape)
+    config = terrain_map.config
+    samples = max(terrain_map.heights.shape)
     if heightfield is None:
         heightfield = not len(terrain_map.solids) and samples <= _MAX_SAMPLES
     if heightfield:
@@ -149,7 +150,8 @@ class MapGenerator:
             for terrain in cfg.sub_terrains.values()
         )
         _require_contacts(terrain_map, is_heightfield=is_heightfield)
-        mesh, center = terrain_map.mesh(), np.array([*terrain_map.grid.center, 0.0])
+        mesh = terrain_map.mesh()
+        center = np.array([*terrain_map.grid.center, 0.0])
         vertices = mesh.vertices - center
         if is_heightfield:
             # Newton samples the mesh from its edge on: the samples of the map, without the rim.

@@ -35,7 +35,8 @@ class TerrainProgress:
 
     def __call__(self, env: Any, command_name: str, asset_name: str = "robot") -> torch.Tensor:
         """Measure a step, and return False for each environment."""
-        data, term = env.scene[asset_name].data, env.command_manager.get_term(command_name)
+        data = env.scene[asset_name].data
+        term = env.command_manager.get_term(command_name)
         position, yaw = _numpy(data.root_link_pos_w), _numpy(data.heading_w)
         command = _numpy(env.command_manager.get_command(command_name))
         starts = np.flatnonzero(self._starts)
@@ -87,7 +88,8 @@ class TerrainLevels:
         return self._log()
 
     def _update(self, env: Any, ids: NDArray[np.int64]) -> None:
-        terrain, terminations = env.scene.terrain, env.termination_manager
+        terrain = env.scene.terrain
+        terminations = env.termination_manager
         progress = terminations.get_term_cfg(PROGRESS).func.progress
         size = np.array(terrain.cfg.terrain_generator.size)
         patches = np.multiply(terrain.terrain_origins.shape[:2], size)

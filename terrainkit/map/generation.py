@@ -97,7 +97,8 @@ class _MapBuilder:
         self.moved_spawns: Counter[str] = Counter()
         """Number of patches whose spawn origin was moved, by sub-terrain."""
 
-        grid, size = config.grid, (config.rows, config.cols)
+        grid = config.grid
+        size = (config.rows, config.cols)
         self._config, self._grid = config, grid
         self._heights = config.border_heights()
         # A view of one number takes no memory, and most maps have one friction.
@@ -112,7 +113,8 @@ class _MapBuilder:
 
     def add(self, row: int, col: int, terrain_type: int, patch: Patch) -> None:
         """Add a patch."""
-        config, sub_terrain = self._config, self._config.sub_terrains[terrain_type]
+        config = self._config
+        sub_terrain = self._config.sub_terrains[terrain_type]
         block = config.patch_cells(row, col)
         self._heights[block] = patch.heights
         uniform = self._patch_friction

@@ -167,7 +167,9 @@ def build_patch(
 def _build_patch(
     config: MapConfig, sub_terrain: SubTerrain, difficulty: float, row: int, col: int
 ) -> Patch:
-    grid, name, plugin = config.patch_grid(row, col), sub_terrain.name, sub_terrain.plugin
+    grid = config.patch_grid(row, col)
+    name = sub_terrain.name
+    plugin = sub_terrain.plugin
     terrain = sub_terrain.at(difficulty)
     overlays = []
     for overlay in sub_terrain.overlays:
@@ -310,7 +312,8 @@ def _place_goals(config: MapConfig, name: str, geometry: PatchGeometry) -> NDArr
     Raises:
         ConfigError: if a goal is not on the patch.
     """
-    grid, goals = geometry.grid, geometry.goals.copy()
+    grid = geometry.grid
+    goals = geometry.goals.copy()
     if len(goals):
         from terrainkit.geometry.ground_surface import surface_at
 

@@ -33,7 +33,8 @@ def repeated_levels(terrain_map: TerrainMap) -> Iterator[str]:
             for name in same:
                 if here.requested[name] != before.requested[name] or len(same) == len(ranges):
                     repeated[name].append(level)
-        found, number = [], len(levels)
+        found = []
+        number = len(levels)
         for name in ranges:
             values = [(level, p.realized[name], p.requested[name]) for level, p in levels]
             zero = [level for level, realized, requested in values if realized == 0 != requested]

@@ -100,7 +100,9 @@ class SpawnGround:
         Raises:
             ConfigError: if patch `name` has no place to spawn.
         """
-        config, grid, origin = self.config, self.grid, self.find(position)
+        config = self.config
+        grid = self.grid
+        origin = self.find(position)
         if origin is None:
             tolerance = self.flattest_tolerance(position)
             largest = 0.45 * (min(grid.shape) - 1) * grid.cell
@@ -282,7 +284,8 @@ class SpawnGround:
 
     def _heights_at(self, point: tuple[float, float]) -> tuple[float, float, float]:
         """Return the lowest height of a disk, the height at its center and the highest [m]."""
-        threshold, heights = self.config.wall_threshold, self.heights
+        threshold = self.config.wall_threshold
+        heights = self.heights
         index, radius = _sample_index(self.grid, point), self.config.spawn_radius / self.grid.cell
         low, high = _height_range(heights, index, radius)
         if low == high:
@@ -304,7 +307,8 @@ class SpawnGround:
         """
         import cv2
 
-        radius, heights = self.config.spawn_radius / self.grid.cell, self.heights
+        radius = self.config.spawn_radius / self.grid.cell
+        heights = self.heights
         margin = math.ceil(radius + 1)
         inner = tuple(n - 2 * margin for n in heights.shape)
         if min(inner) <= 0:

@@ -55,7 +55,8 @@ def make_report(
         counts: Fields of the report that are known.
     """
     worst, _ = _compare(terrain_map, _grid_points(terrain_map, source, origin), only_above=False)
-    face, num_lost = [0.0] * 5, 0
+    face = [0.0] * 5
+    num_lost = 0
     if isinstance(source, MeshSource):
         points = _face_points(terrain_map, source, origin)
         face, num_lost = _compare(terrain_map, points, only_above=True)
@@ -76,7 +77,8 @@ def _compare(
     terrain_map: TerrainMap, blocks: Iterator[NDArray[np.float64]], *, only_above: bool
 ) -> tuple[list[float], int]:
     """Return the largest error with its x, y, z and map height, and how many exceed half a cell."""
-    worst, number = [0.0] * 5, 0
+    worst = [0.0] * 5
+    number = 0
     for points in blocks:
         error, map_top = _height_errors(terrain_map, points, only_above=only_above)
         number += int((error > terrain_map.grid.cell / 2).sum())

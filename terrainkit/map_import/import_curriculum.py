@@ -94,7 +94,8 @@ def import_curriculum(
     """
     options = options or ImportOptions()
     _check_options(options, blend)
-    files, is_whole = _find_files(paths), options.patch_size is None
+    files = _find_files(paths)
+    is_whole = options.patch_size is None
     options = _with_common_size(files, options)
     patches: list[_Patch] = []
     skipped: list[str] = []
@@ -135,7 +136,8 @@ def _check_options(options: ImportOptions, blend: float) -> None:
 
 def _find_files(paths: Sequence[str | Path]) -> list[Path]:
     """Return the files, and the files in folders that have a reader, sorted by name."""
-    readers, files = modules_by_suffix("terrainkit.importing"), set[Path]()
+    readers = modules_by_suffix("terrainkit.importing")
+    files = set[Path]()
     for path in map(Path, paths):
         inside = sorted(path.iterdir()) if path.is_dir() else []
         found = [file for file in inside if file.suffix.lower() in readers]
@@ -172,7 +174,8 @@ def _places(
     path: Path, options: ImportOptions, is_whole: bool
 ) -> list[tuple[Source, NDArray[np.float64]]]:
     """Return the ground and the lower corner of each patch of a file, centered in the file."""
-    source, size = open_source(path, options), np.array(options.patch_size)
+    source = open_source(path, options)
+    size = np.array(options.patch_size)
     step = source.cell or import_map.DEFAULT_CELL
     check_length(path, source, options.cell or step)
     lower, extent = np.array(source.lower), np.subtract(source.upper, source.lower)
@@ -199,7 +202,8 @@ def _import_patch(
     place = replace(options, origin=(*lower.tolist(), 0.0), rows=1, cols=1, border=0.0)
     # The whole map records the files, once each.
     config, origin = import_map.make_config(path, source, place, SubTerrain(terrain="imported"))
-    anywhere, center = replace(config, **_ANYWHERE), np.array([[config.patch_grid(0, 0).center]])
+    anywhere = replace(config, **_ANYWHERE)
+    center = np.array([[config.patch_grid(0, 0).center]])
     types = np.zeros((1, 1), dtype=np.int32)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*heights are missing", TerrainkitWarning)
@@ -234,7 +238,9 @@ def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> TerrainMap:
     if len(chosen) < len(ordered):
         text = f"used {len(chosen)} of {len(ordered)} patches, at equal distances in their order"
         warnings.warn(text, TerrainkitWarning, stacklevel=3)
-    terrains, used, numbers = {}, {patch.path for patch in chosen}, Counter[str]()
+    terrains = {}
+    used = {patch.path for patch in chosen}
+    numbers = Counter[str]()
     for path in dict.fromkeys(patch.path for patch in patches if patch.path in used):
         numbers[path.name] += 1  # files in several folders may have the same name
         name = path.name if numbers[path.name] == 1 else f"{path.name} ({numbers[path.name]})"
@@ -251,9 +257,11 @@ def _arrange(patches: Sequence[_Patch], options: ImportOptions) -> TerrainMap:
     )
     samples = math.prod(config.grid.shape)
     check_memory(samples * _BYTES_PER_SAMPLE, f"a map of {samples} samples")
-    heights, solids = np.zeros(config.grid.shape, dtype=np.float32), []
+    heights = np.zeros(config.grid.shape, dtype=np.float32)
+    solids = []
     spawns = np.empty((rows, cols), dtype=object)
-    types, tolerances = np.empty((rows, cols), dtype=np.int32), {}
+    types = np.empty((rows, cols), dtype=np.int32)
+    tolerances = {}
     for (path, made, _, _), index in zip(chosen, np.ndindex(rows, cols), strict=True):
         x, y = config.patch_grid(*index).lower
         heights[config.patch_cells(*index)] = made.heights

@@ -66,7 +66,8 @@ def import_map(path: str | Path, options: ImportOptions | None = None) -> Import
             no place to spawn.
         MemoryLimitError: if the map would not fit in memory.
     """
-    path, options = Path(path), options or ImportOptions()
+    path = Path(path)
+    options = options or ImportOptions()
     source = open_source(path, options)
     check_length(path, source, options.cell or source.cell or DEFAULT_CELL)
     terrain = sub_terrain(path, path.stem, options)
@@ -106,7 +107,9 @@ def make_map(
     if options.solids and not isinstance(source, MeshSource):
         raise ConfigError(f"solids: got {path}; expected a mesh")
     x, y = (grid.axis(k) + origin[k] for k in (0, 1))
-    solids, columns, counts = Solids.empty(), None, {}
+    solids = Solids.empty()
+    columns = None
+    counts = {}
     if isinstance(source, MeshSource):
         ground = source
         if options.solids:
@@ -151,7 +154,8 @@ def make_config(
     origin = np.array(options.origin or (*source.lower, 0.0))
     counts, sizes = [], []
     for k, count in enumerate((options.rows, options.cols)):
-        axis, extent = "xy"[k], source.upper[k] - float(origin[k])
+        axis = "xy"[k]
+        extent = source.upper[k] - float(origin[k])
         if origin[k] < source.lower[k] - cell / 2 or not cell / 2 <= extent < math.inf:
             raise ConfigError(
                 f"origin: got {axis} = {origin[k]:g} m; the file extends from "
@@ -239,7 +243,8 @@ def assemble_map(
     for row, col in np.ndindex(size):
         record = records[terrain_types[row, col]]
         parameters[row, col] = PatchParameters(requested=record, realized=record)
-        block, start = heights[config.patch_cells(row, col)], float(spawns[row, col][0, 2])
+        block = heights[config.patch_cells(row, col)]
+        start = float(spawns[row, col][0, 2])
         measured[row, col] = measured_difficulty(block, config.cell, start)
     rank = np.unique(measured.round(6), return_inverse=True)[1].reshape(size)
     return TerrainMap(

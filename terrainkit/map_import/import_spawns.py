@@ -44,7 +44,8 @@ def place_spawns(
     Raises:
         ConfigError: if a patch has no free disk, or no flat one and `relax` is false.
     """
-    spawns, tolerances = np.empty((config.rows, config.cols), dtype=object), {}
+    spawns = np.empty((config.rows, config.cols), dtype=object)
+    tolerances = {}
     for patch in np.ndindex(spawns.shape):
         placed = place_on_flattest(config, heights, solids, patch, spawn_xy[patch])
         spawns[patch], tolerances[patch] = placed
@@ -110,7 +111,8 @@ def relaxed_config(
     uneven = [patch for patch, least in tolerances.items() if least > config.spawn_tolerance]
     if not uneven:
         return config
-    worst, total = max(uneven, key=tolerances.__getitem__), len(tolerances)
+    worst = max(uneven, key=tolerances.__getitem__)
+    total = len(tolerances)
     tolerance = tolerances[worst]
     who = f"{len(uneven)} of {total} patches: " if total > 1 else ""
     where = f"most in patch {worst}, " if total > 1 else ""

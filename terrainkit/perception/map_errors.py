@@ -131,7 +131,8 @@ class MapErrors:
         Raises:
             ConfigError: if a shape is wrong, or a value is not finite.
         """
-        n, options = len(self._age), self._options
+        n = len(self._age)
+        options = self._options
         pos = to_floats("position", position, [n, 3])
         angle = to_floats("yaw", yaw, [n])
         rng = make_rng((self._seed, self._steps, 0))

@@ -38,7 +38,8 @@ class RayCaster:
         Args:
             terrain_map: The map.
         """
-        threshold, solids = terrain_map.config.wall_threshold, terrain_map.solids
+        threshold = terrain_map.config.wall_threshold
+        solids = terrain_map.solids
         first, cell = terrain_map.first_sample, terrain_map.grid.cell
         self._ground = GroundRays(terrain_map.heights, first, cell, threshold)
         self._solids = SolidIndex(solids.select(solids.visible))

@@ -204,7 +204,8 @@ def _summary(kind: type[Any]) -> str:
 def _toml_lines(path: str, config: Config) -> Iterator[str]:
     """Yield the lines of a config: values first, then a table for each nested config."""
     kind: Any = type(config)
-    docs, tables = field_docs(kind), []
+    docs = field_docs(kind)
+    tables = []
     for key, value in config.to_table().items():
         if isinstance(value, tuple) and value and isinstance(value[0], Config):
             tables += [(f"[[{path}{key}]]", item) for item in value]

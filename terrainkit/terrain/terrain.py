@@ -69,7 +69,8 @@ class Terrain(Parameterized, ABC):
             raise ConfigError(
                 f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
             )
-        known, values = parameters_of(cls), values or {}
+        known = parameters_of(cls)
+        values = values or {}
         fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
         if values:
             check_names(cls.kind(), values, known)

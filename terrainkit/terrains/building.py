@@ -287,7 +287,8 @@ class Building(FlatTerrain, Stairway):
     def _floors(self, grid: Grid) -> list[list[list[float]]]:
         """Return the lower and upper corners of the floors above the ground, and of the roof."""
         x, y, end, _ = self._bounds(grid)
-        low, floors = self._stairwell_y, []
+        low = self._stairwell_y
+        floors = []
         for z in self.floors(grid)[1:]:
             parts = [(0.0, 0.0, self._level, low), (0.0, low, x, y)]
             parts += [(end, 0.0, x, low)] if end < x else []

@@ -205,7 +205,8 @@ class Course(Lane):
         """
         lengths = [element.element_length for element in self.elements]
         cells = np.array([0 if length is None else grid.cells(length) for length in lengths])
-        is_share, total = cells == 0, int(cells.sum())
+        is_share = cells == 0
+        total = int(cells.sum())
         free = grid.shape[0] - 2 * grid.cells(self.start)
         if self.order == "random":
             cells[is_share] = slot = grid.cells(self.slot_length)

@@ -93,7 +93,8 @@ def _offsets(
         expected: Area of the holes of each row on an endless field [cells], shape (rows,).
         samples: Random numbers from 0 to 1.
     """
-    shifts, missing = [], 0.0
+    shifts = []
+    missing = 0.0
     # Lists, since a row has few offsets.
     for k, (area, share) in enumerate(zip(areas.tolist(), expected.tolist(), strict=True)):
         missing += share

@@ -125,7 +125,8 @@ def _patch_bounds(terrain_map: "TerrainMap") -> tuple[NDArray[np.float64], NDArr
 
     The corners are in meters, of shape (3,). The border and deep gaps are left out.
     """
-    config, heights = terrain_map.config, terrain_map.env_origins[..., 2]
+    config = terrain_map.config
+    heights = terrain_map.env_origins[..., 2]
     first, last = (0, 0), (config.rows - 1, config.cols - 1)
     lower = [*config.patch_grid(*first).lower, heights.min()]
     upper = [*config.patch_grid(*last).upper, heights.max()]
@@ -138,7 +139,8 @@ def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
     from trimesh.visual import TextureVisuals
     from trimesh.visual.material import PBRMaterial
 
-    mesh, grid = terrain_map.ground_mesh(), terrain_map.grid
+    mesh = terrain_map.ground_mesh()
+    grid = terrain_map.grid
     levels = map_levels(terrain_map.heights)
     relief = Image.fromarray(shaded_relief(terrain_map.heights, grid.cell, levels))
     relief.thumbnail((_MAX_TEXTURE, _MAX_TEXTURE))
@@ -151,7 +153,8 @@ def _add_ground(server: "viser.ViserServer", terrain_map: "TerrainMap") -> None:
 
 def _add_solids(server: "viser.ViserServer", terrain_map: "TerrainMap") -> list[Any]:
     solids = terrain_map.solids
-    is_usual, handles = solids.visible & solids.collides, []
+    is_usual = solids.visible & solids.collides
+    handles = []
     levels = map_levels(terrain_map.heights)
     for name, chosen in (("solids", is_usual), ("special_solids", ~is_usual)):
         if chosen.any():

@@ -77,7 +77,8 @@ def viewer_server(host: str, port: int) -> Iterator[viser.ViserServer]:
     Yields:
         The server; it has no scene yet.
     """
-    hosts, handles = _allowed_hosts(host), dict[str, Any]()
+    hosts = _allowed_hosts(host)
+    handles = dict[str, Any]()
 
     def check(connection: ServerConnection, request: Request, response: Response) -> Response:
         if not _is_allowed(request.headers, hosts):

@@ -419,6 +419,7 @@ def _draw_route(image: Picture, route: Route, block: Block) -> None:
     if route.place is not None:
         x, y = block.pixels(route.place).tolist()
         cv2.drawMarker(image, (x, y), color, cv2.MARKER_TILTED_CROSS, 14, 3, cv2.LINE_AA)
-        at, font = (min(x + 10, image.shape[1] - 36), y - 6), cv2.FONT_HERSHEY_SIMPLEX
+        at = (min(x + 10, image.shape[1] - 36), y - 6)
+        font = cv2.FONT_HERSHEY_SIMPLEX
         cv2.putText(image, route.label, at, font, 0.5, _BACKGROUND, 4, cv2.LINE_AA)
         _write(image, route.label, at)

@@ -90,7 +90,8 @@ def _parts(terrain_map: "TerrainMap", axis: int, number: int) -> Iterator[Block]
         axis: The axis that is divided.
         number: Number of the parts; fewer if they are all full.
     """
-    config, total = terrain_map.config, terrain_map.difficulty.shape[axis]
+    config = terrain_map.config
+    total = terrain_map.difficulty.shape[axis]
     cut = max(0, config.border_cells - round(1.0 / config.cell))
     length = -(-total // number)
     for first in range(0, total, length):
