@@ -73,12 +73,14 @@ class Feasibility(PluginCommand):
         """Print the limits, the demands and the blocking places; write the report."""
         from terrainkit.feasibility import assess_map
         from terrainkit.feasibility.report import demand_table
+        from terrainkit.files.atomic_write import check_target
 
         derived = robot_limits(self.robot, self.limit)
         terrain_map = TerrainMap.load(self.map)
         target = self.output.with_suffix("") if self.output else None
         if target:
-            self._check_targets(target)
+            for suffix in (".json", ".png"):
+                check_target(target.with_suffix(suffix), overwrite=self.overwrite)
         with worker_pool(self.jobs) as executor:
             results = assess_map(
                 terrain_map, derived.limits, progress=render.progress, executor=executor
@@ -93,12 +95,6 @@ class Feasibility(PluginCommand):
         if target:
             self._write(target, terrain_map, results, derived)
         return print_impassable(results, derived, self.map)
-
-    def _check_targets(self, target: Path) -> None:
-        from terrainkit.files.atomic_write import check_target
-
-        for suffix in (".json", ".png"):
-            check_target(target.with_suffix(suffix), overwrite=self.overwrite)
 
     def _write(
         self,

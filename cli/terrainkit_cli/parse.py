@@ -293,16 +293,26 @@ def format_help(prog: str, doc: str, options: Sequence[Option], width: int) -> s
     sections: dict[str, Any] = {"": parser}
     for option in options:
         section = option.key.rpartition(".")[0]
-        text = option.help.replace("%", "%%")
         if section not in sections:
             about = _fill(inspect.getdoc(option.owner) or "", width - 2)
             sections[section] = parser.add_argument_group(f"{section} options", about)
-        if option.nargs == 0:
-            sections[section].add_argument(*option.names, action="store_true", help=text)
-        else:
-            names = option.names or [option.key]
-            sections[section].add_argument(*names, metavar=option.metavar, help=text)
+        add_option(sections[section], option, option.help, metavar=option.metavar)
     return parser.format_help()
+
+
+def add_option(parser: Any, option: Option, text: str, **values: Any) -> Any:
+    """Add an option to a parser that describes it, and return the action of argparse.
+
+    Args:
+        parser: The parser, or a group of its options.
+        option: The option.
+        text: Its help text.
+        **values: Arguments of argparse for an option with values.
+    """
+    if option.nargs == 0:
+        values = {"action": "store_true"}
+    names = option.names or [option.key]
+    return parser.add_argument(*names, help=text.replace("%", "%%"), **values)
 
 
 def _with_dashes(word: str) -> str:

@@ -70,11 +70,14 @@ def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
     """
     config = terrain_map.config
     trimesh = terrain_map.mesh() if mesh else None
+    friction = terrain_map.friction
+    if (friction == friction[0, 0]).all():
+        friction = friction[:1, :1]  # stored once if it is the same in all cells
     records = [[dataclasses.asdict(patch) for patch in row] for row in terrain_map.parameters]
     arrays = {
         "format_version": np.int64(FORMAT_VERSION),
         "heights": terrain_map.heights,
-        "ground_friction": _compact(terrain_map.friction),
+        "ground_friction": friction,
         "cell": np.float64(config.cell),
         "lower": np.array(terrain_map.grid.lower),
         "border": np.float64(config.border),
@@ -211,11 +214,6 @@ def _read_config(
         return read(archive.text("config"))
     except ConfigError as error:
         raise MapFileError(f"{archive.path}: config: {error}") from error
-
-
-def _compact(friction: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the friction of all cells, shape (1, 1) if it is the same."""
-    return friction[:1, :1] if (friction == friction[0, 0]).all() else friction
 
 
 def _read_friction(archive: Archive, config: MapConfig) -> NDArray[np.float32]:

@@ -175,8 +175,11 @@ def make_raster(
         spacing, lower = reference.cells(path, values.T.shape)
     scale, offset = _scale_and_offset(path, values.dtype, options, reference)
     if spacing is None or scale is None:
-        needed = ["--file-cell 0.1 (0.1 m between samples)"] * (spacing is None)
-        needed += [_HEIGHT_OPTIONS.get(kind, "")] * (scale is None)
+        needed = []
+        if spacing is None:
+            needed.append("--file-cell 0.1 (0.1 m between samples)")
+        if scale is None:
+            needed.append(_HEIGHT_OPTIONS.get(kind, ""))
         raise ConfigError(
             f"{path}: got {values.dtype} values without their distance or height in meters; "
             f"expected for example {' '.join(needed)}, or a .json beside it"

@@ -62,13 +62,15 @@ def make_report(
         face, num_lost = _compare(terrain_map, points, only_above=True)
     error, x, y, *_ = max(worst, face)
     lost: dict[str, Any] = {"lost_top": face[3], "map_top": face[4], "lost_at": (face[1], face[2])}
+    cell = terrain_map.grid.cell
+    num_hidden = 0 if columns is None else int((columns.sheets > cell / 2).sum())
     return ImportReport(
         max_error=error,
         max_error_at=(x, y) if error else None,
         num_lost_faces=num_lost,
         **(lost if num_lost else {}),
         **_overhangs(terrain_map, columns),
-        hidden_area=_hidden_area(terrain_map, columns),
+        hidden_area=num_hidden * cell**2,
         **counts,
     )
 
@@ -181,12 +183,6 @@ def _height_errors(
     has_wall = highest - lowest > terrain_map.config.wall_threshold
     error = np.where(has_wall, np.minimum(error, beyond), error)
     return np.where(z > top, error, 0.0) if only_above else error, top
-
-
-def _hidden_area(terrain_map: TerrainMap, columns: Columns | None) -> float:
-    """Return the area where surfaces without thickness are above each other [m2]."""
-    cell = terrain_map.grid.cell
-    return 0.0 if columns is None else int((columns.sheets > cell / 2).sum()) * cell**2
 
 
 def _overhangs(terrain_map: TerrainMap, columns: Columns | None) -> dict[str, Any]:
