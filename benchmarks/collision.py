@@ -6,12 +6,12 @@ the boxes near each robot, as in training.
 """
 
 import time
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
 import terrainkit
+from terrainkit.terrain.presets import get_preset
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
@@ -28,7 +28,6 @@ _FLAT_TERRAINS = ("pyramid_stairs_inverted", "pyramid_stairs", "stairs", "obstac
 
 
 def run() -> Iterator[tuple[str, float]]:
-    warnings.simplefilter("ignore", terrainkit.TerrainkitWarning)  # cliffs, as expected
     for preset in ("stairs", "legged_gym", "indoor", "street"):
         terrain_map = terrainkit.generate(terrainkit.MapConfig(preset=preset))
         for name, cost in _step_times(terrain_map).items():
@@ -48,15 +47,7 @@ def run() -> Iterator[tuple[str, float]]:
 
 
 def _flat_map(rows: int) -> terrainkit.TerrainMap:
-    inverted = "_inverted"
-    terrains = tuple(
-        terrainkit.SubTerrain(
-            terrain=name.removesuffix(inverted),
-            name=name,
-            parameters={"inverted": True} if name.endswith(inverted) else {},
-        )
-        for name in _FLAT_TERRAINS
-    )
+    terrains = tuple(terrain for terrain in get_preset("all") if terrain.name in _FLAT_TERRAINS)
     config = terrainkit.MapConfig(rows=rows, cols=6, terrains=terrains, slope_threshold=0.25)
     return terrainkit.generate(config)
 

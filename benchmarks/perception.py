@@ -58,7 +58,7 @@ def run() -> Iterator[tuple[str, float]]:
             ),
         )
 
-    x, y, z = (each.ravel()[:MILLION] for each in _points(scan, position, yaw, rng))
+    x, y, z = (values.ravel()[:MILLION] for values in _points(scan, position, yaw, rng))
     geom, up = np.zeros(1, np.int32), 9.0
     start, down = np.array([0.0, 0.0, up]), np.array([0.0, 0.0, -1.0])
     found, on_heightfield = np.empty(len(x)), np.empty(len(x), bool)
@@ -83,5 +83,5 @@ def run() -> Iterator[tuple[str, float]]:
 
 def _points(scan, position, yaw, rng):  # type: ignore[no-untyped-def]
     """Return x, y and z of the points of two scans of the robots."""
-    parts = [scan.points(position, each) for each in (yaw, rng.permutation(yaw))]
+    parts = [scan.points(position, heading) for heading in (yaw, rng.permutation(yaw))]
     return np.concatenate(parts, axis=1)

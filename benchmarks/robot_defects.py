@@ -30,9 +30,9 @@ from lxml import etree
 from mutants.defect import Defect, load_defects
 from mutants.mutant import Mutant, NotApplicableError
 from mutants.robot import SourceRobot
+from mutants.robot_files import ROBOT_FILES, robot_folder
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.selection import lint_selected
@@ -40,11 +40,6 @@ from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 DEFECTS = Path(__file__).parent / "defects"
-ROBOTS = Path(
-    os.environ.get("TERRAINKIT_ROBOTS", Path(__file__).resolve().parents[2] / "shared" / "robots")
-)
-URDF = ("a1/urdf/a1.urdf", "go2/urdf/go2.urdf", "h1/urdf/h1.urdf", "g1/g1_29dof.urdf")
-MJCF = ("go2_mjcf/go2.xml", "h1/h1.xml", "g1/g1_29dof.xml")
 
 _MAX_SECONDS = 60
 """A check that takes longer counts as a crash [s]."""
@@ -97,24 +92,14 @@ class Result:
 
 def robots() -> list[Path]:
     """Return the files of the original robots, URDF first."""
-    bundled_files = [path for name in bundled.robot_names() if (path := bundled.urdf_path(name))]
-    others = [ROBOTS / name for name in (*URDF, *MJCF)]
-    existing = [path for path in others if path.is_file()]
-    return sorted(
-        [*bundled_files, *(path.with_suffix(".xml") for path in bundled_files), *existing],
-        key=lambda path: (path.suffix, str(path)),
-    )
+    existing = filter(Path.is_file, ROBOT_FILES.values())
+    return sorted(existing, key=lambda path: (path.suffix, str(path)))
 
 
 @cache
 def defects() -> list[Defect]:
     """Return all kinds of defects."""
     return [defect for path in sorted(DEFECTS.glob("*.toml")) for defect in load_defects(path)]
-
-
-def _robot_folder(path: Path) -> Path:
-    """Return the folder with a robot and its meshes."""
-    return path.parents[1] if path.parent.name == "urdf" else path.parent
 
 
 _PARENT: list[str] = []
@@ -133,24 +118,21 @@ def _process_folder() -> Path:
 @cache
 def _load_source(path: Path) -> tuple[SourceRobot, tuple[Finding, ...], SourceResult, Meshes]:
     """Copy a robot to the folder of this process, and check it."""
-    source_folder = _robot_folder(path)
+    source_folder = robot_folder(path)
     folder = _process_folder() / path.suffix[1:] / source_folder.name
     shutil.copytree(source_folder, folder, copy_function=_link)
     file = folder / path.relative_to(source_folder)
-    times: list[float] = []
-    while len(times) < 3 and sum(times) < 1:
-        meshes = Meshes()
-        start = time.perf_counter()
-        facts = Facts(load_robot(file), meshes)
-        report = lint_selected(facts, Settings(simulate=False))
-        times.append(time.perf_counter() - start)
+    start, meshes = time.perf_counter(), Meshes()
+    facts = Facts(load_robot(file), meshes)
+    report = lint_selected(facts, Settings(simulate=False))
+    seconds = time.perf_counter() - start
     counts = Counter(finding.severity for finding in report.findings)
     result = SourceResult(
         robot=path.name,
         findings=tuple(_format(f) for f in report.findings if f.severity != "note"),
         errors=counts["error"],
         warnings=counts["warning"],
-        seconds=median(times),
+        seconds=seconds,
     )
     root = etree.parse(file).getroot()
     source = SourceRobot(label=source_folder.name, file=file, root=root, facts=facts)
@@ -265,7 +247,7 @@ def _test_robot(
 
 
 def _num_bytes(path: Path) -> int:
-    return sum(file.stat().st_size for file in _robot_folder(path).rglob("*"))
+    return sum(file.stat().st_size for file in robot_folder(path).rglob("*"))
 
 
 def _is_selected(defect: Defect, only: str) -> bool:
@@ -368,7 +350,7 @@ def _table(result: Result, only: str) -> Iterator[str]:
 
 def _missed(result: Result, count: int) -> Iterator[str]:
     for title, group in sorted(_by_title(result).items()):
-        for mutant in [each for each in group if not each.is_found][:count]:
+        for mutant in [mutant for mutant in group if not mutant.is_found][:count]:
             yield f"missed: {title}, in {mutant.robot}: {', '.join(mutant.names)}"
             yield from (f"    {line}" for line in (mutant.error, *mutant.findings[:6]) if line)
 

@@ -35,7 +35,7 @@ from terrainkit.feasibility import assess_map
 from terrainkit.feasibility.report import routes
 from terrainkit.features.building_codes import Clause, clauses
 from terrainkit.lazy_names import public_names
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.perception import EdgeMap, RayCaster, depth_directions
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.schema import Config, field_keys, field_types, is_required

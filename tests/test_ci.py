@@ -70,7 +70,7 @@ def test_api_check_finds_what_breaks(tmp_path):
         subprocess.run([*git, *words], cwd=tmp_path, check=True)
     for path, old, new in (
         ("terrainkit/map/terrain_map.py", "def assign(self, num_envs", "def assign(self, num"),
-        ("terrainkit/map/config.py", "    rows: Count", "    lines: Count"),
+        ("terrainkit/map/map_config.py", "    rows: Count", "    lines: Count"),
         ("terrainkit/perception/height_scan.py", "def below(", "def under("),
         ("terrainkit/views/preview.py", "def render_preview(", "def render("),  # not public
         ("terrainkit/__init__.pyi", "import Flight as Flight", "import Flight as _Flight"),

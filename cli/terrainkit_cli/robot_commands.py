@@ -127,7 +127,7 @@ class CheckRobot(Command):
             baseline = baseline.updated(result.report for result in results)
             baseline.write()
             render.note(f"wrote {baseline.path}")
-        results = [replace(each, report=baseline.accept(each.report)) for each in results]
+        results = [replace(result, report=baseline.accept(result.report)) for result in results]
         self._print([result.report for result in results], "".join(r.diff for r in results))
         crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
@@ -200,12 +200,14 @@ class CheckRobot(Command):
         settings = settings.over(read_settings(Path(name).parent))
 
         def lint_contents(contents: Mapping[Path, bytes]) -> "Report":
-            against, spec = self.against or None, self.spec
+            against = self.against or None
+            spec = self.spec
             return check_robot(name, settings, against=against, spec=spec, contents=contents)
 
         with render.steps() as steps:
             steps.update(f"checking {name}")
-            report, diff = lint_contents({}), ""
+            report = lint_contents({})
+            diff = ""
         path = report.facts.model.file
         if self.fix or self.unsafe_fixes or self.diff:
             from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff
@@ -286,9 +288,9 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
     write_fixes(result)
     safeties = ("safe", "unsafe") if unsafe else ("safe",)
     unfixed = tuple(
-        (each.finding, each.reason)
-        for each in result.unfixed
-        if each.finding.fix is not None and each.finding.fix.safety in safeties
+        (unfixed.finding, unfixed.reason)
+        for unfixed in result.unfixed
+        if unfixed.finding.fix is not None and unfixed.finding.fix.safety in safeties
     )
     return replace(result.report, fixed=result.fixed, unfixed=unfixed)
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 from terrainkit.feasibility.solid_tops import Tops, solid_widths
 from terrainkit.geometry.free_space import free_intervals
+from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.solid_index import SolidIndex
-from terrainkit.geometry.surface import surface_at
 from terrainkit.map.patch import Patch
 
 MAX_SPACING = 0.035

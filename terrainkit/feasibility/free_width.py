@@ -8,10 +8,10 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.columns import Columns
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.gradient import SLOPE_LENGTH
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 
 NUM_DIRECTIONS = 8
 """Number of directions in which the free width is measured."""
@@ -155,7 +155,8 @@ class FreeWidth:
                 i, j, active = i[is_open], j[is_open], active[is_open]
                 above, min_clearance = above[is_open], min_clearance[is_open]
                 # No later cell looks further back.
-                levels[cell.slope_start :] = [each[is_open] for each in levels[cell.slope_start :]]
+                later = levels[cell.slope_start :]
+                levels[cell.slope_start :] = [nodes[is_open] for nodes in later]
             if not len(active):
                 break
             levels.append(above)

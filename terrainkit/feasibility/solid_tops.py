@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 from terrainkit.geometry.free_space import CONTACT
 from terrainkit.geometry.solid_index import Crossings, half_spaces
 from terrainkit.geometry.solids import Solids, rotation_matrices
@@ -251,7 +251,8 @@ def _disk_diameters(
         return np.asarray(np.minimum(away, max_size / 2))
 
     # A point of a solid that was widened may be outside.
-    every, out = np.arange(len(xy)), distances(xy)
+    every = np.arange(len(xy))
+    out = distances(xy)
     nearest = np.argmin(out, axis=1)
     xy = xy - normal[every, nearest] * np.minimum(out[every, nearest], 0.0)[:, None]
     center, length = xy.copy(), max_size / 2

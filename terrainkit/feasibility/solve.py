@@ -9,11 +9,11 @@ import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility.assess import assess_patch
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.grid import Grid
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch, build_patch
 from terrainkit.terrain.parameter import Parameter, Range, at_difficulty, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
@@ -83,22 +83,22 @@ def solve_ranges(
         raise ConfigError(f"{got}; expected LOW:HIGH with 0 <= LOW < HIGH <= {MAX_DEMAND:g}")
     samples = replace(config, rows=1, cols=_SAMPLES)
     parts = [_parts(sub_terrain) for sub_terrain in config.sub_terrains]
-    jobs = {_key(part): part for each in parts for part in each}
+    jobs = {_key(part): part for own_parts in parts for part in own_parts}
     solve = partial(_solve, samples, limits, demand)
     results = parallel_map(executor, solve, jobs.values())
     indices = iter([(0, k) for k in range(len(jobs))])
     steps = progress(indices, len(jobs)) if progress else indices
     solved = {key: result for key, _, result in zip(jobs, steps, results, strict=True)}
     return [
-        _solution(sub_terrain, [solved[_key(part)] for part in each])
-        for sub_terrain, each in zip(config.sub_terrains, parts, strict=True)
+        _solution(sub_terrain, [solved[_key(part)] for part in own_parts])
+        for sub_terrain, own_parts in zip(config.sub_terrains, parts, strict=True)
     ]
 
 
 def _table_name(sub_terrain: SubTerrain) -> str | None:
     """Return the name of the parameter with the elements of a course."""
     declared = parameters_of(sub_terrain.terrain_class)
-    return next((name for name, each in declared.items() if each.table), None)
+    return next((name for name, parameter in declared.items() if parameter.table), None)
 
 
 def _parts(sub_terrain: SubTerrain) -> list[SubTerrain]:
@@ -106,7 +106,7 @@ def _parts(sub_terrain: SubTerrain) -> list[SubTerrain]:
     name = _table_name(sub_terrain)
     if name is None:
         return [sub_terrain]
-    return [_with(sub_terrain, {name: (each,)}) for each in _value(sub_terrain, name)]
+    return [_with(sub_terrain, {name: (element,)}) for element in _value(sub_terrain, name)]
 
 
 def _key(part: SubTerrain) -> str:
@@ -128,9 +128,9 @@ def _solution(
         TerrainSolution(sub_terrain=_with(element, ranges), ranges=ranges, demand=demand)
         for element, (ranges, demand) in zip(_value(sub_terrain, name), results, strict=True)
     )
-    course = _with(sub_terrain, {name: tuple(each.sub_terrain for each in elements)})
+    course = _with(sub_terrain, {name: tuple(element.sub_terrain for element in elements)})
     # A course demands as much as the hardest of its elements.
-    low, high = np.max([each.demand for each in elements], axis=0).tolist()
+    low, high = np.max([element.demand for element in elements], axis=0).tolist()
     return TerrainSolution(sub_terrain=course, demand=(low, high), elements=elements)
 
 
@@ -140,7 +140,8 @@ def _solve(
     """Return the solved ranges of a sub-terrain, or of the element of a course, and the demands."""
     name = _table_name(part)
     solved_part = part if name is None else part.parameters[name][0]
-    ranges, grid = _ranges(solved_part), config.patch_grid(0, 0)
+    ranges = _ranges(solved_part)
+    grid = config.patch_grid(0, 0)
     cache: dict[tuple[float, float], float] = {}
 
     def demand_at(end: float, difficulty: float) -> float:
@@ -218,7 +219,7 @@ def _demand(
             break
         patches.append(other)
     return float(
-        np.median([assess_patch(each, limits, config.wall_threshold).demand for each in patches])
+        np.median([assess_patch(patch, limits, config.wall_threshold).demand for patch in patches])
     )
 
 
@@ -228,7 +229,7 @@ def _is_same(first: Patch, second: Patch) -> bool:
         return False
     shift = np.append(np.subtract(second.grid.lower, first.grid.lower), 0.0)
     points = [
-        np.concatenate([*each.solids.bounds(), each.goals[:, :3]]) for each in (first, second)
+        np.concatenate([*patch.solids.bounds(), patch.goals[:, :3]]) for patch in (first, second)
     ]
     return len(points[0]) == len(points[1]) and np.allclose(points[0] + shift, points[1], atol=1e-4)
 

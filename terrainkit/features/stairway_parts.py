@@ -71,8 +71,8 @@ class StairParts:
         offset = np.array([x, y, z, 0.0])
         return replace(
             self,
-            plates=tuple(each + offset[:2] for each in self.plates),
-            nosings=tuple(each + offset[:2] for each in self.nosings),
+            plates=tuple(plate + offset[:2] for plate in self.plates),
+            nosings=tuple(nosing + offset[:2] for nosing in self.nosings),
             tops=self.tops + z,
             sides=(self.sides[0] + offset[:3], self.sides[1] + offset[:3]),
             landings=self.landings + offset,

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import HeightFileError, prefixed_errors
-from terrainkit.importing.source import MAX_FILE_BYTES, check_file
+from terrainkit.importing.height_source import MAX_FILE_BYTES, check_file
 
 MAX_ELEMENTS = 100_000
 """Most elements, copies included; MuJoCo needs seconds for this many."""
@@ -109,7 +109,8 @@ class _Reader:
         )
         root = etree.fromstring(data, parser)
         for include in [*root.iter("include")]:
-            name, parent = include.get("file", ""), include.getparent()
+            name = include.get("file", "")
+            parent = include.getparent()
             file = folder / name if (folder / name).exists() else path.parent / name
             with prefixed_errors(f"{name}: "):
                 part = self._document(file, folder, (*parents, path))

@@ -59,9 +59,6 @@ class Escape:
     module: str = ""
     """Python source with a class `Policy`, which torch compiles, in place of the other texts."""
 
-    was_refused: bool = False
-    """Whether a search of the text for calls refused it, which was the check before this list."""
-
     def archive(self, path: Path | str, num_obs: int = 8, num_actions: int = 3) -> bytes:
         """Return the archive.
 
