@@ -65,7 +65,7 @@ class CheckPolicy(PluginCommand):
             steps.update(f"checking {self.policy}")
             findings = check_policy(Path(self.policy), robot, self.contract, task)
         if self.format == "json":
-            report = {"policy": self.policy, "findings": [asdict(each) for each in findings]}
+            report = {"policy": self.policy, "findings": [asdict(finding) for finding in findings]}
             render.report(json.dumps(report, indent=2) + "\n")
         else:
             render.result("\n".join(text_lines(self.policy, findings)))
@@ -75,10 +75,12 @@ class CheckPolicy(PluginCommand):
 def text_lines(policy: str, findings: "list[Finding]") -> list[str]:
     """Return the findings as lines, at most some of each code."""
     lines = []
-    for _, group in groupby(sorted(findings, key=lambda each: each.code), lambda each: each.code):
+    for _, group in groupby(
+        sorted(findings, key=lambda finding: finding.code), lambda finding: finding.code
+    ):
         same = list(group)
-        for each in same[:MAX_PRINTED]:
-            lines += [f"{each.code}  {each.got}", f"        expected: {each.expected}"]
+        for finding in same[:MAX_PRINTED]:
+            lines += [f"{finding.code}  {finding.got}", f"        expected: {finding.expected}"]
         if more := len(same) - MAX_PRINTED:
             lines += [f"        and {more} more"] * (more > 0)
         lines.append(f"        {same[0].help}")

@@ -274,7 +274,7 @@ def gait_lines(result: "EvaluationResult") -> list[str]:
         lines = ["commands followed: not measured"]
     if metrics.swing_height is None or metrics.duty_factor is None:
         return lines
-    heights = (_number(each, 100, 1) for each in metrics.swing_height)
+    heights = (_number(value, 100, 1) for value in metrics.swing_height)
     values = (
         f"{_number(metrics.step_frequency, 1, 1)} steps/s per foot",
         f"feet slip at {_number(metrics.foot_slip, 1, 2)} m/s",
@@ -306,7 +306,7 @@ def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
             command = (f"{value:g}" for value in group.command or ())
             fell = str(group.falls) if group.robots == 1 else f"{group.falls}/{group.robots}"
             errors = _number(group.lin_vel_error), _number(group.ang_vel_error)
-            swing = [each for each in group.swing_height or () if each is not None]
+            swing = [height for height in group.swing_height or () if height is not None]
             lowest = _number(min(swing, default=None), 100, 1)
             rows.append((*command, fell, *errors, _percent(group.followed), lowest))
         return rows
@@ -314,7 +314,7 @@ def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
         return []
     levels = [group.level for group in groups["by_level"]]
     by_level = *groups["by_terrain_and_level"], *groups.get("by_direction_and_level", ())
-    success = {(each.terrain or each.direction, each.level): each.success for each in by_level}
+    success = {(group.terrain or group.direction, group.level): group.success for group in by_level}
     names = "terrain", "robots", "fell", "m/s", "rad/s", "success"
     rows = [(*names, *(f"level {level}" if level == levels[0] else str(level) for level in levels))]
     for group in (*groups["by_terrain"], *groups.get("by_direction", ())):

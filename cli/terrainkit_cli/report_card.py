@@ -83,8 +83,8 @@ def report_margins(
     render.result(f"margins of {margins.robot}, {margins.checkpoint}")
     render.table(margins.rows())
     render.result(f"\n{NOTE}")
-    for each in margins.left_out:
-        render.note(f"warning: left out: {each}")
+    for condition in margins.left_out:
+        render.note(f"warning: left out: {condition}")
     return margins
 
 

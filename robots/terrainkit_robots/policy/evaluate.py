@@ -333,6 +333,6 @@ def _map_masks(rollout: EvaluationRollout) -> Iterator[_Group]:
         yield "by_terrain_and_level", mask, {"terrain": name, "level": level}
     for size in sorted({*sizes} - {None}):
         key = dict(zip(("terrain", "parameter", "value"), size, strict=True))
-        on_size = np.array([each == size for each in sizes])
+        on_size = np.array([robot_size == size for robot_size in sizes])
         for name, mask in directions.items():
             yield "by_terrain_dimension", mask & on_size, {**key, "direction": name}

@@ -231,7 +231,7 @@ class ScriptNetwork(torch.nn.Module):
 def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the actions of an ONNX file for the observations (n, k) of each step."""
     session, results = make_session(data), []
-    shapes = [each.shape for each in session.get_inputs()[1:]]
+    shapes = [node.shape for node in session.get_inputs()[1:]]
     state = make_state([(layers, width) for layers, _, width in shapes], len(steps[0]))
     for obs in steps:
         actions, *state = call_model(session, obs, state)
@@ -250,7 +250,7 @@ def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: Mapping[str, 
     file, model = io.BytesIO(), network.model
     names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
     _, *states = model.get_dummy_inputs()
-    inputs = obs, *(each.repeat(1, len(obs), 1) for each in states)
+    inputs = obs, *(state.repeat(1, len(obs), 1) for state in states)
     axes = {name: {1: "batch"} for name in (*model.input_names, *model.output_names)}
     axes |= {"obs": {0: "batch"}, "actions": {0: "batch"}}
     # With `dynamo`, the export takes 5 s instead of 0.1 s.
@@ -305,11 +305,11 @@ def _export_networks(
         onnx_data, script_file = export_onnx(network, obs[:, order], metadata), io.BytesIO()
         torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
         script = torch.jit.load(io.BytesIO(script_file.getvalue()))
-        live = [network.clipped(actor, each).numpy() for each in steps]
+        live = [network.clipped(actor, step).numpy() for step in steps]
         # TorchScript of rsl-rl keeps the state of one robot.
         rows = slice(1) if actor.is_recurrent else slice(None)
-        script_actions = [script(each[rows][:, order]).numpy() for each in steps]
-    onnx_actions = run_onnx(onnx_data, [each[:, order].numpy() for each in steps])
+        script_actions = [script(step[rows][:, order]).numpy() for step in steps]
+    onnx_actions = run_onnx(onnx_data, [step[:, order].numpy() for step in steps])
     errors = (
         verify_actions(np.stack(onnx_actions), np.stack(live), ONNX_FILE),
         verify_actions(np.stack(script_actions), np.stack(live)[:, rows], TORCHSCRIPT_FILE),

@@ -103,15 +103,15 @@ class Margins:
 
     def as_json(self) -> dict[str, Any]:
         """Return the margins as values of JSON."""
-        margins = [each.as_dict() for each in self.margins]
+        margins = [margin.as_dict() for margin in self.margins]
         return {"schema_version": SCHEMA_VERSION} | asdict(self) | {"margins": margins}
 
     def first_falls(self) -> list[RolloutMetrics]:
         """Return the smallest disturbance with falls on each side of its nominal value."""
         found: dict[tuple[Any, bool], RolloutMetrics] = {}
-        for each in filter(lambda each: each.falls, self.margins):
-            is_more = each.unit == "x" and (each.value or 0) > 1
-            found.setdefault((each.condition, is_more), each)
+        for margin in filter(lambda margin: margin.falls, self.margins):
+            is_more = margin.unit == "x" and (margin.value or 0) > 1
+            found.setdefault((margin.condition, is_more), margin)
         return list(found.values())
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -119,19 +119,19 @@ class Margins:
         head = f"fell of {self.margins[0].robots}", "m/s", "followed", "swing [cm]", "steps/s"
         loads, first = ("torque", "joint speed", "foot force"), self.first_falls()
         rows: list[tuple[str, ...]] = [("condition", *head, *loads, "")]
-        for each in self.margins:
-            value = "" if each.value is None else f"{each.value:g}"
-            amount = f"x {value}" if each.unit == "x" else f"{value} {each.unit or ''}"
-            swings = [100 * height for height in each.swing_height or () if height is not None]
+        for margin in self.margins:
+            value = "" if margin.value is None else f"{margin.value:g}"
+            amount = f"x {value}" if margin.unit == "x" else f"{value} {margin.unit or ''}"
+            swings = [100 * height for height in margin.swing_height or () if height is not None]
             numbers = (
-                _text(each.lin_vel_error_1s, ".3f"),
-                _text(each.followed, ".0%"),
+                _text(margin.lin_vel_error_1s, ".3f"),
+                _text(margin.followed, ".0%"),
                 _text(min(swings, default=None), ".1f"),
-                _text(each.step_frequency, ".1f"),
+                _text(margin.step_frequency, ".1f"),
             )
-            mark = "<- first falls" if each in first else ""
-            label = f"{each.condition} {amount}".rstrip()
-            rows.append((label, str(each.falls), *numbers, *each.load_cells(), mark))
+            mark = "<- first falls" if margin in first else ""
+            label = f"{margin.condition} {amount}".rstrip()
+            rows.append((label, str(margin.falls), *numbers, *margin.load_cells(), mark))
         return rows
 
 
@@ -167,9 +167,12 @@ def measure_margins(
     robots = np.repeat(np.arange(len(conditions)), repetitions * len(commands))
     values = {
         name: np.array(
-            [key["value"] if key["condition"] == name else each.nominal for key in conditions]
+            [
+                key["value"] if key["condition"] == name else disturbance.nominal
+                for key in conditions
+            ]
         )[robots]
-        for name, each in DISTURBANCES.items()
+        for name, disturbance in DISTURBANCES.items()
     }
     randomization = {
         "action_delay": (0.0, 0.001 * max(DISTURBANCES["latency"].values)),
@@ -209,9 +212,9 @@ def _conditions(env: LeggedEnv) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     conditions: list[dict[str, Any]] = [{"condition": "nominal"}]
     base, step = float(env.scene.model.body_mass[env.scene.base]), 1000 * env.cfg.sim.dt
     left_out = []
-    for name, each in DISTURBANCES.items():
-        values = each.values
-        if each.observation and each.observation not in env.obs_terms["policy"]:
+    for name, disturbance in DISTURBANCES.items():
+        values = disturbance.values
+        if disturbance.observation and disturbance.observation not in env.obs_terms["policy"]:
             continue
         if name == "latency":  # a number of physics steps
             steps = dict.fromkeys(max(1, round(value / step)) for value in values)
@@ -221,7 +224,7 @@ def _conditions(env: LeggedEnv) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
             got = f"the base weighs {base:.3g} of {env.mass:.3g} kg"
             left_out += [f"mass x {value:g}: {got}" for value in light]
             values = tuple(value for value in values if value not in light)
-        keys = {"condition": name, "unit": each.unit}
+        keys = {"condition": name, "unit": disturbance.unit}
         conditions += [{**keys, "value": float(value)} for value in values]
     return conditions, tuple(left_out)
 

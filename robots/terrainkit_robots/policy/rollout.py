@@ -91,7 +91,7 @@ class EvaluationRollout:
         self._command_steps = np.zeros(n, np.int64)  # since the command changed
         self._measured_steps = np.zeros(n, np.int64)  # without interruption
         self._num_steps = 0
-        self.motion = MotionSums(**{each.name: np.zeros(n) for each in fields(MotionSums)})
+        self.motion = MotionSums(**{field.name: np.zeros(n) for field in fields(MotionSums)})
         self.gait: list[GaitStep] = []
         self.loads = Loads(env)
 
@@ -184,7 +184,7 @@ class EvaluationRollout:
         """
         tried = self.crossed | self.falls | (self.commanded_distance >= self.half_patch)
         crossed = self.crossed[mask & tried]
-        errors: dict[str, Any] = {name: each.over(mask) for name, each in self.errors.items()}
+        errors: dict[str, Any] = {name: error.over(mask) for name, error in self.errors.items()}
         return RolloutMetrics(
             **key,
             robots=int(mask.sum()),
@@ -207,7 +207,7 @@ class EvaluationRollout:
         followed = moved & (motion.lin_vel >= MIN_FOLLOWED * motion.lin_command)
         followed &= motion.ang_vel >= MIN_FOLLOWED * motion.ang_command
         measured, contact, height, foot_speed = (
-            np.array([each[mask] for each in parts]) for parts in zip(*self.gait, strict=True)
+            np.array([array[mask] for array in parts]) for parts in zip(*self.gait, strict=True)
         )
         heights = gait.swing_heights(contact, height, measured)
         duty = gait.duty_factors(contact, measured)
@@ -218,7 +218,7 @@ class EvaluationRollout:
             "followed": float(followed[commanded].mean()),
             "step_frequency": _number(gait.step_frequency(contact, measured, self.env.cfg.dt)),
             "foot_slip": _number(gait.foot_slip(contact, foot_speed, measured)),
-            "asymmetry": max(gait.asymmetry(each, mirror) for each in (heights, duty)),
+            "asymmetry": max(gait.asymmetry(values, mirror) for values in (heights, duty)),
             "base_pitch": float(motion.pitch.sum() / motion.steps.sum()),
             "cost_of_transport": float(motion.power.sum() / work) if work else None,
             "swing_height": tuple(map(_number, heights)),

@@ -142,10 +142,10 @@ class ReportCard:
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return the card as rows of text with a header: crossed attempts by test and level."""
-        levels = [str(each.level) for each in self.tests[0].levels]
+        levels = [str(result.level) for result in self.tests[0].levels]
         rows = [("test", f"level {levels[0]}", *levels[1:], "success", "passed level")]
         for test in self.tests:
-            counts = (str(each.outcomes[OUTCOMES[CROSSED]]) for each in test.levels)
+            counts = (str(level.outcomes[OUTCOMES[CROSSED]]) for level in test.levels)
             rows.append((test.name, *counts, _percent(test), test.passed_text))
         return rows
 
@@ -197,7 +197,7 @@ def measure(
         _test_result(terrain_map, col, f"{name} {col}" if counts[name] > 1 else name, attempts)
         for col, (name, attempts) in enumerate(zip(names, columns, strict=True))
     )
-    success, interval = _success(np.concatenate([each.outcomes for each in columns]))
+    success, interval = _success(np.concatenate([attempts.outcomes for attempts in columns]))
     return ReportCard(
         robot=spec.robot.spec.name,
         checkpoint=spec.policy_name,
@@ -221,7 +221,7 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
             range(rows), _changing_parameters(terrain_map, col), *by_level, strict=True
         )
     )
-    failed = [each.level for each in levels if each.success < 1]
+    failed = [result.level for result in levels if result.success < 1]
     passed = (failed[0] if failed else rows) - 1
     success, interval = _success(attempts.outcomes)
     return TestResult(
@@ -235,9 +235,9 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
 
 def _changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, Any]]:
     """Return the realized parameters of a column that differ between levels, for each level."""
-    realized = [dict(each.realized) for each in terrain_map.parameters[:, col].tolist()]
-    names = [name for name in realized[0] if len({str(each[name]) for each in realized}) > 1]
-    return [{name: each[name] for name in names} for each in realized]
+    realized = [dict(parameters.realized) for parameters in terrain_map.parameters[:, col].tolist()]
+    names = [name for name in realized[0] if len({str(level[name]) for level in realized}) > 1]
+    return [{name: level[name] for name in names} for level in realized]
 
 
 def _level_result(

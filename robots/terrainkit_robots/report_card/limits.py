@@ -178,12 +178,12 @@ class PolicyLimits:
         total = self.repetitions
         rows: list[tuple[str, ...]] = []
         rows.append(("test", f"{total} of {total} cross", "next value", "limit of the robot"))
-        for each in self.limits:
+        for result in self.limits:
             following = "-"
-            if each.failed is not None:
-                following = f"{each.crossed} of {total} at {_text(each.failed, each.unit)}"
-            passed = "none" if each.passed is None else _text(each.passed, each.unit)
-            rows.append((each.test, passed, following, _text(each.robot_limit, each.unit)))
+            if result.failed is not None:
+                following = f"{result.crossed} of {total} at {_text(result.failed, result.unit)}"
+            passed = "none" if result.passed is None else _text(result.passed, result.unit)
+            rows.append((result.test, passed, following, _text(result.robot_limit, result.unit)))
         return rows
 
 

@@ -13,8 +13,8 @@ def draw_card(card: ReportCard) -> bytes:
     rows = [
         HeatmapRow(
             label=test.name,
-            success=[each.success for each in test.levels],
-            texts=[str(each.outcomes[OUTCOMES[CROSSED]]) for each in test.levels],
+            success=[level.success for level in test.levels],
+            texts=[str(level.outcomes[OUTCOMES[CROSSED]]) for level in test.levels],
             note=test.passed_text,
         )
         for test in card.tests
@@ -28,15 +28,15 @@ def draw_card(card: ReportCard) -> bytes:
 def _margin_rows(margins: Margins) -> list[HeatmapRow]:
     """Return a row per disturbance, and a cell per value: the share of robots that do not fall."""
     rows, first = [], margins.first_falls()
-    for name, group in groupby(margins.margins[1:], lambda each: each.condition):
+    for name, group in groupby(margins.margins[1:], lambda margin: margin.condition):
         found = list(group)
-        values = {f"{each.value:g}": each for each in found}
+        values = {f"{margin.value:g}": margin for margin in found}
         rows.append(
             HeatmapRow(
                 label=f"{name} [{found[0].unit or 1}]",
-                success=[1 - each.falls / each.robots for each in found],
+                success=[1 - margin.falls / margin.robots for margin in found],
                 texts=[*values],
-                note=", ".join(k for k, each in values.items() if each in first) or "none",
+                note=", ".join(k for k, margin in values.items() if margin in first) or "none",
             )
         )
     return rows

@@ -122,15 +122,15 @@ class LeggedEnv(VecEnv):
         self.velocity_command.waypoints = self.waypoints = self._make_waypoints()
         self.obs_terms = {
             group: {
-                name: replace(each, function=checked("observation", name, each.function, (n, None)))
-                for name, each in terms.items()
+                name: replace(term, function=checked("observation", name, term.function, (n, None)))
+                for name, term in terms.items()
             }
             for group, terms in self.observation_terms().items()
         }
         self.active_rewards = self._scaled_rewards()
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.active_rewards}
         self.active_terminations = [
-            checked("termination", *each, (n,)) for each in self.termination_terms().items()
+            checked("termination", *item, (n,)) for item in self.termination_terms().items()
         ]
         self.active_events = self.event_terms()
         self._call_events("startup")
@@ -168,7 +168,7 @@ class LeggedEnv(VecEnv):
         """Unit of each joint's position."""
         slide = mujoco.mjtJoint.mjJNT_SLIDE
         types = (self.scene.model.joint(name).type[0] for name in self.robot.spec.joint_order)
-        return tuple("m" if each == slide else "rad" for each in types)
+        return tuple("m" if kind == slide else "rad" for kind in types)
 
     @property
     def unwrapped(self) -> "LeggedEnv":
@@ -491,8 +491,8 @@ class LeggedEnv(VecEnv):
         tables = {name: vars(owner) for name, owner in owners.items() if owner}
         tables |= {"rewards": self.episode_sums, "buffers": self.buffers}
         return arrays | {
-            f"{table}.{name}": each
+            f"{table}.{name}": array
             for table, values in tables.items()
-            for name, each in values.items()
-            if isinstance(each, np.ndarray)
+            for name, array in values.items()
+            if isinstance(array, np.ndarray)
         }

@@ -8,7 +8,6 @@ foot has a phase, in which it should be in the air or on the ground.
 """
 
 from collections.abc import Callable
-from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -296,6 +295,6 @@ def foot_clearance(env: "LeggedEnv") -> FloatArray:
 
 
 REWARDS: dict[str, Reward] = {
-    name: each for name, each in globals().items() if name in {one.name for one in fields(Rewards)}
+    name: term for name, term in globals().items() if name in Rewards.__dataclass_fields__
 }
 """Every reward term of this module by name."""

@@ -277,13 +277,13 @@ def parts_to_load(
             )
         if TRAINING_KEYS & read_checkpoint(last_checkpoint(run)).keys():
             return None
-    rates = [(each.learning_rate, each.schedule) for each in (task.algorithm, run.task.algorithm)]
-    is_plane, was_plane = (each.terrain.collision == "plane" for each in (task, run.task))
+    new, old = task.algorithm, run.task.algorithm
+    is_plane, was_plane = (config.terrain.collision == "plane" for config in (task, run.task))
     return {
         "actor": True,
         "critic": True,
         "noise_std": task.policy.init_noise_std == run.task.policy.init_noise_std,
-        "optimizer": rates[0] == rates[1],
+        "optimizer": (new.learning_rate, new.schedule) == (old.learning_rate, old.schedule),
         "curriculum": is_plane == was_plane
         and is_same_map
         and task.terrain.curriculum == run.task.terrain.curriculum,

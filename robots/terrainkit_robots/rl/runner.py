@@ -120,15 +120,17 @@ class MetricsLogger(Logger):
 
     def state_dict(self) -> dict[str, Any]:
         """Return the buffers, for a checkpoint."""
-        deques = {name: list(each) for name, each in vars(self).items() if isinstance(each, deque)}
-        sums = {name: each for name, each in vars(self).items() if name.startswith("cur_")}
+        deques = {
+            name: list(buffer) for name, buffer in vars(self).items() if isinstance(buffer, deque)
+        }
+        sums = {name: buffer for name, buffer in vars(self).items() if name.startswith("cur_")}
         times = {"tot_timesteps": self.tot_timesteps, "tot_time": float(self.tot_time)}
         return deques | sums | times
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore the buffers; buffers per environment only if their number is the same."""
         own = self.state_dict()
-        deques = [name for name, each in own.items() if isinstance(each, list)]
+        deques = [name for name, buffer in own.items() if isinstance(buffer, list)]
         sums = [name for name in own if name.startswith("cur_")]
         is_same = any(np.shape(state.get(name, 0)) == (self.num_envs,) for name in sums)
         expected = own | {name: [0.0] for name in deques}
@@ -359,9 +361,13 @@ class LeggedRunner(OnPolicyRunner):
         """
         saved, optimizer = state["optimizer_state_dict"], self.alg.optimizer
         groups = optimizer.state_dict()["param_groups"]
-        parameters = enumerate(each for group in optimizer.param_groups for each in group["params"])
+        weights = enumerate(
+            weight for group in optimizer.param_groups for weight in group["params"]
+        )
         step = torch.tensor(0.0)
-        moments = {k: {"step": step, "exp_avg": each, "exp_avg_sq": each} for k, each in parameters}
+        moments = {
+            k: {"step": step, "exp_avg": weight, "exp_avg_sq": weight} for k, weight in weights
+        }
         is_new = not state["iteration"] and saved["state"] == {}  # before the first update
         check_state("optimizer_state_dict.state", saved["state"], {} if is_new else moments)
         rates = [{"lr": group["lr"]} for group in saved["param_groups"]]
@@ -377,8 +383,8 @@ class LeggedRunner(OnPolicyRunner):
     def check_weights(self) -> None:
         """Raise ConfigError if a weight of the networks is not finite."""
         networks = (getattr(self.alg, name, None) for name in _NETWORKS)
-        weights = (each for network in networks if network for each in network.parameters())
-        if not all(torch.isfinite(each).all() for each in weights):
+        weights = (weight for network in networks if network for weight in network.parameters())
+        if not all(torch.isfinite(weight).all() for weight in weights):
             raise ConfigError(
                 f"iteration {self._completed + 1}: the networks have diverged, their weights are "
                 "not finite; smaller rewards or a smaller algorithm.learning_rate may help"

@@ -93,15 +93,15 @@ def _attach(robot: Robot, terrain: Ground, task: Task) -> Any:
     ground_mjspec = terrain.spec()
     for element in (*mjspec.actuators, *mjspec.sensors, *mjspec.keys, *mjspec.cameras):
         mjspec.delete(element)
-    for each in (mjspec, ground_mjspec):  # options of both, or MuJoCo warns about differences
-        each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
-        each.option.timestep = task.sim.dt
+    for model_spec in (mjspec, ground_mjspec):  # options of both, or MuJoCo warns about differences
+        model_spec.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
+        model_spec.option.timestep = task.sim.dt
         # Implicit in forces that depend on the velocity, such as the damping of the motors.
-        each.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        model_spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # Faster than elliptic cones; see `Asset` for what else halves the time of a step.
-        each.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-        each.option.iterations = task.sim.iterations
-        each.option.ls_iterations = task.sim.ls_iterations
+        model_spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+        model_spec.option.iterations = task.sim.iterations
+        model_spec.option.ls_iterations = task.sim.ls_iterations
     # The terrain is attached to the robot, so the robot's names keep their form.
     mjspec.attach(ground_mjspec, frame=mjspec.worldbody.add_frame(), prefix="ground/")
     return mjspec

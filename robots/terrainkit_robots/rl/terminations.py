@@ -56,6 +56,7 @@ def stuck(env: "LeggedEnv") -> BoolArray:
 
 
 TERMINATIONS = {
-    each.__name__: each for each in (illegal_contact, bad_orientation, terrain_out_of_bounds, stuck)
+    function.__name__: function
+    for function in (illegal_contact, bad_orientation, terrain_out_of_bounds, stuck)
 }
 """Every termination of this module by name."""

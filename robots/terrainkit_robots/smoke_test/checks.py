@@ -187,7 +187,7 @@ def check_standing(env: LeggedEnv) -> Check:
     env.reset()
     walking = replace(env.cfg.commands, standing=0.0)
     env.set_commands(sample_commands(env.rng, env.num_envs, walking)[0])
-    terms = [each for name, each in env.active_rewards.items() if name.startswith("tracking_")]
+    terms = [term for name, term in env.active_rewards.items() if name.startswith("tracking_")]
     earned = np.zeros(env.num_envs)
     for function, scale in terms:
         earned += scale * function(env)

@@ -44,8 +44,10 @@ def record_rewards(env: LeggedEnv) -> list[list[float]]:
     def record(unstable: BoolArray) -> FloatArray:
         before = [total.copy() for total in env.episode_sums.values()]
         rewards, after = compute(unstable), env.episode_sums.values()
-        terms = [each - last for each, last in zip(after, before, strict=True)]
-        recorded.append([float(each.mean()) / env.cfg.dt for each in (env.state.fallen, *terms)])
+        terms = [total - last for total, last in zip(after, before, strict=True)]
+        recorded.append(
+            [float(values.mean()) / env.cfg.dt for values in (env.state.fallen, *terms)]
+        )
         return rewards
 
     env._compute_rewards = record  # type: ignore[method-assign]

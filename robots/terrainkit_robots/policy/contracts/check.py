@@ -198,13 +198,13 @@ def check_motion(
         hint = "see the other findings"
         yield Finding("POL010", "; ".join(motion), "to follow the command", hint)
     candidates = list(repairs(contract, robot))
-    short = test(contract, [each.contract for each in candidates], SHORT_SECONDS)
+    short = test(contract, [repair.contract for repair in candidates], SHORT_SECONDS)
     best = sorted(range(len(short)), key=lambda k: -short[k][0])[:NUM_REPAIRS]
     candidates = [candidates[k] for k in best]
-    scores = test(contract, [each.contract for each in candidates], SECONDS)
-    for each in other_simulations(contract, robot):
-        candidates.append(each)
-        scores += test(each.contract, [each.contract], SECONDS)
+    scores = test(contract, [repair.contract for repair in candidates], SECONDS)
+    for repair in other_simulations(contract, robot):
+        candidates.append(repair)
+        scores += test(repair.contract, [repair.contract], SECONDS)
     order = sorted(range(len(scores)), key=lambda k: -scores[k][0])
     for k in order[:MAX_NAMED]:
         (new, faults), repair = scores[k], candidates[k]
@@ -256,7 +256,8 @@ def motion_commands(limits: Commands) -> FloatArray:
         Forward and left velocity [m/s] and yaw velocity [rad/s], shape (5, 3).
     """
     x, y, yaw = (
-        COMMAND_SHARE * each[1] for each in (limits.lin_vel_x, limits.lin_vel_y, limits.ang_vel_yaw)
+        COMMAND_SHARE * limit[1]
+        for limit in (limits.lin_vel_x, limits.lin_vel_y, limits.ang_vel_yaw)
     )
     rows = [[x, 0, 0], [x / 2, 0, yaw], [x / 2, 0, -yaw], [x / 2, y, 0], [0, 0, 0]]
     return np.array(rows, np.float32)

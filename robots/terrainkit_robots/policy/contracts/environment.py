@@ -168,7 +168,7 @@ def _table(
         blocks.append(steps if contract.newest_first else steps[::-1])
     if contract.is_interleaved:
         blocks = [list(step) for step in zip(*blocks, strict=True)]
-    return np.concatenate([each for block in blocks for each in block], axis=1).astype(np.float32)
+    return np.concatenate([table for block in blocks for table in block], axis=1).astype(np.float32)
 
 
 def make_spec(

@@ -162,7 +162,7 @@ def _orders(contract: Contract, robot: Robot) -> Iterator[list[int]]:
         by_kind = [start + k for k in range(size) for start in starts]
         yield by_kind
         yield [by_kind.index(k) for k in range(count)]
-    mirror = {joint: each.joint for joint, each in robot.spec.mirror.items()}
+    mirror = {joint: image.joint for joint, image in robot.spec.mirror.items()}
     joints, pairs = contract.joints, list(combinations(range(count), 2))
     for i, j in pairs:
         is_likely = j == i + 1 or mirror.get(joints[i]) == joints[j]
