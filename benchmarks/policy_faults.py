@@ -14,7 +14,7 @@ from pathlib import Path
 
 import torch
 
-from terrainkit_robots.policy.contracts.check import check_contract
+from terrainkit_robots.policy.check_policy import check_contract
 from terrainkit_robots.policy.contracts.contract import Contract
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.open_policy import find_contract, read_contract

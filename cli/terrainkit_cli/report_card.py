@@ -95,7 +95,7 @@ def to_json(document: dict[str, Any]) -> bytes:
 
 def report_limits(spec: "PolicySpec", config: "EvaluationConfig", repetitions: int) -> list[bytes]:
     """Measure the limits of a policy, print them, and return them as JSON."""
-    from terrainkit_robots.report_card.limits import measure_limits
+    from terrainkit_robots.report_card.policy_limits import measure_limits
     from terrainkit_robots.simulation.robot_limits import derive_limits
 
     render.note(f"measuring the limits of {spec.policy_name}: {repetitions} robots in each test")

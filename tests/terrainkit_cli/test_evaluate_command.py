@@ -12,7 +12,7 @@ from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.report_card import limits
-from terrainkit_robots.report_card.limits import LimitResult, PolicyLimits
+from terrainkit_robots.report_card.policy_limits import LimitResult, PolicyLimits
 from terrainkit_robots.rl import run as run_module
 from terrainkit_robots.rl.run import open_run
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import Config
 from terrainkit.settings.type_hint import PositiveInt
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.policy.patch_dimensions import collision_kind, patch_dimensions
-from terrainkit_robots.policy.rollout import SETTLING_TIME, EvaluationRollout, Progress
+from terrainkit_robots.policy.policy_rollout import SETTLING_TIME, EvaluationRollout, Progress
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.observations import uses_height_scan

@@ -29,9 +29,9 @@ from terrainkit_robots.policy.contracts.contract import (
     unknown_terms,
 )
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, write_deploy_yaml
-from terrainkit_robots.policy.contracts.mjlab import write_metadata
+from terrainkit_robots.policy.contracts.mjlab_metadata import write_metadata
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_actor, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_actor, single_torch_thread
 from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
 from terrainkit_robots.rl.config import Normalization
 from terrainkit_robots.rl.env import LeggedEnv

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.metrics import RolloutMetrics
-from terrainkit_robots.policy.rollout import EvaluationRollout, Progress
+from terrainkit_robots.policy.policy_rollout import EvaluationRollout, Progress
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import EventTerm, apply_params, push_interval, reset_push

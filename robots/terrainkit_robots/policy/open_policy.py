@@ -19,11 +19,11 @@ from terrainkit.errors import (
     one_line,
     prefixed_errors,
 )
+from terrainkit_robots.policy.contract_env import make_spec
 from terrainkit_robots.policy.contracts.contract import UNITREE, Contract, from_description
+from terrainkit_robots.policy.contracts.contract_robot import qpos_order, replace_joints
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, read_yaml
-from terrainkit_robots.policy.contracts.environment import make_spec
-from terrainkit_robots.policy.contracts.mjlab import JOINTS_KEY, read_metadata
-from terrainkit_robots.policy.contracts.robot import qpos_order, replace_joints
+from terrainkit_robots.policy.contracts.mjlab_metadata import JOINTS_KEY, read_metadata
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.export import (
     JSON_FILE,

@@ -16,8 +16,13 @@ from terrainkit_robots.policy.evaluate import (
     make_eval_env,
     summarize,
 )
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
-from terrainkit_robots.policy.rollout import EvaluationRollout, Progress, command_schedule, rollout
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
+from terrainkit_robots.policy.policy_rollout import (
+    EvaluationRollout,
+    Progress,
+    command_schedule,
+    rollout,
+)
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv

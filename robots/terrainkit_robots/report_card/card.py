@@ -13,7 +13,7 @@ from terrainkit.suites import suite_hash
 from terrainkit.terrain.parameter import format_value
 from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.policy.margins import NOTE, Margins
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.policy_rollout import Progress
 from terrainkit_robots.report_card.crossing import (
     CROSSED,
     EXTRA_TIME,

@@ -14,8 +14,8 @@ from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.robot_file import is_description
 from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
 from terrainkit_robots.policy.evaluate import eval_task
-from terrainkit_robots.policy.load import single_torch_thread
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.load_policy import single_torch_thread
+from terrainkit_robots.policy.policy_rollout import Progress
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.config import Task

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from terrainkit.errors import TerrainkitError
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.policy_rollout import Progress
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.runner import LeggedRunner

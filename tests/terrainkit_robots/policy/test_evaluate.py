@@ -17,7 +17,7 @@ from terrainkit_robots.policy.evaluate import (
     summarize,
 )
 from terrainkit_robots.policy.metrics import ErrorMean
-from terrainkit_robots.policy.rollout import EvaluationRollout
+from terrainkit_robots.policy.policy_rollout import EvaluationRollout
 from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
 from terrainkit_robots.rl.run import open_run
 

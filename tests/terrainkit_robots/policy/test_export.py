@@ -22,9 +22,9 @@ from terrainkit_robots.policy.export import (
     export_policy,
     observation_order,
 )
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.policy.open_policy import open_policy
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Control, Env, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv

@@ -8,7 +8,7 @@ from terrainkit_robots.policy import margins
 from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.policy.margins import Disturbance, Margins, margin_commands, measure_margins
 from terrainkit_robots.policy.metrics import RolloutMetrics
-from terrainkit_robots.policy.rollout import EvaluationRollout
+from terrainkit_robots.policy.policy_rollout import EvaluationRollout
 from terrainkit_robots.rl.config import Commands, Observations, Task
 from terrainkit_robots.rl.run import PolicySpec
 

@@ -5,7 +5,7 @@ import yaml
 from terrainkit.errors import ConfigError, ExportError
 from terrainkit_robots.policy.contracts.contract import MJLAB, UNITREE, from_description
 from terrainkit_robots.policy.contracts.deploy_yaml import read_yaml, write_deploy_yaml
-from terrainkit_robots.policy.contracts.mjlab import read_metadata, write_metadata
+from terrainkit_robots.policy.contracts.mjlab_metadata import read_metadata, write_metadata
 from terrainkit_robots.policy.export import describe_policy
 from terrainkit_robots.rl.config import Commands, Control, Env, Task
 from terrainkit_robots.rl.env import LeggedEnv

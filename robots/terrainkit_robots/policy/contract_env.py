@@ -15,7 +15,7 @@ from terrainkit_robots.policy.contracts.contract import (
     ContractTerm,
     own_name,
 )
-from terrainkit_robots.policy.contracts.robot import contract_robot, imu_position
+from terrainkit_robots.policy.contracts.contract_robot import contract_robot, imu_position
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv

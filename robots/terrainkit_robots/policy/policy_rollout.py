@@ -8,9 +8,9 @@ import numpy as np
 import torch
 
 from terrainkit_robots.policy import gait
-from terrainkit_robots.policy.load import Policy
-from terrainkit_robots.policy.loads import Loads
+from terrainkit_robots.policy.load_policy import Policy
 from terrainkit_robots.policy.metrics import ErrorMean, GaitStep, MotionSums, RolloutMetrics
+from terrainkit_robots.policy.motor_loads import Loads
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.transforms import BoolArray, FloatArray

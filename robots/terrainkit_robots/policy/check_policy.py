@@ -13,14 +13,14 @@ import numpy as np
 import torch
 
 from terrainkit.errors import ConfigError, prefixed_errors
+from terrainkit_robots.policy.contract_env import make_spec
 from terrainkit_robots.policy.contracts.contract import DEFAULT_STEP_DT, PER_JOINT, Contract
-from terrainkit_robots.policy.contracts.environment import make_spec
-from terrainkit_robots.policy.contracts.repairs import other_simulations, repairs
-from terrainkit_robots.policy.contracts.robot import load_model
+from terrainkit_robots.policy.contracts.contract_repairs import other_simulations, repairs
+from terrainkit_robots.policy.contracts.contract_robot import load_model
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane

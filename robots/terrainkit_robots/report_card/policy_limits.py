@@ -14,7 +14,7 @@ from terrainkit.feasibility import RobotLimits
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain.parameter import Range, at_difficulty
 from terrainkit_robots.policy.evaluate import EvaluationConfig
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.policy_rollout import Progress
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
 from terrainkit_robots.rl.run import PolicySpec
 

@@ -7,7 +7,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.rl.config import Env, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run

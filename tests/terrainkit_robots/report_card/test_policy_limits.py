@@ -10,7 +10,7 @@ from terrainkit.feasibility import RobotLimits
 from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.report_card import limits as limits_module
 from terrainkit_robots.report_card.crossing import CROSSED, FELL, Attempts
-from terrainkit_robots.report_card.limits import (
+from terrainkit_robots.report_card.policy_limits import (
     LEVELS,
     limit_tests,
     limits_config,
