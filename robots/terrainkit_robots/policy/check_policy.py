@@ -14,7 +14,12 @@ import torch
 
 from terrainkit.errors import ConfigError, prefixed_errors
 from terrainkit_robots.policy.contract_env import make_spec
-from terrainkit_robots.policy.contracts.contract import DEFAULT_STEP_DT, PER_JOINT, Contract
+from terrainkit_robots.policy.contracts.contract import (
+    DEFAULT_STEP_DT,
+    PER_JOINT,
+    Contract,
+    ContractError,
+)
 from terrainkit_robots.policy.contracts.contract_repairs import other_simulations, repairs
 from terrainkit_robots.policy.contracts.contract_robot import load_model
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
@@ -98,17 +103,17 @@ def check_contract(
         try:
             make_spec(contract, policy, robot, task)
         except ConfigError as error:
-            got, _, expected = str(error).partition("; expected ")
-            return [Finding("POL001", got, expected, "correct the contract, or choose the robot")]
+            fault = error if isinstance(error, ContractError) else ContractError(str(error))
+            hint = "correct the contract, or choose the robot"
+            return [Finding("POL001", fault.got, fault.expected, hint)]
         findings = list(check_motion(contract, policy, robot, task))
     return findings
 
 
 def check_values(contract: Contract, robot: Robot) -> Iterator[Finding]:
     """Yield the values of a contract that do not fit the robot or each other."""
-    for note in contract.notes:
-        got, _, expected = note.partition(", so expected ")
-        yield Finding("POL002", got, expected, "write one value for each motor")
+    for doubt in contract.doubts:
+        yield Finding("POL002", doubt.got, doubt.expected, "write one value for each motor")
     step = contract.step_dt or DEFAULT_STEP_DT
     if not 0.008 <= step <= 0.05:
         hint = "step_dt is the time between two actions [s]"

@@ -192,7 +192,7 @@ def build_eval_env(
         terrain=replace(task.terrain, measure_heights=scan),
         domain_rand=replace(task.domain_rand, **(domain_rand or {})),
     )
-    return make_env(task, spec.robot, terrain, device)
+    return make_env(task, spec.robot, terrain, device, spec.interface)
 
 
 def is_plane(spec: PolicySpec, terrain: str | None = None) -> bool:

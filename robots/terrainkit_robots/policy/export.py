@@ -25,11 +25,11 @@ from terrainkit_robots.policy.contracts.contract import (
     TERM_NAMES,
     UNITREE,
     Contract,
-    from_description,
     unknown_terms,
 )
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, write_deploy_yaml
 from terrainkit_robots.policy.contracts.mjlab_metadata import write_metadata
+from terrainkit_robots.policy.contracts.policy_json import JSON_FILE, METADATA_KEY, to_contract
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.load_policy import load_actor, single_torch_thread
 from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
@@ -42,10 +42,10 @@ from terrainkit_robots.rl.state import CONTACT_FORCE
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import FloatArray
 
-ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
+ONNX_FILE, TORCHSCRIPT_FILE = "policy.onnx", "policy.pt"
 
-FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 2, "terrainkit", 17
-"""Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots have."""
+FORMAT_VERSION, ONNX_OPSET = 2, 17
+"""Version of the JSON, and an opset that runtimes on robots have."""
 
 RECURRENT_STEPS = 10
 """Steps for which an exported recurrent network is compared with the live one."""
@@ -125,11 +125,11 @@ def export_policy(
     text = json.dumps(description, indent=2) + "\n"
     metadata, notes = {METADATA_KEY: text}, []
     if deploy_yaml:
-        contract = from_description(description, UNITREE)
+        contract = to_contract(description, UNITREE)
         other_files[YAML_FILE] = write_deploy_yaml(contract).encode()
         notes += _unknown_terms(contract)
     try:
-        contract = from_description(description, MJLAB)
+        contract = to_contract(description, MJLAB)
         metadata |= write_metadata(contract)
         notes += _unknown_terms(contract)
     except ExportError as error:

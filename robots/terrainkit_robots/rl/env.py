@@ -20,7 +20,7 @@ from terrainkit_robots.rl.commands import CommandTerm, Gait, VelocityCommand
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.events import EVENTS, EventTerm, RandomizedParams, apply_params
-from terrainkit_robots.rl.observations import ObservationTerm
+from terrainkit_robots.rl.observations import ObservationTerm, PolicyInterface
 from terrainkit_robots.rl.own_terms import checked
 from terrainkit_robots.rl.rewards import REWARDS, Reward, is_moving, reward_scales
 from terrainkit_robots.rl.scene import Scene
@@ -33,7 +33,13 @@ from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 
 
-def make_env(task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> "LeggedEnv":
+def make_env(
+    task: Task,
+    robot: Robot,
+    terrain: Ground,
+    device: str = "cpu",
+    interface: PolicyInterface | None = None,
+) -> "LeggedEnv":
     """Return the environment of a task: of its `env_class`, or of `LeggedEnv`.
 
     Raises:
@@ -43,7 +49,7 @@ def make_env(task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> 
     kind = task.env_class or LeggedEnv
     plugin = None if is_built_in(kind) else f"{kind.__module__}:{kind.__qualname__}"
     with plugin_errors(plugin, TerrainkitError):
-        return kind(task, robot, terrain, device)
+        return kind(task, robot, terrain, device, interface)
 
 
 class LeggedEnv(VecEnv):
@@ -64,9 +70,17 @@ class LeggedEnv(VecEnv):
 
     _observations: TensorDict
 
-    def __init__(self, task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> None:
+    def __init__(
+        self,
+        task: Task,
+        robot: Robot,
+        terrain: Ground,
+        device: str = "cpu",
+        interface: PolicyInterface | None = None,
+    ) -> None:
         """Build the simulations and reset every environment."""
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
+        self.interface = interface
         self.num_envs = n = task.env.num_envs
         self.max_episode_length, self.step_dt = task.max_episode_length, task.dt
         self.scene = Scene(robot, terrain, task)
@@ -120,12 +134,15 @@ class LeggedEnv(VecEnv):
         self.velocity_command = cast("VelocityCommand", self.active_commands["velocity"])
         self.commands = self.velocity_command.values  # a view of the current commands
         self.velocity_command.waypoints = self.waypoints = self._make_waypoints()
+        groups = self.observation_terms()
+        if interface is not None:
+            groups = {**groups, "policy": interface.observation_terms(self, groups)}
         self.obs_terms = {
             group: {
                 name: replace(term, function=checked("observation", name, term.function, (n, None)))
                 for name, term in terms.items()
             }
-            for group, terms in self.observation_terms().items()
+            for group, terms in groups.items()
         }
         self.active_rewards = self._scaled_rewards()
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.active_rewards}
@@ -271,6 +288,8 @@ class LeggedEnv(VecEnv):
         Returns:
             Controls of all actuators, shape (n, j).
         """
+        if self.interface is not None:
+            return self.interface.to_ctrl(self, actions)
         target = np.tile(self.action_offset, (len(actions), 1))
         target[:, self.action_joints] += self.action_scale[self.action_joints] * actions
         # A joint with a zero offset reads too much, so its motor stops short by the same angle.

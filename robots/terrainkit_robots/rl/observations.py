@@ -6,7 +6,7 @@ terms without noise, and terms that only a simulation has. Exported policies use
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,16 @@ class ObservationTerm:
 
 ObsTerms = Mapping[str, Mapping[str, ObservationTerm]]
 """The terms of each observation group by name."""
+
+
+class PolicyInterface(Protocol):
+    """What a policy of another project observes, and what its actions do."""
+
+    def observation_terms(self, env: "LeggedEnv", groups: ObsTerms) -> dict[str, ObservationTerm]:
+        """Return the terms of the policy, in place of those of `groups`."""
+
+    def to_ctrl(self, env: "LeggedEnv", actions: FloatArray) -> FloatArray:
+        """Return the controls of all actuators, shape (n, j), for actions of shape (n, a)."""
 
 
 def uses_height_scan(task: Task, *, is_plane: bool) -> bool:

@@ -14,7 +14,7 @@ from datetime import datetime
 from importlib.metadata import version
 from os.path import isdir, isfile
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from terrainkit import MapConfig, TerrainMap
 from terrainkit.errors import ConfigError, ExportError, listing, prefixed_errors
@@ -29,6 +29,9 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.observations import PolicyInterface
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
 CURRICULUM_FILE, LOCK_FILE = "curriculum.png", ".lock"
@@ -67,6 +70,7 @@ class PolicySpec:
     """A function from observations, a tensor of shape (n, k), to actions, a tensor or array of
     shape (n, a). It replaces the checkpoint."""
     checkpoint: Path | None = None  # of a run, by default the last; None if there is none
+    interface: "PolicyInterface | None" = None  # of a policy of another project
 
     @property
     def policy_name(self) -> str:

@@ -14,8 +14,9 @@ import onnx
 import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
+from terrainkit_robots.policy.contracts.policy_json import METADATA_KEY
 from terrainkit_robots.policy.evaluate import eval_task
-from terrainkit_robots.policy.export import METADATA_KEY, export_policy
+from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.rl.config import (
     Control,
     Env,

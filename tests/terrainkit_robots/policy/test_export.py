@@ -15,9 +15,9 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy import export as module
+from terrainkit_robots.policy.contracts.policy_json import METADATA_KEY
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, eval_task
 from terrainkit_robots.policy.export import (
-    METADATA_KEY,
     describe_policy,
     export_policy,
     observation_order,
@@ -189,7 +189,7 @@ def test_joints_without_action(held_calves, tmp_path, monkeypatch):
     assert obs.shape == (43,)
     expected = env.to_ctrl(names["action"][None])[0]
     np.testing.assert_allclose(names["target"], expected, atol=1e-6)
-    assert open_policy(folder / "policy.onnx", held_calves).policy.num_actions == 8
+    assert open_policy(folder / "policy.onnx", held_calves).policy.policy.num_actions == 8
 
 
 def test_example_computes_the_observations(exported, trained, monkeypatch):
