@@ -15,13 +15,16 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
+import torch
+
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit_cli import render, signals, train_command
+from terrainkit_cli import render, signals, train_command, training_progress
 from terrainkit_cli.main import main
 from terrainkit_cli.training_extra import require_training
+from terrainkit_cli.training_progress import TrainingProgress, shown_progress
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.run import checkpoints, open_run
-from terrainkit_robots.rl.runner import TrainingProgress
 
 Train = Callable[..., int]
 
@@ -95,7 +98,7 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
             for number in numbers if progress.iteration == iteration else ():
                 signal.raise_signal(number)
 
-        monkeypatch.setattr(render, "training", lambda: nullcontext(show))
+        monkeypatch.setattr(train_command, "shown_progress", lambda: nullcontext(show))
 
     return interrupt_in
 
@@ -176,7 +179,7 @@ PROGRESS = TrainingProgress(
 
 
 def test_training_progress_lines_are_sparse(capsys):
-    with render.training() as watch:
+    with shown_progress() as watch:
         for iteration in range(1, 51):
             watch(PROGRESS._replace(iteration=iteration))
         watch(PROGRESS._replace(iteration=53, max_iterations=53))
@@ -194,7 +197,7 @@ def test_training_progress_lines_are_sparse(capsys):
 
 @pytest.mark.parametrize("name", ["reward", "episode_length", "falls", "speed"])
 def test_training_progress_without_a_completed_episode(capsys, name):
-    with render.training() as watch:
+    with shown_progress() as watch:
         watch(PROGRESS._replace(iteration=10, **{name: None}))
     labels = {"reward", "episode"} if name in ("reward", "episode_length") else {"falls", "speed"}
     shown = {each.split()[0] for each in capsys.readouterr().err.split(": ")[1].split(", ")}
@@ -208,7 +211,7 @@ def test_training_progress_on_terminal_is_table(monkeypatch):
 
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with render.training() as watch:
+    with shown_progress() as watch:
         watch(PROGRESS)
     shown = terminal.getvalue()
     for text in ("iteration 20/400", "1:02:03", "tracking_lin_vel", "+0.500 /s", "75% succeed"):
@@ -249,3 +252,38 @@ def test_train_in_a_small_address_space_is_one_line(tmp_path, limit, words, mess
     assert done.returncode == 2, done.stderr
     assert len(errors) == 1
     assert message in errors[0]
+
+
+def test_progress_meter_shows_means_of_episodes_shares_and_time(monkeypatch):
+    shown, times = [], iter([100.0, 104.0, 108.0])
+    monkeypatch.setattr(training_progress.time, "perf_counter", lambda: next(times))
+    policy = SimpleNamespace(output_std=torch.tensor([0.5, 1.0]))
+    runner = SimpleNamespace(
+        folder=Path("logs/rover"),
+        current_learning_iteration=10,
+        last_iteration=30,
+        collect_time=1.0,
+        learn_time=3.0,
+        gpu_world_size=2,
+        logger=SimpleNamespace(rewbuffer=[], lenbuffer=[]),
+        alg=SimpleNamespace(get_policy=lambda: policy),
+        env=SimpleNamespace(num_envs=5, cfg=Task()),
+    )
+    meter = training_progress.ProgressMeter(shown.append)
+    meter.start(runner)
+    runner.current_learning_iteration = 11
+    meter.update(runner)
+    assert (shown[0].reward, shown[0].falls, shown[0].rewards) == (None, None, {})
+    rates = {"Episode/falls": 0.5, "Episode/speed": 1.0, "Episode/rew_progress": 0.2}
+    runner.logger.episode_callback(3, rates)
+    runner.logger.episode_callback(1, rates | {"Episode/falls": 1.0, "Episode/rew_torques": -0.3})
+    runner.logger.rewbuffer, runner.logger.lenbuffer = [1.0, 2.0], [100.0, 200.0]
+    runner.current_learning_iteration = 12
+    meter.update(runner)
+    last = shown[1]
+    assert (last.iteration, last.max_iterations, last.eta) == (12, 30, 72.0)  # 18 of 4 s
+    assert (last.steps_per_second, last.learning_fraction) == (24 * 5 * 2 / 4, 0.75)
+    assert (last.falls, last.speed) == (pytest.approx((3 * 0.5 + 1) / 4), 1.0)
+    assert (last.reward, last.episode_length, last.noise_std) == (1.5, pytest.approx(3.0), 0.75)
+    assert last.rewards == {"progress": pytest.approx(0.2), "torques": pytest.approx(-0.3)}
+    assert last.shares["progress"] == pytest.approx(0.2 / 0.5)

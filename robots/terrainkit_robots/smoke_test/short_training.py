@@ -67,7 +67,10 @@ def train_briefly(robot: Robot, task: Task, samples: int, progress: Progress) ->
     with torch.random.fork_rng(devices=()):
         torch.manual_seed(task.runner.seed)
         runner = LeggedRunner(
-            env, progress_callback=lambda done: progress(done.iteration / done.max_iterations)
+            env,
+            progress_callback=lambda runner: progress(
+                runner.current_learning_iteration / runner.last_iteration
+            ),
         )
         update = runner.alg.update
         runner.alg.update = lambda: losses.append(update()) or losses[-1]  # type: ignore[func-returns-value]

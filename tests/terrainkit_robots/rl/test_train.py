@@ -64,7 +64,7 @@ def fill_disk():
 
 def after(iteration, act):
     """Return a callback that acts once, after an iteration."""
-    return lambda progress: act() if progress.iteration == iteration else None
+    return lambda runner: act() if runner.current_learning_iteration == iteration else None
 
 
 def test_train_writes_a_run_in_the_default_folder(task, tmp_path, monkeypatch):
@@ -156,9 +156,10 @@ def test_resume_with_other_task_starts_new_run(task, run_after, tmp_path, mixed_
     run = run_after(4)
     other = with_iterations(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
     seen, folder = [], tmp_path / "other"
-    options = {"resume": open_run(run), "progress_callback": seen.append}
+    options = {"resume": open_run(run)}
+    options["progress_callback"] = lambda runner: seen.append(runner.current_learning_iteration)
     assert train("quadruped", "plane", other, folder=folder, **options).folder == folder
-    assert [progress.iteration for progress in seen] == [1]
+    assert seen == [1]
     blind = with_iterations(replace(task, terrain=Terrain(measure_heights=False)), 1)
     path = mixed_map.save(tmp_path / "map.npz")
     done = train("quadruped", path, blind, folder=tmp_path / "map", **options)
