@@ -56,7 +56,7 @@ class ContractInterface(PolicyInterface):
 
     def to_ctrl(self, env: LeggedEnv, actions: FloatArray) -> FloatArray:
         """Return the targets of all joints for the actions of the contracts."""
-        target = np.tile(env.action_offset, (len(actions), 1))
+        target = np.tile(env.actions.offset, (len(actions), 1))
         joints, rows = list(env.robot.spec.joint_order), np.arange(len(actions))
         parts = np.split(rows, len(self._contracts))
         for contract, part in zip(self._contracts, parts, strict=True):

@@ -332,8 +332,8 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     dofs = env.scene.joint_qvel
     joints = {
         "default_position": robot.default_pose,
-        "action_offset": env.action_offset,
-        "action_scale": env.action_scale,
+        "action_offset": env.actions.offset,
+        "action_scale": env.actions.scale,
         "gain": model.actuator_gainprm[:, 0],
         "stiffness": stiffness,
         "damping": damping,
@@ -371,12 +371,12 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "action": {
             "size": env.num_actions,
             "clip": task.normalization.clip_actions,
-            "joints": [robot.spec.joint_order[k] for k in env.action_joints],
+            "joints": [robot.spec.joint_order[k] for k in env.actions.joints],
         },
         "control_type": task.control.control_type,
         "joints": {
             "name": list(robot.spec.joint_order),
-            "position_unit": list(env.joint_units),
+            "position_unit": list(env.scene.joint_units),
             "drive": drive.tolist(),
             **{name: _to_list(values) for name, values in joints.items()},
         },

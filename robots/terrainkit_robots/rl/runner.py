@@ -26,6 +26,7 @@ from terrainkit_robots.checkpoint import (
 )
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env_state import env_state, load_env_state
 from terrainkit_robots.rl.symmetry import has_symmetry
 
 _NETWORKS = "actor", "critic", "student", "teacher", "rnd"
@@ -287,7 +288,7 @@ class LeggedRunner(OnPolicyRunner):
                     self.env.reset()
                 return {}
             self.current_learning_iteration = state["iteration"]
-            self.env.load_state_dict(process["env"])
+            load_env_state(self.env, process["env"])
             self.logger.load_state_dict(state["logger"])
             if len(processes) != self.gpu_world_size:  # no two processes may sample alike
                 seed = [self.env.cfg.runner.seed, state["iteration"]]
@@ -309,7 +310,7 @@ class LeggedRunner(OnPolicyRunner):
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything for an exact resume; of all processes, in the main process."""
-        process = {"env": self.env.state_dict(), "random": {"cpu": torch.get_rng_state()}}
+        process = {"env": env_state(self.env), "random": {"cpu": torch.get_rng_state()}}
         if self.device != "cpu":
             process["random"]["cuda"] = torch.cuda.get_rng_state(self.device)
         processes: list[Any] = [process]

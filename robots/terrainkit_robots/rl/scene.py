@@ -72,6 +72,8 @@ class Scene:
         joints = [model.joint(name).id for name in robot.spec.joint_order]
         self.joint_qpos = model.jnt_qposadr[joints]  # indices of the joints, in the robot's order
         self.joint_qvel = model.jnt_dofadr[joints]
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        self.joint_units = tuple("m" if model.jnt_type[k] == slide else "rad" for k in joints)
         self.default_qpos = model.qpos0.copy()  # the default pose with the base at height 0
         self.default_qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
         self.default_qpos[self.joint_qpos] = robot.default_pose
@@ -203,3 +205,10 @@ def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArr
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return foot_pos.astype(np.float32), np.array(depths, np.float32)
+
+
+def drawn_model(scene: Scene, robot: Robot, terrain: Ground, task: Task) -> Any:
+    """Return the model of a scene with all geoms of its terrain, for pictures."""
+    if scene.near_terrain is None:
+        return scene.model
+    return Scene(robot, terrain, task, all_geoms=True).model

@@ -43,7 +43,7 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
     """
-    robot, scene, scale = env.robot, env.scene, env.action_scale
+    robot, scene, scale = env.robot, env.scene, env.actions.scale
     names, pairs = robot.spec.joint_order, robot.spec.mirror_joints()
     joints = _map([names.index(pair.joint) for pair in pairs], [pair.sign for pair in pairs])
     _check_sides(robot, scene, scale, joints)

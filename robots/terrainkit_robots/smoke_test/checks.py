@@ -199,7 +199,7 @@ def check_standing(env: LeggedEnv) -> Check:
 
 def check_action_scale(env: LeggedEnv) -> Check:
     """Check that an action of 1 is within the effort of each joint."""
-    torque = env.action_scale * env.scene.model.actuator_gainprm[:, 0] / env.robot.effort
+    torque = env.actions.scale * env.scene.model.actuator_gainprm[:, 0] / env.robot.effort
     worst = int(torque.argmax())
     measured = f"{torque[worst]:.2g} of the effort of {env.robot.spec.joint_order[worst]}"
     expected = f"at most {MAX_ACTION_TORQUE:g}; action_scale in robot.toml is the factor"

@@ -43,10 +43,12 @@ def differences(a, b, path=""):
     return [] if same or path == ".logger.tot_time" else [path]
 
 
-@pytest.mark.parametrize("on_map", [False, True])
-def test_resuming_continues_exactly(make, task, tmp_path, map_ground, on_map):
+@pytest.mark.parametrize("kind", ["plane", "map", "stuck"])
+def test_resuming_continues_exactly(make, task, tmp_path, map_ground, kind):
     ground = None
-    if on_map:
+    if kind == "stuck":
+        task = replace(task, termination=Termination(stuck_time=0.1))
+    if kind == "map":
         commands = replace(task.commands, heading_command=True)
         terrain = replace(task.terrain, curriculum="learning_progress")
         task, ground = replace(task, commands=commands, terrain=terrain), map_ground
@@ -180,11 +182,15 @@ OF_ENV = "processes 0 env"
         ("processes", DELETED, "state.processes: got nothing"),
         (OF_ENV, 3, "env: got int; expected dict"),
         (
-            f"{OF_ENV} arrays path_length",
+            f"{OF_ENV} arrays buffers.path_length",
             torch.zeros(3),
-            "arrays.path_length: got float32 (3,); exp",
+            "arrays.buffers.path_length: got float32 (3,); exp",
         ),
-        (f"{OF_ENV} arrays episode_length", torch.zeros(2).long(), "episode_length: got int64 (2"),
+        (
+            f"{OF_ENV} arrays sim.episode_length",
+            torch.zeros(2).long(),
+            "episode_length: got int64 (2",
+        ),
         (f"{OF_ENV} curriculum levels", torch.full((3,), 99), "levels: got 99 to 99; expected 0"),
         (f"{OF_ENV} observations policy", torch.zeros(3), "env.observations.policy: got float32"),
         (f"{OF_ENV} rng state state", 2**200, ""),
