@@ -4,7 +4,7 @@ import statistics
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,23 +22,15 @@ MAX_EPISODES = 100
 
 
 class TrainingProgress(NamedTuple):
-    """The progress of a training, with means over the last episodes."""
+    """The progress of a training, as texts by name."""
 
     folder: Path | None
     iteration: int
     max_iterations: int
-    steps_per_second: float  # environment steps, learning included
-    learning_fraction: float  # of the time, 0 to 1
-    eta: float  # [s]
-    reward: float | None  # sum of an episode; None before the first has ended
-    episode_length: float | None  # [s]
-    falls: float | None  # fraction of the episodes
-    speed: float | None  # horizontal [m/s]
-    noise_std: float
-    rewards: Mapping[str, float]  # of each term [1/s]
-    shares: Mapping[str, float]  # of the most that the term can be; of a penalty: that all can be
-    levels: Mapping[str, float]  # on each terrain; empty on a plane
-    success: Mapping[str, float]  # on each terrain, 0 to 1
+    metrics: Mapping[str, str]  # in the order in which they are shown
+    learning: str  # share of the time
+    success: Mapping[str, str]  # on each terrain
+    rewards: Mapping[str, str]  # per second, and as a share of the most that they can be
 
 
 class ProgressMeter:
@@ -70,35 +62,50 @@ class ProgressMeter:
             {k.removeprefix(p): mean for k, mean in self._means.items() if k.startswith(p)}
             for p in ("Episode/rew_", "Curriculum/level_", "Curriculum/success_")
         )
-        env, logger = runner.env, runner.logger
-        scales = {name: float(getattr(env.cfg.rewards, name)) for name in rewards}
-        most = sum(scale for scale in scales.values() if scale > 0) or 1.0
-        iteration, last = runner.current_learning_iteration, runner.last_iteration
-        seconds = runner.collect_time + runner.learn_time
-        steps = env.cfg.runner.num_steps_per_env * env.num_envs * runner.gpu_world_size
-        pace = (time.perf_counter() - self._start_time) / (iteration - self._first)
         progress = TrainingProgress(
             folder=runner.folder,
-            iteration=iteration,
-            max_iterations=last,
-            steps_per_second=steps / seconds,
-            learning_fraction=runner.learn_time / seconds,
-            eta=(last - iteration) * pace,
-            reward=_mean(logger.rewbuffer),
-            episode_length=_mean([env.cfg.dt * length for length in logger.lenbuffer]),
-            falls=_mean(self._falls),
-            speed=_mean(self._speeds),
-            noise_std=runner.alg.get_policy().output_std.detach().mean().item(),
-            rewards=rewards,
-            shares={k: v / (scales[k] if scales[k] > 0 else most) for k, v in rewards.items()},
-            levels=levels,
-            success=success,
+            iteration=runner.current_learning_iteration,
+            max_iterations=runner.last_iteration,
+            metrics=self._metrics(runner)
+            | {f"level {name}": f"{level:.1f}" for name, level in levels.items()},
+            learning=f"{runner.learn_time / (runner.collect_time + runner.learn_time):.0%}",
+            success={name: f"{rate:.0%}" for name, rate in success.items()},
+            rewards=reward_texts(rewards, runner.env.cfg.rewards),
         )
         self._show(progress)
 
+    def _metrics(self, runner: "LeggedRunner") -> dict[str, str]:
+        """Return speed, time to go, and means over the last episodes, once one has ended."""
+        env, logger, completed = runner.env, runner.logger, runner.current_learning_iteration
+        steps = env.cfg.runner.num_steps_per_env * env.num_envs * runner.gpu_world_size
+        pace = (time.perf_counter() - self._start_time) / (completed - self._first)
+        metrics = {
+            "env steps/s": f"{steps / (runner.collect_time + runner.learn_time):.0f}",
+            "to go": _clock((runner.last_iteration - completed) * pace),
+        }
+        if logger.lenbuffer:
+            metrics["reward"] = f"{statistics.mean(logger.rewbuffer):.2f}"
+            metrics["episode"] = f"{env.cfg.dt * statistics.mean(logger.lenbuffer):.1f} s"
+        if self._falls:
+            metrics["falls"] = f"{statistics.mean(self._falls):.0%}"
+            metrics["speed"] = f"{statistics.mean(self._speeds):.2f} m/s"
+        noise = runner.alg.get_policy().output_std.detach().mean().item()
+        return metrics | {"noise std": f"{noise:.2f}"}
 
-def _mean(values: Collection[float]) -> float | None:
-    return statistics.mean(values) if values else None
+
+def reward_texts(rewards: Mapping[str, float], scales: object) -> dict[str, str]:
+    """Return each reward per second, and as a share of the most that it can be.
+
+    The share of a penalty is relative to the sum of the most that all rewards can be.
+
+    Args:
+        rewards: Mean of each reward [1/s].
+        scales: Object with the scales of the rewards.
+    """
+    own = {name: float(getattr(scales, name)) for name in rewards}
+    most = sum(scale for scale in own.values() if scale > 0) or 1.0
+    shares = {k: v / (own[k] if own[k] > 0 else most) for k, v in rewards.items()}
+    return {k: f"{v:+.3f} /s ({shares[k]:.0%})" for k, v in rewards.items()}
 
 
 @contextmanager
@@ -118,40 +125,14 @@ def _print_lines(progress: TrainingProgress) -> None:
     iteration, last = progress.iteration, progress.max_iterations
     lines = []
     if iteration % LINE_INTERVAL == 0 or iteration == last:
-        lines.append([f"{name} {value}" for name, value in _metrics(progress)])
+        lines.append([f"{name} {value}" for name, value in progress.metrics.items()])
     if iteration % TERMS_INTERVAL == 0 or iteration == last:
-        terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
-        rewards = [f"{name} {value}" for name, value in _rewards(progress)]
-        lines.append(terms + rewards)
+        terms = [f"success {name} {rate}" for name, rate in progress.success.items()]
+        lines.append(terms + [f"{name} {value}" for name, value in progress.rewards.items()])
     with suppress(OSError):  # such as from a closed terminal
         for line in filter(None, lines):
             sys.stderr.write(f"iteration {iteration}/{last}: {', '.join(line)}\n")
             sys.stderr.flush()
-
-
-def _rewards(progress: TrainingProgress) -> list[tuple[str, str]]:
-    """Return each reward per second, and as a share of the most that it can be.
-
-    The share of a penalty is relative to the sum of the most that all rewards can be.
-    """
-    shares = progress.shares
-    return [(k, f"{v:+.3f} /s ({shares[k]:.0%})") for k, v in progress.rewards.items()]
-
-
-def _metrics(progress: TrainingProgress) -> list[tuple[str, str]]:
-    """Return names and values of the metrics that both formats show."""
-    metrics = [
-        ("env steps/s", f"{progress.steps_per_second:.0f}"),
-        ("to go", _clock(progress.eta)),
-        ("noise std", f"{progress.noise_std:.2f}"),
-    ]
-    if progress.reward is not None and progress.episode_length is not None:
-        metrics.insert(2, ("reward", f"{progress.reward:.2f}"))
-        metrics.insert(3, ("episode", f"{progress.episode_length:.1f} s"))
-    if progress.falls is not None and progress.speed is not None:
-        metrics.insert(4, ("falls", f"{progress.falls:.0%}"))
-        metrics.insert(5, ("speed", f"{progress.speed:.2f} m/s"))
-    return metrics + [(f"level {name}", f"{level:.1f}") for name, level in progress.levels.items()]
 
 
 def _make_table(progress: TrainingProgress) -> "Table":
@@ -162,14 +143,14 @@ def _make_table(progress: TrainingProgress) -> "Table":
     table = Table(title=title, caption=where, show_header=False, title_justify="left")
     table.add_column()
     table.add_column(justify="right")
-    for name, value in _metrics(progress):
+    for name, value in progress.metrics.items():
         rate = progress.success.get(name.removeprefix("level "))
-        reached = "" if rate is None or not name.startswith("level ") else f"  {rate:.0%} succeed"
-        table.add_row(name, value + reached)
-    table.add_row("time learning", f"{progress.learning_fraction:.0%}")
+        is_level = rate is not None and name.startswith("level ")
+        table.add_row(name, f"{value}  {rate} succeed" if is_level else value)
+    table.add_row("time learning", progress.learning)
     table.add_section()
-    for row in _rewards(progress):
-        table.add_row(*row)
+    for name, value in progress.rewards.items():
+        table.add_row(name, value)
     return table
 
 

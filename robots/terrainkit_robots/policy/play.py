@@ -11,18 +11,19 @@ import numpy as np
 from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
-    EvaluationResult,
     is_plane,
     make_eval_env,
     summarize,
 )
 from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
+from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.policy.policy_rollout import (
     EvaluationRollout,
     Progress,
     command_schedule,
     rollout,
 )
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
@@ -38,7 +39,7 @@ DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
 class PlayResult:
     """Metrics of a played policy, and the video to render; None without a video."""
 
-    evaluation: EvaluationResult
+    evaluation: ResultTable[RolloutMetrics]
     video: VideoSpec | None
 
 

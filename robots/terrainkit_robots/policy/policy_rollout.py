@@ -226,7 +226,7 @@ class EvaluationRollout:
         }
 
     def contacts(self) -> dict[str, str]:
-        """Return the contacts that `EvaluationResult` has."""
+        """Return the contacts of `summarize`."""
         forward, left, yaw = self.last_commands.T
         robot = int((forward - np.abs(left) - np.abs(yaw)).argmax())
         steps = round(DIAGRAM_TIME / self.env.cfg.dt)

@@ -16,6 +16,7 @@ from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, o
 from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.load_policy import single_torch_thread
 from terrainkit_robots.policy.policy_rollout import Progress
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.config import Task
@@ -57,17 +58,9 @@ class Check:
     expected: str
 
 
-@dataclass(frozen=True)
-class SmokeTestResult:
-    """The name of a robot and its checks; a failure may end the test early."""
-
-    robot: str
-    checks: tuple[Check, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether every check passed."""
-        return all(check.passed for check in self.checks)
+def make_result(robot: str, *checks: Check) -> ResultTable[Check]:
+    """Return the checks of a robot; a failure may end the test early."""
+    return ResultTable(about={"robot": robot}, tables={"checks": checks}, schema_version=2)
 
 
 def smoke_test(
@@ -76,7 +69,7 @@ def smoke_test(
     *,
     samples: int = DEFAULT_SAMPLES,
     progress: Progress = lambda _: None,
-) -> SmokeTestResult:
+) -> ResultTable[Check]:
     """Check whether a robot can be trained for its task on a plane.
 
     Args:
@@ -101,16 +94,16 @@ def smoke_test(
         passed = onboarded.folder is not None
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")
         if onboarded.folder is None:
-            return SmokeTestResult(onboarded.report.facts.model.title, (check,))
+            return make_result(onboarded.report.facts.model.title, check)
         robot = Robot.load(onboarded.folder)
         result = run_checks(robot, default_task(robot.spec), samples, progress)
-    return replace(result, checks=(check, *result.checks))
+    return make_result(robot.spec.name, check, *result["checks"])
 
 
 @single_torch_thread()
 def run_checks(
     robot: Robot, task: Task, samples: int, progress: Progress = lambda _: None
-) -> SmokeTestResult:
+) -> ResultTable[Check]:
     """Check whether a robot can be trained for a task on a plane; see `smoke_test`."""
     name, expected = "environment initializes", "no error"
     task = replace(task, commands=replace(task.commands, waypoints=False))  # a plane has no goals
@@ -120,7 +113,7 @@ def run_checks(
         env = make_env(replace(task, env=env_cfg, algorithm=algorithm), robot, Plane())
         still_env = make_env(eval_task(task, NUM_ENVS), robot, Plane())
     except TerrainkitError as error:
-        return SmokeTestResult(robot.spec.name, (Check(name, False, str(error), expected),))
+        return make_result(robot.spec.name, Check(name, False, str(error), expected))
     record = train_briefly(robot, task, samples, progress) if samples else None
     trained = record if record and not record.error and samples >= MIN_TREND_SAMPLES else None
     checks = (
@@ -134,7 +127,7 @@ def run_checks(
         *([check_training(record)] if record else []),
         *(check_trends(trained) if trained else []),
     )
-    return SmokeTestResult(robot.spec.name, checks)
+    return make_result(robot.spec.name, *checks)
 
 
 def check_spawn_height(env: LeggedEnv) -> Check:
