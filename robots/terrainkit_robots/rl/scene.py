@@ -13,9 +13,9 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.near_terrain import add_near_geoms, find_near_terrain
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.simulation.geoms import collides, lowest_point
+from terrainkit_robots.simulation.near_terrain import add_near_geoms, find_near_terrain
 from terrainkit_robots.spec.robot import Robot
 from terrainkit_robots.transforms import FloatArray
 
