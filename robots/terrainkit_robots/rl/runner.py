@@ -3,7 +3,6 @@
 import os
 import sys
 import threading
-from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout, suppress
 from dataclasses import replace
@@ -40,7 +39,7 @@ _TABLES = "actor", "critic", "student", "teacher", "algorithm", "obs_groups"
 
 
 class MetricsLogger(Logger):
-    """rsl-rl's logger without console output; its buffers are part of a checkpoint."""
+    """rsl-rl's logger without console output."""
 
     writer: Any
 
@@ -90,30 +89,21 @@ class MetricsLogger(Logger):
             super().log(**values)
         self._runner.finish_iteration(values["it"], values["collect_time"], values["learn_time"])
 
-    def state_dict(self) -> dict[str, Any]:
-        """Return the buffers, for a checkpoint."""
-        return {
-            name: list(value) if isinstance(value, deque) else value
-            for name, value in vars(self).items()
-            if isinstance(value, deque) or name.startswith(("cur_", "tot_"))
-        }
+    def continue_from(self, state: Mapping[str, Any]) -> None:
+        """Continue the curves of a run; the means begin with the episodes that are running.
 
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore the buffers; buffers per environment only if their number is the same."""
-        own = self.state_dict()
-        deques = [name for name, buffer in own.items() if isinstance(buffer, list)]
-        sums = [name for name in own if name.startswith("cur_")]
-        is_same = any(np.shape(state.get(name, 0)) == (self.num_envs,) for name in sums)
-        expected = own | {name: [0.0] for name in deques}
-        check_state("logger", state, expected | ({} if is_same else dict.fromkeys(sums, ...)))
-        count = len(state["lenbuffer"])
-        for name in deques:
-            if (got := len(state[name])) != count:
-                raise ConfigError(f"logger.{name}: got {got} numbers; expected {count}")
-            getattr(self, name).extend(state[name])
-        for name in sums if is_same else ():
-            getattr(self, name).copy_(state[name])
+        Args:
+            state: Steps of all robots, and time of the training [s], as `totals` returns them.
+        """
+        check_state("logger", state, self.totals())
         self.tot_timesteps, self.tot_time = state["tot_timesteps"], state["tot_time"]
+        env = self._runner.env
+        self.cur_reward_sum[:] = torch.from_numpy(np.sum([*env.episode_sums.values()], axis=0))
+        self.cur_episode_length[:] = torch.from_numpy(env.steps_since_reset)
+
+    def totals(self) -> dict[str, Any]:
+        """Return steps and time since the start of the training, for a checkpoint."""
+        return {"tot_timesteps": self.tot_timesteps, "tot_time": self.tot_time}
 
     def _store_code_state(self) -> list[str]:
         return []  # a run.toml records the versions; the user's git repository is not touched
@@ -289,7 +279,7 @@ class LeggedRunner(OnPolicyRunner):
                 return {}
             self.current_learning_iteration = state["iteration"]
             load_env_state(self.env, process["env"])
-            self.logger.load_state_dict(state["logger"])
+            self.logger.continue_from(state["logger"])
             if len(processes) != self.gpu_world_size:  # no two processes may sample alike
                 seed = [self.env.cfg.runner.seed, state["iteration"]]
                 self.env.rng = np.random.default_rng(seed)
@@ -325,7 +315,7 @@ class LeggedRunner(OnPolicyRunner):
             "observed": self.env.obs_sizes,
             **self._algorithm_state(),
             "processes": processes,
-            "logger": self.logger.state_dict(),
+            "logger": self.logger.totals(),
         }
 
     def _algorithm_state(self) -> dict[str, Any]:
