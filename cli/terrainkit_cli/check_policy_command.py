@@ -81,8 +81,8 @@ def text_lines(policy: str, findings: "list[Finding]") -> list[str]:
         same = list(group)
         for finding in same[:MAX_PRINTED]:
             lines += [f"{finding.code}  {finding.got}", f"        expected: {finding.expected}"]
-        if more := len(same) - MAX_PRINTED:
-            lines += [f"        and {more} more"] * (more > 0)
+        if len(same) > MAX_PRINTED:
+            lines.append(f"        and {len(same) - MAX_PRINTED} more")
         lines.append(f"        {same[0].help}")
     found = f"{len(findings)} findings" if len(findings) != 1 else "1 finding"
     return [*lines, f"{policy}: {found if findings else 'the robot stands, walks and turns'}"]

@@ -105,8 +105,9 @@ def export_policy(
         ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, if an
             exported policy does not match the live one, or if `deploy.yaml` cannot describe it.
     """
-    names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE] + [YAML_FILE] * deploy_yaml
-    names += [EXAMPLE.name] * example
+    names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE]
+    names += [YAML_FILE] if deploy_yaml else []
+    names += [EXAMPLE.name] if example else []
     files = tuple(folder / name for name in names)
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)

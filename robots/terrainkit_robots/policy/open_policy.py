@@ -109,7 +109,7 @@ def read_contract(found: ForeignPolicy, robot: Robot) -> Contract:
     """
     if found.kind == "json":
         try:
-            return to_contract(read_policy_json(found.text).document, UNITREE)
+            return to_contract(read_policy_json(found.text), UNITREE)
         except (ConfigError, LookupError, TypeError, ExportError) as error:
             raise ConfigError(one_line(str(error))[:300]) from error
     if found.kind == "mjlab":
@@ -122,12 +122,12 @@ def _open_description(found: ForeignPolicy, path: Path, robot: Robot, default: T
     policy = found.policy
     try:
         described = read_policy_json(found.text)
-        task = default.from_table(described.task, default.with_defaults(), "task.")
-        model = replace_joints(robot, described.joints, task.control.control_type)
+        task = default.from_table(described["task"], default.with_defaults(), "task.")
+        model = replace_joints(robot, described["joints"], task.control.control_type)
         spec = PolicySpec(task=task, robot=model, policy=policy)
         env = build_eval_env(spec, Plane(), 1, EvaluationConfig())
         built = describe_policy(env)
-        check_policy_json(described.document, built)
+        check_policy_json(described, built)
     except ConfigError as error:
         raise ConfigError(f"{found.source}: {one_line(str(error))[:300]}") from error
     sizes = built["observation"]["size"], env.num_actions

@@ -77,7 +77,7 @@ def repairs(contract: Contract, robot: Robot) -> Iterator[Repair]:
     for order in _orders(contract, robot):
         joints = tuple(contract.joints[k] for k in order)
         moved_names = [a for a, b in zip(joints, contract.joints, strict=True) if a != b]
-        more = ", ..." * (len(moved_names) > 2)
+        more = ", ..." if len(moved_names) > 2 else ""
         text = f"the joints {', '.join(moved_names[:2])}{more} are exchanged"
         yield Repair("POL020", text, replace(contract, joints=joints))
         rows: dict[str, Any] = {

@@ -25,28 +25,20 @@ _OF_THE_ROBOT = ("joints.frictionloss", "joints.passive_damping")
 """Keys that may differ between the robot and the robot of the training."""
 
 
-class PolicyJson(msgspec.Struct):
-    """The content of `policy.json`."""
-
+class _Required(msgspec.Struct):
     joints: dict[str, list[str | float | bool | None]]
-    """`name`, and lists with a value for each name."""
-
-    task: dict[str, Any]
-    """Settings of the task by section."""
-
-    document: dict[str, Any]
-    """All of it."""
+    task: dict[str, Any] = {}
 
 
-def read_policy_json(data: bytes) -> PolicyJson:
-    """Return the content of `policy.json`.
+def read_policy_json(data: bytes) -> dict[str, Any]:
+    """Return the content of `policy.json`, which has lists of `joints`, and the table `task`.
 
     Raises:
         ConfigError: If it is not JSON, or has no joints.
     """
     try:
         document = msgspec.json.decode(data, type=dict[str, Any])
-        return msgspec.convert({"task": {}, **document, "document": document}, PolicyJson)
+        return document | msgspec.structs.asdict(msgspec.convert(document, _Required))
     except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
         raise ConfigError(str(error)) from error
 
