@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from terrainkit_robots.policy.contracts.check import check_contract
+from terrainkit_robots.policy.check_policy import check_contract
 from terrainkit_robots.policy.contracts.contract import Contract, ContractTerm
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.open_policy import find_contract, read_contract

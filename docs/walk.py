@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from terrainkit import MapConfig, Patch, generate, make_patch
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rendering import appearance
 from terrainkit_robots.rendering.child_process import Frame, stream_frames
 from terrainkit_robots.rendering.video import smooth_path

@@ -14,7 +14,7 @@ from terrainkit_cli.parse import option, positional
 from terrainkit_cli.plugin_command import PluginCommand
 
 if TYPE_CHECKING:
-    from terrainkit_robots.policy.contracts.check import Finding
+    from terrainkit_robots.policy.check_policy import Finding
 
 MAX_PRINTED = 3
 """Largest number of findings of one kind in the text."""
@@ -58,7 +58,7 @@ class CheckPolicy(PluginCommand):
         if not self.policy or not (self.robot or self.task):
             raise ConfigError("POLICY, --robot: missing; expected policy.onnx --robot quadruped")
         require_training("onnx", "onnxruntime")
-        from terrainkit_robots.policy.contracts.check import check_policy
+        from terrainkit_robots.policy.check_policy import check_policy
         from terrainkit_robots.rl.tasks import robot_and_task
 
         robot, task = robot_and_task(self.robot, self.task)

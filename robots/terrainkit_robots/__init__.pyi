@@ -11,12 +11,12 @@ from terrainkit_robots.onboarding.pipeline import onboard as onboard
 from terrainkit_robots.onboarding.result import OnboardResult as OnboardResult
 from terrainkit_robots.policy.average import average_checkpoints as average_checkpoints
 from terrainkit_robots.policy.evaluate import EvaluationConfig as EvaluationConfig
-from terrainkit_robots.policy.evaluate import EvaluationResult as EvaluationResult
 from terrainkit_robots.policy.evaluate import evaluate as evaluate
 from terrainkit_robots.policy.margins import measure_margins as measure_margins
 from terrainkit_robots.policy.metrics import RolloutMetrics as RolloutMetrics
 from terrainkit_robots.policy.open_policy import open_policy as open_policy
 from terrainkit_robots.policy.play import play as play
+from terrainkit_robots.policy.result_table import ResultTable as ResultTable
 from terrainkit_robots.rl.config import Task as Task
 from terrainkit_robots.rl.run import PolicySpec as PolicySpec
 from terrainkit_robots.rl.run import open_run as open_run

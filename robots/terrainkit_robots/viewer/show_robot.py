@@ -155,7 +155,7 @@ class FindingPlaces:
                 self._add(joint.name, [joint.source], (body.index, _point(joint.anchor)))
             for link, pose in zip(body.links, body.poses, strict=True):
                 place = (body.index, _point(pose[:3, 3]))
-                sources = [each.source for each in (*link.collisions, *link.visuals)]
+                sources = [element.source for element in (*link.collisions, *link.visuals)]
                 sources += [link.inertial.source] if link.inertial is not None else []
                 self._add(link.name, [link.source, *sources], place)
 

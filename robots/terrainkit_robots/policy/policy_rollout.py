@@ -1,16 +1,16 @@
 """Roll out a policy, and measure velocity errors, gait, falls and success."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 import torch
 
 from terrainkit_robots.policy import gait
-from terrainkit_robots.policy.load import Policy
-from terrainkit_robots.policy.loads import Loads
-from terrainkit_robots.policy.metrics import ErrorMean, GaitStep, MotionSums, RolloutMetrics
+from terrainkit_robots.policy.load_policy import Policy
+from terrainkit_robots.policy.metrics import ErrorMean, GaitStep, RolloutMetrics
+from terrainkit_robots.policy.motor_loads import Loads
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.symmetry import mirror_feet
 from terrainkit_robots.transforms import BoolArray, FloatArray
@@ -91,7 +91,8 @@ class EvaluationRollout:
         self._command_steps = np.zeros(n, np.int64)  # since the command changed
         self._measured_steps = np.zeros(n, np.int64)  # without interruption
         self._num_steps = 0
-        self.motion = MotionSums(**{each.name: np.zeros(n) for each in fields(MotionSums)})
+        # Sums over the measured steps of robots that are commanded to move, by name, shapes (n,).
+        self.motion = defaultdict[str, Any](lambda: np.zeros(n))
         self.gait: list[GaitStep] = []
         self.loads = Loads(env)
 
@@ -139,17 +140,19 @@ class EvaluationRollout:
         state, moving = self.env.state, settled & (commands != 0).any(axis=1)
         along, squares = velocity * commands, np.square(commands)
         lin_command = squares[:, :2].sum(axis=1)
-        step = MotionSums(
-            lin_vel=along[:, :2].sum(axis=1),
-            lin_command=lin_command,
-            ang_vel=along[:, 2],
-            ang_command=squares[:, 2],
-            pitch=np.arctan2(state.projected_gravity[:, 0], -state.projected_gravity[:, 2]),
-            power=np.abs(state.torques * state.dof_vel).sum(axis=1) * (lin_command > 0),
-            speed=np.hypot(velocity[:, 0], velocity[:, 1]) * (lin_command > 0),
-            steps=np.ones(len(commands)),
-        )
-        self.motion.add(step, moving)
+        is_linear = lin_command > 0
+        step = {
+            "lin_vel": along[:, :2].sum(axis=1),  # dot product of velocity and command [m2/s2]
+            "lin_command": lin_command,
+            "ang_vel": along[:, 2],  # product of yaw velocity and command [rad2/s2]
+            "ang_command": squares[:, 2],
+            "pitch": np.arctan2(state.projected_gravity[:, 0], -state.projected_gravity[:, 2]),
+            "power": np.abs(state.torques * state.dof_vel).sum(axis=1) * is_linear,  # [W]
+            "speed": np.hypot(velocity[:, 0], velocity[:, 1]) * is_linear,
+            "steps": np.ones(len(commands)),
+        }
+        for name, values in step.items():
+            self.motion[name][moving] += values[moving]
         if len(self.gait) < MAX_GAIT_STEPS and settled.any():
             foot_speed = np.hypot(state.foot_vel[..., 0], state.foot_vel[..., 1])
             feet = state.foot_contact, state.foot_height.copy(), foot_speed
@@ -184,7 +187,7 @@ class EvaluationRollout:
         """
         tried = self.crossed | self.falls | (self.commanded_distance >= self.half_patch)
         crossed = self.crossed[mask & tried]
-        errors: dict[str, Any] = {name: each.over(mask) for name, each in self.errors.items()}
+        errors: dict[str, Any] = {name: error.over(mask) for name, error in self.errors.items()}
         return RolloutMetrics(
             **key,
             robots=int(mask.sum()),
@@ -199,34 +202,35 @@ class EvaluationRollout:
 
     def _gait_metrics(self, mask: BoolArray) -> dict[str, Any]:
         """Return the gait of the robots in a mask, as fields of `RolloutMetrics`."""
-        scene, motion = self.env.scene, self.motion.of(mask)
-        moved = motion.steps > 0
+        scene = self.env.scene
+        motion = {name: total[mask] for name, total in self.motion.items()}
+        moved = motion["steps"] > 0
         if not moved.any():
             return {}
         commanded = (self.last_commands[mask] != 0).any(axis=1) | moved
-        followed = moved & (motion.lin_vel >= MIN_FOLLOWED * motion.lin_command)
-        followed &= motion.ang_vel >= MIN_FOLLOWED * motion.ang_command
+        followed = moved & (motion["lin_vel"] >= MIN_FOLLOWED * motion["lin_command"])
+        followed &= motion["ang_vel"] >= MIN_FOLLOWED * motion["ang_command"]
         measured, contact, height, foot_speed = (
-            np.array([each[mask] for each in parts]) for parts in zip(*self.gait, strict=True)
+            np.array([array[mask] for array in parts]) for parts in zip(*self.gait, strict=True)
         )
         heights = gait.swing_heights(contact, height, measured)
         duty = gait.duty_factors(contact, measured)
         mirror = mirror_feet(scene.foot_pos)
         # Energy over weight times distance; the time step cancels in the ratio of the two sums.
-        work = 9.81 * scene.model.body_subtreemass[scene.base] * motion.speed.sum()
+        work = 9.81 * scene.model.body_subtreemass[scene.base] * motion["speed"].sum()
         return {
             "followed": float(followed[commanded].mean()),
             "step_frequency": _number(gait.step_frequency(contact, measured, self.env.cfg.dt)),
             "foot_slip": _number(gait.foot_slip(contact, foot_speed, measured)),
-            "asymmetry": max(gait.asymmetry(each, mirror) for each in (heights, duty)),
-            "base_pitch": float(motion.pitch.sum() / motion.steps.sum()),
-            "cost_of_transport": float(motion.power.sum() / work) if work else None,
+            "asymmetry": max(gait.asymmetry(values, mirror) for values in (heights, duty)),
+            "base_pitch": float(motion["pitch"].sum() / motion["steps"].sum()),
+            "cost_of_transport": float(motion["power"].sum() / work) if work else None,
             "swing_height": tuple(map(_number, heights)),
             "duty_factor": tuple(map(_number, duty)),
         }
 
     def contacts(self) -> dict[str, str]:
-        """Return the contacts that `EvaluationResult` has."""
+        """Return the contacts of `summarize`."""
         forward, left, yaw = self.last_commands.T
         robot = int((forward - np.abs(left) - np.abs(yaw)).argmax())
         steps = round(DIAGRAM_TIME / self.env.cfg.dt)

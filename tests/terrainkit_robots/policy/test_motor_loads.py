@@ -3,7 +3,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from terrainkit_robots.policy.loads import Loads
+from terrainkit_robots.policy.motor_loads import Loads
 
 
 def test_loads_are_shares_of_the_limits():

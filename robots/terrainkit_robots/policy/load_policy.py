@@ -1,6 +1,5 @@
 """Load policies: the checkpoint of a run, or a function."""
 
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -10,13 +9,12 @@ from rsl_rl.models import MLPModel
 from rsl_rl.utils import resolve_class
 from tensordict import TensorDict
 
-from terrainkit.errors import ConfigError, TerrainkitError, TerrainkitWarning, plugin_errors
+from terrainkit.errors import ConfigError, TerrainkitError, plugin_errors
 from terrainkit_robots.checkpoint import check_state, open_checkpoint
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import PolicySpec, Run, changed_robot_files, last_checkpoint
+from terrainkit_robots.rl.run import PolicySpec, Run, last_checkpoint
 from terrainkit_robots.rl.runner import runner_config
-from terrainkit_robots.spec.robot import SPEC_FILE
 
 Policy = Callable[[TensorDict], torch.Tensor]
 
@@ -54,16 +52,9 @@ class _Function:
 def load_actor(run: Run, env: LeggedEnv) -> MLPModel:
     """Return the actor network of a run: a deterministic policy for `env`, in evaluation mode.
 
-    Warns:
-        TerrainkitWarning: If the robot's model changed after training.
-
     Raises:
         ConfigError: If the run has no checkpoint, or its checkpoint is for another robot or task.
     """
-    # The run has its own copy of the spec, so only a change of the model matters.
-    if files := [name for name in changed_robot_files(run) if name != SPEC_FILE]:
-        message = f"{run.info.robot}: {' and '.join(files)} changed after {run.folder} was trained"
-        warnings.warn(message, TerrainkitWarning, stacklevel=2)
     obs_sizes = {"policy": env.obs_sizes["policy"]}  # the critic's do not matter
     with open_checkpoint(last_checkpoint(run), env.robot.spec.joint_order, obs_sizes) as state:
         actor = make_actor(run.task, env)

@@ -8,10 +8,11 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit.feasibility import RobotLimits
 from terrainkit_robots.policy.evaluate import EvaluationConfig
-from terrainkit_robots.report_card import limits as limits_module
+from terrainkit_robots.report_card import policy_limits as limits_module
 from terrainkit_robots.report_card.crossing import CROSSED, FELL, Attempts
-from terrainkit_robots.report_card.limits import (
+from terrainkit_robots.report_card.policy_limits import (
     LEVELS,
+    limit_rows,
     limit_tests,
     limits_config,
     measure_limits,
@@ -64,7 +65,7 @@ def measure(monkeypatch):
 def test_bisection_finds_the_hardest_level_of_each_test(measure):
     values = 0.02 + 0.38 * np.arange(LEVELS) / (LEVELS - 1)  # 0.1 to 2 times 0.2 m
     for highest in ([-1, 0, 1, 2, 9, 10, 17, 18, 19], [19, 18, 17, 10, 9, 2, 1, 0, -1]):
-        results = measure(highest).limits
+        results = measure(highest)["limits"]
         for result, level in zip(results, highest, strict=True):
             assert (result.passed is None) == (level < 0)
             assert (result.failed is None) == (level == LEVELS - 1)
@@ -77,27 +78,27 @@ def test_bisection_finds_the_hardest_level_of_each_test(measure):
 
 def test_limits_of_a_robot_with_long_legs(measure):
     """The gap of 1.3 m ends at the sides of the patch, but not along x."""
-    results = measure([19] * 9, dataclasses.replace(LIMITS, gap=0.65)).limits
+    results = measure([19] * 9, dataclasses.replace(LIMITS, gap=0.65))["limits"]
     assert results[3].passed == pytest.approx(1.3)
 
 
 def test_limits_are_printed_with_units(measure):
     results = measure([9, 9, 9, 9, 9, 9, -1, 19, 9])
-    rows = results.rows()
+    rows = limit_rows(results)
     assert rows[:2] == [
         ("test", "2 of 2 cross", "next value", "limit of the robot"),
         ("step up", "20.0 cm", "1 of 2 at 22.0 cm", "20.0 cm"),
     ]
     assert ("clearance", "none", "1 of 2 at 72.0 cm", "35.0 cm") in rows
     assert {row[0]: row[2:] for row in rows}["stone"][0] == "-"
-    document = results.as_json()
+    document = results.document()
     about = [document[key] for key in ("robot", "checkpoint", "repetitions", "seed")]
     assert about == ["quadruped", open_run("quadruped").checkpoint.name, 2, 3]
     assert document["limits"][0]["passed"] == pytest.approx(0.2)
 
 
 def test_slopes_across_are_as_steep_as_slopes_up(measure):
-    results = {each.test: each.passed for each in measure([19] * 9).limits}
+    results = {each.test: each.passed for each in measure([19] * 9)["limits"]}
     steepest = pytest.approx(math.degrees(math.atan(2 * 0.577)))
     assert (results["slope across"], results["slope up and down"]) == (steepest, steepest)
 

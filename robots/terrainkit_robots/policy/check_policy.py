@@ -13,14 +13,19 @@ import numpy as np
 import torch
 
 from terrainkit.errors import ConfigError, prefixed_errors
-from terrainkit_robots.policy.contracts.contract import DEFAULT_STEP_DT, PER_JOINT, Contract
-from terrainkit_robots.policy.contracts.environment import make_spec
-from terrainkit_robots.policy.contracts.repairs import other_simulations, repairs
-from terrainkit_robots.policy.contracts.robot import load_model
+from terrainkit_robots.policy.contract_env import make_spec
+from terrainkit_robots.policy.contracts.contract import (
+    DEFAULT_STEP_DT,
+    PER_JOINT,
+    Contract,
+    ContractError,
+)
+from terrainkit_robots.policy.contracts.contract_repairs import other_simulations, repairs
+from terrainkit_robots.policy.contracts.contract_robot import load_model
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
@@ -98,17 +103,17 @@ def check_contract(
         try:
             make_spec(contract, policy, robot, task)
         except ConfigError as error:
-            got, _, expected = str(error).partition("; expected ")
-            return [Finding("POL001", got, expected, "correct the contract, or choose the robot")]
+            fault = error if isinstance(error, ContractError) else ContractError(str(error))
+            hint = "correct the contract, or choose the robot"
+            return [Finding("POL001", fault.got, fault.expected, hint)]
         findings = list(check_motion(contract, policy, robot, task))
     return findings
 
 
 def check_values(contract: Contract, robot: Robot) -> Iterator[Finding]:
     """Yield the values of a contract that do not fit the robot or each other."""
-    for note in contract.notes:
-        got, _, expected = note.partition(", so expected ")
-        yield Finding("POL002", got, expected, "write one value for each motor")
+    for doubt in contract.doubts:
+        yield Finding("POL002", doubt.got, doubt.expected, "write one value for each motor")
     step = contract.step_dt or DEFAULT_STEP_DT
     if not 0.008 <= step <= 0.05:
         hint = "step_dt is the time between two actions [s]"
@@ -198,13 +203,13 @@ def check_motion(
         hint = "see the other findings"
         yield Finding("POL010", "; ".join(motion), "to follow the command", hint)
     candidates = list(repairs(contract, robot))
-    short = test(contract, [each.contract for each in candidates], SHORT_SECONDS)
+    short = test(contract, [repair.contract for repair in candidates], SHORT_SECONDS)
     best = sorted(range(len(short)), key=lambda k: -short[k][0])[:NUM_REPAIRS]
     candidates = [candidates[k] for k in best]
-    scores = test(contract, [each.contract for each in candidates], SECONDS)
-    for each in other_simulations(contract, robot):
-        candidates.append(each)
-        scores += test(each.contract, [each.contract], SECONDS)
+    scores = test(contract, [repair.contract for repair in candidates], SECONDS)
+    for repair in other_simulations(contract, robot):
+        candidates.append(repair)
+        scores += test(repair.contract, [repair.contract], SECONDS)
     order = sorted(range(len(scores)), key=lambda k: -scores[k][0])
     for k in order[:MAX_NAMED]:
         (new, faults), repair = scores[k], candidates[k]
@@ -256,7 +261,8 @@ def motion_commands(limits: Commands) -> FloatArray:
         Forward and left velocity [m/s] and yaw velocity [rad/s], shape (5, 3).
     """
     x, y, yaw = (
-        COMMAND_SHARE * each[1] for each in (limits.lin_vel_x, limits.lin_vel_y, limits.ang_vel_yaw)
+        COMMAND_SHARE * limit[1]
+        for limit in (limits.lin_vel_x, limits.lin_vel_y, limits.ang_vel_yaw)
     )
     rows = [[x, 0, 0], [x / 2, 0, yaw], [x / 2, 0, -yaw], [x / 2, y, 0], [0, 0, 0]]
     return np.array(rows, np.float32)

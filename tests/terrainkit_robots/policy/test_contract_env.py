@@ -7,12 +7,12 @@ import pytest
 import torch
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.policy.contract_env import make_spec
 from terrainkit_robots.policy.contracts.contract import ContractTerm
-from terrainkit_robots.policy.contracts.environment import make_spec
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.policy.open_policy import find_contract, open_policy, read_contract
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane

@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import pytest
 
-from terrainkit_robots.policy.contracts import check
-from terrainkit_robots.policy.contracts.check import check_contract, check_values
-from terrainkit_robots.policy.contracts.repairs import Repair
+from terrainkit_robots.policy import check_policy
+from terrainkit_robots.policy.check_policy import check_contract, check_values
+from terrainkit_robots.policy.contracts.contract_repairs import Repair
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.spec.robot import Robot
@@ -62,8 +62,8 @@ def test_change_with_which_the_robot_walks_names_the_fault(found, contract, robo
         yield Repair("POL027", "half", replace(given, action_scale=(0.12,) * 12))
         yield Repair("POL020", "front legs", replace(given, joints=contract.joints))
 
-    monkeypatch.setattr(check, "repairs", candidates)
-    monkeypatch.setattr(check, "other_simulations", lambda *_: iter(()))
+    monkeypatch.setattr(check_policy, "repairs", candidates)
+    monkeypatch.setattr(check_policy, "other_simulations", lambda *_: iter(()))
     assert wrong.joints[0] == "FR_hip_joint"
     motion, cause = check_contract(wrong, found.policy, robot, task)
     assert (motion.code, cause.code, cause.expected) == ("POL010", "POL020", "front legs")

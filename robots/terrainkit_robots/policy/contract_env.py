@@ -1,25 +1,26 @@
 """The environment of a contract: terrainkit's terms, which a policy receives in its own form."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any, ClassVar, cast
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import torch
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import listing
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit_robots.policy.contracts.contract import (
     DEFAULT_STEP_DT,
     Contract,
+    ContractError,
     ContractTerm,
     own_name,
 )
-from terrainkit_robots.policy.contracts.robot import contract_robot, imu_position
+from terrainkit_robots.policy.contracts.contract_robot import contract_robot, imu_position
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.observations import ObservationTerm
+from terrainkit_robots.rl.observations import ObservationTerm, ObsTerms, PolicyInterface
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot import Robot
@@ -29,34 +30,36 @@ _SOURCES = {"absolute_dof_pos": "dof_pos", "grid_height_scan": "height_scan"}
 """Terms that are another order or offset of a term of the environment."""
 
 
-class ContractEnv:
-    """Part of an environment before a `LeggedEnv`: its policy gets raw terms, without scales.
+class ContractInterface(PolicyInterface):
+    """What policies observe and do by their contracts: raw terms, without scales.
 
     `ContractPolicy` scales and orders them. The history is terrainkit's: whole observations,
     the newest first. Several contracts with the same simulation share the robots in equal parts.
     """
 
-    contracts: ClassVar[tuple[Contract, ...]]
+    def __init__(self, contracts: Sequence[Contract]) -> None:
+        self._contracts = contracts
 
-    def observation_terms(self: Any) -> dict[str, dict[str, ObservationTerm]]:
+    def observation_terms(self, env: LeggedEnv, groups: ObsTerms) -> dict[str, ObservationTerm]:
         """Return the raw terms of the first contract by terrainkit's names."""
-        groups = super().observation_terms()  # type: ignore[misc]
-        known = groups["privileged"] | groups["policy"] | _other_terms(self.robot)
+        known = {**groups["privileged"], **groups["policy"], **_other_terms(env.robot)}
         history = known.pop("history", None)
-        names = [_source(self.contracts[0], term, [*known]) for term in self.contracts[0].terms]
+        contract = self._contracts[0]
+        names = [_source(contract, term, [*known]) for term in contract.terms]
         if any(name.endswith("projected_gravity") for name in names):  # repairs exchange them
             names += ["projected_gravity", "xyzw_projected_gravity"]
         raw = {
             name: replace(known[name], offset=0.0, scale=1.0, clip=None, noise=0.0)
             for name in names
         }
-        return groups | {"policy": raw | ({"history": history} if history else {})}
+        return raw | ({"history": history} if history else {})
 
-    def to_ctrl(self: Any, actions: FloatArray) -> FloatArray:
+    def to_ctrl(self, env: LeggedEnv, actions: FloatArray) -> FloatArray:
         """Return the targets of all joints for the actions of the contracts."""
-        target = np.tile(self.action_offset, (len(actions), 1))
-        joints, rows = list(self.robot.spec.joint_order), np.arange(len(actions))
-        for contract, part in zip(self.contracts, np.split(rows, len(self.contracts)), strict=True):
+        target = np.tile(env.actions.offset, (len(actions), 1))
+        joints, rows = list(env.robot.spec.joint_order), np.arange(len(actions))
+        parts = np.split(rows, len(self._contracts))
+        for contract, part in zip(self._contracts, parts, strict=True):
             offset, scale = np.array([contract.action_offset, contract.action_scale], np.float32)
             values = offset + scale * actions[part]
             if contract.target_limits:
@@ -93,30 +96,18 @@ def _source(contract: Contract, term: ContractTerm, known: Sequence[str]) -> str
     return "imu_lin_vel" if is_imu else _SOURCES.get(name, name)
 
 
-class ContractPolicy:
-    """A policy that receives its observations in the form of its contract.
+class MappedPolicy:
+    """A policy that receives its observations in another form than the environment's.
 
     Args:
         policy: The policy, from observations in that form to actions.
-        contracts: Contracts that share the robots in equal parts.
-        env: An environment of these contracts.
+        tables: Tables of the parts that share the robots equally, each of shape (5, k): index,
+            offset, scale and limits of each number that the policy receives.
     """
 
-    def __init__(
-        self, policy: Callable[[Any], Any], contracts: Sequence[Contract], env: LeggedEnv
-    ) -> None:
+    def __init__(self, policy: Callable[[Any], Any], tables: Sequence[FloatArray]) -> None:
         self.policy, self.__name__ = policy, getattr(policy, "__name__", type(policy).__name__)
-        terms = {k: v for k, v in env.obs_terms["policy"].items() if k != "history"}
-        widths = {name: term.function(env).shape[1] for name, term in terms.items()}
-        terrain = env.cfg.terrain
-        grid = len(terrain.measured_points_x), len(terrain.measured_points_y)
-        joints = list(env.robot.spec.joint_order)
-        self._tables = [_table(contract, widths, joints, grid) for contract in contracts]
-
-    @property
-    def num_obs(self) -> int:
-        """Number of observations in the form of the contract."""
-        return int(self._tables[0].shape[1])
+        self._tables = tables
 
     def __call__(self, obs: torch.Tensor) -> Any:
         """Return actions (n, a) for raw observations of the environment."""
@@ -131,6 +122,15 @@ class ContractPolicy:
         """Clear the state of robots, a mask of shape (n,)."""
         if reset := getattr(self.policy, "reset", None):
             reset(dones)
+
+
+def _contract_tables(contracts: Sequence[Contract], env: LeggedEnv) -> list[FloatArray]:
+    """Return the table of each contract, for an environment of these contracts."""
+    terms = {name: term for name, term in env.obs_terms["policy"].items() if name != "history"}
+    widths = {name: term.function(env).shape[1] for name, term in terms.items()}
+    terrain, joints = env.cfg.terrain, list(env.robot.spec.joint_order)
+    grid = len(terrain.measured_points_x), len(terrain.measured_points_y)
+    return [_table(contract, widths, joints, grid) for contract in contracts]
 
 
 def _table(
@@ -157,8 +157,8 @@ def _table(
         elif own == "grid_height_scan":  # x varies fastest
             index = index.reshape(grid).T.ravel()
         if len(term.scale) not in (1, len(index)):
-            got = f"got {len(term.scale)} numbers"
-            raise ConfigError(f"scale of {term.name}: {got}; expected 1 or {len(index)}")
+            got = f"scale of {term.name}: got {len(term.scale)} numbers"
+            raise ContractError(got, f"1 or {len(index)}")
         index = index[list(term.columns)] if len(term.columns) == len(index) else index
         offset = contract.default_pose if own == "dof_pos" else term.params.get("offset", 0.0)
         rows = offset, term.scale, *(term.clip or (-np.inf, np.inf))
@@ -168,7 +168,7 @@ def _table(
         blocks.append(steps if contract.newest_first else steps[::-1])
     if contract.is_interleaved:
         blocks = [list(step) for step in zip(*blocks, strict=True)]
-    return np.concatenate([each for block in blocks for each in block], axis=1).astype(np.float32)
+    return np.concatenate([table for block in blocks for table in block], axis=1).astype(np.float32)
 
 
 def make_spec(
@@ -191,56 +191,61 @@ def make_spec(
         ConfigError: If the contract does not fit the robot or the policy, or a term is unknown.
     """
     contracts = contracts or (contract,)
-    own = contract_task(contract, task, (contract, *contracts)[-len(contracts) :])
-    spec = PolicySpec(task=own, robot=contract_robot(contract, robot))
+    spec = PolicySpec(
+        task=contract_task(contract, task),
+        robot=contract_robot(contract, robot),
+        interface=ContractInterface(contracts),
+    )
     env = build_eval_env(spec, Plane(), len(contracts), EvaluationConfig())
-    mapped = ContractPolicy(policy, contracts, env)
-    for name, got, expected in (
-        ("observations", getattr(policy, "num_obs", mapped.num_obs), mapped.num_obs),
-        ("actions", getattr(policy, "num_actions", env.num_actions), env.num_actions),
+    tables = _contract_tables(contracts, env)
+    inputs, outputs = tables[0].shape[1], env.num_actions
+    terms = listing(f"{term.name} x {term.history}" for term in contract.terms)
+    for name, got, expected, what in (
+        ("observations", getattr(policy, "num_obs", inputs), inputs, terms),
+        ("actions", getattr(policy, "num_actions", outputs), outputs, listing(contract.joints)),
     ):
         if got != expected:
-            terms = (f"{term.name} x {term.history}" for term in contract.terms)
-            what = listing(terms) if name == "observations" else listing(contract.joints)
-            raise ConfigError(f"got a network for {got} {name}; expected {expected}: {what}")
-    return replace(spec, policy=mapped)
+            raise ContractError(f"got a network for {got} {name}", f"{expected}: {what}")
+    return replace(spec, policy=MappedPolicy(policy, tables))
 
 
-def contract_task(contract: Contract, task: Task, contracts: Sequence[Contract]) -> Task:
+def contract_task(contract: Contract, task: Task) -> Task:
     """Return a task whose environment has the observations and the timing of a contract."""
     own = [own_name(contract.style, term.name, [term.name]) for term in contract.terms]
     history = max(term.history for term in contract.terms)
     if contract.is_interleaved and {term.history for term in contract.terms} != {history}:
-        raise ConfigError("history_length: got several; expected one, with use_gym_history")
+        raise ContractError("history_length: got several", "one, with use_gym_history")
     step_dt, dt = contract.step_dt or DEFAULT_STEP_DT, contract.physics_dt or task.sim.dt
     decimation = max(1, round(step_dt / dt))
+    ranges = {"lin_vel_x": "lin_vel_x", "lin_vel_y": "lin_vel_y", "ang_vel_z": "ang_vel_yaw"}
     commands: dict[str, Any] = {
-        name.replace("ang_vel_z", "ang_vel_yaw"): limits
-        for name, limits in contract.commands.items()
-        if name in ("lin_vel_x", "lin_vel_y", "ang_vel_z")
+        ranges[name]: limits for name, limits in contract.commands.items() if name in ranges
     }
     for term in contract.terms:
         if "period" in term.params:
             commands["gait_period"] = term.params["period"]
-    base: type = task.env_class or LeggedEnv
-    space: dict[str, Any] = {"contracts": tuple(contracts), "__module__": base.__module__}
-    env_class = type(base.__name__, (ContractEnv, base), space)
-    space = {"env_class": env_class, "__module__": type(task).__module__}
-    kind: Any = dataclass(frozen=True, kw_only=True)(type("Task", (type(task),), space))
-    scan = any(name.endswith("height_scan") for name in own)
-    changes: dict[str, dict[str, Any]] = {
-        "control": {"control_type": "P", "decimation": decimation}
-        | dict.fromkeys(("stiffness", "damping", "action_scale")),
-        "sim": {"dt": step_dt / decimation},
-        "observations": {
-            "base_lin_vel": "base_lin_vel" in own,
-            "foot_contact": "foot_contact" in own,
-            "history_length": history,
-        },
-        "terrain": {"measure_heights": scan},
-        "commands": commands,
-        "normalization": {"clip_observations": MAX_VALUE, "clip_actions": MAX_VALUE},
-    }
-    values = {field.name: getattr(task, field.name) for field in fields(task)}
-    changed = {name: replace(values[name], **keys) for name, keys in changes.items()}
-    return cast("Task", kind(**values | changed))
+    return replace(
+        task,
+        control=replace(
+            task.control,
+            control_type="P",
+            decimation=decimation,
+            stiffness=None,
+            damping=None,
+            action_scale=None,
+        ),
+        sim=replace(task.sim, dt=step_dt / decimation),
+        observations=replace(
+            task.observations,
+            base_lin_vel="base_lin_vel" in own,
+            foot_contact="foot_contact" in own,
+            history_length=history,
+        ),
+        terrain=replace(
+            task.terrain, measure_heights=any(name.endswith("height_scan") for name in own)
+        ),
+        commands=replace(task.commands, **commands),
+        normalization=replace(
+            task.normalization, clip_observations=MAX_VALUE, clip_actions=MAX_VALUE
+        ),
+    )

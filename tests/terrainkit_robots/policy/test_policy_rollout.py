@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from terrainkit_robots.policy.evaluate import eval_task
-from terrainkit_robots.policy.rollout import (
+from terrainkit_robots.policy.policy_rollout import (
     SETTLING_TIME,
     EvaluationRollout,
     command_schedule,

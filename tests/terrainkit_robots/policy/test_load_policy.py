@@ -1,5 +1,3 @@
-import shutil
-import warnings
 from dataclasses import replace
 
 import pytest
@@ -7,12 +5,10 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.rl.config import Env, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
-from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
-from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 
 
@@ -34,19 +30,6 @@ def test_load_policy_acts_as_the_runner(trained, env):
 def test_load_policy_requires_a_checkpoint(make_run, env):
     with pytest.raises(ConfigError, match="got no checkpoint; expected a trained run"):
         load_policy(make_run(), env)
-
-
-@pytest.mark.parametrize(("name", "warns"), [("quadruped.xml", True), ("robot.toml", False)])
-def test_load_policy_warns_about_a_changed_model(trained, env, tmp_path, name, warns):
-    robot = shutil.copytree(get_task("quadruped").folder, tmp_path / "robot")
-    folder = create_run(tmp_path / "run", trained.task, robot, "plane").folder
-    shutil.copy(trained.checkpoint, folder)
-    (robot / name).write_text((robot / name).read_text() + "\n")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        load_policy(open_run(folder), env)
-    told = [str(each.message) for each in caught]
-    assert told == warns * [f"{robot}: quadruped.xml changed after {folder} was trained"]
 
 
 @pytest.mark.parametrize(

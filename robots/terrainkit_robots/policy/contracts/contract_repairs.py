@@ -77,7 +77,7 @@ def repairs(contract: Contract, robot: Robot) -> Iterator[Repair]:
     for order in _orders(contract, robot):
         joints = tuple(contract.joints[k] for k in order)
         moved_names = [a for a, b in zip(joints, contract.joints, strict=True) if a != b]
-        more = ", ..." * (len(moved_names) > 2)
+        more = ", ..." if len(moved_names) > 2 else ""
         text = f"the joints {', '.join(moved_names[:2])}{more} are exchanged"
         yield Repair("POL020", text, replace(contract, joints=joints))
         rows: dict[str, Any] = {
@@ -162,7 +162,7 @@ def _orders(contract: Contract, robot: Robot) -> Iterator[list[int]]:
         by_kind = [start + k for k in range(size) for start in starts]
         yield by_kind
         yield [by_kind.index(k) for k in range(count)]
-    mirror = {joint: each.joint for joint, each in robot.spec.mirror.items()}
+    mirror = {joint: image.joint for joint, image in robot.spec.mirror.items()}
     joints, pairs = contract.joints, list(combinations(range(count), 2))
     for i, j in pairs:
         is_likely = j == i + 1 or mirror.get(joints[i]) == joints[j]

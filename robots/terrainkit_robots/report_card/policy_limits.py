@@ -3,7 +3,7 @@
 import math
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from terrainkit.feasibility import RobotLimits
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain.parameter import Range, at_difficulty
 from terrainkit_robots.policy.evaluate import EvaluationConfig
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.policy_rollout import Progress
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.report_card.crossing import CROSSED, Crossing
 from terrainkit_robots.rl.run import PolicySpec
 
@@ -123,10 +124,6 @@ def limits_config(tests: Sequence[LimitTest], levels: Sequence[int], seed: int) 
     )
 
 
-SCHEMA_VERSION = 1
-"""Version of the JSON; it changes when a key changes its meaning or is removed."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class LimitResult:
     """The limit of a policy in a test."""
@@ -150,41 +147,18 @@ class LimitResult:
     """Limit of the robot for feasibility."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PolicyLimits:
-    """The limits of a policy."""
-
-    robot: str
-    """Name of the robot."""
-
-    checkpoint: str
-    """Name of the checkpoint."""
-
-    repetitions: int
-    """Robots on each patch."""
-
-    seed: int
-    """Seed of the starts."""
-
-    limits: tuple[LimitResult, ...]
-    """Limits by test."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the limits as values of JSON."""
-        return {"schema_version": SCHEMA_VERSION} | asdict(self)
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the limits as rows of text with a header."""
-        total = self.repetitions
-        rows: list[tuple[str, ...]] = []
-        rows.append(("test", f"{total} of {total} cross", "next value", "limit of the robot"))
-        for each in self.limits:
-            following = "-"
-            if each.failed is not None:
-                following = f"{each.crossed} of {total} at {_text(each.failed, each.unit)}"
-            passed = "none" if each.passed is None else _text(each.passed, each.unit)
-            rows.append((each.test, passed, following, _text(each.robot_limit, each.unit)))
-        return rows
+def limit_rows(table: ResultTable[LimitResult]) -> list[tuple[str, ...]]:
+    """Return the limits as rows of text with a header."""
+    total = table.about["repetitions"]
+    rows: list[tuple[str, ...]] = []
+    rows.append(("test", f"{total} of {total} cross", "next value", "limit of the robot"))
+    for result in table["limits"]:
+        following = "-"
+        if result.failed is not None:
+            following = f"{result.crossed} of {total} at {_text(result.failed, result.unit)}"
+        passed = "none" if result.passed is None else _text(result.passed, result.unit)
+        rows.append((result.test, passed, following, _text(result.robot_limit, result.unit)))
+    return rows
 
 
 def measure_limits(
@@ -193,7 +167,7 @@ def measure_limits(
     repetitions: int,
     config: EvaluationConfig,
     progress: Progress = lambda _: None,
-) -> PolicyLimits:
+) -> ResultTable[LimitResult]:
     """Return the limits of a policy, by bisection: what is easier than a passed value, is passed.
 
     Args:
@@ -241,13 +215,13 @@ def measure_limits(
                 robot_limit=test.in_unit(getattr(limits, test.limit)),
             )
         )
-    return PolicyLimits(
-        robot=spec.robot.spec.name,
-        checkpoint=spec.policy_name,
-        repetitions=repetitions,
-        seed=config.seed,
-        limits=tuple(results),
-    )
+    about = {
+        "robot": spec.robot.spec.name,
+        "checkpoint": spec.policy_name,
+        "repetitions": repetitions,
+        "seed": config.seed,
+    }
+    return ResultTable(about=about, tables={"limits": results})
 
 
 def _generate(config: MapConfig) -> TerrainMap:

@@ -30,7 +30,7 @@ def read_metadata(metadata: Mapping[str, str]) -> Contract:
     names = _split(metadata, "observation_names")
 
     def per_joint(key: str) -> tuple[float, ...]:
-        values = tuple(_number(key, each) for each in _split(metadata, key))
+        values = tuple(_number(key, number) for number in _split(metadata, key))
         return values * len(joints) if len(values) == 1 else values
 
     def per_term(key: str, default: str) -> list[str]:
@@ -48,10 +48,10 @@ def read_metadata(metadata: Mapping[str, str]) -> Contract:
         length = _number(f"history_length of {name}", steps)
         if length > 0 and is_flat.strip().lower() in ("false", "0", "0.000"):
             raise ConfigError(f"flatten_history_dim of {name}: got {is_flat}; expected True")
-        limits = tuple(_number(f"clip of {name}", each) for each in clip.split(";") if each)
+        limits = tuple(_number(f"clip of {name}", number) for number in clip.split(";") if number)
         term = ContractTerm(
             name=name,
-            scale=tuple(_number(f"scale of {name}", each) for each in scale.split(";")),
+            scale=tuple(_number(f"scale of {name}", number) for number in scale.split(";")),
             clip=(limits[0], limits[1]) if len(limits) == 2 and limits != _INFINITE else None,
             history=max(1, int(length)) if 0 <= length <= 1e6 else 0,
             # mjlab's tasks read the velocity from a sensor of the IMU, terrainkit's from the base.
@@ -102,7 +102,7 @@ def _split(metadata: Mapping[str, str], key: str) -> list[str]:
     if not text or len(text) > MAX_LENGTH:
         got = f"got {len(text)} characters" if text else "missing in the metadata"
         raise ConfigError(f"{key}: {got}; expected a list separated by commas, as mjlab writes it")
-    return [each.strip() for each in text.split(",")]
+    return [word.strip() for word in text.split(",")]
 
 
 def _number(key: str, text: str) -> float:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from terrainkit.errors import ConfigError, listing
-from terrainkit_robots.policy.contracts.contract import Contract
+from terrainkit_robots.policy.contracts.contract import Contract, ContractError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.spec.robot import Robot
@@ -58,12 +58,12 @@ def contract_robot(contract: Contract, robot: Robot) -> Robot:
     Joints that the policy does not have follow its joints, without an action.
 
     Raises:
-        ConfigError: If the robot lacks a joint of the policy.
+        ContractError: If the robot lacks a joint of the policy.
     """
     order, spec = contract.joints, robot.spec
     if unknown := [name for name in order if name not in spec.joint_order]:
-        got = f"got {listing(unknown)}, which {spec.name} lacks"
-        raise ConfigError(f"joint names: {got}; expected joints among {listing(spec.joint_order)}")
+        got = f"joint names: got {listing(unknown)}, which {spec.name} lacks"
+        raise ContractError(got, f"joints among {listing(spec.joint_order)}")
     others = [name for name in spec.joint_order if name not in order]
     joints: dict[str, list[Any]] = {"name": [*order, *others]}
     for table in ("stiffness", "damping"):

@@ -85,7 +85,7 @@ def find_near_terrain(
     """
     world = np.flatnonzero(collides(model) & (model.geom_bodyid == 0))
     fields = model.geom_friction, model.geom_priority, model.geom_solref, model.geom_solimp
-    is_alike = all(len(np.unique(each[world], axis=0)) == 1 for each in fields)
+    is_alike = all(len(np.unique(field[world], axis=0)) == 1 for field in fields)
     if len(world) <= MIN_GEOMS or not is_alike:
         return None
     data = mujoco.MjData(model)
@@ -105,7 +105,7 @@ def find_near_terrain(
         # A geom below all ground near a square is out of reach.
         i, j = np.nonzero(top[number] >= lowest[i0:i1, j0:j1])
         squares.append((i + i0) * limit[1] + j + j0)
-    geoms = np.repeat(np.arange(len(world)), [len(each) for each in squares])
+    geoms = np.repeat(np.arange(len(world)), [len(square) for square in squares])
     every = np.concatenate(squares)
     order = np.argsort(every, kind="stable")
     starts = np.searchsorted(every[order], np.arange(lowest.size + 1))
