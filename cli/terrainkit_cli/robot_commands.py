@@ -127,7 +127,7 @@ class CheckRobot(Command):
             baseline = baseline.updated(result.report for result in results)
             baseline.write()
             render.note(f"wrote {baseline.path}")
-        results = [replace(each, report=baseline.accept(each.report)) for each in results]
+        results = [replace(result, report=baseline.accept(result.report)) for result in results]
         self._print([result.report for result in results], "".join(r.diff for r in results))
         crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
@@ -286,9 +286,9 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
     write_fixes(result)
     safeties = ("safe", "unsafe") if unsafe else ("safe",)
     unfixed = tuple(
-        (each.finding, each.reason)
-        for each in result.unfixed
-        if each.finding.fix is not None and each.finding.fix.safety in safeties
+        (unfixed.finding, unfixed.reason)
+        for unfixed in result.unfixed
+        if unfixed.finding.fix is not None and unfixed.finding.fix.safety in safeties
     )
     return replace(result.report, fixed=result.fixed, unfixed=unfixed)
 

@@ -76,7 +76,7 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
         else:
             attached = names(joint.name for joint, _ in joints if joint.parent == WORLD)
             changes.append(f"added the base link {new_name} for the world, with joints {attached}")
-        links = [replace(each, name=new_name) if each.name == WORLD else each for each in links]
+        links = [replace(link, name=new_name) if link.name == WORLD else link for link in links]
         joints = [(_rename_world(joint, new_name), before) for joint, before in joints]
     imu = facts.model.imu
     model = RobotModel(

@@ -28,4 +28,6 @@ def problem_violation(
 
 def problem_violations(robot: Facts, code: str, severity: Severity | None = None) -> Violations:
     """Yield the violations of the problems with a code, none of which can be fixed."""
-    return (problem_violation(robot, each, severity=severity) for each in problems(robot, code))
+    return (
+        problem_violation(robot, problem, severity=severity) for problem in problems(robot, code)
+    )

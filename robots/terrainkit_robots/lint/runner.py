@@ -70,7 +70,7 @@ class Report:
     @property
     def crashed(self) -> tuple[Skipped, ...]:
         """The rules that raised an unexpected exception."""
-        return tuple(each for each in self.skipped if each.kind == "crashed")
+        return tuple(rule for rule in self.skipped if rule.kind == "crashed")
 
     @property
     def verdict(self) -> Verdict:

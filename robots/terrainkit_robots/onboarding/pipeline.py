@@ -154,7 +154,7 @@ def onboard(
         progress=options.progress,
     )
     configs, skipped_configs = _config_files(options.frameworks, robot_files)
-    files = {name: data for each in configs.values() for name, data in each.items()}
+    files = {name: data for texts in configs.values() for name, data in texts.items()}
     if len(files) < sum(map(len, configs.values())):
         raise ConfigError(f"name: got {robot_files.spec.name!r}, a framework; expected another one")
     result = OnboardResult(
@@ -162,7 +162,7 @@ def onboard(
         fixed=fixed,
         folder=target,
         robot=robot_files,
-        configs={framework: tuple(each) for framework, each in configs.items()},
+        configs={framework: tuple(texts) for framework, texts in configs.items()},
         skipped_configs=skipped_configs,
     )
     return _write_folder(result, target, {**robot_files.files, **files}, options)

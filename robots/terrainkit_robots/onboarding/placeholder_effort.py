@@ -47,7 +47,8 @@ def without_effort(
             for joint in model.joints
         ),
         actuators=tuple(
-            replace(each, effort=None) if each.joint in joints else each for each in model.actuators
+            replace(actuator, effort=None) if actuator.joint in joints else actuator
+            for actuator in model.actuators
         ),
     )
     listed = names((joint.name for joint in model.joints if joint.name in joints), max_count=4)

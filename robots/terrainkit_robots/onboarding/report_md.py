@@ -170,13 +170,13 @@ def _comparison(checks: "Verification | None") -> Iterator[str]:
     yield "## Comparison with the source\n"
     rows = [
         (
-            each.file,
-            f"{round(each.mass, 5) + 0.0:+.3%}",
-            f"{each.inertia:.3%} at {each.joint}" if each.joint else "",
-            f"{1000 * each.distance:.2g} mm at {each.link}",
-            f"{math.degrees(each.angle):.2g} deg at {each.angle_link}",
+            equivalence.file,
+            f"{round(equivalence.mass, 5) + 0.0:+.3%}",
+            f"{equivalence.inertia:.3%} at {equivalence.joint}" if equivalence.joint else "",
+            f"{1000 * equivalence.distance:.2g} mm at {equivalence.link}",
+            f"{math.degrees(equivalence.angle):.2g} deg at {equivalence.angle_link}",
         )
-        for each in checks.equivalences
+        for equivalence in checks.equivalences
     ]
     yield "Largest errors at random poses.\n"
     yield from _table([("file", "mass", "joint inertia", "link position", "link rotation"), *rows])

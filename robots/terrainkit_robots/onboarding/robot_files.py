@@ -213,7 +213,7 @@ def _set_motor_limits(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
         else joint
         for joint in model.joints
     )
-    actuators = (replace(each, effort=effort[each.joint]) for each in model.actuators)
+    actuators = (replace(actuator, effort=effort[actuator.joint]) for actuator in model.actuators)
     return replace(model, joints=joints, actuators=tuple(actuators))
 
 

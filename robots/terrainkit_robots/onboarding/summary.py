@@ -72,9 +72,9 @@ def _list_files(robot: "RobotFiles") -> str:
 
 def _compare_files(checks: "Verification") -> str:
     equivalences = checks.equivalences
-    distance = max(each.distance for each in equivalences)
-    mass = max(abs(each.mass) for each in equivalences)
-    files = " and ".join(each.file for each in equivalences)
+    distance = max(equivalence.distance for equivalence in equivalences)
+    mass = max(abs(equivalence.mass) for equivalence in equivalences)
+    files = " and ".join(equivalence.file for equivalence in equivalences)
     return (
         f"{files} match the source: link positions within {1000 * distance:.2g} mm at {NUM_POSES} "
         f"poses, mass within {mass:.2g}"

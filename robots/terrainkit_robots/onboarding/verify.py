@@ -99,9 +99,11 @@ def verify(
         reference = reference_kinematics(with_world_base(source, floating=floating), robot.facts)
     (_, urdf_model), (scene_spec, scene_model) = urdf.result(), scene.result()
     equivalences = compare_models(reference, {URDF: urdf_model, MJCF: scene_model})
-    for each in equivalences:
-        if each.failures:
-            raise ExportError(f"{each.file} differs from the source: {'; '.join(each.failures)}")
+    for equivalence in equivalences:
+        if equivalence.failures:
+            raise ExportError(
+                f"{equivalence.file} differs from the source: {'; '.join(equivalence.failures)}"
+            )
     if not robot.facts.legs or not floating:
         return Verification(equivalences=equivalences)
     joints_locked = not is_statically_stable(robot.facts.legs)

@@ -139,9 +139,9 @@ def make_written_model(facts: Facts) -> WrittenModel:
         model=model,
         floor=int(np.flatnonzero(shapes & is_floor)[0]),
         shapes=tuple(np.flatnonzero(shapes & ~is_floor).tolist()),
-        positions={name: each for name, each in facts.default_pose.items() if name in names},
+        positions={name: value for name, value in facts.default_pose.items() if name in names},
         gains={name: gain for name, gain in suggest_gains(facts).items() if name not in servos},
-        efforts={each.name: each.effort for each in facts.joints if each.effort is not None},
+        efforts={joint.name: joint.effort for joint in facts.joints if joint.effort is not None},
         leg_length=max((leg.length for leg in facts.legs), default=1.0),
         weight=float(model.body_subtreemass[model.jnt_bodyid[0]] * -model.opt.gravity[2]),
         held=not is_statically_stable(facts.legs),
@@ -247,7 +247,7 @@ def stand_as_written(
             data.qfrc_applied[dofs] = np.clip(torques, -limits, limits)
             mujoco.mj_step(model, data)
             if has_diverged(data):
-                return WrittenStand(**{each.name: np.inf for each in fields(WrittenStand)})
+                return WrittenStand(**{field.name: np.inf for field in fields(WrittenStand)})
             # Internal forces have no component on the translation of a free body.
             forces[step], heights[step] = data.qfrc_constraint[2], data.qpos[2]
             speeds[step] = data.qvel[6:]

@@ -168,7 +168,7 @@ def _make_target(
     """Return the largest required stiffness within the effort limit and the time step."""
     effort = min(sim.effort_limit(name) for name in joints)
     units = sim.units(joints[0])
-    stiffness, reason = max(_limit_by_effort(each, effort, units) for each in required)
+    stiffness, reason = max(_limit_by_effort(need, effort, units) for need in required)
     if not math.isfinite(stiffness):
         raise CannotCheckError(f"the load of joint {joints[0]} is too large to compute its gains")
     free = min(inertia[name].free for name in joints)

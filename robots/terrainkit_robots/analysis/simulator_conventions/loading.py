@@ -151,7 +151,7 @@ def _without_repeated_names(model: RobotModel) -> dict[str, bytes]:
     """
     from lxml import etree
 
-    shapes = [each for link in model.links for each in (*link.collisions, *link.visuals)]
+    shapes = [shape for link in model.links for shape in (*link.collisions, *link.visuals)]
     names = [shape.name for shape in shapes if shape.name]
     if model.kind != "urdf" or len(set(names)) == len(names):
         return {}
@@ -266,7 +266,7 @@ def _relevant_elements(root: "etree._Element | None") -> Iterator["etree._Elemen
     yield root
     for child in root:
         if not is_urdf or child.tag in _URDF_TAGS or child.tag == "mujoco":
-            yield from (each for each in child.iter() if isinstance(each.tag, str))
+            yield from (element for element in child.iter() if isinstance(element.tag, str))
 
 
 def _check_element(element: "etree._Element") -> None:

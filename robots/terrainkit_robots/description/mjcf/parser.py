@@ -223,10 +223,10 @@ def _unknown_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
         known=suggestion,
         refused="mujoco",
     )
-    for each in nodes:
-        value = each.attributes.pop(name)
-        if suggestion and suggestion not in each.attributes and is_allowed(each.tag, suggestion):
-            each.attributes[suggestion] = value  # otherwise it would be reported as missing
+    for node in nodes:
+        value = node.attributes.pop(name)
+        if suggestion and suggestion not in node.attributes and is_allowed(node.tag, suggestion):
+            node.attributes[suggestion] = value  # otherwise it would be reported as missing
     return True
 
 
@@ -248,15 +248,15 @@ def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         known=suggestion,
         refused="mujoco",
     )
-    for each in nodes:
+    for node in nodes:
         if (
             suggestion
             and is_allowed(suggestion)
-            and all(is_allowed(suggestion, k) for k in each.attributes)
+            and all(is_allowed(suggestion, k) for k in node.attributes)
         ):
-            each.tag = suggestion  # its children are read as well
+            node.tag = suggestion  # its children are read as well
         else:
-            each.remove()
+            node.remove()
     return True
 
 
@@ -313,8 +313,8 @@ def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         _report_rejected(tree, node, match[0])
     taken = {n.attributes.get("name") for n in tree.nodes()}
     numbers = itertools.count(2)
-    for each in duplicates:
-        each.attributes["name"] = next(new for k in numbers if (new := f"{name}_{k}") not in taken)
+    for node in duplicates:
+        node.attributes["name"] = next(new for k in numbers if (new := f"{name}_{k}") not in taken)
     return True
 
 
@@ -326,8 +326,8 @@ def _invalid_value(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         return False
     nodes = _similar_nodes(tree, node, attribute=name, value=value)
     _report_rejected(tree, node, f"{match[0]} in {name}{_count_suffix(nodes)}")
-    for each in nodes:
-        del each.attributes[name]
+    for node in nodes:
+        del node.attributes[name]
     return True
 
 
@@ -370,8 +370,8 @@ def _unknown_childclass(tree: MjcfTree, node: Node, match: re.Match[str]) -> boo
         return False
     nodes = _similar_nodes(tree, node, attribute="childclass", value=value)
     _report_rejected(tree, node, f"{match[0]} {value!r}{_count_suffix(nodes)}")
-    for each in nodes:
-        del each.attributes["childclass"]
+    for node in nodes:
+        del node.attributes["childclass"]
     return True
 
 

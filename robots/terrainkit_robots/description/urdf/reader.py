@@ -351,7 +351,7 @@ class _Reader:
         """Return an element whose attributes are numbers, named like the fields of `kind`."""
         if element is None:
             return None
-        names = (each.name for each in fields(kind) if each.name != "source")
+        names = (part.name for part in fields(kind) if part.name != "source")
         numbers = {name: self._parse_number(element, name) for name in names}
         return kind(source=self._doc.source(element), **numbers)
 
@@ -394,7 +394,7 @@ def _symmetric(values: list[float | None]) -> Matrix | None:
 def _first_number(texts: Mapping[str | None, str], names: Sequence[str]) -> float | None:
     """Return the first of the named numbers that is positive, or None."""
     found = (parse_numbers(texts[name], 1) for name in names if name in texts)
-    values = (float(each[0]) for each in found if each is not None)
+    values = (float(row[0]) for row in found if row is not None)
     return next((value for value in values if 0 < value < math.inf), None)
 
 
@@ -406,8 +406,8 @@ def _complete(*values: float | None) -> tuple[float, ...] | None:
 
 def _owner(element: "etree._Element") -> str:
     """Return the name of the link or joint that contains an element."""
-    owners = (each for each in (element, *element.iterancestors()) if each.tag in _NAMED_TAGS)
-    return next((str(each.get("name")) for each in owners if each.get("name")), "")
+    owners = (owner for owner in (element, *element.iterancestors()) if owner.tag in _NAMED_TAGS)
+    return next((str(owner.get("name")) for owner in owners if owner.get("name")), "")
 
 
 def _same_content(first: "etree._Element", second: "etree._Element") -> bool:

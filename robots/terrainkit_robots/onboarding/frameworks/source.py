@@ -99,7 +99,7 @@ def sum_assignment(name: str, left: str, operator: str, right: str, *, depth: in
     if len(f"{name} = {line}") <= max_length:
         return [f"{name} = {line}"]
     parts = [line] if len(line) + 4 <= max_length else [left, f"{operator} {right}"]
-    return [f"{name} = (", *(f"    {each}" for each in parts), ")"]
+    return [f"{name} = (", *(f"    {part}" for part in parts), ")"]
 
 
 def comment(text: str, *, depth: int = 0) -> list[str]:
@@ -138,7 +138,7 @@ def fill(template: str, **values: str | Sequence[str]) -> list[str]:
         if isinstance(value, str):
             lines.append(Template(line).substitute(values))
         else:
-            lines += [before + each if each else "" for each in value]
+            lines += [before + text if text else "" for text in value]
     return lines
 
 

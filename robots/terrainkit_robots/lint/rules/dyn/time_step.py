@@ -48,7 +48,7 @@ def low_joint_inertia(robot: Facts) -> Violations:
     lightest = min(shares, key=lambda name: shares[name])
     gain, units = gains[lightest], model.units(lightest)
     inertia = inertias[lightest].free
-    without = {name: replace(each, armature=declared[name]) for name, each in gains.items()}
+    without = {name: replace(gain, armature=declared[name]) for name, gain in gains.items()}
     step = max_stable_time_step(model, without).seconds
     legged = {joint.name for leg in robot.legs for joint in leg.joints}
     is_wrong = lightest in legged and shares[lightest] < _MIN_STIFFNESS_SHARE

@@ -120,7 +120,7 @@ def inertia_too_small(robot: Facts) -> Violations:
         index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
         part = slice(index, index + 1)
         main = replace(whole, links=whole.links[part], poses=whole.poses[part])
-        kept = (each for each, _ in _kept_radii(robot, whole))
+        kept = (body for body, _ in _kept_radii(robot, whole))
         for body in (whole, main, *kept):
             radius = gyration_radius(body.principal, body.mass)
 

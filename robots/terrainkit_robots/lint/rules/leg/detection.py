@@ -56,7 +56,7 @@ def detected_legs(robot: Facts) -> Violations:
     if len(set(roles.values())) == 1:
         listed = f"feet {', '.join(roles)}; joints of each leg: {roles[robot.legs[0].foot]}"
     else:
-        listed = "; ".join(f"{foot}: {each}" for foot, each in roles.items())
+        listed = "; ".join(f"{foot}: {role}" for foot, role in roles.items())
     yield Violation(
         message=f"{len(robot.legs)} legs with a length of {mean_length(robot.legs):.3f} m; "
         f"{listed}",
@@ -112,7 +112,7 @@ def _uncounted_legs(robot: Facts) -> list[str]:
 def _is_equal_limb(robot: Facts, limb: Limb, leg: Limb) -> bool:
     if _joint_types(limb) != _joint_types(leg) or len(limb.chain) != len(leg.chain):
         return False
-    own, other = ([robot.bodies[index].mass for index in each.chain] for each in (limb, leg))
+    own, other = ([robot.bodies[index].mass for index in part.chain] for part in (limb, leg))
     return min(own) > 0 and bool(np.allclose(own, other, rtol=_MAX_MASS_DIFFERENCE))
 
 

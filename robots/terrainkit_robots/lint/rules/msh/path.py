@@ -162,12 +162,12 @@ def package_uri(robot: Facts) -> Violations:
     for (scheme, _), members in groups.items():
         first, fix = members[0]
         severity = not_loaded(next((used for used, _ in members if used.strict), first))
-        edits = [edit for _, each in members if each is not None for edit in each.edits]
+        edits = [edit for _, fix in members if fix is not None for edit in fix.edits]
         description = fix.description if fix and len(members) == 1 else "Use relative paths."
         yield Violation(
             element=first,
             message=f"path of {len(members)} mesh{'es' * (len(members) > 1)} "
-            f"({names((each.name for each, _ in members), 2)}): refers to {scheme}; expected a "
+            f"({names((mesh.name for mesh, _ in members), 2)}): refers to {scheme}; expected a "
             "relative path, which MuJoCo can load",
             severity=severity if scheme == "a host" else None,
             measured={"meshes": len(members)},

@@ -94,7 +94,7 @@ def merged_feet(robot: Facts) -> Violations:
     if not merges:
         return
     foot, bodies = next(iter(merges.items()))
-    by = [name for name in SIMULATORS if any(name in each for each in merges.values())]
+    by = [name for name in SIMULATORS if any(name in simulators for simulators in merges.values())]
     example = f"{foot} into {next(iter(bodies.values()))}" + ", ..." * (len(merges) > 1)
     yield Violation(
         subject=foot,

@@ -72,7 +72,7 @@ def _crosses(robot: Facts, joint: Joint) -> bool:
         for leg in robot.legs
     ]
     own = [chain for chain in chains if joint.name in chain]
-    return any(target in chain for chain in chains) and not any(target in each for each in own)
+    return any(target in chain for chain in chains) and not any(target in chain for chain in own)
 
 
 def _is_gripper(left: Joint, right: Joint) -> bool:
