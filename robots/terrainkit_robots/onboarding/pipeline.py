@@ -29,17 +29,6 @@ if TYPE_CHECKING:
     from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
     from terrainkit_robots.simulation.gain import GainSet
 
-_BLOCKING_RULES = (
-    *("XML", "MSH", "TRE", "INR001", "INR002", "INR003", "INR004", "INR011"),
-    *("JNT001", "JNT004", "JNT007", "JNT013"),
-)
-"""Codes, or starts of codes, of rules whose errors change the robot that would be written, or that
-MuJoCo rejects. For example, a joint of an unknown type would become fixed."""
-
-_FIXED_BY_EXPORT = frozenset({"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
-"""Rules whose errors cannot occur in the written files: each link has an <inertial>, meshes are
-converted and renamed, and rotations are written as roll, pitch and yaw."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class OnboardOptions:
@@ -90,13 +79,6 @@ class OnboardOptions:
     """Called with the name of each step when it starts."""
 
 
-def is_blocking(finding: Finding) -> bool:
-    """Return whether a finding means that the written files would describe another robot."""
-    if finding.code == "MSH001" and not finding.measured.get("collisions"):
-        return False  # the written files have no visual mesh for it
-    return finding.severity == "error" and finding.code.startswith(_BLOCKING_RULES)
-
-
 def onboard(
     path: str | Path, output: str | Path | None = None, options: OnboardOptions | None = None
 ) -> OnboardResult:
@@ -137,7 +119,7 @@ def onboard(
     report, fixed = _fix_in_memory(path, options)
     for rule in report.crashed:
         raise TerrainkitError(f"{path}: {rule.code}: {rule.reason}")
-    if not options.force and any(map(is_blocking, report.findings)):
+    if not options.force and any(finding.is_blocking for finding in report.findings):
         return OnboardResult(report=report, fixed=fixed)
     target = Path(output or options.name or plain_name(report.facts.model))
     check_folder(target, overwrite=options.overwrite)
@@ -184,7 +166,7 @@ def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[F
 
         result = fix_robot(path, check, report=report, unsafe=options.unsafe_fixes)
         report, fixed = result.report, result.fixed
-    by_export = [f for f in report.findings if f.severity == "error" and f.code in _FIXED_BY_EXPORT]
+    by_export = [f for f in report.findings if f.severity == "error" and f.onboarding == "converts"]
     remaining = tuple(f for f in report.findings if f not in by_export)
     # The fix of the lint rule is not applied, so its description is removed.
     fixed = (*fixed, *(replace(finding, fix=None) for finding in by_export))

@@ -12,9 +12,6 @@ if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
     from terrainkit_robots.lint.rule import Finding
 
-_RULE = "JNT011"
-"""The rule that finds placeholder limits."""
-
 
 def placeholder_effort(facts: "Facts", findings: "Iterable[Finding]") -> frozenset[str]:
     """Return the joints of legs whose effort limit is a placeholder, such as 1000 N m."""
@@ -22,7 +19,9 @@ def placeholder_effort(facts: "Facts", findings: "Iterable[Finding]") -> frozens
     return frozenset(
         finding.subject
         for finding in findings
-        if finding.code == _RULE and "effort" in finding.measured and finding.subject in legs
+        if finding.onboarding == "repairs"
+        and "effort" in finding.measured
+        and finding.subject in legs
     )
 
 

@@ -5,9 +5,6 @@ from dataclasses import replace
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
 
-_RULES = ("INR003", "INR004")
-"""Rules on the inertia of a single link."""
-
 _MAX_CHANGE = 0.01
 """Largest change of the inertia of a rigid body, over its smallest principal moment. CAD inertias
 are less accurate than this."""
@@ -25,10 +22,12 @@ def with_repairs_marked_safe(report: Report) -> Report:
 
 
 def _with_safe_fix(report: Report, finding: Finding) -> Finding:
-    if finding.code == "MSH001" and finding.fix is not None:
+    if finding.onboarding != "repairs" or finding.fix is None:
+        return finding
+    if finding.family == "MSH":
         return replace(finding, fix=replace(finding.fix, safety="safe"))
     body = report.facts.body_of.get(finding.subject)
-    if finding.code not in _RULES or finding.fix is None or body is None:
+    if body is None:
         return finding
     link = next(link for link in body.links if link.name == finding.subject)
     change = report.facts.inertia_repair.relative_change(link)

@@ -42,7 +42,7 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
             "backups",
             f"your edits are in {names(result.edits)}; use --spec to apply the values of a spec",
         )
-    num_missing = sum(finding.code == "MSH001" for finding in result.report.findings)
+    num_missing = len(_repairable(result.report.findings, "MSH"))
     if num_missing:
         missing = "mesh is" if num_missing == 1 else "meshes are"
         yield (
@@ -55,11 +55,16 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
 
 def _repairs(fixed: "Sequence[Finding]") -> Iterator[tuple[str, str]]:
     """Yield the repairs of inertias and of mesh paths, which may change the robot."""
-    for noun, codes in (("inertia", ("INR003", "INR004")), ("path", ("MSH001",))):
-        subjects = [finding.subject for finding in fixed if finding.code in codes]
+    for noun, family in (("inertia", "INR"), ("path", "MSH")):
+        subjects = _repairable(fixed, family)
         if subjects:
-            plural = "s" * (len(subjects) > 1)
+            plural = "s" if len(subjects) > 1 else ""
             yield "repaired", f"the {noun}{plural} of {names(subjects, max_count=3)}; see report.md"
+
+
+def _repairable(findings: "Sequence[Finding]", family: str) -> list[str]:
+    """Return the subjects of the findings that onboarding can repair."""
+    return [f.subject for f in findings if f.onboarding == "repairs" and f.family == family]
 
 
 def _list_files(robot: "RobotFiles") -> str:

@@ -12,7 +12,7 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.robot_file import is_description
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
+from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
 from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.load import single_torch_thread
 from terrainkit_robots.policy.rollout import Progress
@@ -96,7 +96,7 @@ def smoke_test(
     options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
         onboarded = onboard(name, Path(folder) / "robot", options)
-        codes = [finding.code for finding in onboarded.report.findings if is_blocking(finding)]
+        codes = [finding.code for finding in onboarded.report.findings if finding.is_blocking]
         measured = f"{len(codes)} errors: {', '.join(dict.fromkeys(codes))}" if codes else "yes"
         passed = onboarded.folder is not None
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")

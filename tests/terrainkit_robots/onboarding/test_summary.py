@@ -8,6 +8,10 @@ from terrainkit_robots.onboarding.summary import summarize
 from terrainkit_robots.onboarding.verify import Verification
 
 
+def finding(code, subject, onboarding="repairs"):
+    return SimpleNamespace(code=code, family=code[:3], subject=subject, onboarding=onboarding)
+
+
 @pytest.fixture
 def lines(monkeypatch, stood):
     """Return a function that summarizes a robot that stood; keywords replace results."""
@@ -19,7 +23,7 @@ def lines(monkeypatch, stood):
 
     def run(standing=stood, files=(), legs=(1,), changes=(), missing=0, verified=None, **given):
         checks = Verification(equivalences=equivalences, standing=standing, **(verified or {}))
-        findings = [SimpleNamespace(code="MSH001")] * missing + [SimpleNamespace(code="MSH002")]
+        findings = [finding("MSH001", "")] * missing + [finding("MSH002", "", "converts")]
         result = {
             "report": SimpleNamespace(findings=findings),
             "fixed": (),
@@ -52,14 +56,16 @@ def test_summary_of_a_plain_robot(lines):
 
 
 def test_summary_without_files_ends_after_the_fixes(lines):
-    fixed = [SimpleNamespace(code="INR003", subject=name) for name in "abcd"]
+    fixed = [finding("INR003", name) for name in "abcd"]
     assert lines(robot=None, fixed=fixed) == {
         "checked": "2 findings",
         "fixed": "4 findings: INR003",
         "repaired": "the inertias of a, b, c, ...; see report.md",
     }
-    one = SimpleNamespace(code="MSH001", subject="a.stl")
-    assert lines(robot=None, fixed=[one])["repaired"] == "the path of a.stl; see report.md"
+    assert (
+        lines(robot=None, fixed=[finding("MSH001", "a.stl")])["repaired"]
+        == "the path of a.stl; see report.md"
+    )
 
 
 def test_summary_lists_what_else_happened(lines):

@@ -14,7 +14,7 @@ _RIGHT = {"right", "fr", "hr", "br", "rf", "rh", "rb", "rm", "mr"}
 """Words of names that give the position of a leg. RR is omitted: it also occurs in other names."""
 
 
-@rule("LEG005", "forward-axis", "warning", needs=("legs",), certainty="likely")
+@rule("LEG005", "forward-axis", "warning", needs=("length-unit", "angle-unit"))
 def forward_axis(robot: Facts) -> Violations:
     """The robot does not face +x.
 

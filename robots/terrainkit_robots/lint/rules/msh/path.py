@@ -36,7 +36,7 @@ _MAX_PARENT_FOLDERS = 3
 """Maximum number of `..` in a relative path, enough for another package of the same workspace."""
 
 
-@rule("MSH001", "missing-mesh", "error", fixes="unsafe")
+@rule("MSH001", "missing-mesh", "error", fixes="unsafe", onboarding="repairs")
 def missing_mesh(robot: Facts) -> Violations:
     """A mesh file does not exist.
 
@@ -62,6 +62,7 @@ def missing_mesh(robot: Facts) -> Violations:
                 severity=not_loaded(used),
                 measured={"collisions": len(used.collisions)},
                 fix=_relative_fix(robot, used, "unsafe") if is_in_other_folder(used.mesh) else None,
+                is_written=bool(used.collisions),  # a missing visual mesh is omitted
             )
 
 
@@ -82,7 +83,7 @@ def _search_result(robot: Facts, used: UsedMesh) -> str:
     return f"searched at {short_path(mesh.path)}"
 
 
-@rule("MSH002", "absolute-path", "error", fixes="unsafe")
+@rule("MSH002", "absolute-path", "error", fixes="unsafe", onboarding="converts")
 def absolute_path(robot: Facts) -> Violations:
     """A mesh has an absolute path.
 
@@ -187,7 +188,7 @@ def _is_same_path(used: UsedMesh) -> bool:
     return [part.lower() for part in used.mesh.path.parts[-len(parts) :]] == parts
 
 
-@rule("MSH004", "filename-case", "error", fixes="safe")
+@rule("MSH004", "filename-case", "error", fixes="safe", onboarding="converts")
 def filename_case(robot: Facts) -> Violations:
     """A mesh path differs from the file name in case, or contains backslashes.
 

@@ -19,7 +19,7 @@ from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
     is_welded,
     loaded_robots,
 )
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import UNITS, Violation, Violations, rule
 from terrainkit_robots.text import conjunction
 
 _MAX_JOINTS = 40
@@ -142,7 +142,7 @@ def welded_trunk(robot: Facts) -> Violations:
     )
 
 
-@rule("SIM003", "genesis-armature", "note")
+@rule("SIM003", "genesis-armature", "note", needs=UNITS)
 def genesis_armature(robot: Facts) -> Violations:
     """The default armature of Genesis exceeds the inertia that a joint moves.
 

@@ -23,7 +23,7 @@ _MAX_SHAPE_ERROR, _SHAPE_MARGIN = 0.3, 0.01
 [m]."""
 
 
-@rule("SYM013", "collision-asymmetry", "warning", certainty="likely")
+@rule("SYM013", "collision-asymmetry", "warning")
 def collision_asymmetry(robot: Facts) -> Violations:
     """The collision shapes of a body differ from its mirror image, or are missing.
 

@@ -37,7 +37,7 @@ _MAX_MOMENT_ERROR = 0.05
 """Difference of principal moments above which SYM003 reports the pair, as the same share."""
 
 
-@rule("SYM003", "inertia-asymmetry", "warning", certainty="likely")
+@rule("SYM003", "inertia-asymmetry", "warning")
 def inertia_asymmetry(robot: Facts) -> Violations:
     """The principal moments of a body differ from its mirror image.
 
@@ -103,7 +103,7 @@ def _precision(body: Body) -> float:
     return float(10.0 ** min(exponents, default=0))
 
 
-@rule("SYM011", "product-asymmetry", "warning", certainty="likely")
+@rule("SYM011", "product-asymmetry", "warning")
 def product_asymmetry(robot: Facts) -> Violations:
     """The principal axes of a body's inertia differ from its mirror image.
 

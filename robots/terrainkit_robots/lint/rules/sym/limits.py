@@ -22,7 +22,7 @@ _MAX_LIMIT_DIFFERENCE = 0.01
 """Allowed relative difference of effort and velocity limits."""
 
 
-@rule("SYM004", "limit-asymmetry", "warning", certainty="likely")
+@rule("SYM004", "limit-asymmetry", "warning")
 def limit_asymmetry(robot: Facts) -> Violations:
     """The limits of a joint do not match its mirror image.
 
@@ -72,7 +72,7 @@ def _limit_sizes(body: Body) -> Matrix | None:
     return None if limits is None else np.sort(np.abs(limits))
 
 
-@rule("SYM005", "effort-asymmetry", "warning", certainty="likely")
+@rule("SYM005", "effort-asymmetry", "warning")
 def effort_asymmetry(robot: Facts) -> Violations:
     """The effort or velocity limit of a joint differs from its mirror image.
 

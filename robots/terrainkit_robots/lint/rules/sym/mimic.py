@@ -8,7 +8,7 @@ from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("SYM012", "mimic-asymmetry", "warning", certainty="likely")
+@rule("SYM012", "mimic-asymmetry", "warning")
 def mimic_asymmetry(robot: Facts) -> Violations:
     """A joint and its mirror image do not follow mirrored joints in the same way.
 

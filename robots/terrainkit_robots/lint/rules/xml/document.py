@@ -7,7 +7,7 @@ from terrainkit_robots.lint.problems import problem_violation, problem_violation
 from terrainkit_robots.lint.rule import Severity, Violations, rule
 
 
-@rule("XML001", "malformed-xml", "error", fixes="safe")
+@rule("XML001", "malformed-xml", "error", fixes="safe", is_fatal=True)
 def malformed_xml(robot: Facts) -> Violations:
     """The file is not well-formed XML.
 
@@ -65,7 +65,7 @@ def entity_declarations(robot: Facts) -> Violations:
     return problem_violations(robot, "XML010")
 
 
-@rule("XML011", "mjcf-parse-error", "error")
+@rule("XML011", "mjcf-parse-error", "error", is_fatal=True)
 def mjcf_parse_error(robot: Facts) -> Violations:
     """MuJoCo cannot parse the MJCF file.
 
@@ -80,7 +80,7 @@ def mjcf_parse_error(robot: Facts) -> Violations:
     return problem_violations(robot, "XML011")
 
 
-@rule("XML002", "unknown-root", "error")
+@rule("XML002", "unknown-root", "error", is_fatal=True)
 def unknown_root(robot: Facts) -> Violations:
     """The file is neither URDF, xacro nor MJCF.
 
@@ -133,7 +133,7 @@ def unexpanded_xacro(robot: Facts) -> Violations:
     return problem_violations(robot, "XML004")
 
 
-@rule("XML005", "xacro-failed", "error")
+@rule("XML005", "xacro-failed", "error", is_fatal=True)
 def xacro_failed(robot: Facts) -> Violations:
     """The xacro file cannot be expanded.
 

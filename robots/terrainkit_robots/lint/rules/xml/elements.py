@@ -124,7 +124,7 @@ def undefined_material(robot: Facts) -> Violations:
     return problem_violations(robot, "XML016")
 
 
-@rule("XML014", "unsupported-quaternion", "error", fixes="unsafe")
+@rule("XML014", "unsupported-quaternion", "error", fixes="unsafe", onboarding="converts")
 def unsupported_quaternion(robot: Facts) -> Violations:
     """A rotation is given as a quaternion, which simulators ignore.
 
