@@ -208,7 +208,8 @@ class Finding(Violation):
 
 Violations = Iterator[Violation]
 
-Check = Callable[["Facts"], Violations]
+Check = Callable[["Facts"], Violations | None]
+"""A generator of violations. A function without code reports what the readers recorded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,7 +244,7 @@ class Rule:
 
     def findings(self, robot: "Facts") -> Iterator[Finding]:
         """Yield the violations on a robot with their defaults filled in."""
-        for violation in self.check(robot):
+        for violation in self._violations(robot):
             element, subject = violation.element, violation.subject
             if subject is None:
                 subject = robot.model.title if element is None else element.name
@@ -261,6 +262,19 @@ class Rule:
                 is_written=violation.is_written,
                 onboarding=self.onboarding,
             )
+
+    def _violations(self, robot: "Facts") -> Violations:
+        """Yield what the readers recorded under the code, then what the check finds."""
+        for problem in robot.model.problems:
+            if problem.code == self.code:
+                yield Violation(
+                    subject=problem.subject or robot.model.name or problem.source.file.name,
+                    source=problem.source,
+                    message=problem.message,
+                    severity=problem.severity,
+                    fix=problem.fix,
+                )
+        yield from self.check(robot) or ()
 
     @property
     def family(self) -> str:

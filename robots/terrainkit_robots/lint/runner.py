@@ -149,12 +149,12 @@ _KINDS: Mapping[Need, SkipKind] = {
 
 
 def has_inputs(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
-    """Return whether the user provided the inputs of a rule: other file, spec, simulation."""
-    return not any(
-        _is_missing(need, facts, simulate=simulate)
-        for need in rule.needs
-        if need in ("mjcf", "simulation", "against", "spec")
-    )
+    """Return whether the user provided the inputs of a rule: other file, spec, simulation.
+
+    A rule whose first missing input is legs is in the report, as skipped.
+    """
+    lacks = (n for n in rule.needs if _is_missing(n, facts, simulate=simulate))
+    return next((n for n in lacks if _KINDS.get(n) != "cannot-check"), "legs") == "legs"
 
 
 def _why_skipped(

@@ -12,6 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import closest, truncate
+from terrainkit_robots.description.fix import number_fix
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -134,7 +135,7 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
             f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
             + (", with decimal points and separated by spaces" if repaired else ""),
             attribute=name,
-            repaired=repaired,
+            fix=number_fix(node.source, name, repaired),
         )
         if repaired:
             node.attributes[name] = repaired
@@ -219,9 +220,7 @@ def _unknown_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean {suggestion}?" if suggestion else ""),
         attribute=name,
-        found=name,
-        known=suggestion,
-        refused="mujoco",
+        severity="error",
     )
     for node in nodes:
         value = node.attributes.pop(name)
@@ -243,10 +242,7 @@ def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         node,
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean <{suggestion}>?" if suggestion else ""),
-        attribute="",
-        found=node.tag,
-        known=suggestion,
-        refused="mujoco",
+        severity="error",
     )
     for node in nodes:
         if (
@@ -278,7 +274,7 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     else:
         expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
     message = f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
-    tree.add_problem(node, "XML006", message, attribute=name, repaired="")
+    tree.add_problem(node, "XML006", message, attribute=name)
     return True
 
 

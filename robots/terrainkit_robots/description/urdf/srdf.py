@@ -46,7 +46,8 @@ def invalid_srdf(doc: XmlDocument) -> Iterator[Problem]:
     root = semantics.root
     if root is None or semantics.problems:
         problem = next(iter(semantics.problems))
-        yield Problem(code="TRE010", message=problem.message, source=problem.source)
+        source, message = problem.source, problem.message
+        yield Problem(code="TRE010", message=message, source=source, subject=source.file.name)
         return
     known = {
         "link": link_names(doc.root),
