@@ -16,6 +16,9 @@ rule, and the sections `Fix:` and `Source:`.
         Source:
             Where the problem and the threshold are documented.
         '''
+
+Other packages add rules as entry points of the group `terrainkit.rules`. The name of an entry point
+is the family of its rules, three capital letters, and its value the module that declares them.
 """
 
 import importlib
@@ -401,7 +404,11 @@ def rules() -> tuple[Rule, ...]:
         with plugin_errors(f"rules {point.name} ({point.value}) cannot be loaded"):
             if point.name in FAMILIES or not re.fullmatch("[A-Z]{3}", point.name):
                 raise ConfigError(f"family: got {point.name}; expected three other capital letters")
+            known = set(_RULES)
             point.load()
+            for code in _RULES.keys() - known:
+                if not code.startswith(point.name):
+                    raise ConfigError(f"rule code: got {code}; expected {point.name} and digits")
     order = list(families())
     return tuple(sorted(_RULES.values(), key=lambda r: (order.index(r.family), r.code)))
 
