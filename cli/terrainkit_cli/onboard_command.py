@@ -20,7 +20,7 @@ from terrainkit_cli.argument_types import (
 from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.pipeline import OnboardOptions
+    from terrainkit_robots.onboarding.options import OnboardOptions
     from terrainkit_robots.onboarding.result import OnboardResult
 
 
@@ -98,7 +98,7 @@ class Onboard(Command):
     def run(self) -> int:
         """Onboard the robot and print a summary."""
         from terrainkit_robots.onboarding.pipeline import onboard
-        from terrainkit_robots.onboarding.summary import summarize
+        from terrainkit_robots.onboarding.statements import summarize
 
         if not self.file:
             raise ConfigError("FILE: missing; expected a robot file, quadruped, or biped")
@@ -123,7 +123,7 @@ class Onboard(Command):
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (
             cache_folder,
         )
-        from terrainkit_robots.onboarding.pipeline import OnboardOptions
+        from terrainkit_robots.onboarding.options import OnboardOptions
 
         return OnboardOptions(
             settings=parse_settings(self.ignore, self.package, self.xacro_arg),
