@@ -10,18 +10,18 @@ from terrainkit.errors import ExportError
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.base_link import with_world_base
+from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
 from terrainkit_robots.onboarding.equivalence import (
     Equivalence,
     compare_models,
     reference_kinematics,
 )
-from terrainkit_robots.onboarding.robot_files import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.assessment import assess
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.onboarding.robot_files import RobotFiles
+    from terrainkit_robots.onboarding.convert import RobotFiles
     from terrainkit_robots.simulation.gain import Gain
     from terrainkit_robots.simulation.standing import StandResult
     from terrainkit_robots.spec.robot_spec import RobotSpec

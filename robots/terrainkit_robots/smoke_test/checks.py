@@ -12,7 +12,8 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.robot_file import is_description
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.load import single_torch_thread
 from terrainkit_robots.policy.rollout import Progress

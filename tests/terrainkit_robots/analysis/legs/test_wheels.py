@@ -3,7 +3,8 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.lint.check import check_robot
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.spec.robot import Robot
 from tests.small_robots import URDF, ball, box, facts, joint, link, shape
 
