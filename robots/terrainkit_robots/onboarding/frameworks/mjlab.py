@@ -27,49 +27,6 @@ _FIELDS = {
 """Fields of BuiltinPositionActuatorCfg, and the corresponding fields of the spec.
 BuiltinVelocityActuatorCfg has the same fields except for the stiffness."""
 
-_ENTITY = '''
-$about
-
-$standard
-from pathlib import Path
-
-import mujoco
-$actuators
-from mjlab.entity import EntityArticulationInfoCfg, EntityCfg
-$task_imports
-
-$robot_xml
-
-
-def get_spec() -> mujoco.MjSpec:
-    """Return the robot without actuators and keyframes, which mjlab adds."""
-    spec = mujoco.MjSpec.from_file(str(ROBOT_XML))
-    actuator = mujoco.mjtObj.mjOBJ_ACTUATOR
-    sensors = [sensor for sensor in spec.sensors if sensor.objtype == actuator]
-    for element in [*sensors, *spec.keys, *spec.actuators]:
-        spec.delete(element)
-    return spec
-
-
-INIT_STATE = EntityCfg.InitialStateCfg(
-    $init_state
-)
-
-$articulation
-$scales
-
-
-def get_robot_cfg() -> EntityCfg:
-    """Return a new configuration of the robot."""
-    return EntityCfg(
-        spec_fn=get_spec,
-        init_state=INIT_STATE,
-        articulation=ARTICULATION,
-        # Actuators in the order of the joints.
-        sort_actuators=True,
-    )
-'''
-
 _POSITION, _VELOCITY = "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg"
 
 
@@ -96,7 +53,7 @@ def config_text(robot: ConfigRobot) -> str:
     has_task = bool(train_arguments(robot.spec))
     kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
     entity = source.fill(
-        _ENTITY,
+        "mjlab_entity",
         about=source.docstring(_about(robot, has_task=has_task)),
         standard=["import argparse", "import sys", "from dataclasses import replace"] * has_task,
         actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
