@@ -31,7 +31,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
-from terrainkit.errors import ConfigError, plugin_errors
+from terrainkit.errors import ConfigError, one_line, plugin_errors
 from terrainkit.settings.text import closest, expected_names
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import Source
@@ -315,12 +315,8 @@ class Rule:
             raise ConfigError(
                 f"docstring of rule {self.code}: expected a title, a reason, Fix: and Source:"
             )
-        why = "\n\n".join(_join_lines(paragraph) for paragraph in match["why"].split("\n\n"))
-        return match["title"], why, _join_lines(match["fix"]), _join_lines(match["source"])
-
-
-def _join_lines(text: str) -> str:
-    return " ".join(text.split())
+        why = "\n\n".join(one_line(paragraph) for paragraph in match["why"].split("\n\n"))
+        return match["title"], why, one_line(match["fix"]), one_line(match["source"])
 
 
 def _need_order(need: Need) -> int:

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.errors import ExportError
+from terrainkit.errors import ExportError, one_line
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.base_link import with_world_base
@@ -142,7 +142,7 @@ def _load_model(path: Path) -> tuple[Any, Any]:
         spec = mujoco.MjSpec.from_file(str(path))
         return spec, spec.compile()
     except ValueError as error:
-        reason = " ".join(str(error).split())
+        reason = one_line(str(error))
         raise ExportError(f"MuJoCo cannot load the written {path.name}: {reason}") from None
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from terrainkit.errors import one_line
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
@@ -216,7 +217,7 @@ def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
     except MemoryError:
         raise
     except Exception as error:  # yourdfpy has no common base class of its errors
-        text = " ".join(str(error).split()) or "no message"
+        text = one_line(str(error)) or "no message"
         return LoadError(message=truncate(f"{type(error).__name__}: {text}", 200))
     finally:
         log.setLevel(level)

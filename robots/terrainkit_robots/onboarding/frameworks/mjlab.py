@@ -30,6 +30,9 @@ BuiltinVelocityActuatorCfg has the same fields except for the stiffness."""
 _POSITION, _VELOCITY = "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg"
 
 
+_STANDARD_IMPORTS = ["import argparse", "import sys", "from dataclasses import replace"]
+
+
 def train_arguments(spec: RobotSpec) -> str:
     """Return the arguments with which Python trains a robot in its folder; empty without a task."""
     if not (spec.feet and spec.joint_order and spec.floating):
@@ -51,11 +54,12 @@ def config_text(robot: ConfigRobot) -> str:
     """
     patterns = mjlab_patterns(robot.all_joints)
     has_task = bool(train_arguments(robot.spec))
-    kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
+    drives = ((_POSITION, robot.position_joints), (_VELOCITY, robot.velocity_joints))
+    kinds = [kind for kind, joints in drives if joints]
     entity = source.fill(
         "mjlab_entity",
         about=source.docstring(_about(robot, has_task=has_task)),
-        standard=["import argparse", "import sys", "from dataclasses import replace"] * has_task,
+        standard=_STANDARD_IMPORTS if has_task else [],
         actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
         task_imports=mjlab_task.IMPORTS.split("\n") if has_task else [],
         robot_xml=source.sum_assignment(
@@ -70,11 +74,11 @@ def config_text(robot: ConfigRobot) -> str:
 
 def _about(robot: ConfigRobot, *, has_task: bool) -> list[str]:
     package = package_name(robot.spec.name)
-    title = f"{robot.title} for mjlab: entity" + (", actuators and velocity task." * has_task)
+    content = "entity, actuators and velocity task" if has_task else "entity and actuators"
     paragraphs = [
-        title if has_task else f"{title} and actuators.",
+        f"{robot.title} for mjlab: {content}.",
         f"{source.GENERATED_NOTE} A pattern matches the whole name of a joint.",
-        *_training(robot) * has_task,
+        *(_training(robot) if has_task else []),
         f"Copy the folder into your Python package as {package}, and use",
         f"    from {package}.mjlab_config import get_robot_cfg\n\n"
         '    cfg.scene.entities = {"robot": get_robot_cfg()}',

@@ -123,4 +123,4 @@ def _actions(robot: ConfigRobot) -> list[str]:
     velocity = _VELOCITY_ACTIONS if robot.velocity_joints else []
     if not robot.position_joints:
         return [_NO_POSITION_ACTIONS, *velocity]
-    return [_POSITION_ACTIONS, *[_NAMED_POSITION_ACTIONS] * bool(velocity), *velocity]
+    return [_POSITION_ACTIONS, *([_NAMED_POSITION_ACTIONS] if velocity else []), *velocity]

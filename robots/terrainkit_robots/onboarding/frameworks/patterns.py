@@ -120,4 +120,4 @@ def _normalize(name: str) -> str:
     """Return the name in USD with repeated underscores merged."""
     flat = re.sub(r"[^A-Za-z0-9]+", "_", name)
     flat = "_" + flat[1:] if flat[0].isdigit() else flat
-    return "a" * flat.startswith("_") + flat
+    return f"a{flat}" if flat.startswith("_") else flat

@@ -167,7 +167,7 @@ def package_uri(robot: Facts) -> Violations:
         description = fix.description if fix and len(members) == 1 else "Use relative paths."
         yield Violation(
             element=first,
-            message=f"path of {len(members)} mesh{'es' * (len(members) > 1)} "
+            message=f"path of {len(members)} mesh{'es' if len(members) > 1 else ''} "
             f"({names((mesh.name for mesh, _ in members), 2)}): refers to {scheme}; expected a "
             "relative path, which MuJoCo can load",
             severity=severity if scheme == "a host" else None,

@@ -95,13 +95,14 @@ def merged_feet(robot: Facts) -> Violations:
         return
     foot, bodies = next(iter(merges.items()))
     by = [name for name in SIMULATORS if any(name in simulators for simulators in merges.values())]
-    example = f"{foot} into {next(iter(bodies.values()))}" + ", ..." * (len(merges) > 1)
+    more = ", ..." if len(merges) > 1 else ""
+    verb = "merges" if len(by) == 1 else "merge"
     yield Violation(
         subject=foot,
         source=robot.tree.parent_joint[foot].source,
         message=(
-            f"{conjunction(by)} merge{'s' * (len(by) == 1)} {len(merges)} feet into their parent "
-            f"links by default ({example})"
+            f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
+            f"({foot} into {next(iter(bodies.values()))}{more})"
         ),
         hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
         measured={"feet": len(merges)},
