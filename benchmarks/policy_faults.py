@@ -20,7 +20,7 @@ from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 Edit = Callable[[Contract], Contract]
 

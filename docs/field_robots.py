@@ -27,7 +27,7 @@ from published_gains import read_published, values_of
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.onboarding.options import OnboardOptions
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.verify import Verification

@@ -20,7 +20,7 @@ from terrainkit_cli.argument_types import (
 from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.options import OnboardOptions
+    from terrainkit_robots.onboarding.onboard_options import OnboardOptions
     from terrainkit_robots.onboarding.result import OnboardResult
 
 
@@ -123,7 +123,7 @@ class Onboard(Command):
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (
             cache_folder,
         )
-        from terrainkit_robots.onboarding.options import OnboardOptions
+        from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 
         return OnboardOptions(
             settings=parse_settings(self.ignore, self.package, self.xacro_arg),

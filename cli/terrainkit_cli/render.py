@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rich.status import Status
     from rich.table import Table
 
-    from terrainkit_robots.lint.report.text import Span
+    from terrainkit_robots.lint.report.text_report import Span
     from terrainkit_robots.rl.runner import ProgressCallback, TrainingProgress
 
 _T = TypeVar("_T")

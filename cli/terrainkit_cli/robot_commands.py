@@ -232,7 +232,7 @@ class CheckRobot(Command):
             if reports and not text:
                 render.note("there is nothing to fix")
         elif self.format == "text":
-            from terrainkit_robots.lint.report import text as text_report
+            from terrainkit_robots.lint.report import text_report
 
             brief = any(map(_is_folder, self.files)) and not (self.notes or self.changed)
             options = {"verbose": self.notes, "brief": brief}

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.lint.check import check_robot
     from terrainkit_robots.lint.rule import Finding
     from terrainkit_robots.lint.runner import Report
-    from terrainkit_robots.onboarding.options import OnboardOptions
+    from terrainkit_robots.onboarding.onboard_options import OnboardOptions
     from terrainkit_robots.onboarding.pipeline import onboard
     from terrainkit_robots.onboarding.result import OnboardResult
     from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -31,7 +31,7 @@ __all__ = [
 
 _MODULES = {
     "Finding": "lint.rule",
-    "OnboardOptions": "onboarding.options",
+    "OnboardOptions": "onboarding.onboard_options",
     "OnboardResult": "onboarding.result",
     "Report": "lint.runner",
     "RobotModel": "description.model",

@@ -20,10 +20,10 @@ from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_changes, imu_site
 from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.onboarding.options import OnboardOptions
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.repair import without_placeholder_efforts
 from terrainkit_robots.spec.column import rounded_length
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel

@@ -11,7 +11,7 @@ from terrainkit_robots.onboarding.convert import MJCF, convert
 from terrainkit_robots.onboarding.folder import check_folder, find_edits, new_folder, write_files
 from terrainkit_robots.onboarding.frameworks.frameworks import check_framework, robot_config_files
 from terrainkit_robots.onboarding.frameworks.naming import package_name
-from terrainkit_robots.onboarding.options import OnboardOptions
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.repair import check_and_repair
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.statements import report_markdown

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Literal
 
-from terrainkit_robots.analysis.bodies.joint_order import permutation
+from terrainkit_robots.analysis.bodies.permutation import permutation
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
 from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
 from terrainkit_robots.lint.report.grouping import group_findings

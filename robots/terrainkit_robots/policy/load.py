@@ -16,7 +16,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec, Run, changed_robot_files, last_checkpoint
 from terrainkit_robots.rl.runner import runner_config
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 
 Policy = Callable[[TensorDict], torch.Tensor]
 

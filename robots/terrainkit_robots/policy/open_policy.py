@@ -36,7 +36,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _COMPARED = "format_version timing observation action control_type joints feet gait height_scan"
 """Keys that state what the policy receives and what its actions do."""

@@ -26,7 +26,7 @@ from terrainkit_robots.export.mjcf import Extras, floor_text, mjcf_text
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.units import PRISMATIC, REVOLUTE, JointUnits
+from terrainkit_robots.simulation.joint_units import PRISMATIC, REVOLUTE, JointUnits
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,13 +14,13 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
 from terrainkit_robots.simulation.gain import GainSet
+from terrainkit_robots.simulation.joint_units import PRISMATIC, JointUnits
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel
 from terrainkit_robots.simulation.time_step import (
     JointInertia,
     max_stable_stiffness,
     min_stable_inertia,
 )
-from terrainkit_robots.simulation.units import PRISMATIC, JointUnits
 
 _UPRIGHT_FACTOR = 1.5
 """Stiffness of a leg over m g l / n, the rate at which gravity tips it over: weight times leg

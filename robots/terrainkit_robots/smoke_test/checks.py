@@ -12,7 +12,7 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.robot_file import is_description
-from terrainkit_robots.onboarding.options import OnboardOptions
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.load import single_torch_thread
@@ -27,7 +27,7 @@ from terrainkit_robots.rl.tasks import default_task, get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.smoke_test.short_training import TrainingRecord, train_briefly
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.text import count
 
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5

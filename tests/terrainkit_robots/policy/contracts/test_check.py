@@ -7,7 +7,7 @@ from terrainkit_robots.policy.contracts.check import check_contract, check_value
 from terrainkit_robots.policy.contracts.repairs import Repair
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.simulation.joint_units import PRISMATIC
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import (
@@ -11,7 +12,6 @@ from terrainkit_robots.simulation.time_step import (
     max_stable_stiffness,
     max_stable_time_step,
 )
-from terrainkit_robots.simulation.units import PRISMATIC
 from terrainkit_robots.text import count
 
 _MIN_STIFFNESS_SHARE = 0.003

@@ -9,7 +9,7 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.simulation.as_written import (
+from terrainkit_robots.simulation.written_model import (
     WrittenStand,
     make_written_model,
     stand_as_written,

@@ -7,9 +7,9 @@ from typing import Any
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.simulation.as_written import make_written_model, position_servos
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.time_step import joint_inertia
+from terrainkit_robots.simulation.written_model import make_written_model, position_servos
 from terrainkit_robots.text import count
 
 # The models of MuJoCo Menagerie and Playground have 0.11 to 1.2, and robots of others 0.03.

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from terrainkit_robots.analysis.bodies.joint_order import permutation
+from terrainkit_robots.analysis.bodies.permutation import permutation
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.simulator_conventions.armature import (

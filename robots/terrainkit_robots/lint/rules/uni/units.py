@@ -3,7 +3,7 @@
 import numpy as np
 
 from terrainkit_robots.analysis.facts import Facts, cached_fact
-from terrainkit_robots.analysis.units import (
+from terrainkit_robots.analysis.unit_errors import (
     UnitError,
     body_unit_errors,
     effort_error,

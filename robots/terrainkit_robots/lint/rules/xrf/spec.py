@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from terrainkit.settings.text import closest, truncate
-from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.bodies.kinematics import ancestors
+from terrainkit_robots.analysis.bodies.permutation import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
