@@ -217,8 +217,12 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         if link not in bodies
     ]
     imu = imu_site(facts)
-    other_frames = [f for f in frames if f.name == imu.name and not _is_same_site(f, imu)]
-    if imu.name in spec.feet or other_frames:
+    is_other = any(
+        frame.name == imu.name
+        and not (frame.body == imu.body and np.allclose(frame.pose, imu.pose))
+        for frame in frames
+    )
+    if imu.name in spec.feet or is_other:
         imu = replace(imu, name=f"{imu.name}_site")
     height = rounded_length(_base_height(facts))
     extras = Extras(
@@ -243,10 +247,6 @@ def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
         f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
         "a standing pose was solved instead",
     )
-
-
-def _is_same_site(first: Site, second: Site) -> bool:
-    return first.body == second.body and np.allclose(first.pose, second.pose)
 
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:

@@ -39,7 +39,10 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
     order = spec.joint_order
     kinds = {joints[name].kind for name in order if name in joints}
     values = {name: match_joints(getattr(spec, name), order).values for name in _COLUMNS}
-    ranges = [_format_limits(joints[name].range) if name in joints else "" for name in order]
+    limits = {
+        name: "none" if joint.range is None else " to ".join(map(format_number, joint.range))
+        for name, joint in joints.items()
+    }
     columns = [["#", *map(str, range(len(order)))], ["joint", *order]]
     if facts.legs:
         roles = {
@@ -48,7 +51,8 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
             for joint, role in zip(leg.joints, leg.roles, strict=True)
         }
         columns.append(["role", *(roles.get(name, "") for name in order)])
-    columns.append([_with_units("limits", ("rad", "m"), kinds), *ranges])
+    title = _with_units("limits", ("rad", "m"), kinds)
+    columns.append([title, *(limits.get(name, "") for name in order)])
     for field, (title, *units) in _COLUMNS.items():
         cells = (format_number(values[field].get(name)) for name in order)
         columns.append([_with_units(title, units, kinds), *cells])
@@ -75,10 +79,6 @@ def _with_units(title: str, units: Sequence[str], kinds: set[str]) -> str:
 
 def _format_gain(gain: "Gain | None") -> str:
     return "" if gain is None else f"{format_number(gain.stiffness)}, {format_number(gain.damping)}"
-
-
-def _format_limits(limits: tuple[float, float] | None) -> str:
-    return "none" if limits is None else " to ".join(map(format_number, limits))
 
 
 def _format_torque(torque: float | None, effort: float | None) -> str:

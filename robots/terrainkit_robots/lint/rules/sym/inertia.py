@@ -132,7 +132,8 @@ def product_asymmetry(robot: Facts) -> Violations:
         if np.abs(left.body.inertia - right.body.inertia).max() < 1e-3 * np.abs(a).max():
             if not _has_products(left.body.inertia):
                 continue
-            if _is_copy(left.body, right.body):
+            # With the same center of mass, they are the same part.
+            if float(np.abs(left.body.center - right.body.center).max()) < 0.002:
                 continue
         largest = max(float(left.body.principal[2]), float(right.body.principal[2]))
         moments = np.abs(left.body.principal - right.body.principal).max() / largest
@@ -184,8 +185,3 @@ def _inertia(body: Body) -> Matrix | None:
 def _has_products(inertia: Matrix) -> bool:
     products = inertia - np.diag(np.diag(inertia))
     return float(np.abs(products).max()) > _MAX_PRODUCT_ERROR / 2 * float(np.abs(inertia).max())
-
-
-def _is_copy(a: Body, b: Body) -> bool:
-    """Return whether two bodies have the same center of mass, so that they are the same part."""
-    return float(np.abs(a.center - b.center).max()) < 0.002
