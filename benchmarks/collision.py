@@ -17,7 +17,7 @@ from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _NUM_PLACES = 20
 _NUM_RUNS = 12

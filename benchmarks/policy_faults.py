@@ -23,7 +23,7 @@ from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 FAULTS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text())["fault"]
 _OF_JOINTS = "joints", "default_pose", "stiffness", "damping", "action_scale", "action_offset"

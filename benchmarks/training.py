@@ -19,7 +19,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _NUM_ENVS = 512
 _NUM_STEPS = 60

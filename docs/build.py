@@ -231,7 +231,7 @@ def rules_page() -> str:
         "`--unsafe-fixes` also applies fixes that change numbers, shapes or other files.\n",
     ]
     for family, about in FAMILIES.items():
-        parts.append(f"## {family}: {about}\n\n| rule | violation | severity | fix |")
+        parts.append(f"## {family}: {about.title}\n\n| rule | violation | severity | fix |")
         parts.append("|---|---|---|---|")
         for rule in rules():
             if rule.family == family:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, TextIO, TypeVar
 if TYPE_CHECKING:
     from rich.status import Status
 
-    from terrainkit_robots.lint.report.text import Span
+    from terrainkit_robots.lint.report.text_report import Span
 
 _T = TypeVar("_T")
 

@@ -234,7 +234,7 @@ class CheckRobot(Command):
             if reports and not text:
                 render.note("there is nothing to fix")
         elif self.format == "text":
-            from terrainkit_robots.lint.report import text as text_report
+            from terrainkit_robots.lint.report import text_report
 
             brief = any(map(_is_folder, self.files)) and not (self.notes or self.changed)
             options = {"verbose": self.notes, "brief": brief}
@@ -317,16 +317,16 @@ class Rule(Command):
 
     def run(self) -> int:
         """Print the documentation of a rule, or a list of rules."""
-        from terrainkit_robots.lint.rule import FAMILIES, get_rule, rules
+        from terrainkit_robots.lint.rule import families, get_rule, rules
 
         if self.code and self.all:
             raise ConfigError("got CODE and --all; expected one of them")
         if self.code:
             render.result(_rule_page(get_rule(self.code)))
             return 0
-        for family, description in FAMILIES.items():
-            render.result(f"{family}: {description}")
-            members = [rule for rule in rules() if rule.family == family]
+        for name, family in families().items():
+            render.result(f"{name}: {family.title}")
+            members = [rule for rule in rules() if rule.family == name]
             render.table(
                 [
                     (f"  {r.code}", r.name, r.severity, _FIX_OPTIONS[r.fixes], r.title)
@@ -343,11 +343,11 @@ _FIX_OPTIONS = {"safe": "--fix", "unsafe": "--unsafe-fixes", "no": ""}
 
 
 def _rule_page(rule: "RobotRule") -> str:
-    from terrainkit_robots.lint.rule import FAMILIES
+    from terrainkit_robots.lint.rule import families
 
     fixes = f"; fixed by {_FIX_OPTIONS[rule.fixes]}" if rule.fixes != "no" else ""
     paragraphs = [
-        f"{rule.code} {rule.name} ({rule.severity}{fixes}), {FAMILIES[rule.family]}",
+        f"{rule.code} {rule.name} ({rule.severity}{fixes}), {families()[rule.family].title}",
         rule.title,
         *rule.why.split("\n\n"),
         f"Fix: {rule.how_to_fix}",

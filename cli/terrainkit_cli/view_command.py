@@ -228,7 +228,7 @@ class View(PluginCommand, ViewerCommand):
     def _check_robot(self) -> "Show":
         from terrainkit_robots.lint.check import check_robot
         from terrainkit_robots.lint.settings import read_settings
-        from terrainkit_robots.spec.robot import SPEC_FILE
+        from terrainkit_robots.spec.robot_arrays import SPEC_FILE
         from terrainkit_robots.spec.robot_spec import RobotSpec
         from terrainkit_robots.viewer.show_robot import show_robot
 
@@ -308,7 +308,7 @@ def source_kind(source: str, *, policy: bool = False) -> Kind:
     from terrainkit_robots.description.robot_file import is_description
     from terrainkit_robots.rl.run import RUN_FILE
     from terrainkit_robots.rl.tasks import task_names
-    from terrainkit_robots.spec.robot import SPEC_FILE
+    from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 
     path = Path(source)
     try:

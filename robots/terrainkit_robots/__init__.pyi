@@ -6,7 +6,7 @@ from terrainkit_robots.lint.check import check_robot as check_robot
 from terrainkit_robots.lint.rule import Finding as Finding
 from terrainkit_robots.lint.runner import Report as Report
 from terrainkit_robots.lint.settings import Settings as Settings
-from terrainkit_robots.onboarding.pipeline import OnboardOptions as OnboardOptions
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions as OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard as onboard
 from terrainkit_robots.onboarding.result import OnboardResult as OnboardResult
 from terrainkit_robots.policy.average import average_checkpoints as average_checkpoints
@@ -23,7 +23,7 @@ from terrainkit_robots.rl.run import open_run as open_run
 from terrainkit_robots.rl.tasks import get_task as get_task
 from terrainkit_robots.rl.tasks import register_task as register_task
 from terrainkit_robots.rl.train import train as train
-from terrainkit_robots.spec.robot import Robot as Robot
+from terrainkit_robots.spec.robot_arrays import Robot as Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec as RobotSpec
 from terrainkit_robots.viewer.show_policy import PolicyView as PolicyView
 from terrainkit_robots.viewer.show_robot import show_robot as show_robot

@@ -14,10 +14,11 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled as bundled_robots
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.simulation.standing import StandResult
-from terrainkit_robots.spec.robot import SPEC_FILE, Robot
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 ROBOTS = Path(__file__).with_name("robots")

@@ -84,7 +84,7 @@ class InertiaRepair:
             (self._nearest(link, declared), "the nearest physical inertia"),
             (self._solid_box(link, inertial), "the inertia of a solid box around the body"),
         )
-        return next((each for each in candidates if each[0] is not None), (None, ""))
+        return next((candidate for candidate in candidates if candidate[0] is not None), (None, ""))
 
     @cached_property
     def _location(self) -> Mapping[str, tuple[Body, int]]:

@@ -20,7 +20,7 @@ from terrainkit_robots.analysis.simulator_conventions.loading import (
 )
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.gain import Gain
-from terrainkit_robots.simulation.geoms import collides, lowest_point
+from terrainkit_robots.simulation.geoms import collides, height_above
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.rollout import check_contacts, check_dofs, has_diverged
 
@@ -139,9 +139,9 @@ def make_written_model(facts: Facts) -> WrittenModel:
         model=model,
         floor=int(np.flatnonzero(shapes & is_floor)[0]),
         shapes=tuple(np.flatnonzero(shapes & ~is_floor).tolist()),
-        positions={name: each for name, each in facts.default_pose.items() if name in names},
+        positions={name: value for name, value in facts.default_pose.items() if name in names},
         gains={name: gain for name, gain in suggest_gains(facts).items() if name not in servos},
-        efforts={each.name: each.effort for each in facts.joints if each.effort is not None},
+        efforts={joint.name: joint.effort for joint in facts.joints if joint.effort is not None},
         leg_length=max((leg.length for leg in facts.legs), default=1.0),
         weight=float(model.body_subtreemass[model.jnt_bodyid[0]] * -model.opt.gravity[2]),
         held=not is_statically_stable(facts.legs),
@@ -236,7 +236,7 @@ def stand_as_written(
             offset, slope = model.actuator_biasprm[index, :2]
             data.ctrl[index] = -(offset + slope * length) / model.actuator_gainprm[index, 0]
         mujoco.mj_kinematics(model, data)
-        data.qpos[2] -= _clearance(written, model, data)
+        data.qpos[2] -= height_above(model, data, written.shapes, written.floor)
         mujoco.mj_forward(model, data)
         check_contacts(data)
         start, steps = data.qpos[:3].copy(), round(_SECONDS / model.opt.timestep)
@@ -247,12 +247,12 @@ def stand_as_written(
             data.qfrc_applied[dofs] = np.clip(torques, -limits, limits)
             mujoco.mj_step(model, data)
             if has_diverged(data):
-                return WrittenStand(**{each.name: np.inf for each in fields(WrittenStand)})
+                return WrittenStand(**{field.name: np.inf for field in fields(WrittenStand)})
             # Internal forces have no component on the translation of a free body.
             forces[step], heights[step] = data.qfrc_constraint[2], data.qpos[2]
             speeds[step] = data.qvel[6:]
         mujoco.mj_kinematics(model, data)
-        clearance = _clearance(written, model, data)
+        clearance = height_above(model, data, written.shapes, written.floor)
     settled = round(_SETTLING_SECONDS / model.opt.timestep)
     return WrittenStand(
         lost_weight=1 - float(forces[settled:].mean()) / written.weight,
@@ -274,9 +274,3 @@ def position_servos(model: Any) -> list[int]:
     kinds = model.jnt_type[model.actuator_trnid[:, 0]]
     moves = (kinds == mujoco.mjtJoint.mjJNT_SLIDE) | (kinds == mujoco.mjtJoint.mjJNT_HINGE)
     return [int(index) for index in np.flatnonzero(is_servo & on_joint & moves)]
-
-
-def _clearance(written: WrittenModel, model: Any, data: Any) -> float:
-    """Return the height of the lowest colliding shape above the floor [m]."""
-    lowest = min(lowest_point(model, data, geom) for geom in written.shapes)
-    return float(lowest - data.geom_xpos[written.floor, 2])

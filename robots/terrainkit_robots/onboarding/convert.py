@@ -18,14 +18,15 @@ from terrainkit_robots.export.canonical import to_canonical
 from terrainkit_robots.export.fixed_joint_merge import merge_fixed_joints
 from terrainkit_robots.export.mjcf import Extras, Site, mjcf_text, scene_text
 from terrainkit_robots.export.sites import foot_sites, imu_changes, imu_site
+from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.mesh.mesh_cache import Meshes
-from terrainkit_robots.onboarding.placeholder_effort import without_effort
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.repair import without_placeholder_efforts
 from terrainkit_robots.spec.column import rounded_length
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import RobotModel
-    from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
     from terrainkit_robots.simulation.gain import GainSet
     from terrainkit_robots.spec.robot_spec import RobotSpec
 
@@ -56,42 +57,16 @@ class RobotFiles:
     """What was omitted, changed or added, one sentence each."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SpecOverride:
-    """A spec with measured or edited values, which replace the derived values."""
-
-    spec: "RobotSpec"
-    """The spec."""
-
-    file: str
-    """The file it was read from."""
-
-
-def make_robot_files(
-    source: Facts,
-    *,
-    name: str = "",
-    collision: "CollisionMethod" = "keep",
-    floating: bool | None = None,
-    user_spec: SpecOverride | None = None,
-    gain_set: "GainSet" = "stand",
-    unknown_effort: frozenset[str] = frozenset(),
-    cache_dir: Path | None = None,
-    progress: "Progress" = lambda items, _: items,
+def convert(
+    report: Report, options: OnboardOptions, user_spec: "RobotSpec | None" = None
 ) -> RobotFiles:
     """Return the files of a robot: robot.toml, robot.urdf, robot.xml, scene.xml and meshes.
 
     Args:
-        source: Facts of the source file.
-        name: Name of the robot; by default the name in the overriding spec or the file.
-        collision: How collision meshes are simplified.
-        floating: Whether the base is floating; by default as in the overriding spec or the file,
-            or as the legs suggest.
-        user_spec: Values that replace the derived values.
-        gain_set: The PD gains: to hold the pose, as declared or suggested, or to train.
-        unknown_effort: Joints whose effort limit in the file is a placeholder.
-        cache_dir: Folder that caches convex decompositions between runs.
-        progress: Wraps an iterable of collision meshes to display a progress bar.
+        report: The report on the source file.
+        options: How it is converted.
+        user_spec: The spec of `options.spec`, with measured or edited values that replace the
+            derived values.
 
     Raises:
         TerrainkitError: if the file contains no robot, a mesh cannot be read, the overriding spec
@@ -101,20 +76,30 @@ def make_robot_files(
     from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
     from terrainkit_robots.export.unsupported import unsupported_elements
     from terrainkit_robots.export.urdf import urdf_text
+    from terrainkit_robots.spec.provenance import with_provenance
 
+    source, effort_changes = without_placeholder_efforts(report)
+    name, floating = options.name, options.floating
     if floating is None and user_spec is not None:
-        floating = user_spec.spec.floating
+        floating = user_spec.floating
     canonical = to_canonical(source, floating=floating)
     simplified = simplify_collisions(
-        canonical.model, source.meshes, collision, cache=cache_dir, progress=progress
+        canonical.model,
+        source.meshes,
+        options.collision,
+        cache=options.cache_dir,
+        progress=options.progress,
     )
     exported = export_meshes(simplified.model, simplified.meshes)
     meshes = Meshes({Path(name): data for name, data in exported.files.items()})
-    model, effort_changes = without_effort(exported.model, unknown_effort)
+    model = exported.model
     spec_changes: tuple[str, ...] = ()
     if user_spec is not None:
-        spec_changes = _check_user_spec(Facts(model, meshes, spec=user_spec.spec), user_spec)
-    spec = _make_spec(Facts(model, meshes), user_spec, gain_set)
+        spec_changes = _check_user_spec(Facts(model, meshes, spec=user_spec), str(options.spec))
+    spec = _derived_spec(Facts(model, meshes), options.gains)
+    if user_spec is not None:
+        own = replace(user_spec, floating=spec.floating, urdf=URDF, mjcf=MJCF)
+        spec = with_provenance(own, spec, str(options.spec))
     if name:
         model, spec = replace(model, name=name), replace(spec, name=name)
     facts = Facts(_set_motor_limits(model, spec), meshes, spec=spec)
@@ -145,8 +130,8 @@ def make_robot_files(
     )
 
 
-def _make_spec(facts: Facts, user_spec: SpecOverride | None, gain_set: "GainSet") -> "RobotSpec":
-    """Return the derived spec, with the values of the overriding spec.
+def _derived_spec(facts: Facts, gain_set: "GainSet") -> "RobotSpec":
+    """Return the derived spec.
 
     Raises:
         ExportError: if the robot cannot be simulated, so that no gains can be derived.
@@ -154,22 +139,21 @@ def _make_spec(facts: Facts, user_spec: SpecOverride | None, gain_set: "GainSet"
     from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
     from terrainkit_robots.simulation.declared_gains import standing_gains
     from terrainkit_robots.simulation.pd_gains import suggest_training_gains
-    from terrainkit_robots.spec.provenance import with_provenance
 
     try:
         gains = standing_gains(facts) if gain_set == "stand" else suggest_training_gains(facts)
     except CannotCheckError as error:
         raise ExportError(f"{facts.model.file}: cannot derive PD gains: {error}") from None
     floating = bool(facts.model.floating)
-    derived = derive_spec(facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF)
-    if user_spec is None:
-        return derived
-    spec = replace(user_spec.spec, floating=floating, urdf=URDF, mjcf=MJCF)
-    return with_provenance(spec, derived, user_spec.file)
+    return derive_spec(facts, gains=gains, floating=floating, urdf=URDF, mjcf=MJCF)
 
 
-def _check_user_spec(facts: Facts, user_spec: SpecOverride) -> tuple[str, ...]:
+def _check_user_spec(facts: Facts, file: str) -> tuple[str, ...]:
     """Return the warnings of the lint rules for the overriding spec.
+
+    Args:
+        facts: The robot and the spec.
+        file: The file of the spec.
 
     Raises:
         ConfigError: if the spec does not fit the robot.
@@ -177,10 +161,11 @@ def _check_user_spec(facts: Facts, user_spec: SpecOverride) -> tuple[str, ...]:
     from terrainkit_robots.lint.rule import rules
     from terrainkit_robots.lint.runner import lint
 
-    file, joints = user_spec.file, set(user_spec.spec.joint_order)
+    spec = facts.required_spec
+    joints = set(spec.joint_order)
     if joints and joints.isdisjoint(joint.name for joint in facts.joints):
         raise ConfigError(
-            f"{file} belongs to {user_spec.spec.name}: none of its joints is in {facts.model.title}"
+            f"{file} belongs to {spec.name}: none of its joints is in {facts.model.title}"
         )
     findings = lint(facts, [rule for rule in rules() if "spec" in rule.needs]).findings
     errors = [finding for finding in findings if finding.severity == "error"]
@@ -213,7 +198,7 @@ def _set_motor_limits(model: "RobotModel", spec: "RobotSpec") -> "RobotModel":
         else joint
         for joint in model.joints
     )
-    actuators = (replace(each, effort=effort[each.joint]) for each in model.actuators)
+    actuators = (replace(actuator, effort=effort[actuator.joint]) for actuator in model.actuators)
     return replace(model, joints=joints, actuators=tuple(actuators))
 
 
@@ -232,8 +217,12 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         if link not in bodies
     ]
     imu = imu_site(facts)
-    other_frames = [f for f in frames if f.name == imu.name and not _is_same_site(f, imu)]
-    if imu.name in spec.feet or other_frames:
+    is_other = any(
+        frame.name == imu.name
+        and not (frame.body == imu.body and np.allclose(frame.pose, imu.pose))
+        for frame in frames
+    )
+    if imu.name in spec.feet or is_other:
         imu = replace(imu, name=f"{imu.name}_site")
     height = rounded_length(_base_height(facts))
     extras = Extras(
@@ -258,10 +247,6 @@ def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
         f"the first keyframe is not the default pose: its feet do not carry the robot ({defect}); "
         "a standing pose was solved instead",
     )
-
-
-def _is_same_site(first: Site, second: Site) -> bool:
-    return first.body == second.body and np.allclose(first.pose, second.pose)
 
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:

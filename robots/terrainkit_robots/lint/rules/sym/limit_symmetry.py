@@ -22,7 +22,7 @@ _MAX_LIMIT_DIFFERENCE = 0.01
 """Allowed relative difference of effort and velocity limits."""
 
 
-@rule("SYM004", "limit-asymmetry", "warning", certainty="likely")
+@rule("SYM004", "limit-asymmetry", "warning")
 def limit_asymmetry(robot: Facts) -> Violations:
     """The limits of a joint do not match its mirror image.
 
@@ -72,7 +72,7 @@ def _limit_sizes(body: Body) -> Matrix | None:
     return None if limits is None else np.sort(np.abs(limits))
 
 
-@rule("SYM005", "effort-asymmetry", "warning", certainty="likely")
+@rule("SYM005", "effort-asymmetry", "warning")
 def effort_asymmetry(robot: Facts) -> Violations:
     """The effort or velocity limit of a joint differs from its mirror image.
 
@@ -109,7 +109,8 @@ def effort_asymmetry(robot: Facts) -> Violations:
         for name, (a, b, difference) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)
             unit = joint.effort_unit if name == "effort" else joint.speed_unit
-            parts.append(f"{own:g} {unit}, {_percent(difference)} from the {mirror:g} {unit}")
+            share, _ = contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")
+            parts.append(f"{own:g} {unit}, {share} from the {mirror:g} {unit}")
             measured[name], measured[f"other_{name}"] = own, mirror
         yield Violation(
             subject=joint.name,
@@ -123,7 +124,3 @@ def effort_asymmetry(robot: Facts) -> Violations:
 
 def _motor_limit(joint: Joint, name: str) -> float | None:
     return joint.effort if name == "effort" else joint.velocity
-
-
-def _percent(difference: float) -> str:
-    return contrast(difference, _MAX_LIMIT_DIFFERENCE, ".1%")[0]

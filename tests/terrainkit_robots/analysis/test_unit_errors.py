@@ -1,6 +1,6 @@
 import pytest
 
-from terrainkit_robots.analysis.units import body_unit_errors
+from terrainkit_robots.analysis.unit_errors import body_unit_errors
 from tests.small_robots import box, facts, joint, link
 
 EXACT, ROUND = "1.66667e7 1.66667e7 3.33333e6 0 0 0", "2e7 2e7 3e6 0 0 0"

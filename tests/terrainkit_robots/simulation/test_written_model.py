@@ -8,7 +8,7 @@ import terrainkit_robots
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.simulation.as_written import (
+from terrainkit_robots.simulation.written_model import (
     make_written_model,
     position_servos,
     stand_as_written,

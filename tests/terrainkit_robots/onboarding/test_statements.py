@@ -12,11 +12,11 @@ from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report, Skipped
+from terrainkit_robots.onboarding.convert import RobotFiles
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.onboarding.equivalence import Equivalence
-from terrainkit_robots.onboarding.report_md import report_markdown
 from terrainkit_robots.onboarding.result import OnboardResult
-from terrainkit_robots.onboarding.robot_files import RobotFiles
+from terrainkit_robots.onboarding.statements import report_markdown
 from terrainkit_robots.onboarding.verify import Verification
 from terrainkit_robots.simulation.gain import Gain
 from tests.robots import QUADRUPED
@@ -42,7 +42,8 @@ def make_result(text=None):
     spec = derive_spec(facts, gains=gains, floating=bool(facts.legs))
     robot = RobotFiles(facts=facts, spec=spec, files={}, changes=())
     report = Report(facts=facts, findings=())
-    return OnboardResult(report=report, folder=Path("out"), robot=robot)
+    verification = Verification(equivalences=())
+    return OnboardResult(report=report, folder=Path("out"), robot=robot, verification=verification)
 
 
 def finding(file="robot.urdf", **changes):

@@ -52,7 +52,7 @@ class Quantity:
 
     def unit(self, factor: float) -> tuple[float, str]:
         """Return factor and name of the likely unit; the name is empty if none is known."""
-        nearest = min(self.units, key=lambda each: abs(np.log(factor / each)))
+        nearest = min(self.units, key=lambda unit: abs(np.log(factor / unit)))
         is_known = 1 / _UNIT_TOLERANCE <= factor / nearest <= _UNIT_TOLERANCE
         return (nearest, self.units[nearest]) if is_known else (factor, "")
 
@@ -181,7 +181,7 @@ def body_unit_errors(robot: Facts) -> Iterator[tuple[str, UnitError]]:
     else:
         if mass is not None:
             yield "masses", UnitError(DENSITY, mass, densities, DENSITY.limits)
-        inertias = [each * (DENSITY.unit(mass)[0] if mass else 1.0) for each in ratios]
+        inertias = [ratio * (DENSITY.unit(mass)[0] if mass else 1.0) for ratio in ratios]
         factor = INERTIA.factor(inertias)
         if factor is not None and not _has_round_inertias(robot):
             yield "inertias", UnitError(INERTIA, factor, inertias, INERTIA.limits)
@@ -190,12 +190,12 @@ def body_unit_errors(robot: Facts) -> Iterator[tuple[str, UnitError]]:
 def _has_round_inertias(robot: Facts) -> bool:
     """Return whether most bodies have inertias of one digit, such as 0.01: placeholders."""
     inertias = [max_inertia(body.main_link) for body in bodies_with_mass(robot.bodies)]
-    return 2 * sum(float(f"{each:.0e}") == each for each in inertias) > len(inertias)
+    return 2 * sum(float(f"{inertia:.0e}") == inertia for inertia in inertias) > len(inertias)
 
 
 def range_error(robot: Facts) -> UnitError | None:
     """Return the error of the ranges of the driven hinges."""
-    ranges = [limits[1] - limits[0] for each in robot.actuated_hinges if (limits := each.range)]
+    ranges = [limits[1] - limits[0] for joint in robot.actuated_hinges if (limits := joint.range)]
     return _error(RANGE, ranges)
 
 
@@ -205,7 +205,7 @@ def effort_error(robot: Facts) -> UnitError | None:
     if robot.model.kind == "mjcf" or not scale > 0:
         return None
     efforts = [joint.effort for joint in robot.leg_joints if joint.kind == "revolute"]
-    return _error(EFFORT, [each / scale for each in efforts if each])
+    return _error(EFFORT, [effort / scale for effort in efforts if effort])
 
 
 def _error(quantity: Quantity, values: Sequence[float]) -> UnitError | None:

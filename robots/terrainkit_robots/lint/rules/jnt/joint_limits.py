@@ -103,7 +103,7 @@ def _limits(limit: Limit) -> tuple[float, float]:
     return limit.lower or 0.0, limit.upper or 0.0
 
 
-@rule("JNT007", "inverted-limits", "error")
+@rule("JNT007", "inverted-limits", "error", onboarding="blocks")
 def inverted_limits(robot: Facts) -> Violations:
     """The lower limit of a joint is above the upper limit.
 
@@ -130,7 +130,7 @@ def inverted_limits(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT008", "wide-range", "warning")
+@rule("JNT008", "wide-range", "warning", needs=("angle-unit",))
 def wide_range(robot: Facts) -> Violations:
     """The range of a hinge is more than two turns.
 
@@ -159,7 +159,7 @@ def wide_range(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT012", "zero-outside-limits", "note")
+@rule("JNT012", "zero-outside-limits", "note", needs=("angle-unit",))
 def zero_outside_limits(robot: Facts) -> Violations:
     """Position zero is outside the limits of a joint.
 
@@ -225,7 +225,7 @@ def unlimited_joint(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT018", "narrow-range", "warning", certainty="likely")
+@rule("JNT018", "narrow-range", "warning", certainty="likely", needs=("angle-unit",))
 def narrow_range(robot: Facts) -> Violations:
     """The range of a driven hinge is only a few degrees.
 
@@ -267,7 +267,7 @@ def narrow_range(robot: Facts) -> Violations:
         )
 
 
-@rule("JNT019", "shifted-range", "warning", certainty="likely")
+@rule("JNT019", "shifted-range", "warning", certainty="likely", needs=("angle-unit",))
 def shifted_range(robot: Facts) -> Violations:
     """The whole range of a hinge is more than half a turn from zero.
 

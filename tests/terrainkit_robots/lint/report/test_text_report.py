@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from terrainkit_robots.lint.report.text import format_lines, to_text
+from terrainkit_robots.lint.report.text_report import format_lines, to_text
 from terrainkit_robots.lint.selection import Suppressed
 
 TEXT = """\
