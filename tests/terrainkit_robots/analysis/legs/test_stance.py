@@ -239,3 +239,10 @@ def test_ground_forces_are_the_most_even_balance(feet):
     np.testing.assert_allclose(forces @ places / 100, center, atol=1e-6)
     even = 100 / len(places)
     assert np.linalg.norm(forces - even) <= np.linalg.norm(shares - even) + 1e-6
+
+
+@given(st.lists(POINT, min_size=1, max_size=8), POINT, st.floats(0, 1000))
+def test_ground_forces_push_upward_with_the_weight(places, center, weight):
+    forces = ground_forces(np.array(places), np.array(center), weight)
+    assert (forces >= 0).all()
+    assert forces.sum() == pytest.approx(weight, abs=1e-9)
