@@ -27,7 +27,7 @@ _EASIEST, _HARDEST = -1.0, 3.0
 """Difficulties to search: ranges are extrapolated beyond their ends at 0 and 1."""
 
 _BISECTIONS = 9
-"""Halvings of that interval, to 0.8 % of the range."""
+"""Halvings of that interval: 4 / 2**9 is 0.8 % of the range."""
 
 _SAMPLES = 3
 """Patches of a random terrain; their median demand counts."""

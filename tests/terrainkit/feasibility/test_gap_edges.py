@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from terrainkit.feasibility import gaps as gaps_module
+from terrainkit.feasibility import gap_edges as gaps_module
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.gap_edges import gap_edges

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing import columns as columns_module
+from terrainkit.importing import mesh_columns as columns_module
 from terrainkit.importing.mesh_columns import make_columns
 from tests.meshes import box
 
