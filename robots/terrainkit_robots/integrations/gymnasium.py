@@ -201,7 +201,8 @@ class Episodes:
         """
         self.final_qpos = self.env.sim.qpos
         _, rewards, dones, extras = self.env.step(torch.as_tensor(actions, dtype=torch.float32))
-        observations, ended = self.policy_observations(), dones.numpy()
+        observations = self.policy_observations()
+        ended = dones.numpy()
         self.final = np.where(ended[:, None], self._before_reset, observations)
         return observations, rewards.numpy(), ended, extras["time_outs"].numpy()
 
@@ -222,7 +223,8 @@ class Episodes:
 def spaces(env: LeggedEnv) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:
     """Return the spaces of the observations and the actions of one robot."""
     limits = env.cfg.normalization
-    size, clip = env.obs_sizes["policy"], limits.clip_observations
+    size = env.obs_sizes["policy"]
+    clip = limits.clip_observations
     observation = gymnasium.spaces.Box(-clip, clip, (size,), np.float32)
     clip = limits.clip_actions
     return observation, gymnasium.spaces.Box(-clip, clip, (env.num_actions,), np.float32)

@@ -57,7 +57,8 @@ class ContractInterface(PolicyInterface):
     def to_ctrl(self, env: LeggedEnv, actions: FloatArray) -> FloatArray:
         """Return the targets of all joints for the actions of the contracts."""
         target = np.tile(env.actions.offset, (len(actions), 1))
-        joints, rows = list(env.robot.spec.joint_order), np.arange(len(actions))
+        joints = list(env.robot.spec.joint_order)
+        rows = np.arange(len(actions))
         parts = np.split(rows, len(self._contracts))
         for contract, part in zip(self._contracts, parts, strict=True):
             offset, scale = np.array([contract.action_offset, contract.action_scale], np.float32)
@@ -128,7 +129,8 @@ def _contract_tables(contracts: Sequence[Contract], env: LeggedEnv) -> list[Floa
     """Return the table of each contract, for an environment of these contracts."""
     terms = {name: term for name, term in env.obs_terms["policy"].items() if name != "history"}
     widths = {name: term.function(env).shape[1] for name, term in terms.items()}
-    terrain, joints = env.cfg.terrain, list(env.robot.spec.joint_order)
+    terrain = env.cfg.terrain
+    joints = list(env.robot.spec.joint_order)
     grid = len(terrain.measured_points_x), len(terrain.measured_points_y)
     return [_table(contract, widths, joints, grid) for contract in contracts]
 
@@ -144,7 +146,8 @@ def _table(
         joints: Joints of the environment in order.
         grid: Numbers of points of the height scan along x and y.
     """
-    starts, blocks = dict(zip(widths, np.cumsum([0, *widths.values()]), strict=False)), []
+    starts = dict(zip(widths, np.cumsum([0, *widths.values()]), strict=False))
+    blocks = []
     ids = [joints.index(joint) for joint in contract.joints]
     for term in contract.terms:
         own, source = (

@@ -124,7 +124,8 @@ def export_policy(
     network = OnnxNetwork(actor, run.task.normalization, order)
     description = describe_policy(env) | {"recurrent": network.describe_state()} | training
     text = json.dumps(description, indent=2) + "\n"
-    metadata, notes = {METADATA_KEY: text}, []
+    metadata = {METADATA_KEY: text}
+    notes = []
     if deploy_yaml:
         contract = to_contract(description, UNITREE)
         other_files[YAML_FILE] = write_deploy_yaml(contract).encode()
@@ -231,7 +232,8 @@ class ScriptNetwork(torch.nn.Module):
 
 def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the actions of an ONNX file for the observations (n, k) of each step."""
-    session, results = make_session(data), []
+    session = make_session(data)
+    results = []
     shapes = [node.shape for node in session.get_inputs()[1:]]
     state = make_state([(layers, width) for layers, _, width in shapes], len(steps[0]))
     for obs in steps:
@@ -248,7 +250,8 @@ def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: Mapping[str, 
         obs: Observations to trace it with, shape (n, k).
         metadata: Its metadata by key.
     """
-    file, model = io.BytesIO(), network.model
+    file = io.BytesIO()
+    model = network.model
     names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
     _, *states = model.get_dummy_inputs()
     inputs = obs, *(state.repeat(1, len(obs), 1) for state in states)
@@ -406,7 +409,8 @@ def observation_order(env: LeggedEnv) -> NDArray[np.int64]:
 
 def _terms(env: LeggedEnv) -> Iterator[tuple[str, ObservationTerm, int, int, int]]:
     """Yield name, term, first number in an observation of `env`, size and steps of each term."""
-    start, steps = 0, env.history_length
+    start = 0
+    steps = env.history_length
     has_history = "history" in env.obs_terms["policy"]
     for name, term in env.obs_terms["policy"].items():
         size = term.function(env).shape[1]
@@ -419,7 +423,8 @@ def _terms(env: LeggedEnv) -> Iterator[tuple[str, ObservationTerm, int, int, int
 
 def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
     """Return slice, steps of the history, unit, offset, scale and clip of each term."""
-    parts, first = [], 0
+    parts = []
+    first = 0
     for name, term, _, size, history in _terms(env):
         part: dict[str, Any] = {"name": name, "start": first, "stop": first + size * history}
         part["history"] = history

@@ -39,7 +39,8 @@ class PolicyFile:
         Raises:
             ConfigError: If the file is not a policy.
         """
-        self.__name__, data = path.name, read_file(path)
+        self.__name__ = path.name
+        data = read_file(path)
         self._dones: BoolArray | None = None
         if path.suffix == ".pt" or data.startswith(b"PK"):
             self._process = ChildProcess(run_script, data, limits=LIMITS)

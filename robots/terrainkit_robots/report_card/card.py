@@ -111,7 +111,8 @@ def card_rows(card: Card) -> list[tuple[str, ...]]:
 
 def card_markdown(card: Card) -> str:
     """Return a card as a Markdown document."""
-    about, margins = card.about, ""
+    about = card.about
+    margins = ""
     if "margins" in card.remarks:
         rows = margin_rows(card.remarks["margins"]["margins"])
         margins = f"\n## Margins\n\n{_markdown_table(rows)}\n{NOTE}\n"
@@ -149,7 +150,8 @@ def measure(
     """
     rows, cols = terrain_map.difficulty.shape
     crossing = Crossing(spec, terrain_map, rows * repetitions, config)
-    levels, columns = np.repeat(np.arange(rows), repetitions), []
+    levels = np.repeat(np.arange(rows), repetitions)
+    columns = []
     for col in range(cols):
         columns.append(crossing.attempt(levels, np.full_like(levels, col)))
         progress((col + 1) / cols)

@@ -29,7 +29,8 @@ def draw_card(card: Card) -> bytes:
 
 def _margin_rows(margins: Sequence[RolloutMetrics]) -> list[HeatmapRow]:
     """Return a row per disturbance, and a cell per value: the share of robots that do not fall."""
-    rows, first = [], first_falls(margins)
+    rows = []
+    first = first_falls(margins)
     for name, group in groupby(margins[1:], lambda margin: margin.condition):
         found = list(group)
         values = {f"{margin.value:g}": margin for margin in found}

@@ -183,7 +183,8 @@ class LeggedEnv(VecEnv):
 
     def command_terms(self) -> dict[str, CommandTerm]:
         """Return the commands by name: `velocity`, and your own ones."""
-        cfg, is_map = self.cfg.commands, not self.terrain.is_plane
+        cfg = self.cfg.commands
+        is_map = not self.terrain.is_plane
         heading = is_map if cfg.heading_command is None else cfg.heading_command
         return {
             "velocity": VelocityCommand(cfg, self.num_envs, self.cfg.dt, heading_command=heading)
@@ -326,7 +327,8 @@ class LeggedEnv(VecEnv):
 
     def _command_state(self, rows: Any) -> dict[str, Any]:
         """Return the fields of `State` that depend on the commands."""
-        commands, time = self.commands[rows].copy(), self.steps_since_reset[rows] * self.cfg.dt
+        commands = self.commands[rows].copy()
+        time = self.steps_since_reset[rows] * self.cfg.dt
         gait_phase, swing_phase = self.gait.phases(time, is_moving(commands))
         return {"commands": commands, "gait_phase": gait_phase, "swing_phase": swing_phase}
 
@@ -365,7 +367,8 @@ class LeggedEnv(VecEnv):
             groups[name] = torch.from_numpy(values)
         if past := self.history_length - 1:
             # The history of a new episode repeats its first observation.
-            new, policy = self.steps_since_reset == 0, groups["policy"]
+            new = self.steps_since_reset == 0
+            policy = groups["policy"]
             width = self.obs_history.shape[1] // past
             policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
         self.set_observations(groups)

@@ -218,7 +218,8 @@ def feet_gait(env: "LeggedEnv") -> FloatArray:
 
 def _swing_height(env: "LeggedEnv") -> np.float32:
     """Return the height of a swinging foot above the ground [m]."""
-    setting, feet = env.cfg.rewards.swing_height, env.state.foot_height.shape[1]
+    setting = env.cfg.rewards.swing_height
+    feet = env.state.foot_height.shape[1]
     target = (setting or SWING_HEIGHT) * env.robot.leg_length
     return np.float32(min(target, MAX_SWING_HEIGHT) if setting is None and feet == 4 else target)
 

@@ -67,7 +67,8 @@ class JointSliders:
         """Add the sliders, in the order of the joints, to the GUI of a server."""
         self._default, self._mirror = facts.default_pose, facts.mirror_map
         self._set_positions = set_positions
-        self._lock, self._is_updating = threading.RLock(), False
+        self._lock = threading.RLock()
+        self._is_updating = False
         self.mirrored = server.gui.add_checkbox("move mirrored joints", initial_value=False)
         self.reset = server.gui.add_button("default pose")
         self.reset.on_click(lambda _: self._assign(self._default))
@@ -133,7 +134,8 @@ def add_markers(server: "viser.ViserServer", report: Report) -> "list[viser.Scen
     handles: list[viser.SceneNodeHandle] = []
     for k, ((body, point), findings) in enumerate(places.items()):
         # Findings are sorted by severity.
-        color, node = _SEVERITY_COLORS[findings[0].severity], f"{body_node(body)}/finding_{k}"
+        color = _SEVERITY_COLORS[findings[0].severity]
+        node = f"{body_node(body)}/finding_{k}"
         radius = max(0.01, 0.05 * float(size))
         codes = ", ".join(dict.fromkeys(finding.code for finding in findings))
         handles += [
