@@ -363,15 +363,9 @@ class LeggedEnv(VecEnv):
         groups = {}
         for name, terms in self.obs_terms.items():
             rng = self.rng if name == "policy" else None  # noise for the policy only
-            values = observations.compute_observations(self, terms, rng)
-            groups[name] = torch.from_numpy(values)
-        if past := self.history_length - 1:
-            # The history of a new episode repeats its first observation.
-            new = self.steps_since_reset == 0
-            policy = groups["policy"]
-            width = self.obs_history.shape[1] // past
-            policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
-        self.set_observations(groups)
+            groups[name] = observations.compute_observations(self, terms, rng)
+        observations.fill_history(self, groups["policy"])
+        self.set_observations({name: torch.from_numpy(group) for name, group in groups.items()})
 
     def set_observations(self, groups: Mapping[str, torch.Tensor]) -> None:
         """Replace the current observations of each group, shape (n, width)."""

@@ -237,3 +237,16 @@ def compute_observations(
     scales = [np.broadcast_to(term.scale, width) for term, width in zip(group, widths, strict=True)]
     observations *= np.concatenate(scales, dtype=np.float32)
     return np.clip(observations, -clip, clip, out=observations)
+
+
+def fill_history(env: "LeggedEnv", observations: FloatArray) -> None:
+    """Let the history of a new episode repeat its first observation.
+
+    Args:
+        env: The environment.
+        observations: Observations of the policy, shape (n, width), which are changed.
+    """
+    if past := env.history_length - 1:
+        new = env.steps_since_reset == 0
+        width = env.obs_history.shape[1] // past
+        observations[new, width : width * (1 + past)] = np.tile(observations[new, :width], past)
