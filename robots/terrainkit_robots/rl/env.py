@@ -47,6 +47,8 @@ def make_env(
     kind = task.env_class or LeggedEnv
     plugin = None if is_built_in(kind) else f"{kind.__module__}:{kind.__qualname__}"
     with plugin_errors(plugin, TerrainkitError):
+        if interface is None:  # which a class of the user need not take
+            return kind(task, robot, terrain, device)
         return kind(task, robot, terrain, device, interface)
 
 
