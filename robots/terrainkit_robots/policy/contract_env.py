@@ -58,8 +58,7 @@ class ContractInterface(PolicyInterface):
         """Return the targets of all joints for the actions of the contracts."""
         target = np.tile(env.actions.offset, (len(actions), 1))
         joints = list(env.robot.spec.joint_order)
-        rows = np.arange(len(actions))
-        parts = np.split(rows, len(self._contracts))
+        parts = np.split(np.arange(len(actions)), len(self._contracts))
         for contract, part in zip(self._contracts, parts, strict=True):
             offset, scale = np.array([contract.action_offset, contract.action_scale], np.float32)
             values = offset + scale * actions[part]
@@ -76,8 +75,7 @@ def _other_terms(robot: Robot) -> dict[str, ObservationTerm]:
     lever = imu_position(robot)
 
     def running_phase(env: LeggedEnv) -> FloatArray:
-        time = env.steps_since_reset * env.cfg.dt
-        return env.gait.phases(time, np.ones(env.num_envs, bool))[0]
+        return env.gait.phases(env.steps_since_reset * env.cfg.dt, np.ones(env.num_envs, bool))[0]
 
     return {
         "running_gait_phase": ObservationTerm(running_phase),

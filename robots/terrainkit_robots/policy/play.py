@@ -94,8 +94,7 @@ def play(
             recorder.record()
 
     evaluation = EvaluationRollout(env)
-    policy = load_policy(spec, env)
-    evaluation.run(policy, config.seconds, commands, update, stop_early=not video)
+    evaluation.run(load_policy(spec, env), config.seconds, commands, update, stop_early=not video)
     recorded = recorder.make_video(robots, size, scan=height_points) if video else None
     return PlayResult(evaluation=summarize(spec, config, evaluation), video=recorded)
 

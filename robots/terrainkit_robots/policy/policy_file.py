@@ -45,8 +45,7 @@ class PolicyFile:
         if path.suffix == ".pt" or data.startswith(b"PK"):
             self._process = ChildProcess(run_script, data, limits=LIMITS)
         else:
-            folder = path.parent.absolute()
-            self._process = ChildProcess(run_model, data, folder, limits=LIMITS)
+            self._process = ChildProcess(run_model, data, path.parent.absolute(), limits=LIMITS)
         try:
             loaded = self._process.receive()
             self.num_obs, self.num_actions = loaded["sizes"].astype(np.int64).tolist()

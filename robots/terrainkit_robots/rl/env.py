@@ -278,8 +278,7 @@ class LeggedEnv(VecEnv):
         """Reset every environment."""
         self._reset_idx(np.arange(self.num_envs))
         self.state = self._compute_state(slice(None))
-        width = observations.history_width(self)
-        self.obs_history = np.zeros((self.num_envs, width), np.float32)
+        self.obs_history = np.zeros((self.num_envs, observations.history_width(self)), np.float32)
         self._update_commands()
         self.update_observations()
 
@@ -321,9 +320,8 @@ class LeggedEnv(VecEnv):
 
     def _compute_state(self, rows: Any, last: State | None = None) -> State:
         """Return the state of some environments; without the `last` one, after a reset."""
-        history = self.action_history[:, rows].copy()
         names = "actions", "last_actions", "last_last_actions"
-        actions: dict[str, Any] = dict(zip(names, history, strict=True))
+        actions: dict[str, Any] = dict(zip(names, self.action_history[:, rows].copy(), strict=True))
         measured = self.sensors.read(rows, last, self.commands[rows])
         return State(**measured, **actions, **self._command_state(rows))
 
@@ -336,8 +334,7 @@ class LeggedEnv(VecEnv):
 
     def _update_commands(self) -> None:
         """Let commands follow headings and waypoints, and write them into the state."""
-        position = self.sim.qpos[:, :2].astype(np.float32)
-        self.velocity_command.update(self.yaw, position)
+        self.velocity_command.update(self.yaw, self.sim.qpos[:, :2].astype(np.float32))
         for name, values in self._command_state(slice(None)).items():
             np.copyto(getattr(self.state, name), values)
 

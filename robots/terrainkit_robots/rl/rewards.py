@@ -122,8 +122,7 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     widths[1][turns_little] = width_at_rest
     ratios = (error / width for error, width in zip(errors, widths, strict=True))
     lin, yaw = ((np.exp(-ratio) + np.exp(-NARROW * ratio)) / 2 for ratio in ratios)
-    moving = is_moving(commands)
-    only_yaw = moving & (squares[0] == 0)
+    only_yaw = is_moving(commands) & (squares[0] == 0)
     return lin * np.where(only_yaw, yaw, 1), yaw * np.where(turns_little, lin, 1)
 
 

@@ -283,8 +283,7 @@ class LeggedRunner(OnPolicyRunner):
             load_env_state(self.env, process["env"])
             self.logger.continue_from(state["logger"])
             if len(processes) != self.gpu_world_size:  # no two processes may sample alike
-                seed = [self.env.cfg.runner.seed, state["iteration"]]
-                self.env.rng = np.random.default_rng(seed)
+                self.env.rng = np.random.default_rng([self.env.cfg.runner.seed, state["iteration"]])
             else:
                 torch.set_rng_state(process["random"]["cpu"])
                 if self.device != "cpu" and "cuda" in process["random"]:

@@ -259,9 +259,8 @@ def check_training(record: TrainingRecord) -> Check:
     values = [list(loss.values()) for loss in record.losses]
     passed = not record.error and bool(np.isfinite([*np.ravel(values), record.noise_std]).all())
     measured = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in last.items())
-    expected = "finite losses and noise"
     name = f"trains for {count(len(record.losses), 'iteration')}"
-    return Check(name, passed, record.error or measured, expected)
+    return Check(name, passed, record.error or measured, "finite losses and noise")
 
 
 def check_trends(record: TrainingRecord) -> Iterator[Check]:

@@ -85,8 +85,7 @@ class JointSliders:
         position = float(self._default.get(joint.name, 0.0))
         lower, upper = slider_range(joint, position)
         step = 10.0 ** math.floor(math.log10((upper - lower) / _SLIDER_STEPS))
-        label = f"{joint.name} [{joint.unit}]"
-        slider = server.gui.add_slider(label, lower, upper, step, position)
+        slider = server.gui.add_slider(f"{joint.name} [{joint.unit}]", lower, upper, step, position)
         slider.on_update(lambda _: self._on_update(joint.name))
         return slider
 
@@ -156,10 +155,9 @@ class FindingPlaces:
             if joint is not None:
                 self._add(joint.name, [joint.source], (body.index, _point(joint.anchor)))
             for link, pose in zip(body.links, body.poses, strict=True):
-                place = (body.index, _point(pose[:3, 3]))
                 sources = [element.source for element in (*link.collisions, *link.visuals)]
                 sources += [link.inertial.source] if link.inertial is not None else []
-                self._add(link.name, [link.source, *sources], place)
+                self._add(link.name, [link.source, *sources], (body.index, _point(pose[:3, 3])))
 
     def _add(self, name: str, sources: Sequence[Source], place: Place) -> None:
         self._by_name.setdefault(name, place)
