@@ -21,11 +21,11 @@ from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.contracts.contract import (
     FORMATS,
+    KNOWN_TERMS,
     MJLAB,
     TERM_NAMES,
     UNITREE,
     Contract,
-    unknown_terms,
 )
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, write_deploy_yaml
 from terrainkit_robots.policy.contracts.mjlab_metadata import write_metadata
@@ -152,7 +152,9 @@ def export_policy(
 
 def _unknown_terms(contract: Contract) -> list[str]:
     """Return a note about the terms that the readers of a format lack."""
-    if not (names := unknown_terms(contract)):
+    known_terms = KNOWN_TERMS[contract.style].split()
+    unknown = [term.name for term in contract.terms if term.name not in known_terms]
+    if not unknown:
         return []
     formulas = {
         name: _FORMULAS[own]
@@ -160,8 +162,8 @@ def _unknown_terms(contract: Contract) -> list[str]:
         for name in names
         if own in _FORMULAS
     }
-    known = "; ".join(dict.fromkeys(formulas[name] for name in names if name in formulas))
-    what = f"readers of {FORMATS[contract.style]} lack {listing(names)}, and stop"
+    known = "; ".join(dict.fromkeys(formulas[name] for name in unknown if name in formulas))
+    what = f"readers of {FORMATS[contract.style]} lack {listing(unknown)}, and stop"
     return [f"{what}; add what policy.json describes{': ' if known else ''}{known}"]
 
 

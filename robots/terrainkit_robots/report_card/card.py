@@ -90,9 +90,11 @@ class TestResult:
         """The hardest level that is passed, and its parameters."""
         if self.passed is None:
             return "none"
-        values = self.levels[self.passed].parameters.items()
-        text = ", ".join(f"{name} {_value_text(value)}" for name, value in values)
-        return f"{self.passed}: {text}" if text else str(self.passed)
+        parts = [
+            f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {format_value(value)}"
+            for name, value in self.levels[self.passed].parameters.items()
+        ]
+        return f"{self.passed}: {', '.join(parts)}" if parts else str(self.passed)
 
 
 Card = ResultTable[TestResult]
@@ -230,10 +232,6 @@ def _success(outcomes: NDArray[np.int8]) -> tuple[float, tuple[float, float]]:
 def _markdown_table(rows: list[tuple[str, ...]]) -> str:
     lines = rows[0], ("---",) * len(rows[0]), *rows[1:]
     return "".join(f"| {' | '.join(row)} |\n" for row in lines)
-
-
-def _value_text(value: Any) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else format_value(value)
 
 
 def _percent(result: Mapping[str, Any]) -> str:
