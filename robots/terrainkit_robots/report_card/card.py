@@ -115,8 +115,8 @@ def card_markdown(card: Card) -> str:
     """Return a card as a Markdown document."""
     about = card.about
     margins = ""
-    if "margins" in card.remarks:
-        rows = margin_rows(card.remarks["margins"]["margins"])
+    if measured := card.remarks["margins"]:
+        rows = margin_rows(measured["margins"])
         margins = f"\n## Margins\n\n{_markdown_table(rows)}\n{NOTE}\n"
     return (
         f"# {about['robot']} on {about['map']}\n\n"
@@ -177,7 +177,7 @@ def measure(
         "success": success,
         "interval": interval,
     }
-    return ResultTable(about=about, tables={"tests": tests})
+    return ResultTable(about=about, tables={"tests": tests}, remarks={"margins": None})
 
 
 def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempts) -> TestResult:

@@ -21,7 +21,7 @@ def draw_card(card: Card) -> bytes:
         )
         for test in card["tests"]
     ]
-    if "margins" not in card.remarks:
+    if not card.remarks["margins"]:
         return draw_heatmap(summary(card), rows, note="passed level")
     rows += _margin_rows(card.remarks["margins"]["margins"])
     return draw_heatmap(summary(card), rows, note="passed level, or first value with falls")
