@@ -40,10 +40,11 @@ def _leg_radius(robot: Facts, leg: Leg, poses: Sequence[Matrix]) -> float:
     if not shapes:
         return 0.0
     contacts = contact_points(body, pose, robot.meshes)
-    if leg.limb.has_wheel:
+    if leg.limb.has_wheel:  # the distance from its axle to the ground
         return float(joint_axis(body, pose)[0][2] - contacts[:, 2].min())
     width = float(np.ptp(contacts @ leg.pitch))
     touching = min(shapes, key=lambda shape: min_height(shape, pose, robot.meshes))
+    # A round foot touches in a point, and a sole along its width; a wide roller does both.
     return max(width / 2, _shape_radius(robot, touching, pose, leg.pitch))
 
 
