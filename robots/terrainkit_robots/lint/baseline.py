@@ -98,7 +98,8 @@ class Baseline:
         """
         entries = self.robots.get(self._key(report), {})
         recorded = Counter((code, subject) for code in entries for subject in entries[code])
-        found, file = _counts(report), display_path(self.path)
+        found = _counts(report)
+        file = display_path(self.path)
         known = {key for key in found if found[key] <= recorded[key]}
         reason = f"{count(sum(found[key] for key in known), 'finding')} accepted in {file}"
         kept, skipped = list[Finding](), list(report.skipped)

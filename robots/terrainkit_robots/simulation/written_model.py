@@ -239,7 +239,8 @@ def stand_as_written(
         data.qpos[2] -= height_above(model, data, written.shapes, written.floor)
         mujoco.mj_forward(model, data)
         check_contacts(data)
-        start, steps = data.qpos[:3].copy(), round(_SECONDS / model.opt.timestep)
+        start = data.qpos[:3].copy()
+        steps = round(_SECONDS / model.opt.timestep)
         speeds = np.zeros((steps, model.nv - 6))
         forces, heights = np.zeros(steps), np.zeros(steps)
         for step in range(steps):

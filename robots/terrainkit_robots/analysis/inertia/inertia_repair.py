@@ -134,7 +134,9 @@ class InertiaRepair:
         """
         if is_zero(inertia):
             return None
-        nearest, box, mass = nearest_physical(inertia), self._box(link), _mass(link)
+        nearest = nearest_physical(inertia)
+        box = self._box(link)
+        mass = _mass(link)
         if nearest is None or box is None or not mass > 0:
             return nearest
         radius = gyration_radius(principal_moments(nearest), mass)

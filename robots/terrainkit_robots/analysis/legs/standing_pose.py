@@ -318,7 +318,9 @@ def _local_minima(cost: Matrix) -> list[tuple[int, int]]:
 
 def _minimize(objective: _LegObjective, starts: Matrix, limits: Matrix) -> Matrix:
     """Return the best position of hip and knee near any of the starts, shape (2,)."""
-    best, width, rows = starts, np.ptp(limits, axis=1), np.arange(len(starts))
+    best = starts
+    width = np.ptp(limits, axis=1)
+    rows = np.arange(len(starts))
     for _ in range(_ROUNDS):
         # Two grid steps to either side of the best point.
         width = width / 5
@@ -368,12 +370,14 @@ def _make_objective(
         foot = leaf.zero_pose.copy()
         foot[:3, :3] = axis_angle_to_matrix(leg.pitch, np.float64(angle)) @ foot[:3, :3]
     else:
-        angle, foot = 0.0, poses[leaf.index]  # the contact of a ball depends on the pose
+        angle = 0.0
+        foot = poses[leaf.index]  # the contact of a ball depends on the pose
     contact = contact_points(leaf, foot, robot.meshes).mean(axis=0)
     if ankles and len(robot.legs) == 2:
         contact = contact + _ankle_offset(leg, robot, foot)
     ratio = _HEIGHT_RATIO.get(len(robot.legs), _DEFAULT_HEIGHT_RATIO)
-    hip_point, length = _hip_point(leg, robot, poses), max(leg.length, 1e-6)
+    hip_point = _hip_point(leg, robot, poses)
+    length = max(leg.length, 1e-6)
     return _LegObjective(
         chain=tuple(chain),
         base_pose=poses[chain[0].parent or 0],

@@ -77,7 +77,8 @@ def expand_xacro(
     try:
         with ChildProcess(expand, request, limits=limits, environment=environment) as process:
             reply = process.receive()
-        xml, files = reply["xml"].tobytes(), tuple(map(Path, reply["files"].tolist()))
+        xml = reply["xml"].tobytes()
+        files = tuple(map(Path, reply["files"].tolist()))
         message, location = str(reply["error"]), reply["location"].tolist()
         place = (Path(location[0]), int(location[1])) if location else None
     except (ProcessError, LookupError, TypeError, ValueError) as error:

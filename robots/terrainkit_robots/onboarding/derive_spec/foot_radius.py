@@ -50,7 +50,8 @@ def _leg_radius(robot: Facts, leg: Leg, poses: Sequence[Matrix]) -> float:
 
 def _shape_radius(robot: Facts, shape: BodyShape, pose: Matrix, axis: Matrix) -> float:
     """Return the radius on which a shape rolls about an axis; 0 for a flat sole."""
-    geometry, rotation = shape.geometry, (pose @ shape.pose)[:3, :3]
+    geometry = shape.geometry
+    rotation = (pose @ shape.pose)[:3, :3]
     match geometry.shape:
         case "sphere" | "capsule":
             return geometry.size[0]
