@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 from terrainkit.errors import ConfigError
 

@@ -3,7 +3,7 @@ import math
 
 import numpy as np
 import pytest
-from terrainkit_robots.lint.compare.link_poses import compare_link_poses, sample_positions
+from terrainkit_robots.lint.compare.pose_differences import compare_link_poses, sample_positions
 
 from terrainkit_robots.analysis.bodies.link_poses import link_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
