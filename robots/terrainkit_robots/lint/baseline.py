@@ -26,9 +26,9 @@ from terrainkit.errors import ConfigError
 from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.description.package_resolver import exists
 from terrainkit_robots.description.xml.document import read_bytes
+from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report, Skipped
-from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import count, display_path, names
 
 Entries = Mapping[str, Sequence[str]]

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from terrainkit_robots.spec.robot_arrays import Robot
 
 from terrainkit.errors import ConfigError
+from terrainkit_robots.spec.robot_arrays import Robot
 
 LEGGED = {"feet": ("a_foot",), "spawn_height": 0.3, "base_height_target": 0.28}
 
