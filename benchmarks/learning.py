@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from terrainkit_robots.policy.evaluate import command_grid, eval_task
-from terrainkit_robots.policy.load import single_torch_thread
-from terrainkit_robots.policy.rollout import EvaluationRollout
+from terrainkit_robots.policy.load_policy import single_torch_thread
+from terrainkit_robots.policy.policy_rollout import EvaluationRollout
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task

@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -13,7 +14,7 @@ from terrainkit_cli.parse import option, positional
 from terrainkit_cli.plugin_command import PluginCommand
 
 if TYPE_CHECKING:
-    from terrainkit_robots.policy.contracts.check import Finding
+    from terrainkit_robots.policy.check_policy import Finding
 
 MAX_PRINTED = 3
 """Largest number of findings of one kind in the text."""
@@ -57,7 +58,7 @@ class CheckPolicy(PluginCommand):
         if not self.policy or not (self.robot or self.task):
             raise ConfigError("POLICY, --robot: missing; expected policy.onnx --robot quadruped")
         require_training("onnx", "onnxruntime")
-        from terrainkit_robots.policy.contracts.check import check_policy
+        from terrainkit_robots.policy.check_policy import check_policy
         from terrainkit_robots.rl.tasks import robot_and_task
 
         robot, task = robot_and_task(self.robot, self.task)
@@ -65,7 +66,7 @@ class CheckPolicy(PluginCommand):
             steps.update(f"checking {self.policy}")
             findings = check_policy(Path(self.policy), robot, self.contract, task)
         if self.format == "json":
-            report = {"policy": self.policy, "findings": [asdict(each) for each in findings]}
+            report = {"policy": self.policy, "findings": [asdict(finding) for finding in findings]}
             render.report(json.dumps(report, indent=2) + "\n")
         else:
             render.result("\n".join(text_lines(self.policy, findings)))
@@ -75,12 +76,13 @@ class CheckPolicy(PluginCommand):
 def text_lines(policy: str, findings: "list[Finding]") -> list[str]:
     """Return the findings as lines, at most some of each code."""
     lines = []
-    for _, group in groupby(sorted(findings, key=lambda each: each.code), lambda each: each.code):
+    by_code = attrgetter("code")
+    for _, group in groupby(sorted(findings, key=by_code), by_code):
         same = list(group)
-        for each in same[:MAX_PRINTED]:
-            lines += [f"{each.code}  {each.got}", f"        expected: {each.expected}"]
-        if more := len(same) - MAX_PRINTED:
-            lines += [f"        and {more} more"] * (more > 0)
+        for finding in same[:MAX_PRINTED]:
+            lines += [f"{finding.code}  {finding.got}", f"        expected: {finding.expected}"]
+        if len(same) > MAX_PRINTED:
+            lines.append(f"        and {len(same) - MAX_PRINTED} more")
         lines.append(f"        {same[0].help}")
     found = f"{len(findings)} findings" if len(findings) != 1 else "1 finding"
     return [*lines, f"{policy}: {found if findings else 'the robot stands, walks and turns'}"]

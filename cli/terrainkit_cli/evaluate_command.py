@@ -22,8 +22,9 @@ from terrainkit_cli.parse import option, positional
 from terrainkit_cli.plugin_command import PluginCommand
 
 if TYPE_CHECKING:
-    from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult
+    from terrainkit_robots.policy.evaluate import EvaluationConfig
     from terrainkit_robots.policy.metrics import RolloutMetrics
+    from terrainkit_robots.policy.result_table import ResultTable
     from terrainkit_robots.rl.run import PolicySpec
 
 DEFAULT_REPETITIONS, MAX_REPETITIONS = 10, 100
@@ -189,19 +190,20 @@ class Evaluate(PolicyCommand):
                 lambda fraction: steps.update(f"rollout: {fraction:.0%} of {self.seconds:g} s"),
             )
         if self.format == "json":
-            render.report(result.as_json())
+            render.report(result.to_json(indent=2))
         else:
             render.result("\n".join([summary_line(result), *gait_lines(result)]))
             render.table(result_rows(result))
             render.table(dimension_rows(result))
         if self.output is not None:
             with atomic_write(self.output, overwrite=self.overwrite) as path:
-                path.write_text(result.as_json(), encoding="utf-8")
+                path.write_text(result.to_json(indent=2), encoding="utf-8")
         if self.diagram is not None:
             from terrainkit_cli.contact_diagram import draw_contacts
 
             with atomic_write(self.diagram, overwrite=self.overwrite) as path:
-                path.write_bytes(draw_contacts(result.contacts, result.dt))
+                contacts = dict(result.about["contacts"])
+                path.write_bytes(draw_contacts(contacts, contacts.pop("dt")))
         for target in filter(None, (self.output, self.diagram)):
             if self.format == "table":
                 render.result(f"wrote {target}")
@@ -233,28 +235,29 @@ class Evaluate(PolicyCommand):
             margins = report_card.report_margins(spec, config, self.repetitions)
         if self.suite:
             contents = report_card.report_suite(spec, self.suite, config, repetitions, margins)
-        elif margins:
-            contents = [report_card.to_json(margins.as_json())]
         else:
-            contents = report_card.report_limits(spec, config, repetitions)
+            result = margins or report_card.report_limits(spec, config, repetitions)
+            contents = [result.to_json().encode()]
         if targets:
             report_card.write_files(targets, contents)
         return 0
 
 
-def summary_line(result: "EvaluationResult") -> str:
+def summary_line(result: "ResultTable[RolloutMetrics]") -> str:
     """Return the metrics of all robots as one line."""
     from terrainkit_robots.text import count, display_path
 
-    metrics, terrain = result.metrics, display_path(result.config.terrain or "plane")
-    if result.collision != "plane":
-        terrain += f" (collision: {result.collision})"
+    about, metrics = result.about, result.about["all"]
+    terrain = display_path(about["terrain"])
+    if about["collision"] != "plane":
+        terrain += f" (collision: {about['collision']})"
     success = "" if metrics.success is None else f", {_percent(metrics.success)} success"
     error = "; ".join(format_errors(metrics))
     if metrics.lin_vel_error is None:
         error = "not measured: no robot walked longer than 2 s after a command"
     return (
-        f"{result.robot}, {result.checkpoint}, on {terrain}: {count(metrics.robots, 'robot')}, "
+        f"{about['robot']}, {about['checkpoint']}, on {terrain}: "
+        f"{count(metrics.robots, 'robot')}, "
         f"{metrics.falls} fell{success}; error {error}"
     )
 
@@ -266,15 +269,15 @@ def format_errors(metrics: "RolloutMetrics") -> tuple[str, str]:
     return f"{lin} m/s ({lin_1s} averaged over 1 s)", f"{ang} rad/s ({ang_1s} averaged over 1 s)"
 
 
-def gait_lines(result: "EvaluationResult") -> list[str]:
+def gait_lines(result: "ResultTable[RolloutMetrics]") -> list[str]:
     """Return the gait of the robots that are commanded to move, and a contact diagram, as lines."""
-    metrics, feet = result.metrics, list(result.contacts)
+    metrics, feet = result.about["all"], result.about["feet"]
     lines = [] if metrics.followed is None else [f"commands followed: {metrics.followed:.0%}"]
     if metrics.lin_vel_error is None:
         lines = ["commands followed: not measured"]
     if metrics.swing_height is None or metrics.duty_factor is None:
         return lines
-    heights = (_number(each, 100, 1) for each in metrics.swing_height)
+    heights = (_number(value, 100, 1) for value in metrics.swing_height)
     values = (
         f"{_number(metrics.step_frequency, 1, 1)} steps/s per foot",
         f"feet slip at {_number(metrics.foot_slip, 1, 2)} m/s",
@@ -290,15 +293,15 @@ def gait_lines(result: "EvaluationResult") -> list[str]:
         f"limits, foot force {loads[2]} times the weight"
     )
     width = max(map(len, feet))
-    for (foot, contacts), duty in zip(result.contacts.items(), metrics.duty_factor, strict=True):
-        blocks = contacts.translate({ord("1"): "#", ord("0"): "."})
+    for foot, duty in zip(feet, metrics.duty_factor, strict=True):
+        blocks = result.about["contacts"][foot].translate({ord("1"): "#", ord("0"): "."})
         lines.append(f"{foot:{width}}  {blocks}  {_percent(duty)} in contact")
     return lines
 
 
-def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
+def result_rows(result: "ResultTable[RolloutMetrics]") -> list[tuple[str, ...]]:
     """Return the groups of a result as rows of a table: by command, or by terrain and level."""
-    groups = result.groups
+    groups = result.tables
     if "by_command" in groups:
         head = "forward", "left", "yaw", "fell", "m/s", "rad/s", "followed", "swing [cm]"
         rows: list[tuple[str, ...]] = [head]
@@ -306,7 +309,7 @@ def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
             command = (f"{value:g}" for value in group.command or ())
             fell = str(group.falls) if group.robots == 1 else f"{group.falls}/{group.robots}"
             errors = _number(group.lin_vel_error), _number(group.ang_vel_error)
-            swing = [each for each in group.swing_height or () if each is not None]
+            swing = [height for height in group.swing_height or () if height is not None]
             lowest = _number(min(swing, default=None), 100, 1)
             rows.append((*command, fell, *errors, _percent(group.followed), lowest))
         return rows
@@ -314,7 +317,7 @@ def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
         return []
     levels = [group.level for group in groups["by_level"]]
     by_level = *groups["by_terrain_and_level"], *groups.get("by_direction_and_level", ())
-    success = {(each.terrain or each.direction, each.level): each.success for each in by_level}
+    success = {(group.terrain or group.direction, group.level): group.success for group in by_level}
     names = "terrain", "robots", "fell", "m/s", "rad/s", "success"
     rows = [(*names, *(f"level {level}" if level == levels[0] else str(level) for level in levels))]
     for group in (*groups["by_terrain"], *groups.get("by_direction", ())):
@@ -331,9 +334,9 @@ def result_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
     return rows
 
 
-def dimension_rows(result: "EvaluationResult") -> list[tuple[str, ...]]:
+def dimension_rows(result: "ResultTable[RolloutMetrics]") -> list[tuple[str, ...]]:
     """Return how many robots succeed at each dimension of stairs, gaps and obstacles, as rows."""
-    groups = result.groups.get("by_terrain_dimension", ())
+    groups = result.tables.get("by_terrain_dimension", ())
     directions = list(dict.fromkeys(str(group.direction) for group in groups))
     rows: dict[tuple[str, str], dict[str, str]] = {}
     for group in groups:

@@ -9,15 +9,14 @@ import textwrap
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
 if TYPE_CHECKING:
     from rich.status import Status
-    from rich.table import Table
 
     from terrainkit_robots.lint.report.text_report import Span
-    from terrainkit_robots.rl.runner import ProgressCallback, TrainingProgress
 
 _T = TypeVar("_T")
 
@@ -140,7 +139,8 @@ def show_warning(
 def progress(items: Iterable[_T], total: int, *, of: str = "patches") -> Iterator[_T]:
     """Return `items`, with a progress bar on stderr if that is a terminal and they take long."""
     items = iter(items)
-    return _with_delayed_bar(items, total, of) if sys.stderr.isatty() else items
+    has_bar = sys.stderr.isatty() and find_spec("rich") is not None
+    return _with_delayed_bar(items, total, of) if has_bar else items
 
 
 def _with_delayed_bar(items: Iterator[_T], total: int, of: str) -> Iterator[_T]:
@@ -192,7 +192,7 @@ class Steps:
 @contextmanager
 def steps() -> Iterator[Steps]:
     """Yield an object that shows the steps of a command."""
-    if not sys.stderr.isatty():
+    if not sys.stderr.isatty() or find_spec("rich") is None:
         yield Steps(None)
         return
     from rich.console import Console
@@ -204,84 +204,3 @@ def steps() -> Iterator[Steps]:
 def drop_stdout() -> None:
     """Discard further output, so that no error is printed at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-LINE_INTERVAL, TERMS_INTERVAL = 10, 50
-"""Iterations between lines of progress, and of success and rewards, if there is no terminal."""
-
-
-@contextmanager
-def training() -> "Iterator[ProgressCallback]":
-    """Yield a callback that shows the progress of training on stderr, live if it is a terminal."""
-    if not sys.stderr.isatty():
-        yield _training_line
-        return
-    from rich.console import Console
-    from rich.live import Live
-
-    with Live(console=Console(stderr=True), auto_refresh=False) as live:
-        yield lambda progress: live.update(_training_table(progress), refresh=True)
-
-
-def _training_line(progress: "TrainingProgress") -> None:
-    iteration, last = progress.iteration, progress.max_iterations
-    lines = []
-    if iteration % LINE_INTERVAL == 0 or iteration == last:
-        lines.append([f"{name} {value}" for name, value in _training_metrics(progress)])
-    if iteration % TERMS_INTERVAL == 0 or iteration == last:
-        terms = [f"success {name} {rate:.0%}" for name, rate in progress.success.items()]
-        rewards = [f"{name} {value}" for name, value in _training_rewards(progress)]
-        lines.append(terms + rewards)
-    with suppress(OSError):  # such as from a closed terminal
-        for line in filter(None, lines):
-            print(f"iteration {iteration}/{last}: {', '.join(line)}", file=sys.stderr, flush=True)
-
-
-def _training_rewards(progress: "TrainingProgress") -> list[tuple[str, str]]:
-    """Return each reward per second, and as a share of the most that it can be.
-
-    The share of a penalty is relative to the sum of the most that all rewards can be.
-    """
-    shares = progress.shares
-    return [(k, f"{v:+.3f} /s ({shares[k]:.0%})") for k, v in progress.rewards.items()]
-
-
-def _training_metrics(progress: "TrainingProgress") -> list[tuple[str, str]]:
-    """Return names and values of the metrics that both formats show."""
-    metrics = [
-        ("env steps/s", f"{progress.steps_per_second:.0f}"),
-        ("to go", _clock(progress.eta)),
-        ("noise std", f"{progress.noise_std:.2f}"),
-    ]
-    if progress.reward is not None and progress.episode_length is not None:
-        metrics.insert(2, ("reward", f"{progress.reward:.2f}"))
-        metrics.insert(3, ("episode", f"{progress.episode_length:.1f} s"))
-    if progress.falls is not None and progress.speed is not None:
-        metrics.insert(4, ("falls", f"{progress.falls:.0%}"))
-        metrics.insert(5, ("speed", f"{progress.speed:.2f} m/s"))
-    return metrics + [(f"level {name}", f"{level:.1f}") for name, level in progress.levels.items()]
-
-
-def _training_table(progress: "TrainingProgress") -> "Table":
-    from rich.table import Table
-
-    title = f"iteration {progress.iteration}/{progress.max_iterations}"
-    where = None if progress.folder is None else str(progress.folder)
-    table = Table(title=title, caption=where, show_header=False, title_justify="left")
-    table.add_column()
-    table.add_column(justify="right")
-    for name, value in _training_metrics(progress):
-        rate = progress.success.get(name.removeprefix("level "))
-        reached = "" if rate is None or not name.startswith("level ") else f"  {rate:.0%} succeed"
-        table.add_row(name, value + reached)
-    table.add_row("time learning", f"{progress.learning_fraction:.0%}")
-    table.add_section()
-    for row in _training_rewards(progress):
-        table.add_row(*row)
-    return table
-
-
-def _clock(seconds: float) -> str:
-    """Return a duration as text, such as 1:02:03."""
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes // 60}:{minutes % 60:02}:{rest:02}"

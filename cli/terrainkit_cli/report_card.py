@@ -1,16 +1,17 @@
 """The report card of a policy on a suite or a map, and its limits."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import is_map
 
 if TYPE_CHECKING:
     from terrainkit_robots.policy.evaluate import EvaluationConfig
-    from terrainkit_robots.policy.margins import Margins
+    from terrainkit_robots.policy.metrics import RolloutMetrics
+    from terrainkit_robots.policy.result_table import ResultTable
+    from terrainkit_robots.report_card.policy_limits import LimitResult
     from terrainkit_robots.rl.run import PolicySpec
 
 CARD_SUFFIXES = (".json", ".md", ".png")
@@ -22,7 +23,7 @@ def report_suite(
     suite: str,
     config: "EvaluationConfig",
     repetitions: int,
-    margins: "Margins | None" = None,
+    margins: "ResultTable[RolloutMetrics] | None" = None,
 ) -> list[bytes]:
     """Measure a policy, print the card, and return it as the files of a report card.
 
@@ -40,7 +41,13 @@ def report_suite(
     """
     from terrainkit import TerrainMap
     from terrainkit.suites import generate_suite
-    from terrainkit_robots.report_card.card import CRITERION, measure, summary
+    from terrainkit_robots.report_card.card import (
+        CRITERION,
+        card_markdown,
+        card_rows,
+        measure,
+        summary,
+    )
     from terrainkit_robots.report_card.picture import draw_card
 
     terrain_map = TerrainMap.load(suite) if is_map(suite) else generate_suite(suite)
@@ -55,19 +62,25 @@ def report_suite(
             lambda fraction: steps.update(f"{suite}: {fraction:.0%} of the tests"),
         )
     render.result(summary(card))
-    render.table(card.rows())
+    render.table(card_rows(card))
     render.result(
         f"\nThe table counts the robots, of {repetitions} on each patch, that crossed. {CRITERION}"
     )
-    card = replace(card, margins=margins)
-    return [to_json(card.as_json()), card.as_markdown().encode(), draw_card(card)]
+    if margins is not None:
+        card = replace(card, remarks={"margins": margins})
+    return [card.to_json().encode(), card_markdown(card).encode(), draw_card(card)]
 
 
 def report_margins(
     spec: "PolicySpec", config: "EvaluationConfig", repetitions: int | None
-) -> "Margins":
+) -> "ResultTable[RolloutMetrics]":
     """Measure the margins of a policy, print them, and return them."""
-    from terrainkit_robots.policy.margins import DEFAULT_REPETITIONS, NOTE, measure_margins
+    from terrainkit_robots.policy.margins import (
+        DEFAULT_REPETITIONS,
+        NOTE,
+        margin_rows,
+        measure_margins,
+    )
     from terrainkit_robots.rl.runner import available_processors
     from terrainkit_robots.text import count
 
@@ -80,22 +93,19 @@ def report_margins(
             repetitions or DEFAULT_REPETITIONS,
             lambda fraction: steps.update(f"margins: {fraction:.0%} of {config.seconds:g} s"),
         )
-    render.result(f"margins of {margins.robot}, {margins.checkpoint}")
-    render.table(margins.rows())
+    render.result(f"margins of {margins.about['robot']}, {margins.about['checkpoint']}")
+    render.table(margin_rows(margins["margins"]))
     render.result(f"\n{NOTE}")
-    for each in margins.left_out:
-        render.note(f"warning: left out: {each}")
+    for condition in margins.remarks["left_out"]:
+        render.note(f"warning: left out: {condition}")
     return margins
 
 
-def to_json(document: dict[str, Any]) -> bytes:
-    """Return values of JSON as the content of a file."""
-    return f"{json.dumps(document, indent=1)}\n".encode()
-
-
-def report_limits(spec: "PolicySpec", config: "EvaluationConfig", repetitions: int) -> list[bytes]:
-    """Measure the limits of a policy, print them, and return them as JSON."""
-    from terrainkit_robots.report_card.limits import measure_limits
+def report_limits(
+    spec: "PolicySpec", config: "EvaluationConfig", repetitions: int
+) -> "ResultTable[LimitResult]":
+    """Measure the limits of a policy, print them, and return them."""
+    from terrainkit_robots.report_card.policy_limits import limit_rows, measure_limits
     from terrainkit_robots.simulation.robot_limits import derive_limits
 
     render.note(f"measuring the limits of {spec.policy_name}: {repetitions} robots in each test")
@@ -107,8 +117,8 @@ def report_limits(spec: "PolicySpec", config: "EvaluationConfig", repetitions: i
             config,
             lambda fraction: steps.update(f"limits: {fraction:.0%}"),
         )
-    render.table(result.rows())
-    return [to_json(result.as_json())]
+    render.table(limit_rows(result))
+    return result
 
 
 def targets(output: Path, *, is_card: bool) -> list[Path]:

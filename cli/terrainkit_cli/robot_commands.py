@@ -200,12 +200,14 @@ class CheckRobot(Command):
         settings = settings.over(read_settings(Path(name).parent))
 
         def lint_contents(contents: Mapping[Path, bytes]) -> "Report":
-            against, spec = self.against or None, self.spec
+            against = self.against or None
+            spec = self.spec
             return check_robot(name, settings, against=against, spec=spec, contents=contents)
 
         with render.steps() as steps:
             steps.update(f"checking {name}")
-            report, diff = lint_contents({}), ""
+            report = lint_contents({})
+            diff = ""
         path = report.facts.model.file
         if self.fix or self.unsafe_fixes or self.diff:
             from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff

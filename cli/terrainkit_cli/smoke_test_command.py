@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -23,10 +23,10 @@ from terrainkit_cli.parse import Command, positional
 from terrainkit_cli.training_extra import require_training
 
 if TYPE_CHECKING:
-    from terrainkit_robots.smoke_test.checks import SmokeTestResult
+    from terrainkit_robots.policy.result_table import ResultTable
+    from terrainkit_robots.smoke_test.checks import Check
 
-SCHEMA_VERSION = 2
-"""Version of the JSON; it changes when a key changes its meaning or is removed."""
+    SmokeTestResult = ResultTable[Check]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,7 @@ class SmokeTest(Command):
             render.report(text)
         if len(results) < len(set(self.robots)):
             return 2
-        return int(not all(result.passed for result in results.values()))
+        return int(any(map(failed_checks, results.values())))
 
     def _check_options(self) -> None:
         from terrainkit_robots.description.robot_file import is_description
@@ -126,12 +126,17 @@ def show_progress(steps: render.Steps, step: str, fraction: float) -> None:
     steps.update(f"{step}: training, {fraction:.0%}")
 
 
+def failed_checks(result: "SmokeTestResult") -> int:
+    """Return the number of checks that failed."""
+    return sum(not check.passed for check in result["checks"])
+
+
 def summary(result: "SmokeTestResult") -> str:
     """Return a result as one line."""
-    failed = sum(not check.passed for check in result.checks)
+    robot, failed = result.about["robot"], failed_checks(result)
     if not failed:
-        return f"{result.robot} can be trained"
-    return f"{result.robot}: {failed} of {len(result.checks)} checks failed"
+        return f"{robot} can be trained"
+    return f"{robot}: {failed} of {len(result['checks'])} checks failed"
 
 
 def as_text(results: "dict[str, SmokeTestResult]") -> str:
@@ -140,9 +145,9 @@ def as_text(results: "dict[str, SmokeTestResult]") -> str:
 
     blocks = []
     for name, result in results.items():
-        width = max(len(check.name) for check in result.checks)
-        lines = [f"robot     {result.robot} ({display_path(name)})", ""]
-        for check in result.checks:
+        width = max(len(check.name) for check in result["checks"])
+        lines = [f"robot     {result.about['robot']} ({display_path(name)})", ""]
+        for check in result["checks"]:
             word = "ok  " if check.passed else "FAIL"
             lines.append(f"{word}  {check.name.ljust(width)}  {check.measured}")
             if not check.passed:
@@ -155,12 +160,15 @@ def as_json(results: "dict[str, SmokeTestResult]") -> str:
     """Return one indented document; for several robots, one document per line."""
     from terrainkit import __version__
 
-    head = {
-        "schema_version": SCHEMA_VERSION,
-        "tool": {"name": "terrainkit", "version": __version__},
-    }
+    tool = {"name": "terrainkit", "version": __version__}
     documents = [
-        {**head, "file": name, "verdict": "pass" if result.passed else "fail", **asdict(result)}
+        {
+            "schema_version": result.schema_version,
+            "tool": tool,
+            "file": name,
+            "verdict": "fail" if failed_checks(result) else "pass",
+            **result.document(),
+        }
         for name, result in results.items()
     ]
     indent = 2 if len(documents) == 1 else None

@@ -16,6 +16,7 @@ from terrainkit_cli.parse import is_option, option, positional
 from terrainkit_cli.plugin_command import PluginCommand
 from terrainkit_cli.signals import stop_on_signals
 from terrainkit_cli.training_extra import require_training
+from terrainkit_cli.training_progress import ProgressMeter, shown_progress
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.config import Task
@@ -107,7 +108,13 @@ class Train(PluginCommand, ConfigCommand):
         task = self.changed_config()
         if task.runner.logger == "wandb" and find_spec("wandb") is None:
             raise ConfigError("runner.logger: wandb is not installed: pip install wandb")
-        with stop_on_signals() as stop_signal, render.training() as show_progress:
+        with stop_on_signals() as stop_signal, shown_progress() as show:
+            meter = ProgressMeter(show)
+
+            def start(runner: "LeggedRunner") -> None:
+                _print_start(runner, terrain)
+                meter.start(runner)
+
             runner = train(
                 robot,
                 terrain,
@@ -115,8 +122,8 @@ class Train(PluginCommand, ConfigCommand):
                 folder=self.log_dir,
                 resume=run,
                 device=self.device,
-                start_callback=lambda runner: _print_start(runner, terrain),
-                progress_callback=show_progress,
+                start_callback=start,
+                progress_callback=meter.update,
                 should_stop=stop_signal,
             )
             completed = runner.current_learning_iteration

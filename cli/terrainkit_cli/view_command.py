@@ -78,7 +78,7 @@ class ViewerCommand(Command):
         """
         with render.steps() as steps:
             steps.update("starting the viewer")
-            from terrainkit.views.viewer_server import viewer_server
+            from terrainkit.viewer.viewer_server import viewer_server
 
             with viewer_server(self.host, self.port) as server:
                 if show_first is not None:
@@ -221,7 +221,7 @@ class View(PluginCommand, ViewerCommand):
         return self.serve(show, self.source)
 
     def _load_map(self) -> "Show":
-        from terrainkit.views.viewer import show_map
+        from terrainkit.viewer.map_scene import show_map
 
         return partial(show_map, terrain_map=TerrainMap.load(self.source))
 
@@ -232,7 +232,8 @@ class View(PluginCommand, ViewerCommand):
         from terrainkit_robots.spec.robot_spec import RobotSpec
         from terrainkit_robots.viewer.show_robot import show_robot
 
-        path, spec = Path(self.source), None
+        path = Path(self.source)
+        spec = None
         if (path / SPEC_FILE).is_file():
             spec = path / SPEC_FILE
             path = path / RobotSpec.load(spec).urdf

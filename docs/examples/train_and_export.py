@@ -19,12 +19,10 @@ from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.train import train
 
 
-def print_progress(progress):
-    """Print the means of the last episodes, after each iteration."""
-    print(
-        f"iteration {progress.iteration}: reward {progress.reward or 0:.2f}, "
-        f"episode {progress.episode_length or 0:.1f} s, {progress.steps_per_second:.0f} steps/s"
-    )
+def print_progress(runner):
+    """Print the mean reward of the last episodes, after each iteration."""
+    reward = np.mean(runner.logger.rewbuffer or [0.0])
+    print(f"iteration {runner.current_learning_iteration}: reward {reward:.2f}")
 
 
 terrains = tuple(terrainkit.SubTerrain(terrain=name) for name in ("rough", "pyramid_slope"))

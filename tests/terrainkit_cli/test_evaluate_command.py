@@ -8,11 +8,11 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, suites
 from terrainkit_cli.evaluate_command import dimension_rows, result_rows, summary_line
-from terrainkit_robots.policy.evaluate import EvaluationConfig, EvaluationResult
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.policy.metrics import RolloutMetrics
-from terrainkit_robots.report_card import limits
-from terrainkit_robots.report_card.limits import LimitResult, PolicyLimits
+from terrainkit_robots.policy.result_table import ResultTable
+from terrainkit_robots.report_card import policy_limits
+from terrainkit_robots.report_card.policy_limits import LimitResult
 from terrainkit_robots.rl import run as run_module
 from terrainkit_robots.rl.run import open_run
 
@@ -104,7 +104,9 @@ def test_exported_policy_is_evaluated(here, rejected, tmp_path, monkeypatch):
     assert (code, err) == (0, "")
     assert out.startswith("quadruped, policy.onnx, on plane: 1 robot, 0 fell")
     seen = []
-    monkeypatch.setattr(limits, "measure_limits", lambda *words: seen.append(words[:2]) or 1 / 0)
+    monkeypatch.setattr(
+        policy_limits, "measure_limits", lambda *words: seen.append(words[:2]) or 1 / 0
+    )
     with pytest.raises(ZeroDivisionError):
         here(*outside, "--limits")
     ((spec, robot_limits),) = seen
@@ -132,16 +134,8 @@ def make_metrics(**values):
 
 
 def make_result(metrics, **groups):
-    config = EvaluationConfig(terrain="hill.npz")
-    return EvaluationResult(
-        robot="hare",
-        checkpoint="model_1.pt",
-        config=config,
-        metrics=metrics,
-        groups=groups,
-        contacts={},
-        dt=0.02,
-    )
+    about = {"robot": "hare", "checkpoint": "model_1.pt", "terrain": "hill.npz", "feet": []}
+    return ResultTable(about=about | {"collision": "plane", "all": metrics}, tables=groups)
 
 
 def test_summary_line_shows_missing_errors():
@@ -237,9 +231,9 @@ def test_limits_are_printed_and_written(here, tmp_path, monkeypatch):
             test="stairs", unit="m", passed=0.1, failed=0.12, crossed=7, robot_limit=0.1792
         )
         about = {"robot": "hare", "checkpoint": "hare.onnx", "repetitions": 10, "seed": 1}
-        return PolicyLimits(**about, limits=(result,))
+        return ResultTable(about=about, tables={"limits": (result,)})
 
-    monkeypatch.setattr(limits, "measure_limits", measure)
+    monkeypatch.setattr(policy_limits, "measure_limits", measure)
     code, out, err = here("walk", "--limits", "-o", "limits.json")
     told = "terrainkit: measuring the limits of model_7.pt: 10 robots in each test\n"
     assert (code, err) == (0, told)

@@ -10,7 +10,7 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.smoke_test import checks as module
-from terrainkit_robots.smoke_test.checks import Check, SmokeTestResult
+from terrainkit_robots.smoke_test.checks import Check, make_result
 
 GOOD = Check("spawn height", True, "1.0 cm", "within 2.0 cm")
 BAD = Check("observation policy", False, "44 numbers", "45 numbers")
@@ -33,7 +33,7 @@ def calls(monkeypatch):
         if name.startswith("none"):
             raise ConfigError(f"there is no {name}")
         checks = (GOOD, BAD) if name.startswith("bad") else (GOOD,)
-        return SmokeTestResult(name.upper(), checks)
+        return make_result(name.upper(), *checks)
 
     monkeypatch.setattr(module, "smoke_test", smoke_test)
     return calls

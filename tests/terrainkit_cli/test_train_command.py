@@ -15,13 +15,16 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
+import torch
+
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
-from terrainkit_cli import render, signals, train_command
+from terrainkit_cli import render, signals, train_command, training_progress
 from terrainkit_cli.main import main
 from terrainkit_cli.training_extra import require_training
+from terrainkit_cli.training_progress import TrainingProgress, shown_progress
+from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.run import checkpoints, open_run
-from terrainkit_robots.rl.runner import TrainingProgress
 
 Train = Callable[..., int]
 
@@ -95,7 +98,7 @@ def interrupt(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
             for number in numbers if progress.iteration == iteration else ():
                 signal.raise_signal(number)
 
-        monkeypatch.setattr(render, "training", lambda: nullcontext(show))
+        monkeypatch.setattr(train_command, "shown_progress", lambda: nullcontext(show))
 
     return interrupt_in
 
@@ -156,49 +159,30 @@ def test_train_works_without_video_packages(monkeypatch):
         require_training("imageio_ffmpeg")
 
 
+METRICS = {"env steps/s": "1234", "to go": "1:02:03", "noise std": "0.88", "level stairs": "3.5"}
 PROGRESS = TrainingProgress(
     folder=Path("logs/rover"),
     iteration=20,
     max_iterations=400,
-    steps_per_second=1234.4,
-    learning_fraction=0.25,
-    eta=3723.0,
-    reward=-1.5,
-    episode_length=4.25,
-    falls=0.125,
-    speed=0.5,
-    noise_std=0.875,
-    rewards={"tracking_lin_vel": 0.5, "torques": -0.0625},
-    shares={"tracking_lin_vel": 0.25, "torques": -0.03125},
-    levels={"stairs": 3.5},
-    success={"stairs": 0.75},
+    metrics=METRICS,
+    learning="25%",
+    success={"stairs": "75%"},
+    rewards={"tracking_lin_vel": "+0.500 /s (25%)", "torques": "-0.062 /s (-3%)"},
 )
 
 
 def test_training_progress_lines_are_sparse(capsys):
-    with render.training() as watch:
+    with shown_progress() as watch:
         for iteration in range(1, 51):
             watch(PROGRESS._replace(iteration=iteration))
         watch(PROGRESS._replace(iteration=53, max_iterations=53))
     out, err = capsys.readouterr()
-    metrics = (
-        "env steps/s 1234, to go 1:02:03, reward -1.50, episode 4.2 s, falls 12%, speed 0.50 m/s, "
-        "noise std 0.88, level stairs 3.5"
-    )
+    metrics = "env steps/s 1234, to go 1:02:03, noise std 0.88, level stairs 3.5"
     rewards = "success stairs 75%, tracking_lin_vel +0.500 /s (25%), torques -0.062 /s (-3%)"
     expected = [f"iteration {k}/400: {metrics}" for k in (10, 20, 30, 40, 50)]
     expected += [f"iteration 50/400: {rewards}"]
     expected += [f"iteration 53/53: {metrics}", f"iteration 53/53: {rewards}"]
     assert (out, err.splitlines()) == ("", expected)
-
-
-@pytest.mark.parametrize("name", ["reward", "episode_length", "falls", "speed"])
-def test_training_progress_without_a_completed_episode(capsys, name):
-    with render.training() as watch:
-        watch(PROGRESS._replace(iteration=10, **{name: None}))
-    labels = {"reward", "episode"} if name in ("reward", "episode_length") else {"falls", "speed"}
-    shown = {each.split()[0] for each in capsys.readouterr().err.split(": ")[1].split(", ")}
-    assert shown == {"env", "to", "noise", "level", "reward", "episode", "falls", "speed"} - labels
 
 
 def test_training_progress_on_terminal_is_table(monkeypatch):
@@ -208,7 +192,7 @@ def test_training_progress_on_terminal_is_table(monkeypatch):
 
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with render.training() as watch:
+    with shown_progress() as watch:
         watch(PROGRESS)
     shown = terminal.getvalue()
     for text in ("iteration 20/400", "1:02:03", "tracking_lin_vel", "+0.500 /s", "75% succeed"):
@@ -249,3 +233,48 @@ def test_train_in_a_small_address_space_is_one_line(tmp_path, limit, words, mess
     assert done.returncode == 2, done.stderr
     assert len(errors) == 1
     assert message in errors[0]
+
+
+def test_progress_meter_shows_means_of_episodes_shares_and_time(monkeypatch):
+    shown, times = [], iter([100.0, 104.0, 108.0])
+    monkeypatch.setattr(training_progress.time, "perf_counter", lambda: next(times))
+    policy = SimpleNamespace(output_std=torch.tensor([0.5, 1.0]))
+    runner = SimpleNamespace(
+        folder=Path("logs/rover"),
+        current_learning_iteration=10,
+        last_iteration=30,
+        collect_time=1.0,
+        learn_time=3.0,
+        gpu_world_size=2,
+        logger=SimpleNamespace(rewbuffer=[], lenbuffer=[]),
+        alg=SimpleNamespace(get_policy=lambda: policy),
+        env=SimpleNamespace(num_envs=5, cfg=Task()),
+    )
+    meter = training_progress.ProgressMeter(shown.append)
+    meter.start(runner)
+    runner.current_learning_iteration = 11
+    meter.update(runner)
+    told = {"env steps/s": "60", "to go": "0:01:16", "noise std": "0.75"}  # 19 times 4 s
+    assert (dict(shown[0].metrics), shown[0].rewards) == (told, {})
+    rates = {"Episode/falls": 0.5, "Episode/speed": 1.0, "Episode/rew_progress": 0.2}
+    runner.logger.episode_callback(3, rates)
+    more = {"Episode/falls": 1.0, "Episode/rew_torques": -0.5, "Curriculum/level_stairs": 2.0}
+    runner.logger.episode_callback(1, rates | more | {"Curriculum/success_stairs": 0.25})
+    runner.logger.rewbuffer, runner.logger.lenbuffer = [1.0, 2.0], [100.0, 200.0]
+    runner.current_learning_iteration = 12
+    meter.update(runner)
+    last = shown[1]
+    assert (last.folder, last.iteration, last.max_iterations) == (Path("logs/rover"), 12, 30)
+    assert last.metrics == {
+        "env steps/s": "60",  # 24 steps of 5 robots in each of 2 processes in 4 s
+        "to go": "0:01:12",  # 18 times 4 s
+        "reward": "1.50",
+        "episode": "3.0 s",
+        "falls": "62%",  # (3 * 0.5 + 1) / 4
+        "speed": "1.00 m/s",
+        "noise std": "0.75",
+        "level stairs": "2.0",
+    }
+    assert (last.learning, last.success) == ("75%", {"stairs": "25%"})
+    # Of the scale 0.5, and of the sum of the positive scales, here of `progress` alone.
+    assert last.rewards == {"progress": "+0.200 /s (40%)", "torques": "-0.500 /s (-100%)"}

@@ -14,9 +14,9 @@ from terrainkit_robots.rendering.child_process import Frame
 from terrainkit_robots.rendering.pose_renderer import PoseRenderer
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
-from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env import LeggedEnv, make_env
+from terrainkit_robots.rl.scene import drawn_model
 from terrainkit_robots.rl.simulation import Ids
-from terrainkit_robots.rl.state import State
 from terrainkit_robots.rl.tasks import get_task, task_names
 from terrainkit_robots.rl.terrain import load_terrain
 from terrainkit_robots.spec.robot_arrays import Robot
@@ -61,7 +61,8 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
             ConfigError: If there is no such robot or terrain, or they do not fit together.
         """
         self.render_mode = render_mode
-        self.env = make_episode_env(robot, terrain, task, 1, render_mode)
+        self._episodes = Episodes(robot, terrain, task, 1, render_mode)
+        self.env = self._episodes.env
         self.metadata = self.metadata | {"render_fps": round(1 / self.env.cfg.dt)}
         self.observation_space, self.action_space = spaces(self.env)
 
@@ -71,13 +72,13 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
         """Start an episode; with a seed, equal actions lead to equal episodes."""
         super().reset(seed=seed)
         del options
-        return self.env.start(self.np_random, seed)[0], {}
+        return self._episodes.start(self.np_random, seed)[0], {}
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Apply an action of shape (j,) for one control step."""
-        _, reward, done, truncated = self.env.step_arrays(np.asarray(action)[None])
+        _, reward, done, truncated = self._episodes.step(np.asarray(action)[None])
         terminated = bool(done[0] and not truncated[0])
-        return self.env.final[0], float(reward[0]), terminated, bool(truncated[0]), {}
+        return self._episodes.final[0], float(reward[0]), terminated, bool(truncated[0]), {}
 
     def render(self) -> Frame | None:
         """Return an image of the robot, shape (360, 640, 3), or None without a render mode.
@@ -85,12 +86,12 @@ class TaskEnv(gymnasium.Env[FloatArray, FloatArray]):
         Raises:
             RenderError: If MuJoCo cannot render on this machine.
         """
-        frames = self.env.render(self.env.final_qpos)
+        frames = self._episodes.render(self._episodes.final_qpos)
         return frames[0] if frames else None
 
     def close(self) -> None:
         """End the process that renders."""
-        self.env.close()
+        self._episodes.close()
 
 
 class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArray]):
@@ -117,7 +118,8 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
     ) -> None:
         """Build the simulations; see `TaskEnv`."""
         self.render_mode, self.num_envs = render_mode, num_envs
-        self.env = make_episode_env(robot, terrain, task, num_envs, render_mode)
+        self._episodes = Episodes(robot, terrain, task, num_envs, render_mode)
+        self.env = self._episodes.env
         self.metadata = self.metadata | {"render_fps": round(1 / self.env.cfg.dt)}
         self.single_observation_space, self.single_action_space = spaces(self.env)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -129,28 +131,28 @@ class TaskVectorEnv(gymnasium.vector.VectorEnv[FloatArray, FloatArray, FloatArra
         """Start an episode in each environment."""
         super().reset(seed=seed)
         del options
-        return self.env.start(self.np_random, seed), {}
+        return self._episodes.start(self.np_random, seed), {}
 
     def step(
         self, actions: FloatArray
     ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """Apply actions of shape (n, a) for one control step."""
-        observations, rewards, dones, truncated = self.env.step_arrays(actions)
-        infos = {"final_obs": self.env.final, "_final_obs": dones} if dones.any() else {}
+        observations, rewards, dones, truncated = self._episodes.step(actions)
+        infos = {"final_obs": self._episodes.final, "_final_obs": dones} if dones.any() else {}
         return observations, rewards, dones & ~truncated, truncated, infos
 
     def render(self) -> tuple[Frame, ...] | None:
         """Return an image of each robot, or None without a render mode; see `TaskEnv`."""
-        return self.env.render(self.env.sim.qpos)
+        return self._episodes.render(self.env.sim.qpos)
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the process that renders."""
         del kwargs
-        self.env.close()
+        self._episodes.close()
 
 
-class EpisodeEnv(LeggedEnv):
-    """A `LeggedEnv` that keeps the last observations and poses of episodes."""
+class Episodes:
+    """The environment of a task, and the last observations and poses of its episodes."""
 
     def __init__(
         self,
@@ -170,35 +172,35 @@ class EpisodeEnv(LeggedEnv):
             algorithm=replace(task.algorithm, num_mini_batches=1),  # one robot allows no more
         )
         ground = load_terrain(terrain, task.terrain.collision)
-        super().__init__(task, Robot.load(registered.folder), ground)
+        self.env = make_env(task, Robot.load(registered.folder), ground)
+        self.env.before_reset = self._keep_last
         self.final = self._before_reset = self.policy_observations()
-        self.final_qpos = self.sim.qpos
-        self._renderer = PoseRenderer(self.drawn_model) if render_mode else None
+        self.final_qpos = self.env.sim.qpos
+        model = drawn_model(self.env.scene, self.env.robot, ground, task)
+        self._renderer = PoseRenderer(model) if render_mode else None
 
     def start(self, rng: np.random.Generator, seed: int | None) -> FloatArray:
         """Reset every environment, with new random numbers if there is a seed, and observe."""
+        env = self.env
         if seed is not None:
-            self.rng = rng
-            terrain = self.cfg.terrain
-            self.curriculum = TerrainCurriculum(self.terrain, self.num_envs, terrain, seed)
-        self.reset()
-        self.final_qpos = self.sim.qpos
+            env.rng = rng
+            env.curriculum = TerrainCurriculum(env.terrain, env.num_envs, env.cfg.terrain, seed)
+        env.reset()
+        self.final_qpos = env.sim.qpos
         return self.policy_observations()
 
     def policy_observations(self) -> FloatArray:
         """Return a copy of the observations of the policy, shape (n, k)."""
-        observations: FloatArray = self.get_observations()["policy"].numpy().copy()
+        observations: FloatArray = self.env.get_observations()["policy"].numpy().copy()
         return observations
 
-    def step_arrays(
-        self, actions: FloatArray
-    ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
+    def step(self, actions: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
         """Return observations (n, k), rewards, ended and truncated episodes (n,) of a step.
 
         Observations are those after resets; `final` has those before, and `final_qpos` the poses.
         """
-        self.final_qpos = self.sim.qpos
-        _, rewards, dones, extras = self.step(torch.as_tensor(actions, dtype=torch.float32))
+        self.final_qpos = self.env.sim.qpos
+        _, rewards, dones, extras = self.env.step(torch.as_tensor(actions, dtype=torch.float32))
         observations, ended = self.policy_observations(), dones.numpy()
         self.final = np.where(ended[:, None], self._before_reset, observations)
         return observations, rewards.numpy(), ended, extras["time_outs"].numpy()
@@ -212,23 +214,9 @@ class EpisodeEnv(LeggedEnv):
         if self._renderer:
             self._renderer.close()
 
-    def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
-        self._compute_observations()
-        self._before_reset, self.final_qpos = self.policy_observations(), self.sim.qpos.copy()
-        return super()._end_episodes(env_ids, state, unstable)
-
-
-def make_episode_env(
-    robot: str | Path,
-    terrain: str | Path,
-    task: Task | None,
-    num_envs: int,
-    render_mode: str | None,
-) -> EpisodeEnv:
-    """Return the environment of a task, as an `EpisodeEnv`."""
-    own = (task or get_task(robot).task).env_class
-    kind = type(own.__name__, (EpisodeEnv, own), {}) if own else EpisodeEnv
-    return kind(robot, terrain, task, num_envs, render_mode)
+    def _keep_last(self, _: Ids) -> None:
+        self.env.update_observations()
+        self._before_reset, self.final_qpos = self.policy_observations(), self.env.sim.qpos.copy()
 
 
 def spaces(env: LeggedEnv) -> tuple[gymnasium.spaces.Box, gymnasium.spaces.Box]:

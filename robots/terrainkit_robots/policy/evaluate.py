@@ -1,7 +1,6 @@
 """Evaluate a policy without noise and randomization: velocity errors, gait, falls and success."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain, product
 from typing import Annotated, Any
@@ -13,10 +12,11 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import Config
 from terrainkit.settings.type_hint import PositiveInt
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.metrics import RolloutMetrics
 from terrainkit_robots.policy.patch_dimensions import collision_kind, patch_dimensions
-from terrainkit_robots.policy.rollout import SETTLING_TIME, EvaluationRollout, Progress
+from terrainkit_robots.policy.policy_rollout import SETTLING_TIME, EvaluationRollout, Progress
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.observations import uses_height_scan
@@ -58,52 +58,13 @@ class EvaluationConfig(Config):
             raise ConfigError("command: got a command and random_commands; expected one of them")
 
 
-@dataclass(frozen=True, kw_only=True)
-class EvaluationResult:
-    """Result of an evaluation. If no terrain was given, `config` names the terrain of the training.
-
-    Attributes:
-        robot: Name of the robot in its spec.
-        checkpoint: File name of the checkpoint, or name of the policy function.
-        config: Settings of the evaluation.
-        metrics: Metrics of all robots.
-        groups: Metrics of groups of robots: `by_command` on a plane; `by_direction`,
-            `by_direction_and_level`, `by_terrain`, `by_level`, `by_terrain_and_level` and
-            `by_terrain_dimension` on a map.
-        collision: Collision geometry of the terrain: plane, hfield or boxes.
-        contacts: Contacts of each foot in the last 2 s, for the robot with the fastest forward
-            command: one character per step, 1 in contact.
-        dt: Time between two steps [s].
-    """
-
-    robot: str
-    checkpoint: str
-    config: EvaluationConfig
-    metrics: RolloutMetrics
-    groups: Mapping[str, Sequence[RolloutMetrics]]
-    contacts: Mapping[str, str]
-    dt: float
-    collision: str = "plane"
-
-    def as_json(self) -> str:
-        """Return the result as JSON; equal evaluations give equal bytes."""
-        config, settling = self.config, {"settling_seconds": SETTLING_TIME}
-        result: dict[str, Any] = {"robot": self.robot, "checkpoint": self.checkpoint}
-        result |= {"terrain": config.terrain, "collision": self.collision}
-        result |= {"seconds": config.seconds, **settling}
-        result |= {"seed": config.seed, "feet": list(self.contacts)}
-        result |= {"contacts": {"dt": self.dt, **self.contacts}, "all": self.metrics.as_dict()}
-        result |= {k: [group.as_dict() for group in v] for k, v in self.groups.items()}
-        return json.dumps(result, indent=2) + "\n"
-
-
 @single_torch_thread()
 def evaluate(
     spec: PolicySpec, config: EvaluationConfig | None = None, progress: Progress = lambda _: None
-) -> EvaluationResult:
+) -> ResultTable[RolloutMetrics]:
     """Evaluate a policy: of a run, an ONNX file (`open_policy`), or any function.
 
-    The same seed gives the same result, bit for bit.
+    The same seed gives the same result, bit for bit. See `summarize` for what it has.
 
     Args:
         spec: The policy with its task and robot.
@@ -192,7 +153,7 @@ def build_eval_env(
         terrain=replace(task.terrain, measure_heights=scan),
         domain_rand=replace(task.domain_rand, **(domain_rand or {})),
     )
-    return make_env(task, spec.robot, terrain, device)
+    return make_env(task, spec.robot, terrain, device, spec.interface)
 
 
 def is_plane(spec: PolicySpec, terrain: str | None = None) -> bool:
@@ -269,7 +230,7 @@ def summarize(
     config: EvaluationConfig,
     rollout: EvaluationRollout,
     commands: FloatArray | None = None,
-) -> EvaluationResult:
+) -> ResultTable[RolloutMetrics]:
     """Return the metrics of a rollout: by command, or on a map by terrain and level.
 
     Args:
@@ -277,22 +238,33 @@ def summarize(
         config: Settings of the evaluation.
         rollout: The finished rollout.
         commands: Command of each robot, shape (n, 3), to group by; None for no such groups.
+
+    Returns:
+        `about["all"]` has the metrics of all robots, and `about["contacts"]` the contacts of each
+        foot in the last 2 s, for the robot with the fastest forward command: one character per
+        step of `dt` seconds, 1 in contact. Tables are `by_command` on a plane; `by_direction`,
+        `by_direction_and_level`, `by_terrain`, `by_level`, `by_terrain_and_level` and
+        `by_terrain_dimension` on a map.
     """
     env = rollout.env
     groups: dict[str, list[RolloutMetrics]] = {}
     for table, mask, key in chain(_command_masks(commands), _map_masks(rollout)):
         if mask.any():
             groups.setdefault(table, []).append(rollout.metrics(mask, **key))
-    return EvaluationResult(
-        robot=spec.robot.spec.name,
-        checkpoint=spec.policy_name,
-        config=replace(config, terrain=str(config.terrain or spec.terrain)),
-        metrics=rollout.metrics(np.ones(env.num_envs, bool)),
-        groups=groups,
-        contacts=rollout.contacts(),
-        dt=env.cfg.dt,
-        collision=collision_kind(env.terrain),
-    )
+    contacts = rollout.contacts()
+    about = {
+        "robot": spec.robot.spec.name,
+        "checkpoint": spec.policy_name,
+        "terrain": str(config.terrain or spec.terrain),
+        "collision": collision_kind(env.terrain),
+        "seconds": config.seconds,
+        "settling_seconds": SETTLING_TIME,
+        "seed": config.seed,
+        "feet": list(contacts),
+        "contacts": {"dt": env.cfg.dt, **contacts},
+        "all": rollout.metrics(np.ones(env.num_envs, bool)),
+    }
+    return ResultTable(about=about, tables=groups, schema_version=None)
 
 
 _Group = tuple[str, BoolArray, dict[str, Any]]
@@ -333,6 +305,6 @@ def _map_masks(rollout: EvaluationRollout) -> Iterator[_Group]:
         yield "by_terrain_and_level", mask, {"terrain": name, "level": level}
     for size in sorted({*sizes} - {None}):
         key = dict(zip(("terrain", "parameter", "value"), size, strict=True))
-        on_size = np.array([each == size for each in sizes])
+        on_size = np.array([robot_size == size for robot_size in sizes])
         for name, mask in directions.items():
             yield "by_terrain_dimension", mask & on_size, {**key, "direction": name}

@@ -25,13 +25,13 @@ from terrainkit_robots.policy.contracts.contract import (
     TERM_NAMES,
     UNITREE,
     Contract,
-    from_description,
     unknown_terms,
 )
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, write_deploy_yaml
-from terrainkit_robots.policy.contracts.mjlab import write_metadata
+from terrainkit_robots.policy.contracts.mjlab_metadata import write_metadata
+from terrainkit_robots.policy.contracts.policy_json import JSON_FILE, METADATA_KEY, to_contract
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_actor, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_actor, single_torch_thread
 from terrainkit_robots.policy.onnx_model import call_model, make_session, make_state
 from terrainkit_robots.rl.config import Normalization
 from terrainkit_robots.rl.env import LeggedEnv
@@ -42,10 +42,10 @@ from terrainkit_robots.rl.state import CONTACT_FORCE
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import FloatArray
 
-ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE = "policy.onnx", "policy.pt", "policy.json"
+ONNX_FILE, TORCHSCRIPT_FILE = "policy.onnx", "policy.pt"
 
-FORMAT_VERSION, METADATA_KEY, ONNX_OPSET = 2, "terrainkit", 17
-"""Version of the JSON, its key in the ONNX metadata, and an opset that runtimes on robots have."""
+FORMAT_VERSION, ONNX_OPSET = 2, 17
+"""Version of the JSON, and an opset that runtimes on robots have."""
 
 RECURRENT_STEPS = 10
 """Steps for which an exported recurrent network is compared with the live one."""
@@ -105,8 +105,9 @@ def export_policy(
         ExportError: If a file exists and `overwrite` is not set, if a file cannot be written, if an
             exported policy does not match the live one, or if `deploy.yaml` cannot describe it.
     """
-    names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE] + [YAML_FILE] * deploy_yaml
-    names += [EXAMPLE.name] * example
+    names = [ONNX_FILE, TORCHSCRIPT_FILE, JSON_FILE, ROBOT_FILE]
+    names += [YAML_FILE] if deploy_yaml else []
+    names += [EXAMPLE.name] if example else []
     files = tuple(folder / name for name in names)
     for file in files if folder.is_dir() else [folder]:
         check_target(file, overwrite=overwrite and file != folder)
@@ -125,11 +126,11 @@ def export_policy(
     text = json.dumps(description, indent=2) + "\n"
     metadata, notes = {METADATA_KEY: text}, []
     if deploy_yaml:
-        contract = from_description(description, UNITREE)
+        contract = to_contract(description, UNITREE)
         other_files[YAML_FILE] = write_deploy_yaml(contract).encode()
         notes += _unknown_terms(contract)
     try:
-        contract = from_description(description, MJLAB)
+        contract = to_contract(description, MJLAB)
         metadata |= write_metadata(contract)
         notes += _unknown_terms(contract)
     except ExportError as error:
@@ -231,7 +232,7 @@ class ScriptNetwork(torch.nn.Module):
 def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the actions of an ONNX file for the observations (n, k) of each step."""
     session, results = make_session(data), []
-    shapes = [each.shape for each in session.get_inputs()[1:]]
+    shapes = [node.shape for node in session.get_inputs()[1:]]
     state = make_state([(layers, width) for layers, _, width in shapes], len(steps[0]))
     for obs in steps:
         actions, *state = call_model(session, obs, state)
@@ -250,7 +251,7 @@ def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: Mapping[str, 
     file, model = io.BytesIO(), network.model
     names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
     _, *states = model.get_dummy_inputs()
-    inputs = obs, *(each.repeat(1, len(obs), 1) for each in states)
+    inputs = obs, *(state.repeat(1, len(obs), 1) for state in states)
     axes = {name: {1: "batch"} for name in (*model.input_names, *model.output_names)}
     axes |= {"obs": {0: "batch"}, "actions": {0: "batch"}}
     # With `dynamo`, the export takes 5 s instead of 0.1 s.
@@ -305,11 +306,11 @@ def _export_networks(
         onnx_data, script_file = export_onnx(network, obs[:, order], metadata), io.BytesIO()
         torch.jit.save(torch.jit.script(ScriptNetwork(actor, network)), script_file)
         script = torch.jit.load(io.BytesIO(script_file.getvalue()))
-        live = [network.clipped(actor, each).numpy() for each in steps]
+        live = [network.clipped(actor, step).numpy() for step in steps]
         # TorchScript of rsl-rl keeps the state of one robot.
         rows = slice(1) if actor.is_recurrent else slice(None)
-        script_actions = [script(each[rows][:, order]).numpy() for each in steps]
-    onnx_actions = run_onnx(onnx_data, [each[:, order].numpy() for each in steps])
+        script_actions = [script(step[rows][:, order]).numpy() for step in steps]
+    onnx_actions = run_onnx(onnx_data, [step[:, order].numpy() for step in steps])
     errors = (
         verify_actions(np.stack(onnx_actions), np.stack(live), ONNX_FILE),
         verify_actions(np.stack(script_actions), np.stack(live)[:, rows], TORCHSCRIPT_FILE),
@@ -332,8 +333,8 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
     dofs = env.scene.joint_qvel
     joints = {
         "default_position": robot.default_pose,
-        "action_offset": env.action_offset,
-        "action_scale": env.action_scale,
+        "action_offset": env.actions.offset,
+        "action_scale": env.actions.scale,
         "gain": model.actuator_gainprm[:, 0],
         "stiffness": stiffness,
         "damping": damping,
@@ -371,12 +372,12 @@ def describe_policy(env: LeggedEnv) -> dict[str, Any]:
         "action": {
             "size": env.num_actions,
             "clip": task.normalization.clip_actions,
-            "joints": [robot.spec.joint_order[k] for k in env.action_joints],
+            "joints": [robot.spec.joint_order[k] for k in env.actions.joints],
         },
         "control_type": task.control.control_type,
         "joints": {
             "name": list(robot.spec.joint_order),
-            "position_unit": list(env.joint_units),
+            "position_unit": list(env.scene.joint_units),
             "drive": drive.tolist(),
             **{name: _to_list(values) for name, values in joints.items()},
         },

@@ -1,16 +1,17 @@
 """The margins of a policy: what it bears of latency, pushes and errors of model and sensors."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.metrics import RolloutMetrics
-from terrainkit_robots.policy.rollout import EvaluationRollout, Progress
+from terrainkit_robots.policy.policy_rollout import EvaluationRollout, Progress
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.events import EventTerm, apply_params, push_interval, reset_push
@@ -18,9 +19,6 @@ from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.transforms import FloatArray, quat_rotate_inverse
-
-SCHEMA_VERSION = 1
-"""Version of the JSON; it changes when a key changes its meaning or is removed."""
 
 DEFAULT_REPETITIONS = 3
 """Robots for each command."""
@@ -73,66 +71,35 @@ DISTURBANCES = {
 """What is measured, by name."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Margins:
-    """The margins of a policy."""
+def first_falls(margins: Sequence[RolloutMetrics]) -> list[RolloutMetrics]:
+    """Return the smallest disturbance with falls on each side of its nominal value."""
+    found: dict[tuple[Any, bool], RolloutMetrics] = {}
+    for margin in margins:
+        if margin.falls:
+            is_more = margin.unit == "x" and (margin.value or 0) > 1
+            found.setdefault((margin.condition, is_more), margin)
+    return list(found.values())
 
-    robot: str
-    """Name of the robot."""
 
-    checkpoint: str
-    """Name of the checkpoint."""
-
-    seed: int
-    """Seed of the directions and times of the disturbances."""
-
-    seconds: float
-    """Duration of the rollout [s]."""
-
-    commands: tuple[tuple[float, ...], ...]
-    """Commands: forward and left velocity [m/s], yaw velocity [rad/s]."""
-
-    repetitions: int
-    """Robots for each command."""
-
-    margins: tuple[RolloutMetrics, ...]
-    """Metrics with each disturbance, the nominal ones first."""
-
-    left_out: tuple[str, ...]
-    """Disturbances that cannot be simulated, and why."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the margins as values of JSON."""
-        margins = [each.as_dict() for each in self.margins]
-        return {"schema_version": SCHEMA_VERSION} | asdict(self) | {"margins": margins}
-
-    def first_falls(self) -> list[RolloutMetrics]:
-        """Return the smallest disturbance with falls on each side of its nominal value."""
-        found: dict[tuple[Any, bool], RolloutMetrics] = {}
-        for each in filter(lambda each: each.falls, self.margins):
-            is_more = each.unit == "x" and (each.value or 0) > 1
-            found.setdefault((each.condition, is_more), each)
-        return list(found.values())
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the margins as rows of text with a header."""
-        head = f"fell of {self.margins[0].robots}", "m/s", "followed", "swing [cm]", "steps/s"
-        loads, first = ("torque", "joint speed", "foot force"), self.first_falls()
-        rows: list[tuple[str, ...]] = [("condition", *head, *loads, "")]
-        for each in self.margins:
-            value = "" if each.value is None else f"{each.value:g}"
-            amount = f"x {value}" if each.unit == "x" else f"{value} {each.unit or ''}"
-            swings = [100 * height for height in each.swing_height or () if height is not None]
-            numbers = (
-                _text(each.lin_vel_error_1s, ".3f"),
-                _text(each.followed, ".0%"),
-                _text(min(swings, default=None), ".1f"),
-                _text(each.step_frequency, ".1f"),
-            )
-            mark = "<- first falls" if each in first else ""
-            label = f"{each.condition} {amount}".rstrip()
-            rows.append((label, str(each.falls), *numbers, *each.load_cells(), mark))
-        return rows
+def margin_rows(margins: Sequence[RolloutMetrics]) -> list[tuple[str, ...]]:
+    """Return the margins as rows of text with a header."""
+    head = f"fell of {margins[0].robots}", "m/s", "followed", "swing [cm]", "steps/s"
+    loads, first = ("torque", "joint speed", "foot force"), first_falls(margins)
+    rows: list[tuple[str, ...]] = [("condition", *head, *loads, "")]
+    for margin in margins:
+        value = "" if margin.value is None else f"{margin.value:g}"
+        amount = f"x {value}" if margin.unit == "x" else f"{value} {margin.unit or ''}"
+        swings = [100 * height for height in margin.swing_height or () if height is not None]
+        numbers = (
+            _text(margin.lin_vel_error_1s, ".3f"),
+            _text(margin.followed, ".0%"),
+            _text(min(swings, default=None), ".1f"),
+            _text(margin.step_frequency, ".1f"),
+        )
+        mark = "<- first falls" if margin in first else ""
+        label = f"{margin.condition} {amount}".rstrip()
+        rows.append((label, str(margin.falls), *numbers, *margin.load_cells(), mark))
+    return rows
 
 
 def _text(value: float | None, form: str) -> str:
@@ -145,7 +112,7 @@ def measure_margins(
     config: EvaluationConfig | None = None,
     repetitions: int = DEFAULT_REPETITIONS,
     progress: Progress = lambda _: None,
-) -> Margins:
+) -> ResultTable[RolloutMetrics]:
     """Measure a policy on a plane with disturbances, one at a time.
 
     All robots are simulated together, some with each value of a disturbance. The same seed gives
@@ -157,6 +124,10 @@ def measure_margins(
         repetitions: Robots for each command.
         progress: Called after each step with the completed fraction, 0 to 1.
 
+    Returns:
+        The table `margins` has the metrics with each disturbance, the nominal ones first;
+        `left_out` in its remarks has the disturbances that cannot be simulated, and why.
+
     Raises:
         ConfigError: If a run has no policy, or its policy is for another robot.
         MemoryLimitError: If the simulations would not fit in memory.
@@ -167,9 +138,12 @@ def measure_margins(
     robots = np.repeat(np.arange(len(conditions)), repetitions * len(commands))
     values = {
         name: np.array(
-            [key["value"] if key["condition"] == name else each.nominal for key in conditions]
+            [
+                key["value"] if key["condition"] == name else disturbance.nominal
+                for key in conditions
+            ]
         )[robots]
-        for name, each in DISTURBANCES.items()
+        for name, disturbance in DISTURBANCES.items()
     }
     randomization = {
         "action_delay": (0.0, 0.001 * max(DISTURBANCES["latency"].values)),
@@ -182,16 +156,16 @@ def measure_margins(
     rollout = EvaluationRollout(env)
     repeated = np.tile(commands, (len(conditions) * repetitions, 1))
     rollout.run(load_policy(spec, env), config.seconds, repeated, progress)
-    return Margins(
-        robot=spec.robot.spec.name,
-        checkpoint=spec.policy_name,
-        seed=config.seed,
-        seconds=config.seconds,
-        commands=tuple(map(tuple, commands.tolist())),
-        repetitions=repetitions,
-        margins=tuple(rollout.metrics(robots == k, **key) for k, key in enumerate(conditions)),
-        left_out=left_out,
-    )
+    margins = [rollout.metrics(robots == k, **key) for k, key in enumerate(conditions)]
+    about = {
+        "robot": spec.robot.spec.name,
+        "checkpoint": spec.policy_name,
+        "seed": config.seed,
+        "seconds": config.seconds,
+        "commands": commands.tolist(),
+        "repetitions": repetitions,
+    }
+    return ResultTable(about=about, tables={"margins": margins}, remarks={"left_out": left_out})
 
 
 def margin_commands(commands: Commands) -> FloatArray:
@@ -209,9 +183,9 @@ def _conditions(env: LeggedEnv) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     conditions: list[dict[str, Any]] = [{"condition": "nominal"}]
     base, step = float(env.scene.model.body_mass[env.scene.base]), 1000 * env.cfg.sim.dt
     left_out = []
-    for name, each in DISTURBANCES.items():
-        values = each.values
-        if each.observation and each.observation not in env.obs_terms["policy"]:
+    for name, disturbance in DISTURBANCES.items():
+        values = disturbance.values
+        if disturbance.observation and disturbance.observation not in env.obs_terms["policy"]:
             continue
         if name == "latency":  # a number of physics steps
             steps = dict.fromkeys(max(1, round(value / step)) for value in values)
@@ -221,7 +195,7 @@ def _conditions(env: LeggedEnv) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
             got = f"the base weighs {base:.3g} of {env.mass:.3g} kg"
             left_out += [f"mass x {value:g}: {got}" for value in light]
             values = tuple(value for value in values if value not in light)
-        keys = {"condition": name, "unit": each.unit}
+        keys = {"condition": name, "unit": disturbance.unit}
         conditions += [{**keys, "value": float(value)} for value in values]
     return conditions, tuple(left_out)
 

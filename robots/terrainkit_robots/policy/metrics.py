@@ -4,7 +4,6 @@ from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
@@ -125,32 +124,6 @@ class ErrorMean:
         measured = robots & (self.count > 0)
         means = self.total[measured] / self.count[measured]
         return float(means.mean()) if means.size else None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MotionSums:
-    """Sums over the measured steps of robots that are commanded to move, shapes (n,).
-
-    Power and speed count only under a linear command.
-    """
-
-    lin_vel: NDArray[Any]  # dot product of linear velocity and command [m2/s2]
-    lin_command: NDArray[Any]  # squared norm of the linear command [m2/s2]
-    ang_vel: NDArray[Any]  # product of yaw velocity and command [rad2/s2]
-    ang_command: NDArray[Any]  # squared yaw command [rad2/s2]
-    pitch: NDArray[Any]  # [rad], positive when the nose is down
-    power: NDArray[Any]  # mechanical power of the motors [W]
-    speed: NDArray[Any]  # horizontal [m/s]
-    steps: NDArray[Any]  # number of steps
-
-    def of(self, robots: BoolArray) -> "MotionSums":
-        """Return the sums of the robots in a mask."""
-        return MotionSums(**{name: total[robots] for name, total in vars(self).items()})
-
-    def add(self, step: "MotionSums", robots: BoolArray) -> None:
-        """Add a step of the robots in a mask."""
-        for name, total in vars(self).items():
-            total[robots] += getattr(step, name)[robots]
 
 
 class GaitStep(NamedTuple):

@@ -97,8 +97,8 @@ def call_model(
     Raises:
         ConfigError: If the model fails.
     """
-    names = [each.name for each in session.get_inputs()]
-    outputs = [each.name for each in session.get_outputs()[: len(names)]]
+    names = [node.name for node in session.get_inputs()]
+    outputs = [node.name for node in session.get_outputs()[: len(names)]]
     count = len(obs) if session.get_inputs()[0].shape[0] == 1 else 1
     rows = [np.split(obs, count), *(np.split(part, count, axis=1) for part in state)]
     try:
@@ -118,13 +118,13 @@ def _input_sizes(session: onnxruntime.InferenceSession) -> tuple[int, list[tuple
 
     The first input has the shape (n, k) or (1, k), the states have (layers, n, width).
     """
-    first, *others = [each.shape for each in session.get_inputs()] or [()]
+    first, *others = [node.shape for node in session.get_inputs()] or [()]
     is_valid = len(first) == 2 and isinstance(first[1], int) and _is_batch(first[0])
     for shape in others:
         is_valid &= len(shape) == 3 and _is_batch(shape[1])
         is_valid = is_valid and isinstance(shape[0], int) and isinstance(shape[2], int)
     if not is_valid:
-        inputs = [f"{each.name} {each.type} {each.shape}" for each in session.get_inputs()]
+        inputs = [f"{node.name} {node.type} {node.shape}" for node in session.get_inputs()]
         expected = "expected one of shape (n, k) or (1, k), and states of shape (layers, n, width)"
         raise ConfigError(f"got the inputs {listing(inputs)}; {expected}")
     return first[1], [(shape[0], shape[2]) for shape in others]

@@ -1,16 +1,11 @@
 """Open a policy from outside: an ONNX or TorchScript file, and the contract that describes it."""
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import isclose
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
-import torch
-from numpy.typing import NDArray
 
 from terrainkit.errors import (
     ConfigError,
@@ -19,35 +14,26 @@ from terrainkit.errors import (
     one_line,
     prefixed_errors,
 )
-from terrainkit_robots.policy.contracts.contract import UNITREE, Contract, from_description
+from terrainkit_robots.policy.contract_env import MappedPolicy, make_spec
+from terrainkit_robots.policy.contracts.contract import UNITREE, Contract
+from terrainkit_robots.policy.contracts.contract_robot import qpos_order, replace_joints
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, read_yaml
-from terrainkit_robots.policy.contracts.environment import make_spec
-from terrainkit_robots.policy.contracts.mjlab import JOINTS_KEY, read_metadata
-from terrainkit_robots.policy.contracts.robot import qpos_order, replace_joints
-from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.export import (
+from terrainkit_robots.policy.contracts.mjlab_metadata import JOINTS_KEY, read_metadata
+from terrainkit_robots.policy.contracts.policy_json import (
     JSON_FILE,
     METADATA_KEY,
-    describe_policy,
-    observation_order,
+    check_policy_json,
+    read_policy_json,
+    to_contract,
 )
+from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
+from terrainkit_robots.policy.export import describe_policy, observation_order
 from terrainkit_robots.policy.policy_file import PolicyFile, read_file
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot_arrays import Robot
-
-_COMPARED = "format_version timing observation action control_type joints feet gait height_scan"
-"""Keys that state what the policy receives and what its actions do."""
-
-_OF_THE_ROBOT = ("joints.frictionloss", "joints.passive_damping")
-"""Keys that may differ between the robot and the robot of the training."""
-
-
-class _Description(msgspec.Struct):
-    joints: dict[str, list[str | float | bool | None]]
-    task: dict[str, Any] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,8 +71,9 @@ def open_policy(
         return _open_description(found, path, model, task)
     with prefixed_errors(f"{found.source}: "):
         parsed = read_contract(found, model)
-        for note in parsed.notes:
-            warnings.warn(f"{found.source}: {note}", TerrainkitWarning, stacklevel=2)
+        for got, expected in parsed.doubts:
+            message = f"{found.source}: {got}, so expected {expected}"
+            warnings.warn(message, TerrainkitWarning, stacklevel=2)
         return make_spec(parsed, found.policy, model, task)
 
 
@@ -122,8 +109,8 @@ def read_contract(found: ForeignPolicy, robot: Robot) -> Contract:
     """
     if found.kind == "json":
         try:
-            return from_description(msgspec.json.decode(found.text, type=dict[str, Any]), UNITREE)
-        except (msgspec.DecodeError, UnicodeError, LookupError, TypeError, ExportError) as error:
+            return to_contract(read_policy_json(found.text), UNITREE)
+        except (ConfigError, LookupError, TypeError, ExportError) as error:
             raise ConfigError(one_line(str(error))[:300]) from error
     if found.kind == "mjlab":
         return read_metadata(found.policy.metadata)
@@ -134,23 +121,14 @@ def _open_description(found: ForeignPolicy, path: Path, robot: Robot, default: T
     """Return a policy with terrainkit's own description."""
     policy = found.policy
     try:
-        document = msgspec.json.decode(found.text, type=dict[str, Any])
-        described = msgspec.convert(document, _Description)
-        task = default.from_table(described.task, default.with_defaults(), "task.")
-        kind = task.control.control_type
-        model = replace_joints(robot, described.joints, kind)
+        described = read_policy_json(found.text)
+        task = default.from_table(described["task"], default.with_defaults(), "task.")
+        model = replace_joints(robot, described["joints"], task.control.control_type)
         spec = PolicySpec(task=task, robot=model, policy=policy)
         env = build_eval_env(spec, Plane(), 1, EvaluationConfig())
         built = describe_policy(env)
-        for key in _COMPARED.split():
-            expected = dict(_leaves(built[key], key))
-            for at, got in _leaves(document.get(key, {}), key):
-                if not at.startswith(_OF_THE_ROBOT) and not _is_close(got, expected.get(at, ...)):
-                    other = "the environment of task and joints has no such value"
-                    if at in expected:
-                        other = f"expected {expected[at]}, as in task and joints"
-                    raise ConfigError(f"{at}: got {str(got)[:80]}; {other}")
-    except (msgspec.DecodeError, UnicodeError, RecursionError, ConfigError) as error:
+        check_policy_json(described, built)
+    except ConfigError as error:
         raise ConfigError(f"{found.source}: {one_line(str(error))[:300]}") from error
     sizes = built["observation"]["size"], env.num_actions
     if (policy.num_obs, policy.num_actions) != sizes:
@@ -158,38 +136,7 @@ def _open_description(found: ForeignPolicy, path: Path, robot: Robot, default: T
         raise ConfigError(
             f"{path}: {got}; expected {sizes[0]} and {sizes[1]}, as in {found.source}"
         )
-    return replace(spec, policy=_OrderedPolicy(policy, observation_order(env)))
-
-
-class _OrderedPolicy:
-    """A policy that receives its observations in the order of exported ones."""
-
-    def __init__(self, policy: PolicyFile, order: NDArray[np.int64]) -> None:
-        self.policy, self.__name__ = policy, policy.__name__
-        self.num_obs, self.num_actions = policy.num_obs, policy.num_actions
-        self._order = torch.from_numpy(order)
-
-    def __call__(self, obs: torch.Tensor) -> Any:
-        """Return actions (n, a) for observations of the environment."""
-        return self.policy(obs[:, self._order])
-
-    def reset(self, dones: torch.Tensor) -> None:
-        """Clear the state of robots, a mask of shape (n,)."""
-        self.policy.reset(dones)
-
-
-def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:
-    """Yield the path and the value of each number, text and null in a value of JSON."""
-    if not isinstance(value, dict | list):
-        yield path, value
-        return
-    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
-        yield from _leaves(item, f"{path}.{key}")
-
-
-def _is_close(got: Any, built: Any) -> bool:
-    numbers = isinstance(got, int | float) and isinstance(built, int | float)
-    try:
-        return isclose(got, built, rel_tol=1e-5, abs_tol=1e-6) if numbers else bool(got == built)
-    except OverflowError:  # an integer beyond the range of float
-        return False
+    order = observation_order(env)
+    table = np.repeat([[0.0], [0.0], [1.0], [-np.inf], [np.inf]], len(order), axis=1)
+    table[0] = order
+    return replace(spec, policy=MappedPolicy(policy, [table.astype(np.float32)]))

@@ -35,7 +35,9 @@ def patch_dimensions(terrain: Ground) -> NDArray[Any]:
     if not isinstance(terrain, MapGround):
         return dimensions
     terrain_map = terrain.terrain_map
-    kinds = {each.name: each.terrain for each in terrain_map.config.sub_terrains}
+    kinds = {
+        sub_terrain.name: sub_terrain.terrain for sub_terrain in terrain_map.config.sub_terrains
+    }
     parameters: Any = terrain_map.parameters
     for place, name in np.ndenumerate(terrain.terrain_names):
         parameter = PARAMETERS.get(kinds.get(str(name), ""), "")

@@ -11,17 +11,24 @@ import numpy as np
 from terrainkit.errors import ConfigError
 from terrainkit_robots.policy.evaluate import (
     EvaluationConfig,
-    EvaluationResult,
     is_plane,
     make_eval_env,
     summarize,
 )
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
-from terrainkit_robots.policy.rollout import EvaluationRollout, Progress, command_schedule, rollout
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
+from terrainkit_robots.policy.metrics import RolloutMetrics
+from terrainkit_robots.policy.policy_rollout import (
+    EvaluationRollout,
+    Progress,
+    command_schedule,
+    rollout,
+)
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.rendering.video import DEFAULT_SIZE, Shot, VideoSpec
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec
+from terrainkit_robots.rl.scene import drawn_model
 from terrainkit_robots.transforms import FloatArray
 
 DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
@@ -32,7 +39,7 @@ DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
 class PlayResult:
     """Metrics of a played policy, and the video to render; None without a video."""
 
-    evaluation: EvaluationResult
+    evaluation: ResultTable[RolloutMetrics]
     video: VideoSpec | None
 
 
@@ -97,7 +104,8 @@ def view(spec: PolicySpec, config: EvaluationConfig | None = None) -> None:
 
     config = replace(config or EvaluationConfig(), num_envs=1)
     env, commands = make_play_env(spec, config)
-    model, data = env.drawn_model, mujoco.MjData(env.drawn_model)
+    model = drawn_model(env.scene, env.robot, env.terrain, env.cfg)
+    data = mujoco.MjData(model)
     schedule = command_schedule(commands, max(1, round(config.seconds / env.cfg.dt)))
     steps = rollout(env, load_policy(spec, env), cycle(schedule))
     try:
@@ -199,7 +207,8 @@ class PoseRecorder:
             stop = int(np.clip(self.first_fall[robot], 1, max(1, frames // len(tracked))))
             shots.append(Shot(robot=robot, captions=(caption,) * stop, points=points(robot)))
         fps = 1 / (env.cfg.dt * self.stride)
-        return VideoSpec(model=env.drawn_model, poses=poses, shots=tuple(shots), fps=fps, size=size)
+        model = drawn_model(env.scene, env.robot, terrain, env.cfg)
+        return VideoSpec(model=model, poses=poses, shots=tuple(shots), fps=fps, size=size)
 
 
 def select_tracked_robots(env: LeggedEnv, count: int) -> list[int]:

@@ -1,7 +1,8 @@
 """The report card: success with confidence intervals by test and level, as JSON and Markdown."""
 
 from collections import Counter
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from terrainkit import TerrainMap
 from terrainkit.suites import suite_hash
 from terrainkit.terrain.parameter import format_value
 from terrainkit_robots.policy.evaluate import EvaluationConfig
-from terrainkit_robots.policy.margins import NOTE, Margins
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.margins import NOTE, margin_rows
+from terrainkit_robots.policy.policy_rollout import Progress
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.report_card.crossing import (
     CROSSED,
     EXTRA_TIME,
@@ -24,9 +26,6 @@ from terrainkit_robots.report_card.crossing import (
 )
 from terrainkit_robots.report_card.route import GOAL_RADIUS
 from terrainkit_robots.rl.run import PolicySpec
-
-SCHEMA_VERSION = 1
-"""Version of the JSON; it changes when a key changes its meaning or is removed."""
 
 # Wilson's interval is valid for the 0 or 10 successes of 10 that are common here; the normal
 # approximation has no width there.
@@ -96,71 +95,34 @@ class TestResult:
         return f"{self.passed}: {text}" if text else str(self.passed)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReportCard:
-    """How far a policy gets on the tests of a map."""
+Card = ResultTable[TestResult]
+"""A report card: how far a policy gets on the tests of a map."""
 
-    robot: str
-    """Name of the robot."""
 
-    checkpoint: str
-    """Name of the checkpoint."""
+def card_rows(card: Card) -> list[tuple[str, ...]]:
+    """Return a card as rows of text with a header: crossed attempts by test and level."""
+    levels = [str(result.level) for result in card["tests"][0].levels]
+    rows = [("test", f"level {levels[0]}", *levels[1:], "success", "passed level")]
+    for test in card["tests"]:
+        counts = (str(level.outcomes[OUTCOMES[CROSSED]]) for level in test.levels)
+        rows.append((test.name, *counts, _percent(vars(test)), test.passed_text))
+    return rows
 
-    map: str
-    """Name of the suite, or path of the map."""
 
-    sha256: str
-    """Hash of the content of the map."""
-
-    repetitions: int
-    """Attempts on each patch."""
-
-    seed: int
-    """Seed of the starts."""
-
-    speed: float
-    """Commanded speed [m/s]."""
-
-    success: float
-    """Fraction of all attempts that crossed."""
-
-    interval: tuple[float, float]
-    """Confidence interval of the success."""
-
-    tests: tuple[TestResult, ...]
-    """Results by test."""
-
-    margins: Margins | None = None
-    """Margins of the policy, if they were measured."""
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the card as values of JSON."""
-        about = {"schema_version": SCHEMA_VERSION, "criterion": CRITERION}
-        margins = {"margins": self.margins.as_json()} if self.margins else {}
-        card = asdict(replace(self, margins=None))
-        return about | {"confidence": CONFIDENCE} | card | margins
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the card as rows of text with a header: crossed attempts by test and level."""
-        levels = [str(each.level) for each in self.tests[0].levels]
-        rows = [("test", f"level {levels[0]}", *levels[1:], "success", "passed level")]
-        for test in self.tests:
-            counts = (str(each.outcomes[OUTCOMES[CROSSED]]) for each in test.levels)
-            rows.append((test.name, *counts, _percent(test), test.passed_text))
-        return rows
-
-    def as_markdown(self) -> str:
-        """Return the card as a Markdown document."""
-        margins = "\n## Margins\n\n" if self.margins else ""
-        margins += f"{_markdown_table(self.margins.rows())}\n{NOTE}\n" if self.margins else ""
-        return (
-            f"# {self.robot} on {self.map}\n\n"
-            f"Policy {self.checkpoint}, {self.repetitions} attempts on each patch at "
-            f"{self.speed:g} m/s, seed {self.seed}. SHA-256 of the map: `{self.sha256}`.\n\n"
-            f"Success: {_percent(self)}, with the {CONFIDENCE:.0%} confidence interval. The table "
-            "has the number of attempts that crossed.\n\n"
-            f"{_markdown_table(self.rows())}\n{CRITERION}\n{margins}"
-        )
+def card_markdown(card: Card) -> str:
+    """Return a card as a Markdown document."""
+    about, margins = card.about, ""
+    if "margins" in card.remarks:
+        rows = margin_rows(card.remarks["margins"]["margins"])
+        margins = f"\n## Margins\n\n{_markdown_table(rows)}\n{NOTE}\n"
+    return (
+        f"# {about['robot']} on {about['map']}\n\n"
+        f"Policy {about['checkpoint']}, {about['repetitions']} attempts on each patch at "
+        f"{about['speed']:g} m/s, seed {about['seed']}. SHA-256 of the map: `{about['sha256']}`."
+        f"\n\nSuccess: {_percent(about)}, with the {CONFIDENCE:.0%} confidence interval. The table "
+        "has the number of attempts that crossed.\n\n"
+        f"{_markdown_table(card_rows(card))}\n{CRITERION}\n{margins}"
+    )
 
 
 def measure(
@@ -170,7 +132,7 @@ def measure(
     repetitions: int,
     config: EvaluationConfig,
     progress: Progress = lambda _: None,
-) -> ReportCard:
+) -> Card:
     """Let a policy cross every patch of a map, and return the report card.
 
     Args:
@@ -197,19 +159,21 @@ def measure(
         _test_result(terrain_map, col, f"{name} {col}" if counts[name] > 1 else name, attempts)
         for col, (name, attempts) in enumerate(zip(names, columns, strict=True))
     )
-    success, interval = _success(np.concatenate([each.outcomes for each in columns]))
-    return ReportCard(
-        robot=spec.robot.spec.name,
-        checkpoint=spec.policy_name,
-        map=name,
-        sha256=suite_hash(terrain_map),
-        repetitions=repetitions,
-        seed=config.seed,
-        speed=crossing.speed,
-        success=success,
-        interval=interval,
-        tests=tests,
-    )
+    success, interval = _success(np.concatenate([attempts.outcomes for attempts in columns]))
+    about = {
+        "criterion": CRITERION,
+        "confidence": CONFIDENCE,
+        "robot": spec.robot.spec.name,
+        "checkpoint": spec.policy_name,
+        "map": name,
+        "sha256": suite_hash(terrain_map),
+        "repetitions": repetitions,
+        "seed": config.seed,
+        "speed": crossing.speed,
+        "success": success,
+        "interval": interval,
+    }
+    return ResultTable(about=about, tables={"tests": tests})
 
 
 def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempts) -> TestResult:
@@ -221,7 +185,7 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
             range(rows), _changing_parameters(terrain_map, col), *by_level, strict=True
         )
     )
-    failed = [each.level for each in levels if each.success < 1]
+    failed = [result.level for result in levels if result.success < 1]
     passed = (failed[0] if failed else rows) - 1
     success, interval = _success(attempts.outcomes)
     return TestResult(
@@ -235,9 +199,9 @@ def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempt
 
 def _changing_parameters(terrain_map: TerrainMap, col: int) -> list[dict[str, Any]]:
     """Return the realized parameters of a column that differ between levels, for each level."""
-    realized = [dict(each.realized) for each in terrain_map.parameters[:, col].tolist()]
-    names = [name for name in realized[0] if len({str(each[name]) for each in realized}) > 1]
-    return [{name: each[name] for name in names} for each in realized]
+    realized = [dict(parameters.realized) for parameters in terrain_map.parameters[:, col].tolist()]
+    names = [name for name in realized[0] if len({str(level[name]) for level in realized}) > 1]
+    return [{name: level[name] for name in names} for level in realized]
 
 
 def _level_result(
@@ -270,11 +234,12 @@ def _value_text(value: Any) -> str:
     return f"{value:.3g}" if isinstance(value, float) else format_value(value)
 
 
-def _percent(result: TestResult | ReportCard) -> str:
-    low, high = result.interval
-    return f"{result.success:.0%} ({low:.0%} to {high:.0%})"
+def _percent(result: Mapping[str, Any]) -> str:
+    low, high = result["interval"]
+    return f"{result['success']:.0%} ({low:.0%} to {high:.0%})"
 
 
-def summary(card: ReportCard) -> str:
-    """Return the card as one line."""
-    return f"{card.robot}, {card.checkpoint}, on {card.map}: success {_percent(card)}"
+def summary(card: Card) -> str:
+    """Return a card as one line."""
+    robot, checkpoint, name = (card.about[key] for key in ("robot", "checkpoint", "map"))
+    return f"{robot}, {checkpoint}, on {name}: success {_percent(card.about)}"

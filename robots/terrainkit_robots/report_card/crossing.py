@@ -12,8 +12,8 @@ from terrainkit.curriculum.waypoints import Waypoints, route_lengths
 from terrainkit.errors import ConfigError
 from terrainkit.map.patch import Patch
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.report_card.route import GOAL_RADIUS, HEADING_STIFFNESS, SPEED, patch_routes
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import PolicySpec

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from terrainkit.curriculum.waypoints import Waypoints
+from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Commands
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.transforms import FloatArray, wrap_to_pi
 
 if TYPE_CHECKING:
-    from terrainkit.curriculum.waypoints import Waypoints
+    from terrainkit_robots.rl.terrain import Ground
 
 # Without the observed velocity, a biped followed 60 % of its commands after 3.1 M samples with 2.3,
 # and 84 % after 3.7 M samples with 3.
@@ -179,6 +181,22 @@ class VelocityCommand(CommandTerm):
             stiffness, limits = self._cfg.heading_stiffness, self._cfg.ang_vel_yaw
             toward = self.waypoints.commands(position, yaw, self.speed, stiffness, limits)
             np.copyto(self.values, toward, where=~np.isnan(toward))
+
+
+def make_waypoints(cfg: Commands, terrain: "Ground", num_envs: int) -> Waypoints | None:
+    """Return the goals of n robots, if they are commanded to walk to them.
+
+    Raises:
+        ConfigError: If the terrain has no goals.
+    """
+    if not cfg.waypoints:
+        return None
+    if np.isnan(terrain.goals).all():
+        raise ConfigError(
+            "commands.waypoints: got a terrain without goals; expected a map with terrains "
+            "such as course, and not collision plane"
+        )
+    return Waypoints.make(num_envs, terrain.goals.shape[2], cfg.waypoint_radius)
 
 
 class Gait:

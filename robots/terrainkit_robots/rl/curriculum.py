@@ -1,7 +1,7 @@
 """The terrain curriculum: the patches that robots are reset on, and what came of the episodes."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -11,7 +11,13 @@ from terrainkit.curriculum import SAMPLERS, CommandProgress, assign_spawns
 from terrainkit.views.curriculum_picture import draw_statistics
 from terrainkit_robots.checkpoint import check_state
 from terrainkit_robots.rl.config import Terrain
+from terrainkit_robots.rl.simulation import Ids
+from terrainkit_robots.rl.terminations import terrain_out_of_bounds
 from terrainkit_robots.rl.terrain import Ground
+from terrainkit_robots.transforms import BoolArray, quat_to_yaw
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.env import LeggedEnv
 
 
 class TerrainCurriculum:
@@ -59,3 +65,53 @@ class TerrainCurriculum:
         """Restore a state; the number of robots may differ."""
         check_state("curriculum", state, self.state_dict() | {"levels": ..., "columns": ...})
         self.sampler.load_state_dict(state)
+
+
+def update_progress(env: "LeggedEnv", unstable: BoolArray) -> None:
+    """Measure how far the robots have followed their commands, after a step."""
+    progress = env.curriculum.progress
+    # MuJoCo moved the unstable robots to the world's origin.
+    pos = np.where(unstable[:, None], progress.position, env.state.base_pos[:, :2])
+    rate = env.velocity_command.yaw_rate(progress.yaw.astype(np.float32))
+    progress.update(pos, quat_to_yaw(env.state.base_quat), env.commands, rate, env.cfg.dt)
+
+
+def end_episodes(env: "LeggedEnv", env_ids: Ids, unstable: BoolArray) -> dict[str, float]:
+    """Update the curricula at the end of episodes.
+
+    Args:
+        env: The environment.
+        env_ids: Environments whose episodes end, shape (k,).
+        unstable: Simulations that MuJoCo has reset, shape (n,).
+
+    Returns:
+        Means of these episodes to log, by name.
+    """
+    seconds, fallen = env.steps_since_reset[env_ids] * env.cfg.dt, env.state.fallen[env_ids]
+    log = {
+        f"Episode/rew_{name}": float((total[env_ids] / seconds).mean())
+        for name, total in env.episode_sums.items()
+    }
+    log["Episode/falls"] = float(fallen.mean())
+    log["Episode/speed"] = float((env.path_length[env_ids] / seconds).mean())
+    # rsl-rl cuts the first episodes to random lengths, so their progress is not meaningful.
+    complete = (env.episode_length_buf.numpy() == env.steps_since_reset)[env_ids]
+    left_map = terrain_out_of_bounds(env) & ~unstable
+    progress = env.curriculum.progress.of_episodes(
+        env_ids, fallen, env.terrain.patch_length / 2, left_map=left_map[env_ids]
+    )
+    if env.waypoints and env.velocity_command.fixed is None:
+        reached = env.waypoints.progress[env_ids]
+        commanded = env.curriculum.progress.commanded[env_ids]
+        start = env.curriculum.progress.start[env_ids]
+        to_goals = env.waypoints.of_episodes(env_ids, fallen, start, commanded)
+        progress = np.where(np.isnan(reached), progress, to_goals)
+        if not np.isnan(reached).all():
+            log["Episode/goals_reached"] = float(np.nanmean(reached))
+    if "tracking_lin_vel" in env.active_rewards:
+        most = env.cfg.env.episode_length_s * env.active_rewards["tracking_lin_vel"][1]
+        tracking = env.episode_sums["tracking_lin_vel"][env_ids] / most
+        env.velocity_command.end_episodes(tracking)
+    returns = np.sum([total[env_ids] for total in env.episode_sums.values()], axis=0)
+    env.curriculum.sampler.update(env_ids[complete], progress[complete], returns[complete])
+    return log if env.terrain.is_plane else log | env.curriculum.log()

@@ -5,35 +5,39 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any, cast
 
-import mujoco
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from rsl_rl.env import VecEnv
 from tensordict import TensorDict
 
-from terrainkit.curriculum.waypoints import Waypoints
-from terrainkit.errors import ConfigError, TerrainkitError, is_built_in, plugin_errors
-from terrainkit_robots.checkpoint import check_state
+from terrainkit.errors import TerrainkitError, is_built_in, plugin_errors
 from terrainkit_robots.rl import observations
-from terrainkit_robots.rl.commands import CommandTerm, Gait, VelocityCommand
+from terrainkit_robots.rl.actions import JointActions, checked_actions
+from terrainkit_robots.rl.commands import CommandTerm, Gait, VelocityCommand, make_waypoints
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.curriculum import TerrainCurriculum
-from terrainkit_robots.rl.events import EVENTS, EventTerm, RandomizedParams, apply_params
-from terrainkit_robots.rl.observations import ObservationTerm
+from terrainkit_robots.rl.curriculum import TerrainCurriculum, end_episodes, update_progress
+from terrainkit_robots.rl.events import EVENTS, EventTerm, RandomizedParams
+from terrainkit_robots.rl.observations import ObservationTerm, PolicyInterface
 from terrainkit_robots.rl.own_terms import checked
-from terrainkit_robots.rl.rewards import REWARDS, Reward, is_moving, reward_scales
+from terrainkit_robots.rl.rewards import REWARDS, Reward, is_moving, scaled_rewards
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Ids, Simulation, check_env_memory
 from terrainkit_robots.rl.state import Sensors, State
 from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
-from terrainkit_robots.rl.terminations import TERMINATIONS, terrain_out_of_bounds
+from terrainkit_robots.rl.terminations import TERMINATIONS
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 
 
-def make_env(task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> "LeggedEnv":
+def make_env(
+    task: Task,
+    robot: Robot,
+    terrain: Ground,
+    device: str = "cpu",
+    interface: PolicyInterface | None = None,
+) -> "LeggedEnv":
     """Return the environment of a task: of its `env_class`, or of `LeggedEnv`.
 
     Raises:
@@ -43,31 +47,66 @@ def make_env(task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> 
     kind = task.env_class or LeggedEnv
     plugin = None if is_built_in(kind) else f"{kind.__module__}:{kind.__qualname__}"
     with plugin_errors(plugin, TerrainkitError):
-        return kind(task, robot, terrain, device)
+        return kind(task, robot, terrain, device, interface)
 
 
 class LeggedEnv(VecEnv):
     """An rsl-rl `VecEnv` of legged robots. Later steps do not modify returned tensors.
 
     The `env_class` of a task of your own is a subclass with other terms: functions of the
-    environment by name.
+    environment by name. They may use the attributes below, where n is the number of robots.
+
+    Args:
+        task: The task.
+        robot: The robot.
+        terrain: The terrain under it.
+        device: Device of observations and rewards, as torch names it.
+        interface: Observations and targets of a policy of another project.
+
+    Attributes:
+        cfg: The task.
+        robot: The robot: its spec, default pose and limits.
+        terrain: The ground under the robots: heights, spawns and goals.
+        scene: The MuJoCo model and indices into it; `sim`: its n simulations.
+        state: State after the last step, with the current commands.
+        params: Physical parameters of the robots; the event `params` samples them.
+        actions: Scale and offset of the actions, and their joints.
+        active_commands: Command terms by name, with their `values`; `commands`: the velocity
+            commands, shape (n, 3).
+        gait, curriculum, waypoints: The gait to follow, the patches of the robots, and their goals.
+        rng: Generator of all random numbers but those of the curriculum.
+        buffers: Arrays that terms keep between steps, by name, which a checkpoint has.
+        num_envs, num_actions: Numbers of robots, n, and of actions.
+        step_dt: Time of a step [s].
+        steps_since_reset: Steps of each episode, shape (n,); `path_length`: way walked [m].
+        action_history: The last three actions, the newest first, shape (3, n, a).
+        joint_offset, lin_vel_bias, push_vel: Zero offsets of the joints [rad], constant error of
+            the observed velocity [m/s], and velocity that the last push added [m/s].
+        mass: Mass of the robot [kg].
     """
 
     params: RandomizedParams
-    """Physical parameters of the robots; the event `params` samples them."""
-
     state: State
-    """State after the last step, with the current commands."""
+    buffers: dict[str, NDArray[Any]]
+    _observations: TensorDict
 
     obs_history: FloatArray
     """Previous observations of the policy, the newest first, shape (n, h)."""
 
-    _observations: TensorDict
+    before_reset: Callable[[Ids], object] | None = None
+    """Called with the environments whose episodes end, before they are reset, shape (k,)."""
 
-    def __init__(self, task: Task, robot: Robot, terrain: Ground, device: str = "cpu") -> None:
+    def __init__(
+        self,
+        task: Task,
+        robot: Robot,
+        terrain: Ground,
+        device: str = "cpu",
+        interface: PolicyInterface | None = None,
+    ) -> None:
         """Build the simulations and reset every environment."""
         self.cfg, self.robot, self.terrain, self.device = task, robot, terrain, device
-        self.num_envs = n = task.env.num_envs
+        self.interface, self.num_envs = interface, task.env.num_envs
         self.max_episode_length, self.step_dt = task.max_episode_length, task.dt
         self.scene = Scene(robot, terrain, task)
         self.has_height_scan = observations.uses_height_scan(task, is_plane=terrain.is_plane)
@@ -79,12 +118,10 @@ class LeggedEnv(VecEnv):
             history=self.history_length - 1,
             ngeom=self.scene.model.ngeom,
         )
-        self.sim = Simulation(self.scene, n, task.env.num_threads)
+        self.sim = Simulation(self.scene, self.num_envs, task.env.num_threads)
         self.mass = float(self.scene.model.body_subtreemass[self.scene.base])
         self.rng = np.random.default_rng(task.runner.seed)
-        self.curriculum = TerrainCurriculum(terrain, n, task.terrain, task.runner.seed)
-        self.buffers: dict[str, NDArray[Any]] = {}
-        """Arrays that own terms keep between steps, which a checkpoint has."""
+        self.curriculum = TerrainCurriculum(terrain, self.num_envs, task.terrain, task.runner.seed)
         self.gait = Gait(task.commands, robot.leg_length, self.scene.foot_pos)
         self.sensors = Sensors(
             self.sim,
@@ -94,47 +131,55 @@ class LeggedEnv(VecEnv):
             leg_length=robot.leg_length,
             scan=self.has_height_scan,
         )
-        self.push_vel = np.zeros((n, 3), np.float32)  # of this step, world frame [m/s]
-        self.steps_until_push = np.zeros(n, np.int64)
-        self.episode_length_buf = torch.zeros(n, dtype=torch.int64)
+        self.actions = JointActions(robot, task.control, self.scene.model)
+        self.num_actions = len(self.actions.joints)
+        self._make_buffers()
+        self._make_terms()
+        self._call_events("startup")
+        self.reset()
+
+    def _make_buffers(self) -> None:
+        n = self.num_envs
+        self.buffers = {}
+        self.action_history = self.add_buffer("action_history", (3, n, self.num_actions))
+        self.joint_offset = self.add_buffer("joint_offset", (n, len(self.robot.default_pose)))
+        self.lin_vel_bias = self.add_buffer("lin_vel_bias", (n, 3))
+        self.push_vel = self.add_buffer("push_vel", (n, 3))
+        self.steps_until_push = self.add_buffer("steps_until_push", (n,), np.int64)
         # rsl-rl starts the first episodes at random lengths; this counts the real steps.
-        self.steps_since_reset = np.zeros(n, np.int64)
-        self.path_length = np.zeros(n)  # since the last reset [m]
+        self.steps_since_reset = self.add_buffer("steps_since_reset", (n,), np.int64)
+        self.path_length = self.add_buffer("path_length", (n,), np.float64)
+        self.episode_length_buf = torch.zeros(n, dtype=torch.int64)
 
-        # A motor receives offset + scale * action; without a scale, there is no action.
-        kind, scale = task.control.control_type, task.control.action_scale
-        default = {"P": robot.action_scale, "V": robot.velocity, "T": robot.effort}[kind]
-        scales = default if scale is None else np.where(default == 0, 0, scale)
-        self.action_scale = scales.astype(np.float32)
-        self.action_joints = np.flatnonzero(self.action_scale)  # indices in the robot's order
-        self.num_actions = len(self.action_joints)
-        if not self.num_actions:
-            raise ConfigError(f"action_scale of {robot.spec.name}: got 0 for every joint")
-        self.action_history = np.zeros((3, n, self.num_actions), np.float32)  # the newest first
-        self.joint_offset = np.zeros((n, len(robot.default_pose)), np.float32)
-        self.lin_vel_bias = np.zeros((n, 3), np.float32)
-        self.is_position_controlled = self.scene.model.actuator_biasprm[:, 1] != 0
-        self.action_offset = np.where(self.is_position_controlled, robot.default_pose, 0)
+    def add_buffer(self, name: str, shape: tuple[int, ...], dtype: Any = np.float32) -> Any:
+        """Return a new array of zeros, one of the `buffers` that a checkpoint has."""
+        buffer = self.buffers[name] = np.zeros(shape, dtype)
+        return buffer
 
+    def _make_terms(self) -> None:
+        n = self.num_envs
         self.active_commands = self.command_terms()
         self.velocity_command = cast("VelocityCommand", self.active_commands["velocity"])
         self.commands = self.velocity_command.values  # a view of the current commands
-        self.velocity_command.waypoints = self.waypoints = self._make_waypoints()
+        self.waypoints = make_waypoints(self.cfg.commands, self.terrain, n)
+        self.velocity_command.waypoints = self.waypoints
+        groups = self.observation_terms()
+        if self.interface is not None:
+            groups = {**groups, "policy": self.interface.observation_terms(self, groups)}
         self.obs_terms = {
             group: {
-                name: replace(each, function=checked("observation", name, each.function, (n, None)))
-                for name, each in terms.items()
+                name: replace(term, function=checked("observation", name, term.function, (n, None)))
+                for name, term in terms.items()
             }
-            for group, terms in self.observation_terms().items()
+            for group, terms in groups.items()
         }
-        self.active_rewards = self._scaled_rewards()
+        self.active_rewards = scaled_rewards(self)
         self.episode_sums = {name: np.zeros(n, np.float32) for name in self.active_rewards}
         self.active_terminations = [
-            checked("termination", *each, (n,)) for each in self.termination_terms().items()
+            checked("termination", name, function, (n,))
+            for name, function in self.termination_terms().items()
         ]
         self.active_events = self.event_terms()
-        self._call_events("startup")
-        self.reset()
 
     def command_terms(self) -> dict[str, CommandTerm]:
         """Return the commands by name: `velocity`, and your own ones."""
@@ -164,24 +209,9 @@ class LeggedEnv(VecEnv):
         return dict(EVENTS)
 
     @property
-    def joint_units(self) -> tuple[str, ...]:
-        """Unit of each joint's position."""
-        slide = mujoco.mjtJoint.mjJNT_SLIDE
-        types = (self.scene.model.joint(name).type[0] for name in self.robot.spec.joint_order)
-        return tuple("m" if each == slide else "rad" for each in types)
-
-    @property
     def unwrapped(self) -> "LeggedEnv":
         """Return the environment itself, whose `step_dt` rsl-rl's RND reads."""
         return self
-
-    @cached_property
-    def drawn_model(self) -> Any:
-        """The model with all geoms of the terrain, for pictures."""
-        whole = self.scene
-        if whole.near_terrain:
-            whole = Scene(self.robot, self.terrain, self.cfg, all_geoms=True)
-        return whole.model
 
     @cached_property
     def mirror_maps(self) -> MirrorMaps:
@@ -200,12 +230,12 @@ class LeggedEnv(VecEnv):
     def step(
         self, actions: torch.Tensor
     ) -> tuple[TensorDict, torch.Tensor, torch.Tensor, dict[str, Any]]:
-        """Apply actions of shape (n, a), one for each of `action_joints`, for one control step.
+        """Apply actions of shape (n, a), one for each of `actions.joints`, for one control step.
 
         Returns:
             Observations, rewards (n,), dones (n,), and extras with `time_outs` and `log`.
         """
-        self._apply_actions(actions)
+        self.apply_actions(actions)
         if size := self.obs_history.shape[1]:  # the newest observation comes first
             self.obs_history = self.get_observations()["policy"].numpy(force=True)[:, :size]
         self._call_events("step")
@@ -225,17 +255,19 @@ class LeggedEnv(VecEnv):
         # A fall at the last step is a termination, which must not be bootstrapped.
         time_out &= ~state.fallen
         done = state.fallen | time_out
-        self._update_progress(state, unstable)
+        update_progress(self, unstable)
         extras: dict[str, Any] = {"time_outs": torch.from_numpy(time_out).to(self.device)}
         env_ids = np.flatnonzero(done)
         if len(env_ids):
-            extras["log"] = self._end_episodes(env_ids, state, unstable)
+            if self.before_reset is not None:
+                self.before_reset(env_ids)
+            extras["log"] = end_episodes(self, env_ids, unstable)
             self._reset_idx(env_ids)
             state.update(env_ids, self._compute_state(env_ids))
         for command in self.active_commands.values():
             command.resample_due(self.rng, self.steps_since_reset)
         self._update_commands()
-        self._compute_observations()
+        self.update_observations()
         rewards_tensor = torch.from_numpy(rewards).to(self.device)
         return self._observations, rewards_tensor, torch.from_numpy(done).to(self.device), extras
 
@@ -243,9 +275,10 @@ class LeggedEnv(VecEnv):
         """Reset every environment."""
         self._reset_idx(np.arange(self.num_envs))
         self.state = self._compute_state(slice(None))
-        self._reset_history()
+        width = observations.history_width(self)
+        self.obs_history = np.zeros((self.num_envs, width), np.float32)
         self._update_commands()
-        self._compute_observations()
+        self.update_observations()
 
     def set_commands(self, commands: FloatArray | None) -> None:
         """Set fixed commands.
@@ -260,7 +293,7 @@ class LeggedEnv(VecEnv):
         if commands is None:
             self.velocity_command.resample(self.rng, np.arange(self.num_envs))
         self._update_commands()
-        self._compute_observations()
+        self.update_observations()
 
     def to_ctrl(self, actions: FloatArray) -> FloatArray:
         """Return the actuator controls for actions.
@@ -271,22 +304,16 @@ class LeggedEnv(VecEnv):
         Returns:
             Controls of all actuators, shape (n, j).
         """
-        target = np.tile(self.action_offset, (len(actions), 1))
-        target[:, self.action_joints] += self.action_scale[self.action_joints] * actions
-        # A joint with a zero offset reads too much, so its motor stops short by the same angle.
-        return target - self.joint_offset * self.is_position_controlled
+        if self.interface is not None:
+            return self.interface.to_ctrl(self, actions)
+        return self.actions.to_ctrl(actions, self.joint_offset)
 
-    def _apply_actions(self, actions: torch.Tensor) -> None:
-        array = actions.detach().to("cpu", torch.float32).numpy()
-        expected = (self.num_envs, self.num_actions)
-        if array.shape != expected:
-            raise ConfigError(f"shape of the actions: got {array.shape}; expected {expected}")
-        if not np.isfinite(array).all():
-            first = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
-            raise ConfigError(f"actions of environment {first} are not finite: the policy diverged")
+    def apply_actions(self, actions: torch.Tensor) -> None:
+        """Give actions of shape (n, a) to the motors, without a step."""
+        values = checked_actions(actions, (self.num_envs, self.num_actions))
         clip = self.cfg.normalization.clip_actions
         self.action_history[1:] = self.action_history[:-1]
-        np.clip(array, -clip, clip, out=self.action_history[0])
+        np.clip(values, -clip, clip, out=self.action_history[0])
         self.sim.ctrl[:] = self.to_ctrl(self.action_history[0])
 
     def _compute_state(self, rows: Any, last: State | None = None) -> State:
@@ -306,7 +333,7 @@ class LeggedEnv(VecEnv):
     def _update_commands(self) -> None:
         """Let commands follow headings and waypoints, and write them into the state."""
         position = self.sim.qpos[:, :2].astype(np.float32)
-        self.velocity_command.update(self._yaw(), position)
+        self.velocity_command.update(self.yaw, position)
         for name, values in self._command_state(slice(None)).items():
             np.copyto(getattr(self.state, name), values)
 
@@ -329,38 +356,8 @@ class LeggedEnv(VecEnv):
             self.episode_sums[name] += term
         return total + termination
 
-    def _scaled_rewards(self) -> dict[str, tuple[Reward, float]]:
-        """Return each reward term with a scale other than 0, and that scale in SI units."""
-        terms, own = self.reward_terms(), type(self.cfg.rewards).__name__
-        for name in terms.keys() - vars(self.cfg.rewards).keys():
-            raise ConfigError(f"reward {name}: {own} has no field {name}; expected its scale")
-        scales = reward_scales(self.cfg.rewards, self.mass, self.robot.leg_length)
-        return {
-            name: (checked("reward", name, function, (self.num_envs,)), scales[name])
-            for name, function in terms.items()
-            if name in scales
-        }
-
-    def _reset_history(self) -> None:
-        """Make the history of the policy: the previous observations of the terms before it."""
-        terms = self.obs_terms["policy"]
-        names = [*terms][: [*terms].index("history")] if "history" in terms else []
-        width = sum(terms[name].function(self).shape[1] for name in names)
-        past = self.history_length - 1
-        self.obs_history = np.zeros((self.num_envs, past * width), np.float32)
-
-    def _make_waypoints(self) -> Waypoints | None:
-        """Return the goals of the robots, if they are commanded to walk to them."""
-        cfg, goals = self.cfg.commands, self.terrain.goals
-        if cfg.waypoints and np.isnan(goals).all():
-            raise ConfigError(
-                "commands.waypoints: got a terrain without goals; expected a map with terrains "
-                "such as course, and not collision plane"
-            )
-        number = goals.shape[2]
-        return Waypoints.make(self.num_envs, number, cfg.waypoint_radius) if cfg.waypoints else None
-
-    def _compute_observations(self) -> None:
+    def update_observations(self) -> None:
+        """Compute the observations of the current state, with new noise."""
         groups = {}
         for name, terms in self.obs_terms.items():
             rng = self.rng if name == "policy" else None  # noise for the policy only
@@ -371,14 +368,11 @@ class LeggedEnv(VecEnv):
             new, policy = self.steps_since_reset == 0, groups["policy"]
             width = self.obs_history.shape[1] // past
             policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
-        self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
+        self.set_observations(groups)
 
-    def _update_progress(self, state: State, unstable: BoolArray) -> None:
-        progress = self.curriculum.progress
-        # MuJoCo moved the unstable robots to the world's origin.
-        pos = np.where(unstable[:, None], progress.position, state.base_pos[:, :2])
-        rate = self.velocity_command.yaw_rate(progress.yaw.astype(np.float32))
-        progress.update(pos, quat_to_yaw(state.base_quat), self.commands, rate, self.cfg.dt)
+    def set_observations(self, groups: Mapping[str, torch.Tensor]) -> None:
+        """Replace the current observations of each group, shape (n, width)."""
+        self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
 
     def _call_events(self, when: str, *arguments: Any) -> None:
         """Call the functions of all events for `startup`, `reset` or `step`."""
@@ -388,39 +382,10 @@ class LeggedEnv(VecEnv):
                 with plugin_errors(f"event {name} ({function.__module__})" if is_own else None):
                     function(self, *arguments)
 
-    def _yaw(self) -> FloatArray:
+    @property
+    def yaw(self) -> FloatArray:
+        """Heading of each robot [rad], shape (n,)."""
         return quat_to_yaw(self.sim.qpos[:, 3:7].astype(np.float32))
-
-    def _end_episodes(self, env_ids: Ids, state: State, unstable: BoolArray) -> dict[str, float]:
-        """Update the curriculum at the end of episodes, and return the values to log."""
-        seconds, fallen = self.steps_since_reset[env_ids] * self.cfg.dt, state.fallen[env_ids]
-        log = {
-            f"Episode/rew_{name}": float((total[env_ids] / seconds).mean())
-            for name, total in self.episode_sums.items()
-        }
-        log["Episode/falls"] = float(fallen.mean())
-        log["Episode/speed"] = float((self.path_length[env_ids] / seconds).mean())
-        # rsl-rl cuts the first episodes to random lengths, so their progress is not meaningful.
-        complete = (self.episode_length_buf.numpy() == self.steps_since_reset)[env_ids]
-        left_map = terrain_out_of_bounds(self) & ~unstable
-        progress = self.curriculum.progress.of_episodes(
-            env_ids, fallen, self.terrain.patch_length / 2, left_map=left_map[env_ids]
-        )
-        if self.waypoints and self.velocity_command.fixed is None:
-            reached = self.waypoints.progress[env_ids]
-            commanded = self.curriculum.progress.commanded[env_ids]
-            start = self.curriculum.progress.start[env_ids]
-            to_goals = self.waypoints.of_episodes(env_ids, fallen, start, commanded)
-            progress = np.where(np.isnan(reached), progress, to_goals)
-            if not np.isnan(reached).all():
-                log["Episode/goals_reached"] = float(np.nanmean(reached))
-        if "tracking_lin_vel" in self.active_rewards:
-            most = self.cfg.env.episode_length_s * self.active_rewards["tracking_lin_vel"][1]
-            tracking = self.episode_sums["tracking_lin_vel"][env_ids] / most
-            self.velocity_command.end_episodes(tracking)
-        returns = np.sum([total[env_ids] for total in self.episode_sums.values()], axis=0)
-        self.curriculum.sampler.update(env_ids[complete], progress[complete], returns[complete])
-        return log if self.terrain.is_plane else log | self.curriculum.log()
 
     def _reset_idx(self, env_ids: Ids) -> None:
         """Start new episodes."""
@@ -429,70 +394,9 @@ class LeggedEnv(VecEnv):
         for total in self.episode_sums.values():
             total[env_ids] = 0
         self._call_events("reset", env_ids)
-        self.curriculum.progress.reset(env_ids, self.sim.qpos[env_ids], self._yaw()[env_ids])
+        self.curriculum.progress.reset(env_ids, self.sim.qpos[env_ids], self.yaw[env_ids])
         if self.waypoints:
             level, column = self.curriculum.levels[env_ids], self.curriculum.columns[env_ids]
             self.waypoints.reset(env_ids, self.terrain.goals[level, column, :, :2])
         for command in self.active_commands.values():
             command.resample(self.rng, env_ids)
-
-    def state_dict(self) -> dict[str, Any]:
-        """Return all mutable state, for an exact resume."""
-        return {
-            "arrays": {name: torch.tensor(array) for name, array in self._arrays().items()},
-            "rng": self.rng.bit_generator.state,
-            "curriculum": self.curriculum.state_dict(),
-            "observations": dict(self._observations.clone().items()),
-        }
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore a state; if the number of environments differs, restore only the curricula."""
-        parts = self.state_dict()
-        check_state("env", state, dict.fromkeys(parts, ...))
-        self.curriculum.load_state_dict(state["curriculum"])
-        arrays, saved = self._arrays(), state["arrays"]
-        num_envs = len(state["curriculum"]["levels"])
-        if num_envs != self.num_envs and num_envs == len(saved["episode_length"]):
-            shared = [f"velocity.{name}" for name in ("lin_vel_x", "tracked", "steps")]
-            check_state("env.arrays", saved, {name: parts["arrays"][name] for name in shared})
-            for name in shared:
-                arrays[name][...] = saved[name].numpy()
-            self.reset()
-            return
-        try:
-            check_state("env", state, parts | {"curriculum": ...})
-        except ConfigError as error:
-            hint = "with another env.num_envs, the networks and the curriculum can be used"
-            raise ConfigError(f"{error}; {hint}") from error
-        for name, array in arrays.items():
-            array[...] = saved[name].numpy()
-        if self.waypoints and (self.waypoints.index > self.waypoints.numbers).any():
-            largest = self.waypoints.index.max()
-            raise ConfigError(f"next goal: got {largest}; expected no more than the robot has")
-        apply_params(self.sim, self.params)
-        self.rng.bit_generator.state = state["rng"]
-        groups = {name: state["observations"][name] for name in parts["observations"]}
-        self._observations = TensorDict(groups, [self.num_envs]).to(self.device)
-
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        """Return views of the arrays to save, by name."""
-        # Names are checkpoint keys; renaming a field breaks resume.
-        names = "action_history joint_offset lin_vel_bias steps_since_reset path_length push_vel"
-        arrays = {name: getattr(self, name) for name in names.split()} | {
-            "physics": self.sim.batch.state,
-            "episode_length": self.episode_length_buf.numpy(),
-            "steps_until_push": self.steps_until_push,
-        }
-        if self.cfg.domain_rand.action_delay:
-            arrays["action_delay"] = self.sim.batch.expand("actuator_delay")
-        # The state has means, accelerations and forces, which cannot be computed from the physics.
-        owners = {"state": self.state, "params": self.params, "waypoints": self.waypoints}
-        owners |= {"progress": self.curriculum.progress, **self.active_commands}
-        tables = {name: vars(owner) for name, owner in owners.items() if owner}
-        tables |= {"rewards": self.episode_sums, "buffers": self.buffers}
-        return arrays | {
-            f"{table}.{name}": each
-            for table, values in tables.items()
-            for name, each in values.items()
-            if isinstance(each, np.ndarray)
-        }

@@ -6,7 +6,7 @@ terms without noise, and terms that only a simulation has. Exported policies use
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,16 @@ ObsTerms = Mapping[str, Mapping[str, ObservationTerm]]
 """The terms of each observation group by name."""
 
 
+class PolicyInterface(Protocol):
+    """What a policy of another project observes, and what its actions do."""
+
+    def observation_terms(self, env: "LeggedEnv", groups: ObsTerms) -> dict[str, ObservationTerm]:
+        """Return the terms of the policy, in place of those of `groups`."""
+
+    def to_ctrl(self, env: "LeggedEnv", actions: FloatArray) -> FloatArray:
+        """Return the controls of all actuators, shape (n, j), for actions of shape (n, a)."""
+
+
 def uses_height_scan(task: Task, *, is_plane: bool) -> bool:
     """Return whether the policy has a height scan; the default is True except on flat ground."""
     setting = task.terrain.measure_heights
@@ -85,7 +95,7 @@ def uses_height_scan(task: Task, *, is_plane: bool) -> bool:
 def policy_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     """Return the policy's terms: 47 numbers for a quadruped; a height scan adds 187."""
     robot, options, term = env.robot, env.cfg.observations, ObservationTerm
-    scales, noise, units = env.cfg.normalization.obs_scales, env.cfg.noise, env.joint_units
+    scales, noise, units = env.cfg.normalization.obs_scales, env.cfg.noise, env.scene.joint_units
     command_scale = (scales.lin_vel, scales.lin_vel, scales.ang_vel)
     # The angle of a wheel grows without bound and carries no information.
     dof_pos_scale = tuple(np.where(robot.wheels, 0.0, scales.dof_pos).tolist())
@@ -154,6 +164,14 @@ def history_length(task: Task, robot: Robot) -> int:
     options = task.observations
     default = 1 if options.base_lin_vel else 5 if len(robot.spec.feet) == 2 else 3
     return default if options.history_length is None else options.history_length
+
+
+def history_width(env: "LeggedEnv") -> int:
+    """Return the width of the history of the policy: previous observations of the terms before."""
+    terms = env.obs_terms["policy"]
+    names = [*terms][: [*terms].index("history")] if "history" in terms else []
+    width = sum(terms[name].function(env).shape[1] for name in names)
+    return (env.history_length - 1) * width
 
 
 def _deepest(env: "LeggedEnv") -> float:

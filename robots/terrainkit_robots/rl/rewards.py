@@ -8,13 +8,14 @@ foot has a phase, in which it should be in the air or on the ground.
 """
 
 from collections.abc import Callable
-from dataclasses import fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Rewards
+from terrainkit_robots.rl.own_terms import checked
 from terrainkit_robots.transforms import FloatArray
 
 if TYPE_CHECKING:
@@ -296,6 +297,24 @@ def foot_clearance(env: "LeggedEnv") -> FloatArray:
 
 
 REWARDS: dict[str, Reward] = {
-    name: each for name, each in globals().items() if name in {one.name for one in fields(Rewards)}
+    name: term for name, term in globals().items() if name in Rewards.__dataclass_fields__
 }
 """Every reward term of this module by name."""
+
+
+def scaled_rewards(env: "LeggedEnv") -> dict[str, tuple[Reward, float]]:
+    """Return each reward term with a scale other than 0, and that scale in SI units.
+
+    Raises:
+        ConfigError: If the task has no scale for a term.
+    """
+    terms, rewards = env.reward_terms(), env.cfg.rewards
+    for name in terms.keys() - vars(rewards).keys():
+        own = type(rewards).__name__
+        raise ConfigError(f"reward {name}: {own} has no field {name}; expected its scale")
+    scales = reward_scales(rewards, env.mass, env.robot.leg_length)
+    return {
+        name: (checked("reward", name, function, (env.num_envs,)), scales[name])
+        for name, function in terms.items()
+        if name in scales
+    }

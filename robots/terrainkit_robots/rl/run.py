@@ -7,6 +7,7 @@ map, `curriculum.png` (success and visits of the patches at the end of training)
 
 import hashlib
 import re
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -14,10 +15,16 @@ from datetime import datetime
 from importlib.metadata import version
 from os.path import isdir, isfile
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from terrainkit import MapConfig, TerrainMap
-from terrainkit.errors import ConfigError, ExportError, listing, prefixed_errors
+from terrainkit.errors import (
+    ConfigError,
+    ExportError,
+    TerrainkitWarning,
+    listing,
+    prefixed_errors,
+)
 from terrainkit.files.atomic_write import atomic_folder, atomic_write
 from terrainkit.settings.schema import Config
 from terrainkit.settings.text import expected_names
@@ -29,6 +36,9 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot_arrays import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
+
+if TYPE_CHECKING:
+    from terrainkit_robots.rl.observations import PolicyInterface
 
 RUN_FILE, TASK_FILE, MAP_FILE = "run.toml", "task.toml", "map.toml"
 CURRICULUM_FILE, LOCK_FILE = "curriculum.png", ".lock"
@@ -51,7 +61,7 @@ class RunInfo(Config):
     versions: Mapping[str, str]
     """Versions of the packages."""
     robot_sha256: Mapping[str, str] | None = None
-    """Digests of the robot's spec and model."""
+    """Digest of the robot's model by file name."""
     averaged: tuple[int, ...] = ()
     """Iterations of the checkpoints whose networks were averaged."""
 
@@ -67,6 +77,7 @@ class PolicySpec:
     """A function from observations, a tensor of shape (n, k), to actions, a tensor or array of
     shape (n, a). It replaces the checkpoint."""
     checkpoint: Path | None = None  # of a run, by default the last; None if there is none
+    interface: "PolicyInterface | None" = None  # of a policy of another project
 
     @property
     def policy_name(self) -> str:
@@ -114,7 +125,7 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         seed=task.runner.seed,
         started=datetime.now().astimezone().isoformat(timespec="seconds"),
         versions={name: version(name) for name in ("terrainkit", "mujoco", "rsl-rl-lib", "torch")},
-        robot_sha256=_robot_digests(robot_folder),
+        robot_sha256=_model_digest(robot_folder / RobotSpec.load(robot_folder / SPEC_FILE).mjcf),
     )
     files = {RUN_FILE: info.to_toml(), TASK_FILE: task.to_toml()}
     files[SPEC_FILE] = read_text(robot_folder / SPEC_FILE)
@@ -178,6 +189,9 @@ def open_run(
         task_file: Python file with the task of the run, which is executed. A run names its task,
             but executes nothing by itself.
 
+    Warns:
+        TerrainkitWarning: If the robot's model changed after training.
+
     Raises:
         ConfigError: If there is no such run or checkpoint, or its task or robot is missing.
         PluginError: If the task file fails.
@@ -196,6 +210,11 @@ def open_run(
     robot = Robot.from_spec(RobotSpec.load(folder / SPEC_FILE), found.folder)
     if not robot.mjcf.is_file():
         raise ConfigError(f"the robot of {folder} is missing: there is no file {robot.mjcf}")
+    # The run has its own copy of the spec, so only a change of the model matters.
+    digest = _model_digest(robot.mjcf)
+    if not digest.items() <= (info.robot_sha256 or digest).items():
+        message = f"{info.robot}: {robot.mjcf.name} changed after {folder} was trained"
+        warnings.warn(message, TerrainkitWarning, stacklevel=2)
     if terrain != "plane":
         # A map whose file is missing is generated again from its config.
         file, config = folder / terrain, folder / MAP_FILE
@@ -239,15 +258,6 @@ def _resolve_run(name: str | Path) -> tuple[Path, Path | None]:
     return shipped, None
 
 
-def changed_robot_files(run: Run) -> tuple[str, ...]:
-    """Return the names of the robot's files that changed since the training."""
-    recorded = run.info.robot_sha256
-    if recorded is None:
-        return ()
-    current = _robot_digests(tasks.get_task(run.info.robot).folder)
-    return tuple(sorted({name for name, _ in recorded.items() ^ current.items()}))
-
-
 def is_same_terrain(run: Run, terrain: str | Path) -> bool:
     """Return whether a terrain is the run's; maps with the same config are the same."""
     trained_on = run.folder / MAP_FILE if (run.folder / MAP_FILE).is_file() else "plane"
@@ -260,30 +270,20 @@ def parts_to_load(
     """Return the parts of a run that a new run starts with, as `LeggedRunner.load` takes them.
 
     None if the run itself can continue exactly with this robot, terrain and task.
-
-    Raises:
-        ConfigError: If a file of the robot or terrain was modified since.
     """
     is_same_map = is_same_terrain(run, terrain)
     env = replace(task.env, num_envs=run.task.env.num_envs, num_threads=run.task.env.num_threads)
     is_same_task = replace(task, env=env, runner=run.task.runner) == run.task
-    if is_same_task and _sources(robot, terrain) == (run.info.robot, run.terrain):
-        changed = [f"{name} of {run.info.robot}" for name in changed_robot_files(run)]
-        changed += [] if is_same_map else [run.terrain]
-        if changed:
-            raise ConfigError(
-                f"{' and '.join(changed)} changed since {run.folder} was trained; with a copy of "
-                "the robot or another --terrain, a new run starts with its networks"
-            )
-        if TRAINING_KEYS & read_checkpoint(last_checkpoint(run)).keys():
-            return None
-    rates = [(each.learning_rate, each.schedule) for each in (task.algorithm, run.task.algorithm)]
-    is_plane, was_plane = (each.terrain.collision == "plane" for each in (task, run.task))
+    is_same = is_same_task and _sources(robot, terrain) == (run.info.robot, run.terrain)
+    if is_same and is_same_map and TRAINING_KEYS & read_checkpoint(last_checkpoint(run)).keys():
+        return None
+    new, old = task.algorithm, run.task.algorithm
+    is_plane, was_plane = (config.terrain.collision == "plane" for config in (task, run.task))
     return {
         "actor": True,
         "critic": True,
         "noise_std": task.policy.init_noise_std == run.task.policy.init_noise_std,
-        "optimizer": rates[0] == rates[1],
+        "optimizer": (new.learning_rate, new.schedule) == (old.learning_rate, old.schedule),
         "curriculum": is_plane == was_plane
         and is_same_map
         and task.terrain.curriculum == run.task.terrain.curriculum,
@@ -315,10 +315,8 @@ def prepare_run_folder(
     return create_run(folder, task, robot, terrain).folder
 
 
-def _robot_digests(folder: Path) -> dict[str, str]:
-    """Return the SHA-256 of a robot's spec and model by file name."""
-    files = (SPEC_FILE, RobotSpec.load(folder / SPEC_FILE).mjcf)
-    return {name: hashlib.sha256((folder / name).read_bytes()).hexdigest() for name in files}
+def _model_digest(mjcf: Path) -> dict[str, str]:
+    return {mjcf.name: hashlib.sha256(mjcf.read_bytes()).hexdigest()}
 
 
 def _sources(robot: str | Path, terrain: str | Path) -> tuple[str, str]:

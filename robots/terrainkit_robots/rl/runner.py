@@ -1,16 +1,13 @@
 """The runner: rsl-rl's `OnPolicyRunner` with exact resume, graceful stopping and progress."""
 
 import os
-import statistics
 import sys
 import threading
-import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, redirect_stdout, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 os.environ.setdefault("GIT_PYTHON_REFRESH", "quiet")  # rsl-rl imports git, which may be missing
 
@@ -28,6 +25,7 @@ from terrainkit_robots.checkpoint import (
 )
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env_state import env_state, load_env_state
 from terrainkit_robots.rl.symmetry import has_symmetry
 
 _NETWORKS = "actor", "critic", "student", "teacher", "rnd"
@@ -40,42 +38,18 @@ _TABLES = "actor", "critic", "student", "teacher", "algorithm", "obs_groups"
 """Tables of rsl-rl's configuration that `runner.rsl_rl` may change; settings have the others."""
 
 
-class TrainingProgress(NamedTuple):
-    """The progress of training, with means over the last 100 episodes."""
-
-    folder: Path | None
-    iteration: int
-    max_iterations: int
-    steps_per_second: float  # environment steps, learning included
-    learning_fraction: float  # of the time, 0 to 1
-    eta: float  # [s]
-    reward: float | None  # sum of an episode; None before the first has ended
-    episode_length: float | None  # [s]
-    falls: float | None  # fraction of the episodes
-    speed: float | None  # horizontal [m/s]
-    noise_std: float
-    rewards: Mapping[str, float]  # of each term [1/s]
-    shares: Mapping[str, float]  # of the most that the term can be; of a penalty: that all can be
-    levels: Mapping[str, float]  # on each terrain; empty on a plane
-    success: Mapping[str, float]  # on each terrain, 0 to 1
-
-
-ProgressCallback = Callable[[TrainingProgress], object]
-
-
 class MetricsLogger(Logger):
-    """rsl-rl's logger without console output; its buffers are part of a checkpoint."""
+    """rsl-rl's logger without console output."""
 
     writer: Any
 
     def __init__(self, runner: "LeggedRunner") -> None:
-        self._runner = runner
-        self.means: dict[str, float] = {}  # latest mean of each value in the env's log
-        # Of each episode, as the rewards and lengths that rsl-rl keeps.
-        self.fallbuffer, self.speedbuffer = (deque[float](maxlen=100) for _ in range(2))
+        self._runner, env = runner, runner.env
+        self.episode_callback: Callable[[int, Mapping[str, float]], object] = lambda *_: None
+        """Called with the number of episodes that a step ended, and the means of their log."""
         world = (runner.is_distributed, runner.gpu_world_size, runner.gpu_global_rank)
-        env = runner.env
         super().__init__(None, runner.cfg, env.cfg, env.num_envs, *world, runner.device)
+        self.tot_time = 0.0
 
     def init_logging_writer(self) -> None:
         """Open the log files."""
@@ -102,9 +76,8 @@ class MetricsLogger(Logger):
             names = [name for name, total in sums if not np.isfinite(total).all()]
             raise ConfigError(f"rewards are not finite: {listing(names) or 'of robots that fell'}")
         super().process_env_step(rewards, dones, extras, *args, **kwargs)
-        for name, buffer in (("falls", self.fallbuffer), ("speed", self.speedbuffer)):
-            if self.writer is not None and (count := int(dones.sum())):
-                buffer.extend([extras["log"][f"Episode/{name}"]] * count)
+        if "log" in extras:
+            self.episode_callback(int(dones.sum()), extras["log"])
 
     def log(self, **values: Any) -> None:
         """Log an iteration, save a checkpoint if one is due, and end training by raising `_Stop`.
@@ -112,35 +85,25 @@ class MetricsLogger(Logger):
         rsl-rl calls this after each update.
         """
         self._runner.check_weights()
-        for key in dict.fromkeys(key for log in self.ep_extras for key in log):
-            self.means[key] = statistics.mean(log[key] for log in self.ep_extras if key in log)
         with redirect_stdout(None):
             super().log(**values)
         self._runner.finish_iteration(values["it"], values["collect_time"], values["learn_time"])
 
-    def state_dict(self) -> dict[str, Any]:
-        """Return the buffers, for a checkpoint."""
-        deques = {name: list(each) for name, each in vars(self).items() if isinstance(each, deque)}
-        sums = {name: each for name, each in vars(self).items() if name.startswith("cur_")}
-        times = {"tot_timesteps": self.tot_timesteps, "tot_time": float(self.tot_time)}
-        return deques | sums | times
+    def continue_from(self, state: Mapping[str, Any]) -> None:
+        """Continue the curves of a run; the means begin with the episodes that are running.
 
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore the buffers; buffers per environment only if their number is the same."""
-        own = self.state_dict()
-        deques = [name for name, each in own.items() if isinstance(each, list)]
-        sums = [name for name in own if name.startswith("cur_")]
-        is_same = any(np.shape(state.get(name, 0)) == (self.num_envs,) for name in sums)
-        expected = own | {name: [0.0] for name in deques}
-        check_state("logger", state, expected | ({} if is_same else dict.fromkeys(sums, ...)))
-        count = len(state["lenbuffer"])
-        for name in deques:
-            if (got := len(state[name])) != count:
-                raise ConfigError(f"logger.{name}: got {got} numbers; expected {count}")
-            getattr(self, name).extend(state[name])
-        for name in sums if is_same else ():
-            getattr(self, name).copy_(state[name])
+        Args:
+            state: Steps of all robots, and time of the training [s], as `totals` returns them.
+        """
+        check_state("logger", state, self.totals())
         self.tot_timesteps, self.tot_time = state["tot_timesteps"], state["tot_time"]
+        env = self._runner.env
+        self.cur_reward_sum[:] = torch.from_numpy(np.sum([*env.episode_sums.values()], axis=0))
+        self.cur_episode_length[:] = torch.from_numpy(env.steps_since_reset)
+
+    def totals(self) -> dict[str, Any]:
+        """Return steps and time since the start of the training, for a checkpoint."""
+        return {"tot_timesteps": self.tot_timesteps, "tot_time": self.tot_time}
 
     def _store_code_state(self) -> list[str]:
         return []  # a run.toml records the versions; the user's git repository is not touched
@@ -160,18 +123,28 @@ class LeggedRunner(OnPolicyRunner):
     gpu_world_size: int
     current_learning_iteration: int
 
+    last_iteration: int
+    """The iteration after which training ends."""
+
+    collect_time: float
+    """Time of the steps of the last iteration [s]."""
+
+    learn_time: float
+    """Time of the update of the last iteration [s]."""
+
     def __init__(
         self,
         env: LeggedEnv,
         folder: Path | None = None,
         device: str = "cpu",
         *,
-        progress_callback: ProgressCallback | None = None,
+        progress_callback: "Callable[[LeggedRunner], object] | None" = None,
         should_stop: Callable[[], object] = lambda: False,
     ) -> None:
         """Create the networks; without a `folder`, no checkpoints and logs are written.
 
-        `should_stop` is called before each iteration: True stops training with a checkpoint.
+        `progress_callback` is called after each iteration with the runner, and `should_stop` before
+        each one: True stops training with a checkpoint.
         """
         self.env, self.folder = env, folder
         self._progress_callback, self._should_stop = progress_callback, should_stop
@@ -186,8 +159,8 @@ class LeggedRunner(OnPolicyRunner):
 
     def learn(self, num_learning_iterations: int, init_at_random_ep_len: bool = False) -> None:
         """Train for some iterations, with the first episodes cut to random lengths if requested."""
-        self._first = self._completed = self.current_learning_iteration
-        self._last, self._start_time = self._first + num_learning_iterations, time.perf_counter()
+        self._completed = self.current_learning_iteration
+        self.last_iteration = self._completed + num_learning_iterations
         self.logger.log_dir = None if self.folder is None else str(self.folder)
         if self._stop_requested():
             self.save()
@@ -219,10 +192,10 @@ class LeggedRunner(OnPolicyRunner):
 
     def finish_iteration(self, iteration: int, collect_time: float, learn_time: float) -> None:
         """Report the progress, write a checkpoint if one is due, and stop if requested."""
-        self._completed = iteration
+        self._completed, self.collect_time, self.learn_time = iteration, collect_time, learn_time
         if self.is_main_process and self._progress_callback is not None:
-            self._progress_callback(self._progress(collect_time, learn_time))
-        stop = iteration == self._last or self._stop_requested()
+            self._progress_callback(self)
+        stop = iteration == self.last_iteration or self._stop_requested()
         if stop or iteration % self.env.cfg.runner.save_interval == 0:
             self.save()
         if stop:
@@ -305,8 +278,8 @@ class LeggedRunner(OnPolicyRunner):
                     self.env.reset()
                 return {}
             self.current_learning_iteration = state["iteration"]
-            self.env.load_state_dict(process["env"])
-            self.logger.load_state_dict(state["logger"])
+            load_env_state(self.env, process["env"])
+            self.logger.continue_from(state["logger"])
             if len(processes) != self.gpu_world_size:  # no two processes may sample alike
                 seed = [self.env.cfg.runner.seed, state["iteration"]]
                 self.env.rng = np.random.default_rng(seed)
@@ -327,7 +300,7 @@ class LeggedRunner(OnPolicyRunner):
 
     def state_dict(self) -> dict[str, Any]:
         """Return everything for an exact resume; of all processes, in the main process."""
-        process = {"env": self.env.state_dict(), "random": {"cpu": torch.get_rng_state()}}
+        process = {"env": env_state(self.env), "random": {"cpu": torch.get_rng_state()}}
         if self.device != "cpu":
             process["random"]["cuda"] = torch.cuda.get_rng_state(self.device)
         processes: list[Any] = [process]
@@ -342,7 +315,7 @@ class LeggedRunner(OnPolicyRunner):
             "observed": self.env.obs_sizes,
             **self._algorithm_state(),
             "processes": processes,
-            "logger": self.logger.state_dict(),
+            "logger": self.logger.totals(),
         }
 
     def _algorithm_state(self) -> dict[str, Any]:
@@ -359,9 +332,13 @@ class LeggedRunner(OnPolicyRunner):
         """
         saved, optimizer = state["optimizer_state_dict"], self.alg.optimizer
         groups = optimizer.state_dict()["param_groups"]
-        parameters = enumerate(each for group in optimizer.param_groups for each in group["params"])
+        weights = enumerate(
+            weight for group in optimizer.param_groups for weight in group["params"]
+        )
         step = torch.tensor(0.0)
-        moments = {k: {"step": step, "exp_avg": each, "exp_avg_sq": each} for k, each in parameters}
+        moments = {
+            k: {"step": step, "exp_avg": weight, "exp_avg_sq": weight} for k, weight in weights
+        }
         is_new = not state["iteration"] and saved["state"] == {}  # before the first update
         check_state("optimizer_state_dict.state", saved["state"], {} if is_new else moments)
         rates = [{"lr": group["lr"]} for group in saved["param_groups"]]
@@ -377,42 +354,12 @@ class LeggedRunner(OnPolicyRunner):
     def check_weights(self) -> None:
         """Raise ConfigError if a weight of the networks is not finite."""
         networks = (getattr(self.alg, name, None) for name in _NETWORKS)
-        weights = (each for network in networks if network for each in network.parameters())
-        if not all(torch.isfinite(each).all() for each in weights):
+        weights = (weight for network in networks if network for weight in network.parameters())
+        if not all(torch.isfinite(weight).all() for weight in weights):
             raise ConfigError(
                 f"iteration {self._completed + 1}: the networks have diverged, their weights are "
                 "not finite; smaller rewards or a smaller algorithm.learning_rate may help"
             )
-
-    def _progress(self, collect_time: float, learn_time: float) -> TrainingProgress:
-        logger, seconds = self.logger, collect_time + learn_time
-        steps = self.cfg["num_steps_per_env"] * self.env.num_envs * self.gpu_world_size
-        pace = (time.perf_counter() - self._start_time) / (self._completed - self._first)
-        lengths = [self.env.cfg.dt * steps for steps in logger.lenbuffer]
-        rewards, levels, success = (
-            {k.removeprefix(p): mean for k, mean in logger.means.items() if k.startswith(p)}
-            for p in ("Episode/rew_", "Curriculum/level_", "Curriculum/success_")
-        )
-        scales = {name: float(getattr(self.env.cfg.rewards, name)) for name in rewards}
-        most = sum(scale for scale in scales.values() if scale > 0) or 1.0
-        shares = {k: v / (scales[k] if scales[k] > 0 else most) for k, v in rewards.items()}
-        return TrainingProgress(
-            folder=self.folder,
-            iteration=self._completed,
-            max_iterations=self._last,
-            steps_per_second=steps / seconds,
-            learning_fraction=learn_time / seconds,
-            eta=(self._last - self._completed) * pace,
-            reward=statistics.mean(logger.rewbuffer) if lengths else None,
-            episode_length=statistics.mean(lengths) if lengths else None,
-            falls=statistics.mean(logger.fallbuffer) if lengths else None,
-            speed=statistics.mean(logger.speedbuffer) if lengths else None,
-            noise_std=self.alg.get_policy().output_std.detach().mean().item(),
-            rewards=rewards,
-            shares=shares,
-            levels=levels,
-            success=success,
-        )
 
     def _configure_multi_gpu(self) -> None:
         """Join torchrun's other processes; on CPUs with gloo, which rsl-rl does not support."""

@@ -13,9 +13,9 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.rl.near_terrain import add_near_geoms, find_near_terrain
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.simulation.geoms import collides, lowest_point
+from terrainkit_robots.simulation.near_terrain import add_near_geoms, find_near_terrain
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 
@@ -72,6 +72,8 @@ class Scene:
         joints = [model.joint(name).id for name in robot.spec.joint_order]
         self.joint_qpos = model.jnt_qposadr[joints]  # indices of the joints, in the robot's order
         self.joint_qvel = model.jnt_dofadr[joints]
+        slide = mujoco.mjtJoint.mjJNT_SLIDE
+        self.joint_units = tuple("m" if model.jnt_type[k] == slide else "rad" for k in joints)
         self.default_qpos = model.qpos0.copy()  # the default pose with the base at height 0
         self.default_qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
         self.default_qpos[self.joint_qpos] = robot.default_pose
@@ -93,15 +95,15 @@ def _attach(robot: Robot, terrain: Ground, task: Task) -> Any:
     ground_mjspec = terrain.spec()
     for element in (*mjspec.actuators, *mjspec.sensors, *mjspec.keys, *mjspec.cameras):
         mjspec.delete(element)
-    for each in (mjspec, ground_mjspec):  # options of both, or MuJoCo warns about differences
-        each.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
-        each.option.timestep = task.sim.dt
+    for model_spec in (mjspec, ground_mjspec):  # options of both, or MuJoCo warns about differences
+        model_spec.option = mujoco.MjSpec().option  # gravity, wind: the same for every robot
+        model_spec.option.timestep = task.sim.dt
         # Implicit in forces that depend on the velocity, such as the damping of the motors.
-        each.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        model_spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # Faster than elliptic cones; see `Asset` for what else halves the time of a step.
-        each.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-        each.option.iterations = task.sim.iterations
-        each.option.ls_iterations = task.sim.ls_iterations
+        model_spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+        model_spec.option.iterations = task.sim.iterations
+        model_spec.option.ls_iterations = task.sim.ls_iterations
     # The terrain is attached to the robot, so the robot's names keep their form.
     mjspec.attach(ground_mjspec, frame=mjspec.worldbody.add_frame(), prefix="ground/")
     return mjspec
@@ -203,3 +205,10 @@ def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArr
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))
     return foot_pos.astype(np.float32), np.array(depths, np.float32)
+
+
+def drawn_model(scene: Scene, robot: Robot, terrain: Ground, task: Task) -> Any:
+    """Return the model of a scene with all geoms of its terrain, for pictures."""
+    if scene.near_terrain is None:
+        return scene.model
+    return Scene(robot, terrain, task, all_geoms=True).model

@@ -43,9 +43,9 @@ def mirror_maps(env: "LeggedEnv") -> MirrorMaps:
     Raises:
         ConfigError: If left and right of the robot or its height scan differ.
     """
-    robot, scene, scale = env.robot, env.scene, env.action_scale
+    robot, scene, scale = env.robot, env.scene, env.actions.scale
     names, pairs = robot.spec.joint_order, robot.spec.mirror_joints()
-    joints = _map([names.index(each.joint) for each in pairs], [each.sign for each in pairs])
+    joints = _map([names.index(pair.joint) for pair in pairs], [pair.sign for pair in pairs])
     _check_sides(robot, scene, scale, joints)
     controlled = np.flatnonzero(scale)
     images = np.searchsorted(controlled, joints.index[controlled])
@@ -115,7 +115,7 @@ def augment(
     maps = env.mirror_maps
 
     def doubled(values: torch.Tensor, image: SignedPermutation) -> torch.Tensor:
-        index, sign = (torch.from_numpy(each).to(values.device) for each in vars(image).values())
+        index, sign = (torch.from_numpy(array).to(values.device) for array in vars(image).values())
         return torch.cat([values, values[:, index] * sign])
 
     if obs is not None:

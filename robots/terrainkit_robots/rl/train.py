@@ -12,7 +12,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.spec.robot_arrays import Robot
 
 if TYPE_CHECKING:
-    from terrainkit_robots.rl.runner import LeggedRunner, ProgressCallback
+    from terrainkit_robots.rl.runner import LeggedRunner
 
 
 def train(
@@ -24,7 +24,7 @@ def train(
     resume: run.Run | None = None,
     device: str = "cpu",
     start_callback: "Callable[[LeggedRunner], object]" = lambda _: None,
-    progress_callback: "ProgressCallback | None" = None,
+    progress_callback: "Callable[[LeggedRunner], object] | None" = None,
     should_stop: Callable[[], object] = lambda: False,
 ) -> "LeggedRunner":
     """Train a policy, and write checkpoints at intervals, at the end, and when stopped.
@@ -41,8 +41,8 @@ def train(
             starts with the optimizer state if the learning rate and its schedule are the same, and
             with the terrain levels if the map is the same.
         device: Device of the networks: `cpu`, `cuda`, `cuda:1`. The physics runs on the CPU.
-        start_callback: Called before the first iteration.
-        progress_callback: Called after each iteration.
+        start_callback: Called with the runner before the first iteration.
+        progress_callback: Called with the runner after each iteration.
         should_stop: Called before each iteration; True stops training with a checkpoint.
 
     Returns:

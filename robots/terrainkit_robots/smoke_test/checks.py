@@ -15,8 +15,9 @@ from terrainkit_robots.description.robot_file import is_description
 from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.policy.evaluate import eval_task
-from terrainkit_robots.policy.load import single_torch_thread
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.load_policy import single_torch_thread
+from terrainkit_robots.policy.policy_rollout import Progress
+from terrainkit_robots.policy.result_table import ResultTable
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.commands import sample_commands
 from terrainkit_robots.rl.config import Task
@@ -58,17 +59,9 @@ class Check:
     expected: str
 
 
-@dataclass(frozen=True)
-class SmokeTestResult:
-    """The name of a robot and its checks; a failure may end the test early."""
-
-    robot: str
-    checks: tuple[Check, ...]
-
-    @property
-    def passed(self) -> bool:
-        """Whether every check passed."""
-        return all(check.passed for check in self.checks)
+def make_result(robot: str, *checks: Check) -> ResultTable[Check]:
+    """Return the checks of a robot; a failure may end the test early."""
+    return ResultTable(about={"robot": robot}, tables={"checks": checks}, schema_version=2)
 
 
 def smoke_test(
@@ -77,7 +70,7 @@ def smoke_test(
     *,
     samples: int = DEFAULT_SAMPLES,
     progress: Progress = lambda _: None,
-) -> SmokeTestResult:
+) -> ResultTable[Check]:
     """Check whether a robot can be trained for its task on a plane.
 
     Args:
@@ -102,16 +95,16 @@ def smoke_test(
         passed = onboarded.folder is not None
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")
         if onboarded.folder is None:
-            return SmokeTestResult(onboarded.report.facts.model.title, (check,))
+            return make_result(onboarded.report.facts.model.title, check)
         robot = Robot.load(onboarded.folder)
         result = run_checks(robot, default_task(robot.spec), samples, progress)
-    return replace(result, checks=(check, *result.checks))
+    return make_result(robot.spec.name, check, *result["checks"])
 
 
 @single_torch_thread()
 def run_checks(
     robot: Robot, task: Task, samples: int, progress: Progress = lambda _: None
-) -> SmokeTestResult:
+) -> ResultTable[Check]:
     """Check whether a robot can be trained for a task on a plane; see `smoke_test`."""
     name, expected = "environment initializes", "no error"
     task = replace(task, commands=replace(task.commands, waypoints=False))  # a plane has no goals
@@ -121,7 +114,7 @@ def run_checks(
         env = make_env(replace(task, env=env_cfg, algorithm=algorithm), robot, Plane())
         still_env = make_env(eval_task(task, NUM_ENVS), robot, Plane())
     except TerrainkitError as error:
-        return SmokeTestResult(robot.spec.name, (Check(name, False, str(error), expected),))
+        return make_result(robot.spec.name, Check(name, False, str(error), expected))
     record = train_briefly(robot, task, samples, progress) if samples else None
     trained = record if record and not record.error and samples >= MIN_TREND_SAMPLES else None
     checks = (
@@ -135,7 +128,7 @@ def run_checks(
         *([check_training(record)] if record else []),
         *(check_trends(trained) if trained else []),
     )
-    return SmokeTestResult(robot.spec.name, checks)
+    return make_result(robot.spec.name, *checks)
 
 
 def check_spawn_height(env: LeggedEnv) -> Check:
@@ -188,7 +181,7 @@ def check_standing(env: LeggedEnv) -> Check:
     env.reset()
     walking = replace(env.cfg.commands, standing=0.0)
     env.set_commands(sample_commands(env.rng, env.num_envs, walking)[0])
-    terms = [each for name, each in env.active_rewards.items() if name.startswith("tracking_")]
+    terms = [term for name, term in env.active_rewards.items() if name.startswith("tracking_")]
     earned = np.zeros(env.num_envs)
     for function, scale in terms:
         earned += scale * function(env)
@@ -200,7 +193,7 @@ def check_standing(env: LeggedEnv) -> Check:
 
 def check_action_scale(env: LeggedEnv) -> Check:
     """Check that an action of 1 is within the effort of each joint."""
-    torque = env.action_scale * env.scene.model.actuator_gainprm[:, 0] / env.robot.effort
+    torque = env.actions.scale * env.scene.model.actuator_gainprm[:, 0] / env.robot.effort
     worst = int(torque.argmax())
     measured = f"{torque[worst]:.2g} of the effort of {env.robot.spec.joint_order[worst]}"
     expected = f"at most {MAX_ACTION_TORQUE:g}; action_scale in robot.toml is the factor"

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from terrainkit.errors import TerrainkitError
-from terrainkit_robots.policy.rollout import Progress
+from terrainkit_robots.policy.policy_rollout import Progress
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.runner import LeggedRunner
@@ -44,8 +44,10 @@ def record_rewards(env: LeggedEnv) -> list[list[float]]:
     def record(unstable: BoolArray) -> FloatArray:
         before = [total.copy() for total in env.episode_sums.values()]
         rewards, after = compute(unstable), env.episode_sums.values()
-        terms = [each - last for each, last in zip(after, before, strict=True)]
-        recorded.append([float(each.mean()) / env.cfg.dt for each in (env.state.fallen, *terms)])
+        terms = [total - last for total, last in zip(after, before, strict=True)]
+        recorded.append(
+            [float(values.mean()) / env.cfg.dt for values in (env.state.fallen, *terms)]
+        )
         return rewards
 
     env._compute_rewards = record  # type: ignore[method-assign]
@@ -65,7 +67,10 @@ def train_briefly(robot: Robot, task: Task, samples: int, progress: Progress) ->
     with torch.random.fork_rng(devices=()):
         torch.manual_seed(task.runner.seed)
         runner = LeggedRunner(
-            env, progress_callback=lambda done: progress(done.iteration / done.max_iterations)
+            env,
+            progress_callback=lambda runner: progress(
+                runner.current_learning_iteration / runner.last_iteration
+            ),
         )
         update = runner.alg.update
         runner.alg.update = lambda: losses.append(update()) or losses[-1]  # type: ignore[func-returns-value]

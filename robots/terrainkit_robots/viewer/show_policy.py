@@ -9,9 +9,9 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.policy.evaluate import EvaluationConfig
-from terrainkit_robots.policy.load import load_policy, single_torch_thread
+from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.play import demo_commands, make_play_env
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.transforms import FloatArray, quat_to_yaw, wrap_to_pi
 from terrainkit_robots.viewer.ground_scene import look_at, show_ground

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit.views.viewer import add_checkbox
+from terrainkit.viewer.map_scene import add_checkbox
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Finding
@@ -155,7 +155,7 @@ class FindingPlaces:
                 self._add(joint.name, [joint.source], (body.index, _point(joint.anchor)))
             for link, pose in zip(body.links, body.poses, strict=True):
                 place = (body.index, _point(pose[:3, 3]))
-                sources = [each.source for each in (*link.collisions, *link.visuals)]
+                sources = [element.source for element in (*link.collisions, *link.visuals)]
                 sources += [link.inertial.source] if link.inertial is not None else []
                 self._add(link.name, [link.source, *sources], place)
 

@@ -1,3 +1,4 @@
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
@@ -9,10 +10,13 @@ import pytest
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 import numpy as np
+import onnx
 import torch
 
 from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
+from terrainkit_robots.policy.contracts.policy_json import METADATA_KEY
 from terrainkit_robots.policy.evaluate import eval_task
+from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.rl.config import (
     Control,
     Env,
@@ -122,3 +126,22 @@ def make_sliding(quadruped: Robot) -> Callable[..., SlidingEnv]:
         return env
 
     return make
+
+
+@pytest.fixture(scope="session")
+def all_forms(tmp_path_factory):
+    """The bundled quadruped's policy with one form of its contract in each folder."""
+    folder = tmp_path_factory.mktemp("forms")
+    export_policy(open_run("quadruped"), folder / "export", deploy_yaml=True)
+    model = onnx.load(folder / "export" / "policy.onnx")
+    for form in ("mjlab", "yaml", "script"):
+        (folder / form).mkdir()
+    kept = [each for each in model.metadata_props if each.key != METADATA_KEY]
+    del model.metadata_props[:]
+    onnx.save(model, folder / "yaml" / "policy.onnx")
+    model.metadata_props.extend(kept)
+    onnx.save(model, folder / "mjlab" / "policy.onnx")
+    shutil.copy(folder / "export" / "policy.pt", folder / "script")
+    for form in ("yaml", "script"):
+        shutil.copy(folder / "export" / "deploy.yaml", folder / form)
+    return folder

@@ -5,7 +5,7 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
 from terrainkit_robots.policy.average import average_checkpoints
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.rl.terrain import Plane

@@ -6,7 +6,7 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.policy.bundle import bundle_policy
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner

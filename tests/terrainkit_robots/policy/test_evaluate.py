@@ -17,7 +17,7 @@ from terrainkit_robots.policy.evaluate import (
     summarize,
 )
 from terrainkit_robots.policy.metrics import ErrorMean
-from terrainkit_robots.policy.rollout import EvaluationRollout
+from terrainkit_robots.policy.policy_rollout import EvaluationRollout
 from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
 from terrainkit_robots.rl.run import open_run
 
@@ -141,7 +141,7 @@ def test_evaluation_is_reproducible(make_run, map_file, on_map):
         config = EvaluationConfig(num_envs=3, seed=seed, random_commands=True)
         rollout, _ = run_still(run, config, seconds=2.1)
         assert rollout.errors["lin_vel_error"].count.all()
-        return summarize(run, config, rollout).as_json()
+        return summarize(run, config, rollout).to_json()
 
     first = result(3)
     assert result(3) == first
@@ -151,7 +151,7 @@ def test_evaluation_is_reproducible(make_run, map_file, on_map):
 def test_summary_groups_by_command(make_run):
     ranges = {"lin_vel_x": (-1, 1), "lin_vel_y": (-0.5, 0.5), "ang_vel_yaw": (-1, 1)}
     run, config = make_run(commands=Commands(**ranges)), EvaluationConfig()
-    document = json.loads(summarize(run, config, *run_still(run, config)).as_json())
+    document = json.loads(summarize(run, config, *run_still(run, config)).to_json())
     assert document["all"]["robots"] == 75
     assert document["all"]["success"] is None
     assert document["all"]["lin_vel_error"] is None  # nothing is measured before settling
@@ -178,15 +178,15 @@ def test_summary_has_the_velocity_errors_of_each_command(make_run, make_sliding)
     result = summarize(make_run(), EvaluationConfig(), rollout, commands)
     for suffix in ("", "_1s"):
         linear, yaw = (f"{name}_vel_error{suffix}" for name in ("lin", "ang"))
-        found = [[getattr(g, linear), getattr(g, yaw)] for g in result.groups["by_command"]]
+        found = [[getattr(g, linear), getattr(g, yaw)] for g in result["by_command"]]
         assert found == [pytest.approx([0.5, 0.25]), pytest.approx([0.5, 0.5])]
-        assert getattr(result.metrics, yaw) == pytest.approx(0.375)
+        assert getattr(result.about["all"], yaw) == pytest.approx(0.375)
 
 
 def test_summary_groups_by_terrain_and_level(make_run, map_file):
     run, config = make_run(map_file), EvaluationConfig(num_envs=12)
     rollout, _ = run_still(run, config)
-    document = json.loads(summarize(run, config, rollout).as_json())
+    document = json.loads(summarize(run, config, rollout).to_json())
     assert [group["terrain"] for group in document["by_terrain"]] == ["stairs", "rough_slope"]
     assert [group["level"] for group in document["by_level"]] == [0, 1, 2]
     each = document["by_terrain_and_level"]
@@ -199,14 +199,15 @@ def test_summary_groups_by_terrain_and_level(make_run, map_file):
 
 def test_bundled_quadruped_follows_commands():
     result = evaluate(open_run("quadruped"), EvaluationConfig(seconds=8.0, num_envs=8))
-    assert result.metrics.robots == len(result.groups["by_command"]) == 8
-    assert result.metrics.falls == 0
-    assert result.metrics.lin_vel_error < 0.25
-    assert result.metrics.ang_vel_error < 0.25
-    assert result.metrics.followed == 1
-    assert 1 < result.metrics.step_frequency < 6
-    assert all(0 < height < 0.15 for height in result.metrics.swing_height)
-    assert {len(each) for each in result.contacts.values()} == {100}
+    assert result.about["all"].robots == len(result["by_command"]) == 8
+    assert result.about["all"].falls == 0
+    assert result.about["all"].lin_vel_error < 0.25
+    assert result.about["all"].ang_vel_error < 0.25
+    assert result.about["all"].followed == 1
+    assert 1 < result.about["all"].step_frequency < 6
+    assert all(0 < height < 0.15 for height in result.about["all"].swing_height)
+    contacts = result.about["contacts"]
+    assert {len(contacts[foot]) for foot in result.about["feet"]} == {100}
 
 
 def test_evaluate_uses_single_torch_thread():

@@ -15,16 +15,16 @@ from tensordict import TensorDict
 
 from terrainkit.errors import ExportError
 from terrainkit_robots.policy import export as module
+from terrainkit_robots.policy.contracts.policy_json import METADATA_KEY
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env, eval_task
 from terrainkit_robots.policy.export import (
-    METADATA_KEY,
     describe_policy,
     export_policy,
     observation_order,
 )
-from terrainkit_robots.policy.load import load_policy
+from terrainkit_robots.policy.load_policy import load_policy
 from terrainkit_robots.policy.open_policy import open_policy
-from terrainkit_robots.policy.rollout import rollout
+from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Control, Env, Observations, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -189,7 +189,7 @@ def test_joints_without_action(held_calves, tmp_path, monkeypatch):
     assert obs.shape == (43,)
     expected = env.to_ctrl(names["action"][None])[0]
     np.testing.assert_allclose(names["target"], expected, atol=1e-6)
-    assert open_policy(folder / "policy.onnx", held_calves).policy.num_actions == 8
+    assert open_policy(folder / "policy.onnx", held_calves).policy.policy.num_actions == 8
 
 
 def test_example_computes_the_observations(exported, trained, monkeypatch):

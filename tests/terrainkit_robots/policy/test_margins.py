@@ -6,9 +6,14 @@ import torch
 
 from terrainkit_robots.policy import margins
 from terrainkit_robots.policy.evaluate import EvaluationConfig
-from terrainkit_robots.policy.margins import Disturbance, Margins, margin_commands, measure_margins
+from terrainkit_robots.policy.margins import (
+    Disturbance,
+    margin_commands,
+    margin_rows,
+    measure_margins,
+)
 from terrainkit_robots.policy.metrics import RolloutMetrics
-from terrainkit_robots.policy.rollout import EvaluationRollout
+from terrainkit_robots.policy.policy_rollout import EvaluationRollout
 from terrainkit_robots.rl.config import Commands, Observations, Task
 from terrainkit_robots.rl.run import PolicySpec
 
@@ -36,10 +41,10 @@ def measure(quadruped, monkeypatch):
 
 def robots_with(found, condition, value):
     """Return a slice of the robots with a disturbance."""
-    number = found.margins[0].robots
+    number = found["margins"][0].robots
     (k,) = (
         k
-        for k, each in enumerate(found.margins)
+        for k, each in enumerate(found["margins"])
         if each.condition == condition and each.value == pytest.approx(value)
     )
     return slice(k * number, (k + 1) * number)
@@ -107,11 +112,11 @@ def test_margins_are_reproducible_and_leave_out_what_cannot_be(measure, monkeypa
     monkeypatch.setitem(margins.DISTURBANCES, "mass", Disturbance("x", (0.01, 1.1), 1))
     first, second = (measure(2)[0] for _ in range(2))
     assert first == second
-    assert [each.robots for each in first.margins] == [14] * len(first.margins)
-    assert not [each for each in first.margins if "velocity" in str(each.condition)]
-    (left_out,) = first.left_out
+    assert [each.robots for each in first["margins"]] == [14] * len(first["margins"])
+    assert not [each for each in first["margins"] if "velocity" in str(each.condition)]
+    (left_out,) = first.remarks["left_out"]
     assert left_out.startswith("mass x 0.01: the base weighs ")
-    json.dumps(first.as_json(), allow_nan=False)
+    json.dumps(first.document(), allow_nan=False)
 
 
 def made(condition, value=None, unit=None, falls=0):
@@ -126,9 +131,7 @@ def test_first_falls_stand_out_on_each_side():
     mass = [made("mass", value, "x", falls) for value, falls in ((0.9, 0), (0.8, 3), (1.2, 1))]
     push = [made("push", value, "m/s", falls) for value, falls in ((0.5, 0), (1.5, 2), (2, 9))]
     every = (made("nominal"), *push, *mass, made("friction", 0.8, ""))
-    about = {"robot": "hare", "checkpoint": "model_1.pt", "seed": 1, "seconds": 20.0}
-    found = Margins(**about, commands=(), repetitions=3, margins=every, left_out=())
-    head, *rows = found.rows()
+    head, *rows = margin_rows(every)
     marked = [row[0] for row in rows if row[-1]]
     assert marked == ["push 1.5 m/s", "mass x 0.8", "mass x 1.2"]
     assert head[:3] == ("condition", "fell of 21", "m/s")

@@ -39,7 +39,7 @@ def test_play_on_a_plane_shows_demo_commands(make_run, map_file, flat_map):
     run = make_run(map_file, terrain=Terrain(collision="plane")) if flat_map else make_run()
     result = play(run, EvaluationConfig(seconds=0.8), progress=fractions.append)
     assert (len(fractions), fractions[-1]) == (40, 1)
-    assert result.evaluation.metrics.robots == 9
+    assert result.evaluation.about["all"].robots == 9
     video = result.video
     assert (video.poses.shape, video.fps) == ((20, 9, 19), 25)
     (shot,) = video.shots
@@ -71,7 +71,7 @@ def test_play_uses_a_given_command(make_run, command, caption):
 def test_play_on_a_map_follows_robots_on_each_terrain(make_run, map_file):
     run, config = make_run(map_file), EvaluationConfig(seconds=0.8)
     result = play(run, config, robots=2, size=(128, 72))
-    assert result.evaluation.metrics.robots == 6  # one per patch
+    assert result.evaluation.about["all"].robots == 6  # one per patch
     video = result.video
     assert (video.poses.shape[:2], video.size) == ((20, 6), (128, 72))
     captions = [shot.captions[0] for shot in video.shots]
@@ -105,7 +105,7 @@ def test_tracked_robots_cover_all_terrains_first(make_run, map_file):
 def test_play_without_video_records_nothing(make_run):
     result = play(make_run(), EvaluationConfig(seconds=0.04, num_envs=1), video=False)
     assert result.video is None
-    assert result.evaluation.metrics.falls == 0
+    assert result.evaluation.about["all"].falls == 0
 
 
 def test_play_rejects_zero_robots(make_run):

@@ -61,8 +61,8 @@ def change_json(path, **keys):
 
 
 def test_exported_policy_is_evaluated_as_its_run(trained, mine):
-    spec, result = open_policy(mine, "quadruped"), json.loads(evaluate(trained, SHORT).as_json())
-    outside = json.loads(evaluate(spec, SHORT).as_json())
+    spec, result = open_policy(mine, "quadruped"), json.loads(evaluate(trained, SHORT).to_json())
+    outside = json.loads(evaluate(spec, SHORT).to_json())
     assert (result.pop("checkpoint"), outside.pop("checkpoint")) == ("model_2.pt", "mine.onnx")
     assert (outside.pop("all"), outside) == (pytest.approx(result.pop("all"), abs=1e-4), result)
 
@@ -97,7 +97,7 @@ def test_functions_are_evaluated_in_place_of_a_checkpoint(trained, quadruped):
 
     for spec in (trained, PolicySpec(task=SMALL, robot=quadruped)):
         result = evaluate(replace(spec, policy=stand), SHORT)
-        assert (result.checkpoint, result.metrics.falls) == ("stand", 0)
+        assert (result.about["checkpoint"], result.about["all"].falls) == ("stand", 0)
     with pytest.raises(ConfigError, match=r"shape of the actions: got \(3, 2\)"):
         evaluate(replace(spec, policy=lambda obs: obs[:, :2]), SHORT)
     with pytest.raises(ConfigError, match="policy: got none; expected a run, or a function"):

@@ -64,5 +64,5 @@ def made_env(
         mass=100 / 9.81,
         has_height_scan=True,
         history_length=task.observations.history_length or 1,
-        joint_units=("rad",) * joints[0],
+        scene=SimpleNamespace(joint_units=("rad",) * joints[0]),
     )

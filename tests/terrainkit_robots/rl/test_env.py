@@ -19,6 +19,7 @@ from terrainkit_robots.rl.config import (
     Terrain,
 )
 from terrainkit_robots.rl.env import LeggedEnv
+from terrainkit_robots.rl.env_state import env_state, load_env_state
 from terrainkit_robots.rl.observations import ObservationTerm
 from terrainkit_robots.rl.symmetry import has_symmetry
 from terrainkit_robots.rl.terrain import MapGround, Plane
@@ -235,7 +236,7 @@ class TestActionDelay:
     def test_delay_ends_within_a_policy_step(self, make, quadruped):
         # After 2 of 4 simulation steps; the motors are at rest until then.
         env = make((0.01, 0.01), control=Control(control_type="T"))
-        env._apply_actions(torch.full((3, 12), 0.1))
+        env.apply_actions(torch.full((3, 12), 0.1))
         seen = []
         for _ in range(4):
             env.sim.step(1)
@@ -248,7 +249,7 @@ class TestActionDelay:
         env = make((0.005 * steps, 0.005 * steps), 1, control=control)
         applied = []
         for step in range(1500):  # the time accumulates rounding errors
-            env._apply_actions(torch.full((1, 12), 1e-4 * step))
+            env.apply_actions(torch.full((1, 12), 1e-4 * step))
             env.sim.step(1)
             applied.append(env.sim.torque[0, 0] / quadruped.effort[0] * 1e4)
         expected = np.maximum(np.arange(1500) - steps, 0)
@@ -410,32 +411,32 @@ class TestStateDict:
         env.episode_length_buf = torch.arange(6)
         actions = acts(env, 80)
         record(env, actions[:21])
-        saved, seen = env.state_dict(), env.get_observations()
+        saved, seen = env_state(env), env.get_observations()
         lengths = env.episode_length_buf.tolist()
         expected = record(env, actions[21:])
         record(other, actions[40:50])  # another past
-        other.load_state_dict(saved)
+        load_env_state(other, saved)
         assert other.episode_length_buf.tolist() == lengths
         for name, group in seen.items():
             assert torch.equal(other.get_observations()[name], group), name
         assert record(other, actions[21:]) == expected
 
-    @pytest.mark.parametrize("name", ["steps_until_push", "state.foot_force"])
+    @pytest.mark.parametrize("name", ["buffers.steps_until_push", "state.foot_force"])
     def test_load_rejects_other_version(self, random_env, name):
-        saved = random_env(3).state_dict()
+        saved = env_state(random_env(3))
         del saved["arrays"][name]
         with pytest.raises(ConfigError, match=rf"env\.arrays\.{name}: got nothing; expected"):
-            random_env(3).load_state_dict(saved)
-        random_env(4).load_state_dict(saved)
+            load_env_state(random_env(3), saved)
+        load_env_state(random_env(4), saved)
 
     def test_load_rejects_other_robot_or_map(self, random_env, biped, map_ground):
-        saved = random_env(3).state_dict()
+        saved = env_state(random_env(3))
         for robot, ground, told in (
             (biped, None, r"physics: got float64 \(3, \d+\); expected"),
             (biped, map_ground, r"visits: got float64 \(1, 1\); expected"),
         ):
             with pytest.raises(ConfigError, match=told):
-                random_env(3, ground, robot).load_state_dict(saved)
+                load_env_state(random_env(3, ground, robot), saved)
 
 
 class TestSetCommands:
@@ -534,7 +535,7 @@ class TestJointsWithoutAction:
         robot = Robot.load(held_calves)
         env = nominal_env(2, robot=robot, control=control)
         calves = np.array([name.endswith("calf_joint") for name in robot.spec.joint_order])
-        np.testing.assert_array_equal(env.action_joints, np.flatnonzero(~calves))
+        np.testing.assert_array_equal(env.actions.joints, np.flatnonzero(~calves))
         actions = np.arange(-8, 8, dtype=np.float32).reshape(2, 8) / 10
         moved = env.to_ctrl(actions) - robot.default_pose
         np.testing.assert_array_equal(moved[:, calves], 0)

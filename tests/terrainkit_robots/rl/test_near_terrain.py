@@ -3,10 +3,10 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
-from terrainkit_robots.rl.near_terrain import FAR, MIN_RATIO, _reach
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapGround
+from terrainkit_robots.simulation.near_terrain import FAR, MIN_RATIO, _reach
 
 _NUM = 12
 

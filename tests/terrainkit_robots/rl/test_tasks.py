@@ -166,6 +166,7 @@ def test_task_of_the_guide_has_its_terms(guide):
     import torch
 
     from terrainkit_robots.rl.env import make_env
+    from terrainkit_robots.rl.env_state import env_state
     from terrainkit_robots.rl.terrain import Plane
 
     assert (guide.name, guide.folder) == ("crouch", QUADRUPED)
@@ -180,7 +181,7 @@ def test_task_of_the_guide_has_its_terms(guide):
     assert env.mirror_maps.groups["policy"].index[-2:].tolist() == [143, 142]
     height = env.active_commands["height"].values
     assert 0.2 <= height.min() < height.max() <= 0.35
-    assert env.state_dict()["arrays"]["height.values"].tolist() == height.tolist()
+    assert env_state(env)["arrays"]["height.values"].tolist() == height.tolist()
     env.state.base_height[:] = height[:, 0] + np.float32([0, 0.5, -1, 2])
     function, scale = env.active_rewards["height"]
     assert (function(env).round(4).tolist(), scale) == ([0, 0.25, 1, 4], -20)

@@ -1,6 +1,7 @@
 import os
 import resource
 import shutil
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import torch
 from filelock import FileLock, Timeout
 
 import terrainkit
-from terrainkit.errors import ConfigError, ExportError, MemoryLimitError
+from terrainkit.errors import ConfigError, ExportError, MemoryLimitError, TerrainkitWarning
 from terrainkit_robots.checkpoint import read_checkpoint, save_checkpoint
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Algorithm, Commands, Env, Runner, Terrain
@@ -64,7 +65,7 @@ def fill_disk():
 
 def after(iteration, act):
     """Return a callback that acts once, after an iteration."""
-    return lambda progress: act() if progress.iteration == iteration else None
+    return lambda runner: act() if runner.current_learning_iteration == iteration else None
 
 
 def test_train_writes_a_run_in_the_default_folder(task, tmp_path, monkeypatch):
@@ -138,27 +139,28 @@ def test_resume_from_earlier_checkpoint_overwrites_nothing(task, tmp_path, run_a
     assert same_weights(run / "model_4.pt", branch / "model_4.pt")
 
 
-@pytest.mark.parametrize("name", ["quadruped.xml", "robot.toml"])
-def test_resume_rejects_a_modified_robot(task, tmp_path, name):
+def test_resume_of_a_modified_robot_warns_and_continues(task, tmp_path):
     mine, run = tmp_path / "mine", tmp_path / "run"
     shutil.copytree(tasks.get_task("quadruped").folder, mine)
     train(mine, "plane", with_iterations(task, 1), folder=run)
-    (mine / name).write_text((mine / name).read_text() + "\n")
-    with pytest.raises(ConfigError, match=rf"{name} of .*mine changed since .*run was trained"):
-        train(mine, "plane", task, resume=open_run(run))
-    assert list(checkpoints(run)) == [1]
-    other, once = shutil.copytree(mine, tmp_path / "other"), with_iterations(task, 1)
-    done = train(other, "plane", once, resume=open_run(run), folder=tmp_path / "new")
-    assert list(checkpoints(done.folder)) == [1]
+    model = mine / "quadruped.xml"
+    model.write_text(model.read_text() + "\n")
+    with pytest.warns(TerrainkitWarning, match=r"mine: quadruped\.xml changed after .*run was tr"):
+        opened = open_run(run)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TerrainkitWarning)
+        train(mine, "plane", with_iterations(task, 2), resume=opened)
+    assert list(checkpoints(run)) == [1, 2]
 
 
 def test_resume_with_other_task_starts_new_run(task, run_after, tmp_path, mixed_map):
     run = run_after(4)
     other = with_iterations(replace(task, rewards=replace(task.rewards, base_height=-1.0)), 1)
     seen, folder = [], tmp_path / "other"
-    options = {"resume": open_run(run), "progress_callback": seen.append}
+    options = {"resume": open_run(run)}
+    options["progress_callback"] = lambda runner: seen.append(runner.current_learning_iteration)
     assert train("quadruped", "plane", other, folder=folder, **options).folder == folder
-    assert [progress.iteration for progress in seen] == [1]
+    assert seen == [1]
     blind = with_iterations(replace(task, terrain=Terrain(measure_heights=False)), 1)
     path = mixed_map.save(tmp_path / "map.npz")
     done = train("quadruped", path, blind, folder=tmp_path / "map", **options)

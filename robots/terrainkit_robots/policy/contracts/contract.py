@@ -3,11 +3,10 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import NamedTuple
 
-from terrainkit.errors import ConfigError, ExportError, listing
+from terrainkit.errors import ConfigError, listing
 from terrainkit.settings.text import truncate
-from terrainkit_robots.rl.config import Terrain
 
 TERM_NAMES: dict[str, tuple[str, ...]] = {
     "base_lin_vel": ("base_lin_vel", "base_lin_vel"),
@@ -51,6 +50,21 @@ KNOWN_TERMS = (
     "base_lin_vel base_ang_vel projected_gravity command joint_pos joint_vel actions height_scan",
 )
 """Terms of Unitree's controllers, and of mjlab's velocity task."""
+
+
+class ContractError(ConfigError):
+    """A contract does not fit: `got` is what it has, and `expected` what it should have."""
+
+    def __init__(self, got: str, expected: str = "") -> None:
+        super().__init__(f"{got}; expected {expected}" if expected else got)
+        self.got, self.expected = got, expected
+
+
+class Doubt(NamedTuple):
+    """A doubtful value of a contract."""
+
+    got: str
+    expected: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,8 +136,8 @@ class Contract:
     commands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Ranges of `lin_vel_x`, `lin_vel_y` [m/s] and `ang_vel_z` [rad/s]."""
 
-    notes: tuple[str, ...] = ()
-    """What is doubtful in the file, one sentence each."""
+    doubts: tuple[Doubt, ...] = ()
+    """What is doubtful in the file."""
 
     def __post_init__(self) -> None:
         """Check that there is one value for each joint, and at least one term.
@@ -171,7 +185,7 @@ def own_name(style: int, name: str, others: Sequence[str]) -> str:
         others: Names of terms of the environment, which a task file may add.
 
     Raises:
-        ConfigError: If the term is unknown.
+        ContractError: If the term is unknown.
     """
     for first in (True, False):  # the name in its own format decides
         for own, names in TERM_NAMES.items():
@@ -181,66 +195,9 @@ def own_name(style: int, name: str, others: Sequence[str]) -> str:
         return name
     known = listing(dict.fromkeys(names[style] for names in TERM_NAMES.values()))
     own = "observation_terms of the environment of a task file, given with --task FILE.py"
-    raise ConfigError(
-        f"observation term {truncate(repr(name))}: unknown; expected one of {known}, or a term of "
-        f"this name in the {own}"
-    )
-
-
-def from_description(document: Mapping[str, Any], style: int) -> Contract:
-    """Return the contract of an exported policy in another format's names.
-
-    Args:
-        document: The content of `policy.json`.
-        style: The format: `UNITREE` or `MJLAB`.
-
-    Raises:
-        ExportError: If a reader of that format would misread the policy.
-    """
-    joints, action, scan = document["joints"], document["action"], document["height_scan"]
-    control = document["control_type"]
-    default, points = Terrain(), (scan or {}).get("points")
-    grid = [[x, y] for x in default.measured_points_x for y in default.measured_points_y]
-    for name, got, is_expressible, expected in (
-        ("control.control_type", control, control == "P", "P: positions"),
-        ("wheels", "velocity targets", "velocity" not in joints["drive"], "position targets"),
-        ("action_scale", "joints without an action", action["joints"] == joints["name"], "none"),
-        ("runner.rsl_rl", "a recurrent network", not document.get("recurrent"), "a network"),
-        ("terrain.measured_points", "another grid", points in (None, grid), "the default grid"),
-    ):
-        if not is_expressible:
-            raise ExportError(f"{FORMATS[style]}: {name}: got {got}; expected {expected}")
-    terms = []
-    for part in document["observation"]["parts"]:
-        name, offset = part["name"], part["offset"]
-        is_pose = name == "dof_pos" and offset == joints["default_position"]
-        if any(offset) and not is_pose and name != "height_scan":
-            raise ExportError(f"{FORMATS[style]}: offset of {name}: got {offset}; expected 0")
-        params = {"offset": offset[0]} if name == "height_scan" else {}
-        if name == "gait_phase":
-            params = {key: document["gait"][key] for key in ("period", "min_yaw_rate")}
-        term = ContractTerm(
-            name=TERM_NAMES.get(name, (name, name))[style],
-            scale=tuple(part["scale"]),
-            clip=tuple(part["clip"]) if "clip" in part else None,
-            history=part["history"],
-            params=params,
-        )
-        terms.append(term)
-    commands = document["task"]["commands"]
-    ranges = {"lin_vel_x": "lin_vel_x", "lin_vel_y": "lin_vel_y", "ang_vel_z": "ang_vel_yaw"}
-    return Contract(
-        style=style,
-        joints=tuple(joints["name"]),
-        default_pose=tuple(joints["default_position"]),
-        stiffness=tuple(joints["stiffness"]),
-        damping=tuple(joints["damping"]),
-        action_scale=tuple(joints["action_scale"]),
-        action_offset=tuple(joints["action_offset"]),
-        terms=tuple(terms),
-        step_dt=document["timing"]["policy_dt"],
-        physics_dt=document["timing"]["physics_dt"],
-        commands={name: tuple(commands[key]) for name, key in ranges.items()},
+    raise ContractError(
+        f"observation term {truncate(repr(name))}: unknown",
+        f"one of {known}, or a term of this name in the {own}",
     )
 
 

@@ -11,6 +11,7 @@ from terrainkit_robots.policy.contracts.contract import (
     UNITREE,
     Contract,
     ContractTerm,
+    Doubt,
     check_length,
 )
 
@@ -125,16 +126,19 @@ def _read(file: _Deploy, joints: tuple[str, ...]) -> Contract:
     if action.joint_ids not in (None, list(range(count))):
         got = f"got {str(action.joint_ids)[:60]}"
         raise ConfigError(f"joint_ids of the action: {got}; expected null: all joints in order")
-    gains, notes = [], []
+    gains, doubts = [], []
     for name, values in (("stiffness", file.stiffness), ("damping", file.damping)):
         if len(values) > max(motors):
             gains.append(tuple(values[motor] for motor in motors))
             continue
         check_length(name, values, count)
         gains.append(tuple(values))
-        notes.append(
-            f"{name}: got {count} values for motors up to {max(motors)}; Unitree's controller "
-            f"gives value k to motor k, so expected {max(motors) + 1} values, 0 without a joint"
+        doubts.append(
+            Doubt(
+                f"{name}: got {count} values for motors up to {max(motors)}; Unitree's controller "
+                "gives value k to motor k",
+                f"{max(motors) + 1} values, 0 without a joint",
+            )
         )
     terms = dict(file.observations)
     if terms.pop("scale_first", False):
@@ -160,7 +164,7 @@ def _read(file: _Deploy, joints: tuple[str, ...]) -> Contract:
         step_dt=file.step_dt,
         physics_dt=file.physics_dt,
         commands=msgspec.convert(given, dict[str, tuple[float, float]], strict=False),
-        notes=tuple(notes),
+        doubts=tuple(doubts),
     )
 
 

@@ -3,9 +3,10 @@ import pytest
 import yaml
 
 from terrainkit.errors import ConfigError, ExportError
-from terrainkit_robots.policy.contracts.contract import MJLAB, UNITREE, from_description
+from terrainkit_robots.policy.contracts.contract import MJLAB, UNITREE
 from terrainkit_robots.policy.contracts.deploy_yaml import read_yaml, write_deploy_yaml
-from terrainkit_robots.policy.contracts.mjlab import read_metadata, write_metadata
+from terrainkit_robots.policy.contracts.mjlab_metadata import read_metadata, write_metadata
+from terrainkit_robots.policy.contracts.policy_json import to_contract
 from terrainkit_robots.policy.export import describe_policy
 from terrainkit_robots.rl.config import Commands, Control, Env, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -34,7 +35,7 @@ def test_gains_have_the_order_of_the_motors():
     assert contract.stiffness == (40, 50, 60, 10, 20, 30)
     assert contract.default_pose == (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
     assert (contract.action_scale, contract.action_offset) == ((0.5,) * 6, (0,) * 6)
-    assert (contract.terms[0].history, contract.notes) == (1, ())
+    assert (contract.terms[0].history, contract.doubts) == (1, ())
 
 
 def test_fewer_gains_than_motors_are_noted():
@@ -42,7 +43,7 @@ def test_fewer_gains_than_motors_are_noted():
     contract = read_yaml(deploy(joint_ids_map=[3, 4, 5, 9, 10, 11]), [*DOGS, *RIGHT], DOGS)
     assert contract.joints[3:] == tuple(RIGHT)
     assert contract.stiffness == (10, 20, 30, 40, 50, 60)
-    assert "stiffness: got 6 values for motors up to 11" in contract.notes[0]
+    assert "stiffness: got 6 values for motors up to 11" in contract.doubts[0].got
 
 
 RIGHT = [f"RL_{part}_joint" for part in ("hip", "thigh", "calf")]
@@ -108,7 +109,7 @@ def describe(quadruped, **sections):
 def test_written_files_say_the_same(quadruped):
     document = describe(quadruped)
     for style in (UNITREE, MJLAB):
-        contract = from_description(document, style)
+        contract = to_contract(document, style)
         if style == UNITREE:
             again = read_yaml(write_deploy_yaml(contract).encode(), contract.joints, [])
         else:
@@ -123,11 +124,11 @@ def test_written_files_say_the_same(quadruped):
 def test_what_a_reader_would_misread_is_refused(quadruped):
     document = describe(quadruped, control=Control(control_type="T"))
     with pytest.raises(ExportError, match="control_type: got T; expected P"):
-        from_description(document, UNITREE)
+        to_contract(document, UNITREE)
 
 
 def test_terms_that_differ_have_names_that_no_reader_knows(quadruped):
     document = describe(quadruped, commands=Commands(gait_period=0.5))
-    names = [term.name for term in from_description(document, UNITREE).terms]
+    names = [term.name for term in to_contract(document, UNITREE).terms]
     assert names[-1] == "moving_gait_phase"
     assert names[:2] == ["velocity_commands", "projected_gravity"]
