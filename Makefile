@@ -22,8 +22,8 @@ bench:         ## print the ratios of speed and memory
 fuzz:          ## read damaged and hostile files for 10 minutes
 	python benchmarks/fuzz.py
 
-mutate:        ## plant changes and print which of them the tests notice; ARGS="--package FOLDER"
-	python benchmarks/mutate.py $(ARGS)
+mutate:        ## plant changes in a file and list those that no test notices; ARGS="FILE TEST ..."
+	.ci/mutate $(ARGS)
 
 docs:          ## write the generated docs, and draw the pictures that are missing
 	python docs/build.py

@@ -6,18 +6,18 @@ the boxes near each robot, as in training.
 """
 
 import time
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
 import terrainkit
+from terrainkit.terrain.presets import get_preset
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _NUM_PLACES = 20
 _NUM_RUNS = 12
@@ -28,15 +28,16 @@ _FLAT_TERRAINS = ("pyramid_stairs_inverted", "pyramid_stairs", "stairs", "obstac
 
 
 def run() -> Iterator[tuple[str, float]]:
-    warnings.simplefilter("ignore", terrainkit.TerrainkitWarning)  # cliffs, as expected
     for preset in ("stairs", "legged_gym", "indoor", "street"):
         terrain_map = terrainkit.generate(terrainkit.MapConfig(preset=preset))
         for name, cost in _step_times(terrain_map).items():
             yield f"{preset}_{name}_over_plane", cost
 
+    flat = tuple(terrain for terrain in get_preset("all") if terrain.name in _FLAT_TERRAINS)
     counts, costs = [], []
     for rows in _NUM_ROWS:
-        terrain_map = _flat_map(rows)
+        config = terrainkit.MapConfig(rows=rows, cols=6, terrains=flat, slope_threshold=0.25)
+        terrain_map = terrainkit.generate(config)
         times = _step_times(terrain_map)
         counts.append(len(terrain_map.boxes().centers))
         costs.append(times["boxes"] / times["hfield"])
@@ -45,20 +46,6 @@ def run() -> Iterator[tuple[str, float]]:
     # The cost grows with the number of boxes and with its logarithm.
     slope, offset = np.polyfit(np.log(counts), costs, 1)
     yield "break_even_boxes", float(np.exp((1 - offset) / slope))
-
-
-def _flat_map(rows: int) -> terrainkit.TerrainMap:
-    inverted = "_inverted"
-    terrains = tuple(
-        terrainkit.SubTerrain(
-            terrain=name.removesuffix(inverted),
-            name=name,
-            parameters={"inverted": True} if name.endswith(inverted) else {},
-        )
-        for name in _FLAT_TERRAINS
-    )
-    config = terrainkit.MapConfig(rows=rows, cols=6, terrains=terrains, slope_threshold=0.25)
-    return terrainkit.generate(config)
 
 
 def _step_times(terrain_map: terrainkit.TerrainMap) -> dict[str, float]:

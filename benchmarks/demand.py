@@ -5,7 +5,6 @@ cross it, as in `terrainkit evaluate --suite`. Values are Spearman's correlation
 failures, so that 1 is best.
 """
 
-import warnings
 from collections.abc import Iterator
 
 import numpy as np
@@ -25,24 +24,23 @@ _POLICIES, _ROWS, _REPETITIONS = ("quadruped", "quadruped_map"), 5, 4
 
 
 def run() -> Iterator[tuple[str, float]]:
-    warnings.simplefilter("ignore", terrainkit.TerrainkitWarning)  # cliffs, as expected
     cols = len(get_preset("all"))
     config = terrainkit.MapConfig(preset="all", rows=_ROWS, cols=cols, border=1.0)
     terrain_map = terrainkit.generate(config)
     limits = derive_limits(get_task("quadruped").folder).limits
     patches = [terrain_map.patch(*place) for place in np.ndindex(terrain_map.difficulty.shape)]
     measures = {
-        "demand": [each.demand for each in assess_map(terrain_map, limits)],
+        "demand": [result.demand for result in assess_map(terrain_map, limits)],
         "difficulty": terrain_map.difficulty.ravel(),
         "measured_difficulty": [
-            measured_difficulty(each.heights, config.cell, float(each.origin[2]))
-            for each in patches
+            measured_difficulty(patch.heights, config.cell, float(patch.origin[2]))
+            for patch in patches
         ],
     }
     yield "patches (at least 200)", len(patches)
     for policy in _POLICIES:
         card = measure(open_run(policy), terrain_map, "all", _REPETITIONS, EvaluationConfig())
-        success = np.array([[each.success for each in test.levels] for test in card.tests]).T
+        success = np.array([[level.success for level in test.levels] for test in card.tests]).T
         yield f"{policy}_success", success.mean()
         for name, values in measures.items():
             yield f"{policy}_{name}", spearmanr(values, 1 - success.ravel()).statistic

@@ -100,7 +100,8 @@ class Fuzzer:
         target = KEPT / self.surface.name / f"{self.seed}_{index}"
         shutil.rmtree(target, ignore_errors=True)
         (source,) = self.folder.glob(f"{index}_*")
-        shutil.copytree(source, target, symlinks=True, ignore=_pipes)
+        pipes = (path.name for path in source.rglob("*") if path.is_fifo())
+        shutil.copytree(source, target, symlinks=True, ignore=shutil.ignore_patterns(*pipes))
         path = target / "work" / json.loads((target / "command").read_text())["path"]
 
         def fails(data: bytes) -> bool:
@@ -139,10 +140,6 @@ def keep_in_corpus(folder: Path) -> None:
 
 def _signature(failure: Failure) -> str:
     return failure.kind + re.sub(r"[\d.]+|/\S*|'[^']*'", "", failure.line)[:60]
-
-
-def _pipes(folder: str, names: list[str]) -> list[str]:
-    return [name for name in names if Path(folder, name).is_fifo()]
 
 
 def measure(surfaces: list[Surface], seed: int, seconds: float, inputs: int) -> Iterator[Fuzzer]:

@@ -46,17 +46,13 @@ def run() -> Iterator[tuple[str, float]]:
     # Twenty cells along a patch: nearly all of the time is spent in Python. A random generator is
     # what a patch with random heights needs at least.
     coarse = terrainkit.MapConfig(cell=0.4, border=0.0)
-    yield (
-        "patch_over_random_generator (at most 12)",
-        ratio(
-            lambda: terrainkit.generate(coarse),
-            lambda: [
-                np.random.default_rng(np.random.SeedSequence([0, *place]))
-                for place in np.ndindex(10, 10)
-            ],
-            25,
-        ),
-    )
+
+    def generators() -> object:
+        places = np.ndindex(10, 10)
+        return [np.random.default_rng(np.random.SeedSequence([0, *place])) for place in places]
+
+    name = "patch_over_random_generator (at most 12)"
+    yield name, ratio(lambda: terrainkit.generate(coarse), generators, 25)
 
     # Without a border, all cells are cells of patches.
     small, large = (terrainkit.MapConfig(rows=n, cols=n, border=0.0) for n in (10, 100))

@@ -1,12 +1,10 @@
 """Speed of other learners relative to stepping the vector environment with random actions.
 
 Everything has one thread, so the CPU time counts, which other load affects little. It needs
-`pip install stable-baselines3 skrl`, and is empty without them.
+`pip install stable-baselines3`, and is empty without it.
 """
 
-import logging
 import statistics
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -15,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from clock import seconds
 
 from terrainkit_robots.integrations.gymnasium import TaskVectorEnv
 from terrainkit_robots.rl.config import Task
@@ -22,7 +21,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _NUM_ENVS = 64
 _NUM_STEPS = 24  # of each environment in an iteration
@@ -31,29 +30,22 @@ _LAYERS = [128, 128, 128]
 
 
 def run() -> Iterator[tuple[str, float]]:
-    if not find_spec("stable_baselines3") or not find_spec("skrl"):
+    if not find_spec("stable_baselines3"):
         return
     torch.set_num_threads(1)
-    with tempfile.TemporaryDirectory() as folder:
-        measured = {"plain": _plain(), **_stable_baselines3(), **_skrl(folder), "rsl_rl": _rsl_rl()}
-        for function in measured.values():
-            function()
-        rounds = [
-            {name: _cpu_seconds(function) for name, function in measured.items()}
-            for _ in range(_NUM_ROUNDS)
-        ]
+    measured = {"plain": _stepping(_make_env()), **_stable_baselines3(), "rsl_rl": _rsl_rl()}
+    for function in measured.values():
+        function()
+    rounds = [
+        {name: seconds(function, time.process_time) for name, function in measured.items()}
+        for _ in range(_NUM_ROUNDS)
+    ]
     plain = statistics.median(times["plain"] for times in rounds)
     yield "plain_steps_per_cpu_second", _NUM_ENVS * _NUM_STEPS / plain
     limits = {"sb3_step": " (at least 0.6)", "sb3_rollout": " (at least 0.6)"}
     for name in measured:
         ratio = statistics.median(times["plain"] / times[name] for times in rounds)
         yield f"{name}{limits.get(name, '')}", ratio
-
-
-def _cpu_seconds(function: Callable[[], Any]) -> float:
-    start = time.process_time()
-    function()
-    return time.process_time() - start
 
 
 def _task() -> Task:
@@ -79,10 +71,6 @@ def _stepping(env: Any) -> Callable[[], None]:
             env.step(rng.normal(0, 0.3, (_NUM_ENVS, 12)).astype(np.float32))
 
     return steps
-
-
-def _plain() -> Callable[[], None]:
-    return _stepping(_make_env())
 
 
 def _stable_baselines3() -> dict[str, Callable[[], Any]]:
@@ -111,31 +99,6 @@ def _stable_baselines3() -> dict[str, Callable[[], Any]]:
         "sb3_rollout": rollout,
         "sb3_ppo": lambda: (rollout(), model.train()),
     }
-
-
-def _skrl(folder: str) -> dict[str, Callable[[], Any]]:
-    from skrl.agents.torch.ppo import PPO, PPO_CFG
-    from skrl.envs.wrappers.torch import wrap_env
-    from skrl.memories.torch import RandomMemory
-    from skrl.trainers.torch import SequentialTrainer
-    from skrl.utils.model_instantiators.torch import deterministic_model, gaussian_model
-
-    logging.getLogger("skrl").setLevel(logging.ERROR)
-    env = wrap_env(_make_env(), verbose=False)
-    spaces = {"observation_space": env.observation_space, "action_space": env.action_space}
-    hidden = {"name": "net", "input": "OBSERVATIONS", "layers": _LAYERS, "activations": "relu"}
-    network = {"network": [hidden], "device": "cpu", **spaces}
-    models = {
-        "policy": gaussian_model(output="ACTIONS", initial_log_std=-0.36, **network),
-        "value": deterministic_model(output="ONE", **network),
-    }
-    silent = {"directory": folder, "write_interval": 0, "checkpoint_interval": 0}
-    cfg = PPO_CFG(rollouts=_NUM_STEPS, learning_epochs=5, mini_batches=4, experiment=silent)
-    memory = RandomMemory(memory_size=_NUM_STEPS, num_envs=_NUM_ENVS, device="cpu")
-    agent = PPO(models=models, memory=memory, cfg=cfg, device="cpu", **spaces)
-    options = {"timesteps": _NUM_STEPS, "headless": True, "disable_progressbar": True}
-    trainer = SequentialTrainer(env=env, agents=agent, cfg=options)
-    return {"skrl_ppo": trainer.train}
 
 
 def _rsl_rl() -> Callable[[], None]:

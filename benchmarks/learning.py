@@ -18,7 +18,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _VEL_ERROR, _INTERVAL, _MAX_SAMPLES, _SECONDS = 0.25, 150_000, 3_000_000, 8.0
 

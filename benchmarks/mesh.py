@@ -1,6 +1,7 @@
 """Time of building the mesh of the default map, relative to the work of Isaac Gym's function."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from clock import ratio
@@ -13,25 +14,17 @@ def run() -> Iterator[tuple[str, float]]:
     config = terrainkit.MapConfig()
     terrain_map = terrainkit.generate(config)
     raw = terrain_map.height_field_raw().T
-    full, merged = terrain_map.mesh(merged=False), terrain_map.mesh()
-    yield (
-        "full_over_isaac_gym (at most 1)",
-        ratio(
-            lambda: terrain_map.mesh(merged=False),
-            lambda: _moved_vertices_mesh(raw, config.cell, 0.005, config.slope_threshold or np.inf),
-        ),
-    )
-    yield (
-        "full_over_copy (at most 12)",
-        ratio(
-            lambda: terrain_map.mesh(merged=False),
-            lambda: (full.vertices.copy(), full.triangles.copy()),
-        ),
-    )
-    yield (
-        "merged_over_full (at most 4)",
-        ratio(terrain_map.mesh, lambda: terrain_map.mesh(merged=False)),
-    )
+    threshold = config.slope_threshold or np.inf
+    make_full = partial(terrain_map.mesh, merged=False)
+    moved = partial(_moved_vertices_mesh, raw, config.cell, 0.005, threshold)
+    full, merged = make_full(), terrain_map.mesh()
+
+    def copy() -> object:
+        return full.vertices.copy(), full.triangles.copy()
+
+    yield "full_over_isaac_gym (at most 1)", ratio(make_full, moved)
+    yield "full_over_copy (at most 12)", ratio(make_full, copy)
+    yield "merged_over_full (at most 4)", ratio(terrain_map.mesh, make_full)
     yield "merged_faces_over_full", len(merged.triangles) / len(full.triangles)
 
 

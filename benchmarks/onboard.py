@@ -11,10 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from clock import process, ratio
-
-from terrainkit_robots.description import bundled
-
-_SHARED = Path(__file__).resolve().parents[2] / "shared" / "robots"
+from mutants.robot_files import ROBOT_FILES
 
 _SIMULATE = """
 import sys, mujoco
@@ -36,14 +33,10 @@ for azimuth in (0, 90, 45):
 
 
 def run() -> Iterator[tuple[str, float]]:
-    robots = Path(os.environ.get("TERRAINKIT_ROBOTS", _SHARED))
     os.environ.setdefault("MUJOCO_GL", "egl")
     program = str(Path(sys.executable).with_name("terrainkit"))
-    for name, path in {
-        "go2": robots / "go2" / "urdf" / "go2.urdf",
-        "quadruped": bundled.urdf_path("quadruped"),
-    }.items():
-        if path is None or not path.exists():
+    for name in ("go2", "quadruped"):
+        if not (path := ROBOT_FILES[name]).exists():
             continue
         with tempfile.TemporaryDirectory() as folder:
             target = Path(folder) / "robot"

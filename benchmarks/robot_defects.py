@@ -30,9 +30,9 @@ from lxml import etree
 from mutants.defect import Defect, load_defects
 from mutants.mutant import Mutant, NotApplicableError
 from mutants.robot import SourceRobot
+from mutants.robot_files import ROBOT_FILES, robot_folder
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.selection import lint_selected
@@ -40,11 +40,6 @@ from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
 DEFECTS = Path(__file__).parent / "defects"
-ROBOTS = Path(
-    os.environ.get("TERRAINKIT_ROBOTS", Path(__file__).resolve().parents[2] / "shared" / "robots")
-)
-URDF = ("a1/urdf/a1.urdf", "go2/urdf/go2.urdf", "h1/urdf/h1.urdf", "g1/g1_29dof.urdf")
-MJCF = ("go2_mjcf/go2.xml", "h1/h1.xml", "g1/g1_29dof.xml")
 
 _MAX_SECONDS = 60
 """A check that takes longer counts as a crash [s]."""
@@ -97,24 +92,14 @@ class Result:
 
 def robots() -> list[Path]:
     """Return the files of the original robots, URDF first."""
-    bundled_files = [path for name in bundled.robot_names() if (path := bundled.urdf_path(name))]
-    others = [ROBOTS / name for name in (*URDF, *MJCF)]
-    existing = [path for path in others if path.is_file()]
-    return sorted(
-        [*bundled_files, *(path.with_suffix(".xml") for path in bundled_files), *existing],
-        key=lambda path: (path.suffix, str(path)),
-    )
+    existing = filter(Path.is_file, ROBOT_FILES.values())
+    return sorted(existing, key=lambda path: (path.suffix, str(path)))
 
 
 @cache
 def defects() -> list[Defect]:
     """Return all kinds of defects."""
     return [defect for path in sorted(DEFECTS.glob("*.toml")) for defect in load_defects(path)]
-
-
-def _robot_folder(path: Path) -> Path:
-    """Return the folder with a robot and its meshes."""
-    return path.parents[1] if path.parent.name == "urdf" else path.parent
 
 
 _PARENT: list[str] = []
@@ -133,24 +118,21 @@ def _process_folder() -> Path:
 @cache
 def _load_source(path: Path) -> tuple[SourceRobot, tuple[Finding, ...], SourceResult, Meshes]:
     """Copy a robot to the folder of this process, and check it."""
-    source_folder = _robot_folder(path)
+    source_folder = robot_folder(path)
     folder = _process_folder() / path.suffix[1:] / source_folder.name
     shutil.copytree(source_folder, folder, copy_function=_link)
     file = folder / path.relative_to(source_folder)
-    times: list[float] = []
-    while len(times) < 3 and sum(times) < 1:
-        meshes = Meshes()
-        start = time.perf_counter()
-        facts = Facts(load_robot(file), meshes)
-        report = lint_selected(facts, Settings(simulate=False))
-        times.append(time.perf_counter() - start)
+    start, meshes = time.perf_counter(), Meshes()
+    facts = Facts(load_robot(file), meshes)
+    report = lint_selected(facts, Settings(simulate=False))
+    seconds = time.perf_counter() - start
     counts = Counter(finding.severity for finding in report.findings)
     result = SourceResult(
         robot=path.name,
         findings=tuple(_format(f) for f in report.findings if f.severity != "note"),
         errors=counts["error"],
         warnings=counts["warning"],
-        seconds=median(times),
+        seconds=seconds,
     )
     root = etree.parse(file).getroot()
     source = SourceRobot(label=source_folder.name, file=file, root=root, facts=facts)
@@ -179,19 +161,18 @@ def _test_mutant(path: Path, index: int, site: int, seed: int) -> MutantResult |
         prefix=f"mutant_{index}_{site}",
         functions=source.functions(),
     )
-    files = []
     try:
         names = defect.apply(mutant)
         for name, content in mutant.files.items():
-            files.append(mutant.folder / name)
-            files[-1].parent.mkdir(parents=True, exist_ok=True)
-            files[-1].write_bytes(content)
+            file = mutant.folder / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
         return _check(mutant, defect, result.robot, names, findings, meshes)
     except NotApplicableError:
         return None
     finally:
-        for file in files:
-            file.unlink(missing_ok=True)
+        for name in mutant.files:
+            (mutant.folder / name).unlink(missing_ok=True)
 
 
 def _raise_timeout(*_: object) -> None:
@@ -264,10 +245,6 @@ def _test_robot(
     return source, results
 
 
-def _num_bytes(path: Path) -> int:
-    return sum(file.stat().st_size for file in _robot_folder(path).rglob("*"))
-
-
 def _is_selected(defect: Defect, only: str) -> bool:
     return any(code.startswith(only) for code in defect.codes)
 
@@ -290,7 +267,7 @@ def measure(sites: int = 2, seed: int = 0, only: str = "", robot: str = "") -> R
             for index, defect in enumerate(defects())
             if defect.format == format_ and _is_selected(defect, only)
         ]
-        size = _num_bytes(path)
+        size = sum(file.stat().st_size for file in robot_folder(path).rglob("*"))
         tasks.append((size, path, indices, (sites + 1) // 2 if size > _MAX_MESH_BYTES else sites))
     if not any(indices for _, _, indices, _ in tasks):
         sys.exit(f"no defect for --only {only!r} and --robots {robot!r}; see {DEFECTS}")
@@ -368,7 +345,7 @@ def _table(result: Result, only: str) -> Iterator[str]:
 
 def _missed(result: Result, count: int) -> Iterator[str]:
     for title, group in sorted(_by_title(result).items()):
-        for mutant in [each for each in group if not each.is_found][:count]:
+        for mutant in [mutant for mutant in group if not mutant.is_found][:count]:
             yield f"missed: {title}, in {mutant.robot}: {', '.join(mutant.names)}"
             yield from (f"    {line}" for line in (mutant.error, *mutant.findings[:6]) if line)
 

@@ -19,7 +19,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _NUM_ENVS = 512
 _NUM_STEPS = 60
@@ -64,9 +64,7 @@ def _time_shares(env: LeggedEnv) -> Iterator[tuple[str, float]]:
     runner = LeggedRunner(env)
     env.sim.step = _timed(env.sim.step, times, "physics")  # type: ignore[method-assign]
     env.step = _timed(env.step, times, "step")  # type: ignore[method-assign]
-    start = time.perf_counter()
-    runner.learn(_NUM_ITERATIONS)
-    total = time.perf_counter() - start
+    total = seconds(partial(runner.learn, _NUM_ITERATIONS))
     yield "physics", times["physics"] / total
     yield "environment", (times["step"] - times["physics"]) / total
     yield "networks", 1 - times["step"] / total

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import torch
 from fuzzing.escapes.torchscript import ESCAPES, MARK, Escape
+from fuzzing.processes import kill, wait
 
 _HANG, _SECONDS, _THREAD = 3.0, 30.0, 3.0
 """Times after which a call hangs, if that is its effect or not, and for threads of a call [s]."""
@@ -30,17 +31,11 @@ def effects_of(escape: Escape, folder: Path) -> set[str]:
     data = escape.archive(target)
     if not (child := os.fork()):
         _load_and_call(data, printed, target, escape.effect)
-    seconds = _HANG if escape.effect == "hangs" else _SECONDS
-    end, is_alive = time.monotonic() + seconds, True
-    while is_alive and time.monotonic() < end + 1:
-        if time.monotonic() > end:
-            os.kill(child, signal.SIGINT)
-        pid, status, usage = os.wait4(child, os.WNOHANG)
-        is_alive = not pid
-        time.sleep(0.01)
-    if is_alive:
-        os.kill(child, signal.SIGKILL)
-        _, status, usage = os.wait4(child, 0)
+    if not (ended := wait(child, _HANG if escape.effect == "hangs" else _SECONDS)):
+        os.kill(child, signal.SIGINT)
+        ended = wait(child, 1.0)
+    is_alive = not ended
+    status, usage = ended or kill(child)
     text = printed.read_text(errors="replace")
     code = os.waitstatus_to_exitcode(status)
     found = {

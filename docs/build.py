@@ -8,8 +8,10 @@ python docs/build.py --check      exit with 1 if a text is out of date or a pict
 
 import ast
 import dataclasses
+import importlib
 import inspect
 import os
+import pkgutil
 import re
 import subprocess
 import sys
@@ -32,7 +34,8 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit.feasibility import assess_map
 from terrainkit.feasibility.report import routes
 from terrainkit.features.building_codes import Clause, clauses
-from terrainkit.map.config import MapConfig
+from terrainkit.lazy_names import public_names
+from terrainkit.map.map_config import MapConfig
 from terrainkit.perception import EdgeMap, RayCaster, depth_directions
 from terrainkit.settings.field_docs import field_docs
 from terrainkit.settings.schema import Config, field_keys, field_types, is_required
@@ -228,7 +231,7 @@ def rules_page() -> str:
         "`--unsafe-fixes` also applies fixes that change numbers, shapes or other files.\n",
     ]
     for family, about in FAMILIES.items():
-        parts.append(f"## {family}: {about}\n\n| rule | violation | severity | fix |")
+        parts.append(f"## {family}: {about.title}\n\n| rule | violation | severity | fix |")
         parts.append("|---|---|---|---|")
         for rule in rules():
             if rule.family == family:
@@ -340,6 +343,32 @@ def example_text(path: Path) -> tuple[str, str]:
     if command is None:
         raise ConfigError(f"{path}: got a docstring without `pip install`; expected a command")
     return " ".join(first.split()), f"`{command[0].strip()}`"
+
+
+def api_pages() -> dict[str, str]:
+    """Return the pages of the API: the public names of each package, as its stub lists them."""
+    pages: dict[str, str] = {}
+    for package, page in (("terrainkit", "api"), ("terrainkit_robots", "api_robots")):
+        names = public_names(package)
+        modules = [name for name, module in names.items() if module == package]
+        pages[f"{page}.md"] = api_page(package, [name for name in names if name not in modules])
+        for name in modules:
+            module = f"{package}.{name}"
+            pages[f"{page}_{name}.md"] = api_page(module, module_names(module))
+    return pages
+
+
+def module_names(module: str) -> list[str]:
+    """Return the names of `__all__` of a package, or of its modules without one."""
+    package = importlib.import_module(module)
+    modules = [name for _, name, _ in pkgutil.iter_modules(package.__path__) if name[0] != "_"]
+    return getattr(package, "__all__", modules)
+
+
+def api_page(module: str, names: list[str]) -> str:
+    summary = inspect.getdoc(importlib.import_module(module)).partition("\n\n")[0]
+    entries = [f"::: {module}.{name}" for name in names]
+    return "\n".join([f"# {module}", "", NOTE, summary, "", *entries, ""])
 
 
 def llms_text() -> str:
@@ -555,6 +584,7 @@ def main() -> int:
         "cli.md": cli_page(),
         "examples.md": examples_page(),
         "llms.txt": llms_text(),
+        **api_pages(),
     }
     missing = [name for name in known if not any(PICTURES.glob(f"{name}.*"))]
     if options == ["--check"]:

@@ -7,7 +7,7 @@ import socket
 import sys
 from pathlib import Path
 
-from terrainkit.views.viewer_server import viewer_server
+from terrainkit.viewer.viewer_server import viewer_server
 from terrainkit_robots.policy.load_policy import single_torch_thread
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.viewer.ground_scene import DEMO_MAP

@@ -27,7 +27,8 @@ from published_gains import read_published, values_of
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.onboarding.verify import Verification
 from terrainkit_robots.simulation.assessment import assess
@@ -193,7 +194,7 @@ def onboard_robot(file: Path, target: Path, published: Path | None) -> Outcome:
         return Outcome(result=f"rejected: {str(error).replace(f'{file}: ', '')}")
     errors = {f"{f.code} {f.name}": None for f in done.report.findings if f.severity == "error"}
     if done.robot is None:
-        blocking = {f"{f.code} {f.name}": None for f in filter(is_blocking, done.report.findings)}
+        blocking = {f"{f.code} {f.name}": None for f in done.report.findings if f.is_blocking}
         return Outcome(result=f"rejected: {', '.join(blocking)}")
     spec, mass = done.robot.spec, done.robot.facts.total_mass
     legged = bool(spec.feet) and spec.floating

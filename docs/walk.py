@@ -10,8 +10,7 @@ import numpy as np
 from gallery import MIN_HEIGHT, add_meshes, block
 from numpy.typing import NDArray
 
-from terrainkit import MapConfig, Patch, SubTerrain, generate, make_patch
-from terrainkit.terrains.course import Element
+from terrainkit import MapConfig, Patch, generate, make_patch
 from terrainkit_robots.policy.evaluate import EvaluationConfig, build_eval_env
 from terrainkit_robots.policy.load_policy import load_policy, single_torch_thread
 from terrainkit_robots.policy.policy_rollout import rollout
@@ -29,12 +28,8 @@ START = 1.2
 SECONDS = 10.0
 """Times of the first and the last frame [s]."""
 
-ELEMENTS = (
-    ("stairs", 2.4, {"step_height": 0.1, "step_width": 0.3, "landing": 0.1}),
-    ("gap_track", 1.9, {"length": 0.25, "min_spacing": 0.9, "max_spacing": 0.9, "start": 0.2}),
-    ("slope", 2.3, {"grade": 0.3, "landing": 0.1}),
-)
-"""Terrain, length [m] and parameters of each part of the course."""
+COURSE = Path(__file__).with_name("walk.toml")
+"""Configuration of the map."""
 
 SIZE = (640, 360)
 """Width and height of the picture [pixels]."""
@@ -62,16 +57,7 @@ TRUNK = (0.13, 0.36, 0.66, 1)
 
 def write_walk(path: Path) -> None:
     """Simulate the walk, and write it as an animated WebP that repeats."""
-    elements = tuple(
-        Element(terrain=name, element_length=length, parameters=parameters)
-        for name, length, parameters in ELEMENTS
-    )
-    course = SubTerrain(
-        terrain="course", parameters={"elements": elements, "platform": 0.5, "start": 1.2}
-    )
-    config = MapConfig(
-        rows=1, cols=1, patch_size=(10, 3), cell=0.05, border=2, mode="selected", terrains=(course,)
-    )
+    config = MapConfig.load(COURSE)
     poses, period = record_poses(config)
     animation = cv2.Animation()
     frames = stream_frames(partial(walk_frames, make_patch(config, 0, 0), poses))
@@ -123,6 +109,5 @@ def walk_frames(patch: Patch, poses: NDArray[np.float64]) -> Iterator[Frame]:
             data.qpos[:] = pose
             mujoco.mj_kinematics(model, data)
             mujoco.mj_camlight(model, data)
-            camera = DISTANCE, azimuth, ELEVATION
-            appearance.update_scene(renderer, data, target, *camera)
+            appearance.update_scene(renderer, data, target, DISTANCE, azimuth, ELEVATION)
             yield renderer.render()

@@ -24,7 +24,7 @@ settings.load_profile("untimed")
 @pytest.fixture
 def make_viewer_server():
     """Return a function that starts a server of the viewer on a free port."""
-    from terrainkit.views.viewer_server import viewer_server
+    from terrainkit.viewer.viewer_server import viewer_server
 
     with contextlib.ExitStack() as servers:
 

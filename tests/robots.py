@@ -8,18 +8,8 @@ QUADRUPED = bundled.urdf_path("quadruped")
 BUNDLED = [f"{name}{suffix}" for name in bundled.robot_names() for suffix in (".urdf", ".xml")]
 """Names of all bundled files, such as `quadruped.xml`. `robot_file` finds them."""
 
-REAL_ROBOTS = [
-    "a1/urdf/a1.urdf",
-    "go2/urdf/go2.urdf",
-    "go2_mjcf/go2.xml",
-    "h1/urdf/h1.urdf",
-    "h1/h1.xml",
-    "g1/g1_29dof.urdf",
-    "g1/g1_29dof.xml",
-    "anymal_c/urdf/anymal_c.urdf",
-    "cassie/urdf/cassie.urdf",
-]
-"""Robot files of other projects. `robot_file` finds them, or skips the test."""
+ROBOTS = [*BUNDLED, "tilted.urdf", "looped.xml"]
+"""Names of the bundled files, and of those in tests/terrainkit_robots/robots."""
 
 BOX = """<robot name="{name}">
   <link name="trunk">

@@ -4,9 +4,11 @@ import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -47,6 +49,64 @@ def test_workflow_has_scripts_that_exist_and_least_permissions(workflow):
     assert granted == PERMISSIONS.get(workflow.name, {})
     pinned = re.compile(r"\./|[\w./-]+@(v\d+|release/v\d+|[0-9a-f]{40})")
     assert all(pinned.fullmatch(step.get("uses", "./")) for step in steps(workflow))
+
+
+def test_containers_run_the_commands_of_the_readme():
+    commands = re.findall(r"^pip install .* && .*$", (ROOT / "README.md").read_text(), re.MULTILINE)
+    text = (ROOT / ".devcontainer/devcontainer.json").read_text()
+    container = json.loads(re.sub(r"^//.*$", "", text, flags=re.MULTILINE))
+    assert f"RUN {commands[0]}\n" in (ROOT / "Dockerfile").read_text()
+    assert container["postCreateCommand"] == commands[1]
+    assert f"AS {container['build']['target']}\n" in (ROOT / "Dockerfile").read_text()
+
+
+def test_api_check_finds_what_breaks(tmp_path):
+    for folder in ("terrainkit", "robots/terrainkit_robots", ".ci"):
+        shutil.copytree(ROOT / folder, tmp_path / folder)
+    changelog = tmp_path / "CHANGELOG.md"
+    changelog.write_text("### What breaks\n\n- `torques` is gone.\n\n### Added\n")
+    git = ["git", "-c", "user.name=a", "-c", "user.email=a@b.c"]
+    for words in (["init", "-q"], ["add", "."], ["commit", "-q", "-m", "First"]):
+        subprocess.run([*git, *words], cwd=tmp_path, check=True)
+    for path, old, new in (
+        ("terrainkit/map/terrain_map.py", "def assign(self, num_envs", "def assign(self, num"),
+        ("terrainkit/map/map_config.py", "    rows: Count", "    lines: Count"),
+        ("terrainkit/perception/height_scan.py", "def below(", "def under("),
+        ("terrainkit/views/preview.py", "def render_preview(", "def render("),  # not public
+        ("terrainkit/__init__.pyi", "import Flight as Flight", "import Flight as _Flight"),
+        ("robots/terrainkit_robots/rl/rewards.py", "def torques(", "def torque("),
+        ("robots/terrainkit_robots/rl/rewards.py", "def collision(", "def collisions("),
+    ):
+        text = (tmp_path / path).read_text()
+        assert old in text
+        (tmp_path / path).write_text(text.replace(old, new, 1))
+    check = partial(subprocess.run, [sys.executable, ".ci/api"], cwd=tmp_path, text=True)
+    done = check(capture_output=True)
+    assert done.returncode == 1
+    assert {*re.findall(r"^\S+ ([\w.]+)", done.stdout, re.MULTILINE)[:-1]} == {
+        *("MapConfig.__init__", "MapConfig.rows", "TerrainMap.assign"),
+        *("HeightScan.below", "Flight", "collision"),
+    }
+    names = "MapConfig, rows, assign, below, Flight, torques, collision"
+    changelog.write_text(f"### What breaks\n\n{names}\n\n### Added\n")
+    assert check(capture_output=True).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("subject", "code"),
+    [
+        ("Reject inverted limits", 0),
+        ("reject inverted limits", 1),
+        ("Reject inverted limits.", 1),
+        (f"R{71 * 'e'}", 0),
+        (f"R{72 * 'e'}", 1),
+        ("", 1),
+    ],
+)
+def test_subject_of_a_commit_is_checked(tmp_path, subject, code):
+    (tmp_path / "message").write_text(f"{subject}\n\nThe body may be longer.\n# a comment\n")
+    done = subprocess.run([ROOT / ".ci/subject", tmp_path / "message"], capture_output=True)
+    assert done.returncode == code
 
 
 def test_workflow_has_declared_python_versions():

@@ -51,7 +51,7 @@ def replace_word(data: bytes, rng: Random) -> bytes:
     """Replace a number or a name, half of the times by as many bytes, as binary formats need."""
     pattern = rng.choice((rb"-?\d[\d.]*(?:e[-+]?\d+)?", rb"[A-Za-z_][\w/.]*"))
     word = rng.choice(list(re.finditer(pattern, data[:100_000])))
-    other = rng.choice((*_WORDS, *(each * len(word[0]) for each in (b"\xff", b"\0", b"9", b"/"))))
+    other = rng.choice((*_WORDS, *(byte * len(word[0]) for byte in (b"\xff", b"\0", b"9", b"/"))))
     return data[: word.start()] + other + data[word.end() :]
 
 
@@ -108,8 +108,8 @@ def edit_archive(data: bytes, rng: Random) -> bytes:
     result = io.BytesIO()
     method = rng.choice((zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED))
     with zipfile.ZipFile(result, "w", method, compresslevel=1) as file:
-        for each in members:
-            file.writestr(*each)
+        for member in members:
+            file.writestr(*member)
     return result.getvalue()
 
 

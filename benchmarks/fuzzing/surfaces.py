@@ -240,8 +240,8 @@ def _state(path: Path, original: Path) -> str:
     from terrainkit_robots.checkpoint import read_checkpoint
 
     contents = io.BytesIO(), io.BytesIO()
-    for each, content in zip((path, original), contents, strict=True):
-        torch.save(read_checkpoint(each), content)
+    for file, content in zip((path, original), contents, strict=True):
+        torch.save(read_checkpoint(file), content)
     damaged, expected = (content.getvalue() for content in contents)
     return "" if damaged == expected else f"a damaged {path.name}, whose content differs"
 

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import re
 import sys
 import tempfile
@@ -20,30 +19,15 @@ from lxml import etree
 from benchmarks.mutants.defect import Defect, load_defects
 from benchmarks.mutants.edits import apply_edits
 from benchmarks.mutants.mutant import Mutant
+from benchmarks.mutants.robot_files import ROBOT_FILES, ROOT, robot_folder
 
-ROOT = Path(__file__).resolve().parents[2]
-SHARED = Path(os.environ.get("TERRAINKIT_ROBOTS", ROOT.parent / "shared" / "robots"))
-BUNDLED = ROOT / "robots/terrainkit_robots/description/bundled"
-ROBOTS = {
-    "a1": SHARED / "a1/urdf/a1.urdf",
-    "go2": SHARED / "go2/urdf/go2.urdf",
-    "h1": SHARED / "h1/urdf/h1.urdf",
-    "g1": SHARED / "g1/g1_29dof.urdf",
-    "quadruped": BUNDLED / "quadruped/quadruped.urdf",
-    "biped": BUNDLED / "biped/biped.urdf",
-    "go2.xml": SHARED / "go2_mjcf/go2.xml",
-    "h1.xml": SHARED / "h1/h1.xml",
-    "g1.xml": SHARED / "g1/g1_29dof.xml",
-    "quadruped.xml": BUNDLED / "quadruped/quadruped.xml",
-    "biped.xml": BUNDLED / "biped/biped.xml",
-}
 SEVERITIES = ("error", "warning")
 ORIGINALS: dict[str, list[dict[str, Any]]] = {}
 
 
 def read(robot: str) -> Any:
     """Return the tree of a robot; the mesh that go2.xml lacks is taken out of it."""
-    tree = etree.parse(ROBOTS[robot], etree.XMLParser(huge_tree=True)).getroot()
+    tree = etree.parse(ROBOT_FILES[robot], etree.XMLParser(huge_tree=True)).getroot()
     if robot == "go2.xml":
         for element in tree.xpath("//*[@file='base_4.obj' or @mesh='base_4']"):
             element.getparent().remove(element)
@@ -60,8 +44,8 @@ def check(robot: str, mutant: Mutant) -> list[dict[str, Any]] | None:
     """
     from terrainkit_cli.main import main as terrainkit
 
-    source = ROBOTS[robot]
-    top = source.parents[1] if source.parent.name == "urdf" else source.parent
+    source = ROBOT_FILES[robot]
+    top = robot_folder(source)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / top.name
         path = folder / source.relative_to(top)
@@ -90,7 +74,7 @@ def is_about(finding: Any, names: Sequence[str], about: str) -> bool:
 def measure(defect: Defect, seed: int) -> Iterator[dict[str, Any]]:
     """Yield the result for each robot that a defect is applied to."""
     for robot in defect.robots:
-        mutant = Mutant(read(robot), Random(f"{defect.title} {robot} {seed}"), ROBOTS[robot])
+        mutant = Mutant(read(robot), Random(f"{defect.title} {robot} {seed}"), ROBOT_FILES[robot])
         names = defect.apply(mutant)
         about = mutant.fill(defect.about)
         result = {"kind": defect.title, "family": defect.family, "robot": robot, "names": names}
@@ -100,7 +84,7 @@ def measure(defect: Defect, seed: int) -> Iterator[dict[str, Any]]:
             continue
         key = robot + defect.title * bool(defect.prepare)
         if key not in ORIGINALS:
-            original = Mutant(read(robot), Random(0), ROBOTS[robot])
+            original = Mutant(read(robot), Random(0), ROBOT_FILES[robot])
             apply_edits(original, defect.prepare)
             ORIGINALS[key] = check(robot, original) or []
         identity = itemgetter("code", "subject", "severity")

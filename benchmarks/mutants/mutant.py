@@ -2,11 +2,11 @@
 
 import random
 import re
+import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from lxml import etree
 
 from .xpath_functions import FUNCTIONS
@@ -17,37 +17,7 @@ Element = Any
 _NAMESPACES = {"re": "http://exslt.org/regular-expressions"}
 _PLACEHOLDER = re.compile(r"\{\{|\}\}|\{(.+?)(?::(\.\d+[fg]))?\}", re.DOTALL)
 
-SELECTORS = {
-    # URDF
-    "links": "/robot/link",
-    "joints": "/robot/joint",
-    "actuated_joints": "$joints[@type='revolute']",
-    "leg_joints": "$actuated_joints[re:test(@name, 'hip|thigh|calf|knee|ankle')]",
-    "knee_joints": "$actuated_joints[re:test(@name, 'calf|knee')]",
-    "actuated_links": "$links[inertial/mass and @name = $actuated_joints/child/@link]",
-    "leg_links": "$actuated_links[re:test(@name, 'hip|thigh|calf|knee|ankle')]",
-    "main_leg_links": "$leg_links[inertial/mass/@value > 0.7 * mass(@name)]",
-    "body_of_it": "$links[@name = body($it/@name)]",
-    "feet": "$links[@name = feet()]",
-    "trunk": "$links[@name = trunk()]",
-    "whole_links": "$actuated_links[num_masses(@name) = 1]",
-    "hips": "$links[@name = main_links()][depth(@name) = 1]"
-    "[re:test(@name, 'hip|thigh|calf|knee|ankle')]",
-    "thighs": "$links[@name = main_links()][depth(@name) = 2][shapes(@name)]"
-    "[re:test(@name, 'hip|thigh|calf|knee|ankle')]",
-    "base": "$links[@name = 'base' or @name = 'trunk'][last()]",
-    # URDF and MJCF
-    "knees": "//joint[re:test(@name, '(calf|knee)_joint$')]",
-    "thigh_joints": "//joint[re:test(@name, '(thigh|hip_pitch)_joint$')]",
-    "named_joints": "//joint[contains(@name, 'joint')]",
-    "shanks": "//*[self::link or self::body][re:test(@name, '(calf|knee_link)$')]",
-    # MJCF
-    "motors": "/mujoco/actuator/motor",
-    "leg_bodies": "//body[inertial and joint][re:test(@name, 'hip|thigh|calf|knee|ankle')]",
-    "solid_geoms": "//body/geom[not(@contype='0' or @class='visual')]",
-    "foot_geoms": "//geom[@class='foot'] | $solid_geoms[not(//geom[@class='foot'])]"
-    "[re:test(../@name, 'ankle_link|ankle_roll_link')]",
-}
+SELECTORS = tomllib.loads(Path(__file__).with_name("selectors.toml").read_text())
 """Elements that defects refer to by `$name`."""
 
 
@@ -67,7 +37,7 @@ class Mutant:
         files: Content of the files besides the robot file, by path relative to its folder.
         folder: Folder of the robot file.
         file_name: Name of the robot file.
-        triangles: Triangles of the mesh that gets the defect, shape (F, 3, 3).
+        mesh: The mesh that gets the defect.
         prefix: Start of the names of new mesh files.
     """
 
@@ -88,7 +58,7 @@ class Mutant:
         self.functions = {(None, name): function for name, function in functions.items()}
         self.variables: dict[str, Any] = {}
         self.files: dict[str, bytes] = {}
-        self.triangles = np.empty((0, 3, 3))
+        self.mesh: Any = None
         self.rewrites: list[Callable[[bytes], bytes]] = []
 
     def rewrite(self, text: bytes) -> bytes:

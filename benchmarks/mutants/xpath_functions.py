@@ -12,12 +12,12 @@ _SIDES = (("FL", "FR"), ("RL", "RR"), ("left", "right"))
 
 def texts(value: Any) -> list[str]:
     """Return the texts of an argument: a string, or a list of attributes or strings."""
-    return [str(each) for each in value] if isinstance(value, list) else [value]
+    return [str(item) for item in value] if isinstance(value, list) else [value]
 
 
 def numbers(text: Any) -> np.ndarray:
     """Return the numbers in an attribute."""
-    return np.array([float(word) for each in texts(text) for word in each.split()])
+    return np.array([float(word) for part in texts(text) for word in part.split()])
 
 
 def format_numbers(values: Iterable[float], digits: int = 9) -> str:

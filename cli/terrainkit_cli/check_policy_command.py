@@ -3,6 +3,7 @@
 import json
 from dataclasses import asdict, dataclass
 from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -75,9 +76,8 @@ class CheckPolicy(PluginCommand):
 def text_lines(policy: str, findings: "list[Finding]") -> list[str]:
     """Return the findings as lines, at most some of each code."""
     lines = []
-    for _, group in groupby(
-        sorted(findings, key=lambda finding: finding.code), lambda finding: finding.code
-    ):
+    by_code = attrgetter("code")
+    for _, group in groupby(sorted(findings, key=by_code), by_code):
         same = list(group)
         for finding in same[:MAX_PRINTED]:
             lines += [f"{finding.code}  {finding.got}", f"        expected: {finding.expected}"]

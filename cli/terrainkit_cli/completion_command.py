@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 from terrainkit.settings.type_hint import parse_hint
 from terrainkit_cli import render
-from terrainkit_cli.parse import HELP, Command, Option, positional
+from terrainkit_cli.parse import HELP, Command, Option, add_option, positional
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,13 +66,11 @@ def complete(commands: Iterable[str], load: Callable[[str], type[Command]]) -> N
 
 
 def _add_option(parser: argparse.ArgumentParser, command: str, option: Option) -> None:
-    text = option.help.partition("\n")[0].replace("%", "%%")
-    if option.nargs == 0:
-        parser.add_argument(*option.names, action="store_true", help=text)
-        return
-    kind, names = "append" if option.is_repeated else "store", option.names or [option.key]
-    action: Any = parser.add_argument(*names, action=kind, nargs=option.nargs, help=text)
-    action.completer = partial(_values, command, option)
+    kind = "append" if option.is_repeated else "store"
+    summary = option.help.partition("\n")[0]
+    action = add_option(parser, option, summary, action=kind, nargs=option.nargs)
+    if option.nargs != 0:
+        action.completer = partial(_values, command, option)
 
 
 def _values(command: str, option: Option, prefix: str, **_: Any) -> list[str]:
@@ -82,7 +80,7 @@ def _values(command: str, option: Option, prefix: str, **_: Any) -> list[str]:
     hint = parse_hint(option.annotation)
     kind = parse_hint(hint.args[0]).kind if hint.origin is tuple else hint.kind
     if kind in (bool, int, float) or get_origin(kind) is Literal:
-        return ["true", "false"] if kind is bool else [str(each) for each in get_args(kind)]
+        return ["true", "false"] if kind is bool else [str(argument) for argument in get_args(kind)]
     source = _NAMES.get(f"{command} {option.key}") or _NAMES.get(option.key)
     names = getattr(import_module(source[0]), source[1])() if source else ()
     found = [str(getattr(name, "code", name)) for name in names]

@@ -54,9 +54,10 @@ class ConfigCommand(Command):
             TerrainkitError: if the config cannot be loaded.
             ConfigError: if an option is unknown, missing, or has an invalid value.
         """
-        defaults, own = cls.load_config(argv), options_of(cls)
+        defaults = cls.load_config(argv)
+        own = options_of(cls)
         values = read_args([*own, *options_of(defaults, cls.ALIASES)], argv)
-        arguments = {each.key: values.pop(each.key) for each in own if each.key in values}
+        arguments = {option.key: values.pop(option.key) for option in own if option.key in values}
         return cls(defaults=defaults, changes=_nested(values), **arguments)
 
     def changed_config(self) -> Any:

@@ -17,7 +17,7 @@ def draw_contacts(contacts: Mapping[str, str], dt: float) -> bytes:
     """
     import cv2
 
-    rows = np.array([[each == "1" for each in text] for text in contacts.values()])
+    rows = np.array([[character == "1" for character in text] for text in contacts.values()])
     cell = np.zeros((ROW_HEIGHT, STEP_WIDTH))
     cell[4:-4] = 1
     blocks = np.kron(rows, cell)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from terrainkit.errors import ConfigError
-from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import (
@@ -73,12 +73,14 @@ class Feasibility(PluginCommand):
         """Print the limits, the demands and the blocking places; write the report."""
         from terrainkit.feasibility import assess_map
         from terrainkit.feasibility.report import demand_table
+        from terrainkit.files.atomic_write import check_target
 
         derived = robot_limits(self.robot, self.limit)
         terrain_map = TerrainMap.load(self.map)
         target = self.output.with_suffix("") if self.output else None
         if target:
-            self._check_targets(target)
+            for suffix in (".json", ".png"):
+                check_target(target.with_suffix(suffix), overwrite=self.overwrite)
         with worker_pool(self.jobs) as executor:
             results = assess_map(
                 terrain_map, derived.limits, progress=render.progress, executor=executor
@@ -93,12 +95,6 @@ class Feasibility(PluginCommand):
         if target:
             self._write(target, terrain_map, results, derived)
         return print_impassable(results, derived, self.map)
-
-    def _check_targets(self, target: Path) -> None:
-        from terrainkit.files.atomic_write import check_target
-
-        for suffix in (".json", ".png"):
-            check_target(target.with_suffix(suffix), overwrite=self.overwrite)
 
     def _write(
         self,
@@ -133,7 +129,7 @@ def robot_limits(robot: str, limits: Sequence[str]) -> "DerivedLimits":
         ConfigError: if there is neither a robot nor a limit, there is no such robot, it has no
             legs, or a limit is invalid.
     """
-    from terrainkit.feasibility.limits import limit_overrides
+    from terrainkit.feasibility.crossing_limits import limit_overrides
     from terrainkit_robots.rl.tasks import get_task
     from terrainkit_robots.simulation.robot_limits import derive_limits
 
@@ -177,14 +173,14 @@ def solve_demand(
     solved = solve_ranges(config, derived.limits, ends, progress=progress, executor=executor)
     rows = [("terrain", "demand", f"ranges for {derived.robot}")]
     for terrain in solved:
-        for indent, each in [("", terrain), *(("  ", element) for element in terrain.elements)]:
-            ranges = [f"{name} {easy:g} to {hard:g}" for name, (easy, hard) in each.ranges.items()]
-            what = ", ".join(ranges) or ("" if each.elements else "unchanged")
-            span = " to ".join(map(demand_text, each.demand))
-            rows.append((indent + each.sub_terrain.name, span, what))
+        for indent, part in [("", terrain), *(("  ", element) for element in terrain.elements)]:
+            ranges = [f"{name} {easy:g} to {hard:g}" for name, (easy, hard) in part.ranges.items()]
+            what = ", ".join(ranges) or ("" if part.elements else "unchanged")
+            span = " to ".join(map(demand_text, part.demand))
+            rows.append((indent + part.sub_terrain.name, span, what))
     render.table(rows)
     render.result("")
-    return replace(config, terrains=tuple(each.sub_terrain for each in solved))
+    return replace(config, terrains=tuple(solution.sub_terrain for solution in solved))
 
 
 def print_impassable(
@@ -200,15 +196,15 @@ def print_impassable(
     render.result("")
     for text in crossed_texts(results):
         render.result(text)
-    blocked = [each for each in results if not each.is_passable]
+    blocked = [patch for patch in results if not patch.is_passable]
     if not blocked:
         render.result(f"\n{path}: {derived.robot} can cross {_patches(len(results))}")
         return 0
     render.result("")
-    for each in blocked[:MAX_LISTED]:
+    for item in blocked[:MAX_LISTED]:
         render.result(
-            f"patch ({each.row}, {each.col}), {each.terrain}: demand {demand_text(each.demand)}, "
-            f"{blocking_text(each, derived.limits)}"
+            f"patch ({item.row}, {item.col}), {item.terrain}: demand {demand_text(item.demand)}, "
+            f"{blocking_text(item, derived.limits)}"
         )
     if len(blocked) > MAX_LISTED:
         render.result(f"and {len(blocked) - MAX_LISTED} more")

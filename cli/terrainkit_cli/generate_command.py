@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from terrainkit.errors import ConfigError
 from terrainkit.export.npz import read_config
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.terrain import registry
 from terrainkit.terrain.overlay import Overlay
 from terrainkit.terrain.parameter import Parameter, parameters_of
@@ -135,9 +135,7 @@ class Generate(PluginCommand, ConfigCommand):
         overlays = tuple(map(_overlay, self.overlay))
         if not overlays:
             return config
-        terrains = [
-            replace(each, overlays=each.overlays + overlays) for each in config.sub_terrains
-        ]
+        terrains = (replace(old, overlays=old.overlays + overlays) for old in config.sub_terrains)
         return replace(config, terrains=tuple(terrains))
 
 

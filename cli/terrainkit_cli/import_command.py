@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from terrainkit.errors import ConfigError
-from terrainkit.importing.options import ImportOptions
+from terrainkit.importing.import_options import ImportOptions
 from terrainkit.settings.type_hint import NonNegative
 from terrainkit_cli import render
 from terrainkit_cli.argument_types import OutputPath, is_map
@@ -63,7 +63,8 @@ class Import(ConfigCommand):
         if len(self.files) == 1 and not self.files[0].is_dir():
             if self.blend != Import.blend:
                 raise ConfigError("--blend: got one file; expected several files")
-            terrain_map, names = import_map(self.files[0], options).terrain_map, [""]
+            terrain_map = import_map(self.files[0], options).terrain_map
+            names = [""]
         else:
             progress = partial(render.progress, of="files")
             terrain_map = import_curriculum(

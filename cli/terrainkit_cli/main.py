@@ -52,6 +52,9 @@ COMMANDS["completion"] = "completion_command"
 _OUT_OF_MEMORY = re.compile("allocate memory|start new thread|failed to map segment")
 """Errors of torch, of threads and of shared libraries under a small limit of the memory."""
 
+_PACKAGES = {"collada": "pycollada", "cv2": "opencv-python-headless", "yaml": "pyyaml"}
+"""Packages whose module has another name."""
+
 _BYTES_PER_JOB = 1 << 27
 """Memory of a process that has imported SciPy [bytes]."""
 
@@ -80,7 +83,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     from terrainkit.errors import TerrainkitError
 
     try:
-        code = _run(arguments)
+        with _package_errors():
+            code = _run(arguments)
         sys.stdout.flush()
         return code
     except TerrainkitError as error:
@@ -153,15 +157,22 @@ def _run_command(name: str, argv: list[str]) -> int:
         if jobs > 1:
             check_memory(jobs * _BYTES_PER_JOB, f"--jobs {jobs}", ("--jobs", jobs))
         limit_allocations(jobs if jobs > 1 else 0)
-    with _memory_errors():
-        return parsed.run()
+    return parsed.run()
 
 
 @contextmanager
-def _memory_errors() -> Iterator[None]:
-    """Raise MemoryError for the errors of packages that run out of memory."""
+def _package_errors() -> Iterator[None]:
+    """Replace the errors of packages that are missing, or run out of memory."""
+    from terrainkit.errors import TerrainkitError
+
     try:
         yield
+    except ModuleNotFoundError as error:
+        module = str(error.name).partition(".")[0]
+        if module.startswith("terrainkit"):
+            raise
+        package = _PACKAGES.get(module, module)
+        raise TerrainkitError(f"missing package: {package}; run: pip install {package}") from error
     except (RuntimeError, ImportError) as error:
         if _OUT_OF_MEMORY.search(str(error)):
             raise MemoryError from error

@@ -9,7 +9,7 @@ from terrainkit.map.terrain_map import TerrainMap
 def written(terrain_map: TerrainMap, path: Path, *others: Path) -> str:
     """Return the message about a written map, and other files that were written beside it."""
     config, grid = terrain_map.config, terrain_map.grid
-    beside = f", with {listing(each.name for each in others)} beside it" if others else ""
+    beside = f", with {listing(file.name for file in others)} beside it" if others else ""
     return (
         f"wrote {path}{beside}: "
         f"{config.rows} x {config.cols} patches of {size_text(*config.patch_size)}, "

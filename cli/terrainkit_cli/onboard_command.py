@@ -20,7 +20,7 @@ from terrainkit_cli.argument_types import (
 from terrainkit_cli.parse import Command, option, positional
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.pipeline import OnboardOptions
+    from terrainkit_robots.onboarding.onboard_options import OnboardOptions
     from terrainkit_robots.onboarding.result import OnboardResult
 
 
@@ -98,7 +98,7 @@ class Onboard(Command):
     def run(self) -> int:
         """Onboard the robot and print a summary."""
         from terrainkit_robots.onboarding.pipeline import onboard
-        from terrainkit_robots.onboarding.summary import summarize
+        from terrainkit_robots.onboarding.statements import summarize
 
         if not self.file:
             raise ConfigError("FILE: missing; expected a robot file, quadruped, or biped")
@@ -123,7 +123,7 @@ class Onboard(Command):
         from terrainkit_robots.export.collision_simplification.decomposition_cache import (
             cache_folder,
         )
-        from terrainkit_robots.onboarding.pipeline import OnboardOptions
+        from terrainkit_robots.onboarding.onboard_options import OnboardOptions
 
         return OnboardOptions(
             settings=parse_settings(self.ignore, self.package, self.xacro_arg),
@@ -169,9 +169,8 @@ def _train_commands(result: "OnboardResult") -> Iterator[str]:
 def _blocking_errors(result: "OnboardResult") -> str:
     """Return a report on the errors that prevent onboarding."""
     from terrainkit_robots.lint.report import to_text
-    from terrainkit_robots.onboarding.pipeline import is_blocking
 
-    errors = tuple(filter(is_blocking, result.report.findings))
+    errors = tuple(finding for finding in result.report.findings if finding.is_blocking)
     return to_text([replace(result.report, findings=errors)], "text")
 
 
@@ -192,7 +191,7 @@ def _warnings(result: "OnboardResult") -> list[str]:
     skipped = result.skipped_configs.items()
     warnings = [f"no configuration for {framework}: {reason}" for framework, reason in skipped]
     # A robot whose legs were not all found was onboarded as another robot.
-    warnings += [f.message for f in result.report.findings if f.code == "LEG002"]
+    warnings += [f.message for f in result.report.findings if f.onboarding == "warns"]
     verification = result.verification
     if verification is not None and not verification.is_stable:
         warnings.append(f"the robot does not stand: {'; '.join(verification.failures)}")

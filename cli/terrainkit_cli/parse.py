@@ -149,15 +149,17 @@ def options_of(
         aliases: Second names of options by key.
         prefix: Beginning of the keys.
     """
-    kind, options = owner if isinstance(owner, type) else type(owner), []
+    kind = owner if isinstance(owner, type) else type(owner)
+    options = []
     for name, annotation in field_types(kind).items():
-        default, key = getattr(owner, name, MISSING), prefix + name
+        default = getattr(owner, name, MISSING)
+        key = prefix + name
         hint = parse_hint(annotation)
         if isinstance(default, Config):
             options += options_of(default, aliases, f"{key}.")
         elif hint.origin is not Mapping and not any(map(is_table, (hint.kind, *hint.args))):
             options.append(_option(kind, key, default, annotation, (aliases or {}).get(key, "")))
-    return sorted(options, key=lambda each: each.key == "plugin")  # which many commands inherit
+    return sorted(options, key=lambda option: option.key == "plugin")  # which many commands inherit
 
 
 def _option(owner: Any, key: str, default: Any, annotation: Any, alias: str) -> Option:
@@ -170,7 +172,8 @@ def _option(owner: Any, key: str, default: Any, annotation: Any, alias: str) -> 
     is_repeated = bool(extra.get("is_repeated"))
     nargs: int | Literal["*"] = 1
     if hint.kind is bool and not hint.is_optional:
-        names, nargs = [*names, f"--{section}{dot}no-{name}"], 0
+        names = [*names, f"--{section}{dot}no-{name}"]
+        nargs = 0
     elif hint.origin is tuple and not is_repeated:
         nargs = "*" if ... in hint.args or hint.is_optional else len(hint.args)
     return Option(
@@ -178,7 +181,7 @@ def _option(owner: Any, key: str, default: Any, annotation: Any, alias: str) -> 
         key=key,
         default=default,
         annotation=annotation,
-        names=[] if "is_positional" in extra else [each for each in names if each],
+        names=[] if "is_positional" in extra else [name for name in names if name],
         nargs=nargs,
         metavar=extra.get("metavar") or _metavar(hint),
         is_repeated=is_repeated,
@@ -196,27 +199,28 @@ def read_args(options: Sequence[Option], argv: Sequence[str]) -> dict[str, Any]:
     end = rest.index("--") if "--" in rest else len(rest)
     for word in filter(is_option, rest[:end]):
         name = word.partition("=")[0]
-        names = [*HELP, *(each for option in options for each in option.names)]
+        names = [*HELP, *(name for option in options for name in option.names)]
         near = closest(name.replace("_", "-"), names)
         hint = f"did you mean {near}?" if near else "--help lists the options"
         raise ConfigError(f"no option {truncate(word)}; {hint}")
     rest = rest[:end] + rest[end + 1 :]
-    positionals = [each for each in options if not each.names]
-    num_missing = sum(each.default is MISSING for each in positionals) - len(rest)
-    lists = [given[each.key] for each in options if each.nargs == "*" and each.key in given]
+    positionals = [option for option in options if not option.names]
+    num_missing = sum(option.default is MISSING for option in positionals) - len(rest)
+    lists = [given[option.key] for option in options if option.nargs == "*" and option.key in given]
     if num_missing > 0 and lists:  # they follow an option with any number of values
         rest += lists[-1][-num_missing:]
         del lists[-1][-num_missing:]
-    for each in positionals[: len(rest)]:
-        number = len(rest) if each.nargs == "*" else 1
-        given[each.key], rest = rest[:number], rest[number:]
+    for option in positionals[: len(rest)]:
+        number = len(rest) if option.nargs == "*" else 1
+        given[option.key], rest = rest[:number], rest[number:]
     if rest:
         raise UsageError(f"got {truncate(rest[0])}; expected no more arguments")
-    for each in options:
-        if each.default is MISSING and each.key not in given:
-            raise UsageError(f"{each.name}: missing")
+    for option in options:
+        if option.default is MISSING and option.key not in given:
+            raise UsageError(f"{option.name}: missing")
     try:
-        return {each.key: each.convert(given[each.key]) for each in options if each.key in given}
+        used = (option for option in options if option.key in given)
+        return {option.key: option.convert(given[option.key]) for option in used}
     except ConfigError as error:
         raise UsageError(str(error)) from None
 
@@ -237,13 +241,13 @@ def split_args(
     )
     parser._negative_number_matcher = _NUMBER
     by_name = {name: option for option in options for name in option.names}
-    for name, each in by_name.items():
-        if each.nargs == 0:
-            value = ["false" if name == each.names[-1] else "true"]
-            parser.add_argument(name, dest=each.key, action="store_const", const=value)
+    for name, option in by_name.items():
+        if option.nargs == 0:
+            value = ["false" if name == option.names[-1] else "true"]
+            parser.add_argument(name, dest=option.key, action="store_const", const=value)
         else:
-            action = "extend" if each.is_repeated or each.nargs == "*" else "store"
-            parser.add_argument(name, dest=each.key, action=action, nargs=each.nargs)
+            action = "extend" if option.is_repeated or option.nargs == "*" else "store"
+            parser.add_argument(name, dest=option.key, action=action, nargs=option.nargs)
     end = argv.index("--") if "--" in argv else len(argv)
     try:
         given, rest = parser.parse_known_args([_with_dashes(word) for word in argv[:end]])
@@ -280,24 +284,35 @@ def format_help(prog: str, doc: str, options: Sequence[Option], width: int) -> s
         options: The options, with the defaults to show.
         width: Length of the lines [characters].
     """
-    positionals = [each.metavar for each in options if not each.names]
+    positionals = [option.metavar for option in options if not option.names]
     parser = argparse.ArgumentParser(
         usage=" ".join([prog, "[OPTIONS]", *positionals]),
         description=_fill(doc, width),
         formatter_class=lambda prog: argparse.RawDescriptionHelpFormatter(prog, width=width),
     )
     sections: dict[str, Any] = {"": parser}
-    for each in options:
-        section, text = each.key.rpartition(".")[0], each.help.replace("%", "%%")
+    for option in options:
+        section = option.key.rpartition(".")[0]
         if section not in sections:
-            about = _fill(inspect.getdoc(each.owner) or "", width - 2)
+            about = _fill(inspect.getdoc(option.owner) or "", width - 2)
             sections[section] = parser.add_argument_group(f"{section} options", about)
-        if each.nargs == 0:
-            sections[section].add_argument(*each.names, action="store_true", help=text)
-        else:
-            names = each.names or [each.key]
-            sections[section].add_argument(*names, metavar=each.metavar, help=text)
+        add_option(sections[section], option, option.help, metavar=option.metavar)
     return parser.format_help()
+
+
+def add_option(parser: Any, option: Option, text: str, **values: Any) -> Any:
+    """Add an option to a parser that describes it, and return the action of argparse.
+
+    Args:
+        parser: The parser, or a group of its options.
+        option: The option.
+        text: Its help text.
+        **values: Arguments of argparse for an option with values.
+    """
+    if option.nargs == 0:
+        values = {"action": "store_true"}
+    names = option.names or [option.key]
+    return parser.add_argument(*names, help=text.replace("%", "%%"), **values)
 
 
 def _with_dashes(word: str) -> str:
@@ -311,7 +326,7 @@ def _metavar(hint: TypeHint) -> str:
     if origin is Literal:
         text = "{" + ",".join(map(str, args)) + "}"
     elif origin is tuple:
-        items = [_metavar(parse_hint(each)) for each in args if each is not ...]
+        items = [_metavar(parse_hint(argument)) for argument in args if argument is not ...]
         text = f"[{items[0]} ...]" if ... in args else " ".join(items)
     else:
         text = {int: "INT", float: "FLOAT", str: "TEXT", bool: "{true,false}"}.get(kind, "VALUE")

@@ -9,13 +9,14 @@ import textwrap
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO, TypeVar
 
 if TYPE_CHECKING:
     from rich.status import Status
 
-    from terrainkit_robots.lint.report.text import Span
+    from terrainkit_robots.lint.report.text_report import Span
 
 _T = TypeVar("_T")
 
@@ -138,7 +139,8 @@ def show_warning(
 def progress(items: Iterable[_T], total: int, *, of: str = "patches") -> Iterator[_T]:
     """Return `items`, with a progress bar on stderr if that is a terminal and they take long."""
     items = iter(items)
-    return _with_delayed_bar(items, total, of) if sys.stderr.isatty() else items
+    has_bar = sys.stderr.isatty() and find_spec("rich") is not None
+    return _with_delayed_bar(items, total, of) if has_bar else items
 
 
 def _with_delayed_bar(items: Iterator[_T], total: int, of: str) -> Iterator[_T]:
@@ -190,7 +192,7 @@ class Steps:
 @contextmanager
 def steps() -> Iterator[Steps]:
     """Yield an object that shows the steps of a command."""
-    if not sys.stderr.isatty():
+    if not sys.stderr.isatty() or find_spec("rich") is None:
         yield Steps(None)
         return
     from rich.console import Console

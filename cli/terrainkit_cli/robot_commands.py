@@ -127,7 +127,7 @@ class CheckRobot(Command):
             baseline = baseline.updated(result.report for result in results)
             baseline.write()
             render.note(f"wrote {baseline.path}")
-        results = [replace(each, report=baseline.accept(each.report)) for each in results]
+        results = [replace(result, report=baseline.accept(result.report)) for result in results]
         self._print([result.report for result in results], "".join(r.diff for r in results))
         crashed = [rule for result in results for rule in result.report.crashed]
         for rule in crashed:
@@ -200,12 +200,14 @@ class CheckRobot(Command):
         settings = settings.over(read_settings(Path(name).parent))
 
         def lint_contents(contents: Mapping[Path, bytes]) -> "Report":
-            against, spec = self.against or None, self.spec
+            against = self.against or None
+            spec = self.spec
             return check_robot(name, settings, against=against, spec=spec, contents=contents)
 
         with render.steps() as steps:
             steps.update(f"checking {name}")
-            report, diff = lint_contents({}), ""
+            report = lint_contents({})
+            diff = ""
         path = report.facts.model.file
         if self.fix or self.unsafe_fixes or self.diff:
             from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff
@@ -232,7 +234,7 @@ class CheckRobot(Command):
             if reports and not text:
                 render.note("there is nothing to fix")
         elif self.format == "text":
-            from terrainkit_robots.lint.report import text as text_report
+            from terrainkit_robots.lint.report import text_report
 
             brief = any(map(_is_folder, self.files)) and not (self.notes or self.changed)
             options = {"verbose": self.notes, "brief": brief}
@@ -286,9 +288,9 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
     write_fixes(result)
     safeties = ("safe", "unsafe") if unsafe else ("safe",)
     unfixed = tuple(
-        (each.finding, each.reason)
-        for each in result.unfixed
-        if each.finding.fix is not None and each.finding.fix.safety in safeties
+        (unfixed.finding, unfixed.reason)
+        for unfixed in result.unfixed
+        if unfixed.finding.fix is not None and unfixed.finding.fix.safety in safeties
     )
     return replace(result.report, fixed=result.fixed, unfixed=unfixed)
 
@@ -315,16 +317,16 @@ class Rule(Command):
 
     def run(self) -> int:
         """Print the documentation of a rule, or a list of rules."""
-        from terrainkit_robots.lint.rule import FAMILIES, get_rule, rules
+        from terrainkit_robots.lint.rule import families, get_rule, rules
 
         if self.code and self.all:
             raise ConfigError("got CODE and --all; expected one of them")
         if self.code:
             render.result(_rule_page(get_rule(self.code)))
             return 0
-        for family, description in FAMILIES.items():
-            render.result(f"{family}: {description}")
-            members = [rule for rule in rules() if rule.family == family]
+        for name, family in families().items():
+            render.result(f"{name}: {family.title}")
+            members = [rule for rule in rules() if rule.family == name]
             render.table(
                 [
                     (f"  {r.code}", r.name, r.severity, _FIX_OPTIONS[r.fixes], r.title)
@@ -341,11 +343,11 @@ _FIX_OPTIONS = {"safe": "--fix", "unsafe": "--unsafe-fixes", "no": ""}
 
 
 def _rule_page(rule: "RobotRule") -> str:
-    from terrainkit_robots.lint.rule import FAMILIES
+    from terrainkit_robots.lint.rule import families
 
     fixes = f"; fixed by {_FIX_OPTIONS[rule.fixes]}" if rule.fixes != "no" else ""
     paragraphs = [
-        f"{rule.code} {rule.name} ({rule.severity}{fixes}), {FAMILIES[rule.family]}",
+        f"{rule.code} {rule.name} ({rule.severity}{fixes}), {families()[rule.family].title}",
         rule.title,
         *rule.why.split("\n\n"),
         f"Fix: {rule.how_to_fix}",

@@ -113,7 +113,7 @@ class SmokeTest(Command):
             check_target(self.output, overwrite=True)  # before the tests
 
     def _smoke_test(self, name: str, progress: Callable[[float], None]) -> "SmokeTestResult":
-        from terrainkit_robots.onboarding.pipeline import OnboardOptions
+        from terrainkit_robots.onboarding.onboard_options import OnboardOptions
         from terrainkit_robots.smoke_test.checks import smoke_test
 
         settings = parse_settings(self.ignore, self.package, self.xacro_arg)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from terrainkit import suites
 from terrainkit.errors import ConfigError
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.terrain.parameter import format_value
 from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit_cli import render
@@ -43,7 +43,11 @@ class Suite(Command):
                 if given:
                     raise ConfigError(f"--{name}: got suite {self.action}; expected suite generate")
         if self.action == "list":
-            self._list()
+            if self.name:
+                expected = "expected no name (suite show NAME)"
+                raise ConfigError(f"suite list: got {self.name!r}; {expected}")
+            configs = {name: suites.get_suite(name).config for name in suites.suite_names()}
+            render.table([(name, _summary(config)) for name, config in configs.items()])
             return 0
         suite = suites.get_suite(self.name)
         if self.action == "show":
@@ -51,12 +55,6 @@ class Suite(Command):
         else:
             self._generate(suite)
         return 0
-
-    def _list(self) -> None:
-        if self.name:
-            raise ConfigError(f"suite list: got {self.name!r}; expected no name (suite show NAME)")
-        configs = {name: suites.get_suite(name).config for name in suites.suite_names()}
-        render.table([(name, _summary(config)) for name, config in configs.items()])
 
     def _generate(self, suite: suites.Suite) -> None:
         from terrainkit import export

@@ -254,7 +254,7 @@ def _solids_text(terrain_map: TerrainMap) -> str:
 
 
 def _print_budget(terrain_map: TerrainMap, foot_radius: float) -> None:
-    from terrainkit.views.budget import MAX_CONTACTS, compute_budget
+    from terrainkit.export.budget import MAX_CONTACTS, compute_budget
 
     budget = compute_budget(terrain_map, foot_radius)
     contacts = (

@@ -78,7 +78,7 @@ class ViewerCommand(Command):
         """
         with render.steps() as steps:
             steps.update("starting the viewer")
-            from terrainkit.views.viewer_server import viewer_server
+            from terrainkit.viewer.viewer_server import viewer_server
 
             with viewer_server(self.host, self.port) as server:
                 if show_first is not None:
@@ -221,18 +221,19 @@ class View(PluginCommand, ViewerCommand):
         return self.serve(show, self.source)
 
     def _load_map(self) -> "Show":
-        from terrainkit.views.viewer import show_map
+        from terrainkit.viewer.map_scene import show_map
 
         return partial(show_map, terrain_map=TerrainMap.load(self.source))
 
     def _check_robot(self) -> "Show":
         from terrainkit_robots.lint.check import check_robot
         from terrainkit_robots.lint.settings import read_settings
-        from terrainkit_robots.spec.robot import SPEC_FILE
+        from terrainkit_robots.spec.robot_arrays import SPEC_FILE
         from terrainkit_robots.spec.robot_spec import RobotSpec
         from terrainkit_robots.viewer.show_robot import show_robot
 
-        path, spec = Path(self.source), None
+        path = Path(self.source)
+        spec = None
         if (path / SPEC_FILE).is_file():
             spec = path / SPEC_FILE
             path = path / RobotSpec.load(spec).urdf
@@ -307,7 +308,7 @@ def source_kind(source: str, *, policy: bool = False) -> Kind:
     from terrainkit_robots.description.robot_file import is_description
     from terrainkit_robots.rl.run import RUN_FILE
     from terrainkit_robots.rl.tasks import task_names
-    from terrainkit_robots.spec.robot import SPEC_FILE
+    from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 
     path = Path(source)
     try:

@@ -16,7 +16,7 @@ from typing import Annotated, Any, BinaryIO, Literal, TypedDict
 import msgspec
 from msgspec import Meta
 
-from terrainkit.errors import ConfigError, listing
+from terrainkit.errors import ConfigError, listing, one_line
 from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.files import open_regular
 
@@ -191,5 +191,5 @@ def open_checkpoint(
     try:
         yield state
     except (RuntimeError, LookupError, ValueError, TypeError, OverflowError) as error:
-        reason = " ".join(str(error).split())[:300]
+        reason = one_line(str(error))[:300]
         raise ConfigError(f"{path} does not fit its robot, task and map: {reason}") from error

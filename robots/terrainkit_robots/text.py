@@ -11,8 +11,8 @@ from terrainkit.settings.text import truncate
 def names(items: Iterable[str], max_count: int = 6, sep: str = ", ") -> str:
     """Return words as `a, b, c`, with `...` in place of all after the first `max_count`."""
     items = list(items)
-    shown = [truncate(word) for word in items[:max_count]]
-    return sep.join(shown + ["..."] * (len(items) > max_count))
+    more = ["..."] if len(items) > max_count else []
+    return sep.join([truncate(word) for word in items[:max_count]] + more)
 
 
 def conjunction(items: Sequence[str]) -> str:

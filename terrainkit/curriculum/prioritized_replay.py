@@ -64,7 +64,8 @@ class PrioritizedReplaySampler(UniformSampler):
         """
         seen = ~np.isnan(self.score)
         probs: FloatArray = (~seen) / seen.size
-        score, order = self.score[seen], np.sort(-self.score[seen])
+        score = self.score[seen]
+        order = np.sort(-self.score[seen])
         # Patches with the same score share their mean rank.
         first, last = (np.searchsorted(order, -score, side) for side in ("left", "right"))
         weight = ((1 + first + last) / 2) ** (-1 / TEMPERATURE)

@@ -130,7 +130,7 @@ class PatchSampler:
         arrays = {name: to_numpy(name, state[name]) for name in self.arrays()}
         rows, cols = shape = self.statistics.visits.shape
         if (got := arrays["visits"].shape) != shape:
-            sizes = (" x ".join(map(str, each)) for each in (got, shape))
+            sizes = (" x ".join(map(str, size)) for size in (got, shape))
             raise ConfigError("state of the curriculum: got {} patches; expected {}".format(*sizes))
         for name, array in self.arrays().items():
             if name not in ("levels", "columns") and arrays[name].shape != array.shape:

@@ -16,8 +16,8 @@ from terrainkit.errors import ConfigError, MapFileError, TerrainkitWarning, is_b
 from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, check_solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.import_report import ImportReport
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import PatchParameters, Values
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain.patch_geometry import MAX_GOALS
@@ -68,12 +68,16 @@ def export(terrain_map: "TerrainMap", path: Path, *, mesh: bool = True) -> None:
         path: Target.
         mesh: Write the trimesh. `TerrainMap.mesh` builds it from the other arrays.
     """
-    config, trimesh = terrain_map.config, terrain_map.mesh() if mesh else None
+    config = terrain_map.config
+    trimesh = terrain_map.mesh() if mesh else None
+    friction = terrain_map.friction
+    if (friction == friction[0, 0]).all():
+        friction = friction[:1, :1]  # stored once if it is the same in all cells
     records = [[dataclasses.asdict(patch) for patch in row] for row in terrain_map.parameters]
     arrays = {
         "format_version": np.int64(FORMAT_VERSION),
         "heights": terrain_map.heights,
-        "ground_friction": _compact(terrain_map.friction),
+        "ground_friction": friction,
         "cell": np.float64(config.cell),
         "lower": np.array(terrain_map.grid.lower),
         "border": np.float64(config.border),
@@ -113,7 +117,8 @@ def read_map(cls: type[_Map], path: str | Path) -> _Map:
     """
     with open_archive(path) as archive:
         config = _read_config(archive)
-        size, grid = (config.rows, config.cols), config.grid
+        size = (config.rows, config.cols)
+        grid = config.grid
         for key, expected in (
             ("cell", config.cell),
             ("border", config.border),
@@ -211,11 +216,6 @@ def _read_config(
         raise MapFileError(f"{archive.path}: config: {error}") from error
 
 
-def _compact(friction: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the friction of all cells, shape (1, 1) if it is the same."""
-    return friction[:1, :1] if (friction == friction[0, 0]).all() else friction
-
-
 def _read_friction(archive: Archive, config: MapConfig) -> NDArray[np.float32]:
     """Return the friction of all cells, which is stored once if it is the same."""
     shape = config.grid.shape
@@ -303,7 +303,7 @@ def _read_parameters(
     archive: Archive, config: MapConfig, terrain_types: NDArray[np.int32]
 ) -> NDArray[np.object_]:
     table = np.empty(terrain_types.shape, dtype=object)
-    names = [_parameter_names(each) for each in config.sub_terrains]
+    names = [_parameter_names(sub_terrain) for sub_terrain in config.sub_terrains]
     text = archive.text("parameters", limit=(table.size + 16) * MAX_PATCH_RECORD_BYTES)
     try:
         rows = msgspec.json.decode(text, type=list[list[_Record]])

@@ -11,7 +11,8 @@ from terrainkit.settings.type_hint import MAX_VALUE
 
 def has_one_friction(terrain_map: TerrainMap) -> bool:
     """Return whether all of the ground and all solids have the friction of the map."""
-    static, solids = np.float32(terrain_map.config.static_friction), terrain_map.solids.friction
+    static = np.float32(terrain_map.config.static_friction)
+    solids = terrain_map.solids.friction
     is_map_friction = np.isnan(solids) | (solids == static)
     return bool((terrain_map.friction == static).all() and is_map_friction.all())
 

@@ -115,7 +115,7 @@ def _add_hulls(link: ET.Element, solids: Solids, contact: dict[str, float], path
         zip(friction.tolist(), hulls.collides.tolist(), hulls.visible.tolist(), strict=True)
     )
     for number, key in enumerate(dict.fromkeys(keys)):
-        members = [k for k, each in enumerate(keys) if each == key]
+        members = [k for k, other in enumerate(keys) if other == key]
         file = path.with_name(f"{path.stem}_hulls_{number}.stl")
         write_stl(concatenate_meshes([meshes[k] for k in members]), file)
         tags = _tags(hulls, members[0])

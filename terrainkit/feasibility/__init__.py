@@ -5,7 +5,7 @@ the robot; the demand of a patch is the largest ratio on the path where it is sm
 """
 
 from terrainkit.feasibility.assess import PatchFeasibility, assess_map, assess_patch
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.feasibility.solve import TerrainSolution, solve_ranges
 

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.export.requirements import require_finite
-from terrainkit.feasibility.arrays import IntArray
 from terrainkit.feasibility.bottleneck import Segment, shortest_path
 from terrainkit.feasibility.columns import Columns, columns_per_cell, sample_columns
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.foothold_graph import FootholdGraph
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.node_arrays import IntArray
 from terrainkit.feasibility.path_edges import MAX_DEMAND, path_edges
 from terrainkit.files.memory import check_memory
 from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.free_space import free_intervals
+from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.solid_index import SolidIndex
-from terrainkit.geometry.surface import surface_at
 from terrainkit.map.patch import Patch
 
 if TYPE_CHECKING:
@@ -191,6 +191,8 @@ class _Path:
             usable = path_edges(graph, step_demand, (start, targets))
             ratios = graph.demand(usable)
             ends = position(usable.end) - position(usable.start)
+            # Of the least demanding paths, a short one over easy ground: a step at the limit counts
+            # as twice its length.
             length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)
             way = shortest_path(usable, length, start, targets, size)
             if way is None:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.edges import Edges
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 
 Segment = tuple[int, IntArray]
 """A piece of the path: a start node, and target nodes. The path ends at any of the targets."""
@@ -110,7 +110,8 @@ def _reaches(
 
     # No sorting is needed: the edges stay in the order of the rows when some are left out.
     before = np.concatenate([[0], np.cumsum(mask)])[rows].astype(np.int32)
-    values, size = np.ones(int(before[-1])), len(rows) - 1
+    values = np.ones(int(before[-1]))
+    size = len(rows) - 1
     graph = csr_matrix((values, end[mask].astype(np.int32), before), shape=(size, size))
     reached = breadth_first_order(graph, start, return_predecessors=False)
     return bool(np.isin(targets, reached).any())

@@ -6,9 +6,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import IntArray
 from terrainkit.feasibility.bottleneck import find_components
 from terrainkit.feasibility.edges import Edges
+from terrainkit.feasibility.node_arrays import IntArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,13 +10,13 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray
 from terrainkit.feasibility.columns import Columns
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.edges import Edges, step_edges
 from terrainkit.feasibility.footholds import foothold_sizes
 from terrainkit.feasibility.free_width import FreeWidth
 from terrainkit.feasibility.gradient import gradient_of
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.node_arrays import FloatArray
 
 DIGITS = 6
 """Digits of a demand, so that a step of exactly the limit is not above it."""
@@ -61,7 +61,8 @@ class FootholdGraph:
             excluded: Nodes that no path may use, shape (nx, ny, m); None for none.
         """
         gradient = gradient_of(columns.floor, columns.spacing)
-        steps, free_width = step_edges(columns, gradient), FreeWidth.build(columns, limits)
+        steps = step_edges(columns, gradient)
+        free_width = FreeWidth.build(columns, limits)
         slope = gradient.slope(columns.spacing)
         quantities = {
             "slope": slope,
@@ -105,7 +106,7 @@ class FootholdGraph:
             for node in (edge.start, edge.end)
         ]
         measured += _quantities(edge)
-        name, value = max(measured, key=lambda each: float(ratio(each[0], each[1], self.limits)[0]))
+        name, value = max(measured, key=lambda item: float(ratio(item[0], item[1], self.limits)[0]))
         return name, float(value[0])
 
 
@@ -137,6 +138,7 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
         # 1 at the limit, and 0 from twice the limit on.
         result = np.maximum(2.0 - value / limit, 0.0)
     elif name == "crouched_height":
+        # 0 from the standing height on, 1 at the crouched height, and more below.
         clearance = np.minimum(value, limits.standing_height)
         result = (limits.standing_height - clearance) / (limits.standing_height - limit)
     else:

@@ -8,10 +8,10 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray, IntArray
 from terrainkit.feasibility.columns import Columns
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.gradient import SLOPE_LENGTH
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 
 NUM_DIRECTIONS = 8
 """Number of directions in which the free width is measured."""
@@ -49,6 +49,8 @@ class FreeWidth:
         """Return the free width around the columns of a patch."""
         import cv2
 
+        # A line shorter than twice the body width has one of its ends within the body width. Rays
+        # end at the side of a cell, half a column before its center.
         reach = math.ceil(limits.body_width / columns.spacing) + 1
         kernel = np.ones((2 * reach + 1, 2 * reach + 1), dtype=np.uint8)
         ceilings = []
@@ -155,7 +157,8 @@ class FreeWidth:
                 i, j, active = i[is_open], j[is_open], active[is_open]
                 above, min_clearance = above[is_open], min_clearance[is_open]
                 # No later cell looks further back.
-                levels[cell.slope_start :] = [each[is_open] for each in levels[cell.slope_start :]]
+                later = levels[cell.slope_start :]
+                levels[cell.slope_start :] = [nodes[is_open] for nodes in later]
             if not len(active):
                 break
             levels.append(above)
@@ -201,6 +204,8 @@ class _Cell(NamedTuple):
 def _trace_ray(angle: float, length: float, spacing: float) -> list[_Cell]:
     """Return the cells that a ray of some length enters [m], in their order."""
     x, y = math.cos(angle), math.sin(angle)
+    # From the center of a cell, the sides across an axis are half a column away, then one column
+    # more each; along the ray, that is divided by the component of its direction.
     crossings = [
         ((n + 0.5) * spacing / abs(along), axis)
         for axis, along in enumerate((x, y))
@@ -208,6 +213,7 @@ def _trace_ray(angle: float, length: float, spacing: float) -> list[_Cell]:
         for n in range(math.ceil(length * abs(along) / spacing + 0.5))
     ]
     cells, at, distances = [], [0, 0], [0.0]
+    # Rounded, so that sides that meet in a corner come in the order of the axes.
     for distance, axis in sorted((round(d, 9), axis) for d, axis in crossings):
         if distance >= length:
             break

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.arrays import FloatArray
+from terrainkit.feasibility.node_arrays import FloatArray
 
 SLOPE_LENGTH = 0.1
 """Length over which ground is steep to both sides if it is a slope [m]; otherwise it is a step. A

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from terrainkit.feasibility.arrays import FloatArray
 from terrainkit.feasibility.bottleneck import Segment, bottleneck
 from terrainkit.feasibility.components import Components
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
-from terrainkit.feasibility.gaps import gap_edges
+from terrainkit.feasibility.gap_edges import gap_edges
+from terrainkit.feasibility.node_arrays import FloatArray
 
 MAX_DEMAND = 2.0
 """Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""
@@ -28,15 +28,17 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
         step_demand: Demand of each step of the graph.
         segment: The segment. Without a path, all steps are returned.
     """
-    steps, num_nodes = graph.steps, graph.columns.floor.size
+    steps = graph.steps
+    num_nodes = graph.columns.floor.size
     gaps = steps.select(slice(0))
-    # A lower bound of the demand of all gaps: the demand of cells that touch at a corner.
+    # Cells that touch at a corner are sqrt(2) - 1 columns apart, and all others at least one (see
+    # `gap_edges`): no gap between cells demands less.
     searched = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap
     without_gaps = least = bottleneck(steps, step_demand, segment, num_nodes)
     while min(least, MAX_DEMAND) > searched:
         reach = least
         if least > MAX_DEMAND:
-            reach = next(each for each in _REACHES if each > searched)
+            reach = next(length for length in _REACHES if length > searched)
         is_usable = step_demand < reach
         components = Components.build(steps, is_usable, num_nodes)
         found, is_path = _search_gaps(graph, components, _below(graph, gaps, reach), segment, reach)
@@ -50,6 +52,7 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
     if least == without_gaps:
         return usable
     # One gap into each component is enough to find the demand; a path may need to go far to it.
+    # Gaps are searched below a demand: to keep those that demand `least`, it is the next number.
     above = np.nextafter(least, np.inf)
     gaps, components = _below(graph, gaps, above), Components.build(steps, is_usable, num_nodes)
     is_reached = components.reached(segment[0], gaps)

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from terrainkit.feasibility.assess import PatchFeasibility
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.views.preview import Route
 
@@ -19,9 +19,9 @@ _UNITS = {"slope": "", "friction": ""}
 
 def demand_table(results: Sequence[PatchFeasibility]) -> list[tuple[str, ...]]:
     """Return the largest demand of each terrain in each row, as text, with a header."""
-    rows = sorted({each.row for each in results})
+    rows = sorted({patch.row for patch in results})
     table = [("terrain", *(f"level {row}" if row == rows[0] else str(row) for row in rows))]
-    for terrain in dict.fromkeys(each.terrain for each in results):
+    for terrain in dict.fromkeys(patch.terrain for patch in results):
         cells = []
         for row in rows:
             demands = [r.demand for r in results if r.terrain == terrain and r.row == row]
@@ -33,9 +33,9 @@ def demand_table(results: Sequence[PatchFeasibility]) -> list[tuple[str, ...]]:
 def crossed_texts(results: Sequence[PatchFeasibility]) -> list[str]:
     """Return how many patches of each terrain can be crossed, and up to which difficulty."""
     return [
-        f"{name}: {each['passable']} of {each['patches']} patches"
-        + ("" if (most := each["max_difficulty"]) is None else f", up to difficulty {most:.2f}")
-        for name, each in _by_terrain(results).items()
+        f"{name}: {counts['passable']} of {counts['patches']} patches"
+        + ("" if (most := counts["max_difficulty"]) is None else f", up to difficulty {most:.2f}")
+        for name, counts in _by_terrain(results).items()
     ]
 
 
@@ -45,8 +45,8 @@ def _by_terrain(results: Sequence[PatchFeasibility]) -> dict[str, dict[str, Any]
     All patches up to this difficulty are passable; it is None if the easiest one is not.
     """
     terrains = {}
-    for name in dict.fromkeys(each.terrain for each in results):
-        patches = [each for each in results if each.terrain == name]
+    for name in dict.fromkeys(patch.terrain for patch in results):
+        patches = [patch for patch in results if patch.terrain == name]
         blocked = min((p.difficulty for p in patches if not p.is_passable), default=math.inf)
         easy = [round(p.difficulty, 6) for p in patches if p.difficulty < blocked]
         terrains[name] = {
@@ -91,22 +91,22 @@ def to_json(
         **about,
         "limits": asdict(limits),
         "max_demand": MAX_DEMAND,
-        "passable": all(each.is_passable for each in results),
+        "passable": all(patch.is_passable for patch in results),
         "terrains": _by_terrain(results),
         "patches": [
             {
-                "row": each.row,
-                "col": each.col,
-                "terrain": each.terrain,
-                "difficulty": round(each.difficulty, 6),
-                "demand": each.demand if math.isfinite(each.demand) else None,
-                "passable": each.is_passable,
-                "limit": each.limit or None,
-                "value": round(each.value, 6) if math.isfinite(each.value) else None,
-                "place": each.place.round(4).tolist() if each.limit else None,
-                "path": each.path.round(4).tolist(),
+                "row": patch.row,
+                "col": patch.col,
+                "terrain": patch.terrain,
+                "difficulty": round(patch.difficulty, 6),
+                "demand": patch.demand if math.isfinite(patch.demand) else None,
+                "passable": patch.is_passable,
+                "limit": patch.limit or None,
+                "value": round(patch.value, 6) if math.isfinite(patch.value) else None,
+                "place": patch.place.round(4).tolist() if patch.limit else None,
+                "path": patch.path.round(4).tolist(),
             }
-            for each in results
+            for patch in results
         ],
     }
 
@@ -115,10 +115,10 @@ def routes(results: Sequence[PatchFeasibility]) -> list[Route]:
     """Return the paths and blocking places for `terrainkit.views.preview.write_preview`."""
     return [
         Route(
-            points=each.path[:, :2],
-            place=tuple(each.place[:2].tolist()) if each.limit else None,
-            label=demand_text(each.demand),
-            is_passable=each.is_passable,
+            points=patch.path[:, :2],
+            place=tuple(patch.place[:2].tolist()) if patch.limit else None,
+            label=demand_text(patch.demand),
+            is_passable=patch.is_passable,
         )
-        for each in results
+        for patch in results
     ]

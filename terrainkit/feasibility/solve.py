@@ -2,18 +2,18 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from terrainkit.errors import ConfigError
 from terrainkit.feasibility.assess import assess_patch
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.path_edges import MAX_DEMAND
 from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.grid import Grid
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch, build_patch
 from terrainkit.terrain.parameter import Parameter, Range, at_difficulty, parameters_of
 from terrainkit.terrain.sub_terrain import SubTerrain
@@ -27,7 +27,7 @@ _EASIEST, _HARDEST = -1.0, 3.0
 """Difficulties to search: ranges are extrapolated beyond their ends at 0 and 1."""
 
 _BISECTIONS = 9
-"""Halvings of that interval, to 0.8 % of the range."""
+"""Halvings of that interval: 4 / 2**9 is 0.8 % of the range."""
 
 _SAMPLES = 3
 """Patches of a random terrain; their median demand counts."""
@@ -83,22 +83,22 @@ def solve_ranges(
         raise ConfigError(f"{got}; expected LOW:HIGH with 0 <= LOW < HIGH <= {MAX_DEMAND:g}")
     samples = replace(config, rows=1, cols=_SAMPLES)
     parts = [_parts(sub_terrain) for sub_terrain in config.sub_terrains]
-    jobs = {_key(part): part for each in parts for part in each}
+    jobs = {_key(part): part for own_parts in parts for part in own_parts}
     solve = partial(_solve, samples, limits, demand)
     results = parallel_map(executor, solve, jobs.values())
     indices = iter([(0, k) for k in range(len(jobs))])
     steps = progress(indices, len(jobs)) if progress else indices
     solved = {key: result for key, _, result in zip(jobs, steps, results, strict=True)}
     return [
-        _solution(sub_terrain, [solved[_key(part)] for part in each])
-        for sub_terrain, each in zip(config.sub_terrains, parts, strict=True)
+        _solution(sub_terrain, [solved[_key(part)] for part in own_parts])
+        for sub_terrain, own_parts in zip(config.sub_terrains, parts, strict=True)
     ]
 
 
 def _table_name(sub_terrain: SubTerrain) -> str | None:
     """Return the name of the parameter with the elements of a course."""
     declared = parameters_of(sub_terrain.terrain_class)
-    return next((name for name, each in declared.items() if each.table), None)
+    return next((name for name, parameter in declared.items() if parameter.table), None)
 
 
 def _parts(sub_terrain: SubTerrain) -> list[SubTerrain]:
@@ -106,7 +106,7 @@ def _parts(sub_terrain: SubTerrain) -> list[SubTerrain]:
     name = _table_name(sub_terrain)
     if name is None:
         return [sub_terrain]
-    return [_with(sub_terrain, {name: (each,)}) for each in _value(sub_terrain, name)]
+    return [_with(sub_terrain, {name: (element,)}) for element in _value(sub_terrain, name)]
 
 
 def _key(part: SubTerrain) -> str:
@@ -128,9 +128,9 @@ def _solution(
         TerrainSolution(sub_terrain=_with(element, ranges), ranges=ranges, demand=demand)
         for element, (ranges, demand) in zip(_value(sub_terrain, name), results, strict=True)
     )
-    course = _with(sub_terrain, {name: tuple(each.sub_terrain for each in elements)})
+    course = _with(sub_terrain, {name: tuple(element.sub_terrain for element in elements)})
     # A course demands as much as the hardest of its elements.
-    low, high = np.max([each.demand for each in elements], axis=0).tolist()
+    low, high = np.max([element.demand for element in elements], axis=0).tolist()
     return TerrainSolution(sub_terrain=course, demand=(low, high), elements=elements)
 
 
@@ -140,33 +140,31 @@ def _solve(
     """Return the solved ranges of a sub-terrain, or of the element of a course, and the demands."""
     name = _table_name(part)
     solved_part = part if name is None else part.parameters[name][0]
-    ranges, grid = _ranges(solved_part), config.patch_grid(0, 0)
-    cache: dict[tuple[float, float], float] = {}
+    ranges = _ranges(solved_part)
+    grid = config.patch_grid(0, 0)
 
+    @cache
     def demand_at(end: float, difficulty: float) -> float:
         """Return the demand with the ranges at a difficulty, and all else at an end of the map.
 
         Values outside of the ranges may be invalid: their demand is -inf below, and inf above.
         """
-        if (end, difficulty) not in cache:
-            values = {name: r.at(difficulty, grid) for name, r in ranges.items()}
-            try:
-                terrain = _with(solved_part, values)
-                terrain = terrain if name is None else _with(part, {name: (terrain,)})
-                demand = _demand(config, limits, terrain, end)
-            except ConfigError:
-                if 0 <= difficulty <= 1:
-                    raise
-                # An invalid value counts as too easy below the range and as too hard above it,
-                # so that the bisection returns into the range.
-                demand = np.copysign(np.inf, difficulty)
-            cache[end, difficulty] = demand
-        return cache[end, difficulty]
+        values = {key: r.at(difficulty, grid) for key, r in ranges.items()}
+        try:
+            terrain = _with(solved_part, values)
+            terrain = terrain if name is None else _with(part, {name: (terrain,)})
+            return _demand(config, limits, terrain, end)
+        except ConfigError:
+            if 0 <= difficulty <= 1:
+                raise
+            # An invalid value counts as too easy below the range and as too hard above it, so that
+            # the bisection returns into the range.
+            return float(np.copysign(np.inf, difficulty))
 
     easy, hard = (_max_difficulty(partial(demand_at, end), demand[int(end)]) for end in (0.0, 1.0))
     if not ranges or easy >= hard:
         return {}, (demand_at(0.0, 0.0), demand_at(1.0, 1.0))
-    solved = {name: (r.at(easy, grid), r.at(hard, grid)) for name, r in ranges.items()}
+    solved = {key: (r.at(easy, grid), r.at(hard, grid)) for key, r in ranges.items()}
     return solved, (demand_at(0.0, easy), demand_at(1.0, hard))
 
 
@@ -218,7 +216,7 @@ def _demand(
             break
         patches.append(other)
     return float(
-        np.median([assess_patch(each, limits, config.wall_threshold).demand for each in patches])
+        np.median([assess_patch(patch, limits, config.wall_threshold).demand for patch in patches])
     )
 
 
@@ -228,7 +226,7 @@ def _is_same(first: Patch, second: Patch) -> bool:
         return False
     shift = np.append(np.subtract(second.grid.lower, first.grid.lower), 0.0)
     points = [
-        np.concatenate([*each.solids.bounds(), each.goals[:, :3]]) for each in (first, second)
+        np.concatenate([*patch.solids.bounds(), patch.goals[:, :3]]) for patch in (first, second)
     ]
     return len(points[0]) == len(points[1]) and np.allclose(points[0] + shift, points[1], atol=1e-4)
 

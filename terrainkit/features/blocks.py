@@ -61,7 +61,7 @@ def make_standing_boxes(
     """
     center = np.asarray(xy, float)
     columns = (top, np.asarray(floor, float) - SINK, yaw)
-    top, bottom, yaw = (np.broadcast_to(np.asarray(each, float), len(center)) for each in columns)
+    top, bottom, yaw = (np.broadcast_to(np.asarray(x, float), len(center)) for x in columns)
     sizes = np.column_stack([np.broadcast_to(size, center.shape), top - bottom])
     z, turned = (top + bottom) / 2, np.broadcast_to(np.asarray(tilt, float), center.shape)
     if turned.any():

@@ -50,9 +50,9 @@ def clauses() -> tuple[Clause, ...]:
     """Return all clauses, by code."""
     text = files(__package__).joinpath("building_codes.toml").read_text(encoding="utf-8")
     return tuple(
-        Clause(**limit, **{name: each[name] for name in ("code", "source", "second_hand")})
-        for each in tomllib.loads(text)["sources"]
-        for limit in each["limits"]
+        Clause(**limit, **{key: source[key] for key in ("code", "source", "second_hand")})
+        for source in tomllib.loads(text)["sources"]
+        for limit in source["limits"]
     )
 
 
@@ -69,7 +69,9 @@ def check_flight(flight: Flight, code: str) -> tuple[Clause, ...]:
     Raises:
         ConfigError: if there is no such code.
     """
-    codes = list(dict.fromkeys(each.code for each in clauses()))
+    codes = list(dict.fromkeys(clause.code for clause in clauses()))
     if code not in codes:
         raise ConfigError(f"no building code {code!r}; {expected_names(code, codes)}")
-    return tuple(each for each in clauses() if each.code == code and not each.is_met(flight))
+    return tuple(
+        clause for clause in clauses() if clause.code == code and not clause.is_met(flight)
+    )

@@ -129,7 +129,8 @@ class Curbside(Lane):
             ConfigError: if they do not fit.
         """
         edges, length = self.slot_edges(grid), self.strip
-        ramp, is_tree = rng.integers(len(edges) - 1), rng.random(len(edges) - 1) < self.trees
+        ramp = rng.integers(len(edges) - 1)
+        is_tree = rng.random(len(edges) - 1) < self.trees
         parts, blocks = [], []
         for k, (y0, y1) in enumerate(itertools.pairwise(edges)):
             y = (y0 + y1) / 2
@@ -163,8 +164,8 @@ class Curbside(Lane):
         across = y + np.array([-outer, -inner, inner, outer])
         low, top = -self.gutter, self.curb
         return make_ramps(
-            [(0.0, each) for each in across[:-1]],
-            [(run, each) for each in across[1:]],
+            [(0.0, y) for y in across[:-1]],
+            [(run, y) for y in across[1:]],
             [(top, top, top, low), (low, top, top, low), (low, top, top, top)],
             floor=low,
         )

@@ -62,16 +62,16 @@ class FloorPlan:
     def walls(self) -> list[Line]:
         """Return the walls between two rooms, as one where they are in line."""
         lines: list[Line] = []
-        for each in sorted(
+        for wall in sorted(
             (line for _, line in _shared(self.rooms)), key=lambda k: (k.axis, k.position, k.start)
         ):
             last = lines[-1] if lines else None
-            in_line = last and last.axis == each.axis and abs(last.position - each.position) < 1e-9
-            if last and in_line and each.start <= last.end + 1e-9:
-                end = max(last.end, each.end)
+            in_line = last and last.axis == wall.axis and abs(last.position - wall.position) < 1e-9
+            if last and in_line and wall.start <= last.end + 1e-9:
+                end = max(last.end, wall.end)
                 lines[-1] = Line(axis=last.axis, position=last.position, start=last.start, end=end)
             else:
-                lines.append(each)
+                lines.append(wall)
         return lines
 
     def path(self, target: int) -> list[tuple[Door, int]]:
@@ -127,7 +127,8 @@ def sample_floor_plan(
         if middle < y:
             rooms.append((edges[k], middle, edges[k + 1], y))
     array = np.array(rooms)
-    group, doors = np.arange(len(array)), []
+    group = np.arange(len(array))
+    doors = []
     # A room is connected to those before it, so that the doors form a tree, with some more doors.
     chances = rng.random((len(array), len(array), 2))
     for (a, b), line in _shared(array):

@@ -1,5 +1,6 @@
 """Lane: a patch that a robot crosses along x from a flat start, and positions along it."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,21 @@ class Lane(Terrain):
                 f"{grid.size[0]:g} m long"
             )
         return np.float64(grid.lower[0] + first) + np.arange(int(number) + 1) * ((low + high) / 2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlotLane(Lane):
+    """The parent class of lanes with an element in each slot, and a goal at the end of each."""
+
+    @abstractmethod
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal at the end of each slot."""
+        return lane_goals(grid, self.slot_edges(grid)[1:])
 
 
 def lane_spawn(grid: Grid, start: float) -> tuple[float, float]:

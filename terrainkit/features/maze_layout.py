@@ -25,24 +25,30 @@ class MazeLayout:
         Returns:
             Cells (i, j), shape (k, 2). The last one is outside of the maze. Empty without an exit.
         """
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import breadth_first_order
-
         nx, ny = self.walls_y.shape[0], self.walls_x.shape[1]
-        number = np.arange((nx + 1) * ny).reshape(nx + 1, ny)  # with the cells behind the exits
-        is_open = ~self.walls_x[1:], ~self.walls_y[:, 1:-1]
-        low = np.concatenate([number[:-1][is_open[0]], number[:-1, :-1][is_open[1]]])
-        high = np.concatenate([number[1:][is_open[0]], number[:-1, 1:][is_open[1]]])
-        graph = coo_array((np.ones(len(low)), (low, high)), shape=(number.size, number.size))
-        first = int(number[start])
-        order, before = breadth_first_order(graph.tocsr(), first, directed=False)
-        behind = order[order >= nx * ny]
-        if not len(behind):
-            return np.empty((0, 2), dtype=np.int64)
-        path = [int(behind[0])]
-        while path[-1] != first:
-            path.append(int(before[path[-1]]))
-        return np.stack(np.unravel_index(path[::-1], number.shape), axis=-1)
+        before, cells = {start: start}, [start]
+        for i, j in cells:  # breadth first: the list grows while it is read
+            if i == nx:
+                return np.array(_way_back(before, (i, j))[::-1])
+            ways = {
+                (i, j + 1): j + 1 < ny and not self.walls_y[i, j + 1],
+                (i + 1, j): not self.walls_x[i + 1, j],
+                (i - 1, j): i > 0 and not self.walls_x[i, j],
+                (i, j - 1): j > 0 and not self.walls_y[i, j],
+            }
+            reached = [cell for cell, is_open in ways.items() if is_open and cell not in before]
+            before |= dict.fromkeys(reached, (i, j))
+            cells += reached
+        return np.empty((0, 2), dtype=np.int64)
+
+
+def _way_back(
+    before: dict[tuple[int, int], tuple[int, int]], cell: tuple[int, int]
+) -> list[tuple[int, int]]:
+    path = [cell]
+    while before[path[-1]] != path[-1]:
+        path.append(before[path[-1]])
+    return path
 
 
 def sample_maze(shape: tuple[int, int], opened: float, rng: np.random.Generator) -> MazeLayout:

@@ -1,13 +1,83 @@
-"""Flat ground with a pit, in which solids can stand.
+"""Flat ground with a pit, in which solids can stand, and the parent classes of such terrains.
 
 The outermost cells of the patch are at height 0, so that it meets the next patch without a cliff.
+The parent classes are no dataclasses: a subclass declares their fields among its own, so that the
+parameters of each terrain keep their order.
 """
 
+from typing import ClassVar
+
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import ConfigError
+from terrainkit.features.lane import SlotLane, lane_goals
 from terrainkit.geometry.grid import Grid
+from terrainkit.terrain import Terrain
+
+
+class PitTerrain(Terrain):
+    """The parent class of terrains over a pit around a platform."""
+
+    has_random_heights: ClassVar[bool] = False
+
+    depth: float
+    """Depth of the pit [m]."""
+
+    platform: float
+    """Side of the flat square at the center [m]."""
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return the pit around the platform."""
+        return pit_around(grid, self.depth, self.platform)
+
+
+class PitLane(SlotLane):
+    """The parent class of lanes over a pit, from the first slot to a gap behind the last."""
+
+    has_random_heights: ClassVar[bool] = False
+
+    gap: float
+    """Distance between two elements along x [m]."""
+
+    depth: float
+    """Depth of the pit [m]."""
+
+    end: float
+    """Minimum length along x behind the last element, with its gap [m]."""
+
+    def pit_slots(
+        self, grid: Grid, spacing: tuple[float, float], *, element: str, length: float
+    ) -> NDArray[np.float64]:
+        """Return the edges of the slots, with at least a cell of ground behind the pit [m].
+
+        The arguments are the same as in `slots`.
+        """
+        end = max(self.end, self.gap + grid.cell)
+        return self.slots(grid, spacing, element=element, length=length, end=end)
+
+    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
+        """Return 0, and `-depth` in the pit."""
+        edges = self.slot_edges(grid)
+        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
+
+    def goals(
+        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
+    ) -> NDArray[np.floating]:
+        """Return a goal behind the pit."""
+        return self.pit_goals(grid, [])
+
+    def pit_goals(self, grid: Grid, x: ArrayLike) -> NDArray[np.float64]:
+        """Return goals on elements over the pit at height 0, and one behind the pit.
+
+        Args:
+            grid: Grid of the patch.
+            x: Positions of the goals over the pit along x [m], shape (k,).
+        """
+        behind = (self.slot_edges(grid)[-1] + self.gap + grid.upper[0]) / 2
+        goals = lane_goals(grid, np.append(x, behind))
+        goals[:-1, 2] = 0.0  # the elements; noise may change the ground behind the pit
+        return goals
 
 
 def pit_around(grid: Grid, depth: float, platform: float) -> NDArray[np.float64]:

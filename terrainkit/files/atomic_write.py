@@ -102,7 +102,7 @@ def check_target(path: Path, *, overwrite: bool) -> None:
 
 def check_parents(path: Path) -> None:
     """Raise ExportError if the folder of `path` does not exist and cannot be created."""
-    existing = next((each for each in path.parents if os.path.lexists(each)), path.parent)
+    existing = next((parent for parent in path.parents if os.path.lexists(parent)), path.parent)
     if not existing.is_dir():
         raise ExportError(f"cannot write {path}: {existing} is not a folder")
     if existing != path.parent and not os.access(existing, os.W_OK):
@@ -112,7 +112,7 @@ def check_parents(path: Path) -> None:
 @contextmanager
 def _new_parents(path: Path) -> Iterator[None]:
     """Create the folders above `path`; if the block raises, remove those that were missing."""
-    missing = [each for each in path.parents if not each.exists()]
+    missing = [parent for parent in path.parents if not parent.exists()]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield
@@ -145,6 +145,8 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
 
 
 def _is_running(pid: int) -> bool:
-    import psutil
-
+    try:
+        import psutil
+    except ModuleNotFoundError:  # the light installation leaves the files of killed processes
+        return True
     return bool(psutil.pid_exists(pid))

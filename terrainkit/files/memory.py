@@ -1,5 +1,6 @@
 """Check that work fits in memory before it starts."""
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -80,10 +81,13 @@ def check_address_space(needed: int, what: str) -> None:
 
 def free_memory() -> int:
     """Return the memory that this process may still allocate [bytes]."""
-    import psutil
-
     # Containers and schedulers kill a process that exceeds the limit of its control group.
-    return max(0, min([int(psutil.virtual_memory().available), *_control_group_limits()]))
+    limits = [*_control_group_limits()]
+    with suppress(ModuleNotFoundError):  # in the light installation, allocations may fail instead
+        import psutil
+
+        limits.append(int(psutil.virtual_memory().available))
+    return max(0, min(limits, default=sys.maxsize))
 
 
 def limit_allocations(num_workers: int) -> None:

@@ -91,8 +91,8 @@ def decompose_boxes(
     np.copyto(low, heights, where=flat)
     _drop_patches_without_walls(flat, node_grid, patch_edges)
     edges = [
-        np.union1d(lines, changes(each)).tolist()
-        for lines, each in zip(patch_edges, (friction, friction.T), strict=True)
+        np.union1d(lines, changes(values)).tolist()
+        for lines, values in zip(patch_edges, (friction, friction.T), strict=True)
     ]
     differ_x = (flat[1:] != flat[:-1]) | (low[1:] != low[:-1])
     differ_y = (flat[:, 1:] != flat[:, :-1]) | (low[:, 1:] != low[:, :-1])
@@ -245,8 +245,8 @@ def merge_boxes(
     before = -1
     while len(boxes) != before:
         before = len(boxes)
-        for each in max_length:
-            boxes = _merge_along_x(boxes, each)[:, [0, 3, 4, 1, 2]]
+        for length in max_length:
+            boxes = _merge_along_x(boxes, length)[:, [0, 3, 4, 1, 2]]
     return boxes
 
 

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from terrainkit.geometry.ground_surface import WallTable, on_triangle
 from terrainkit.geometry.ray_grid import NUDGE, Floats, RayGrid
-from terrainkit.geometry.surface import WallTable, on_triangle
 
 _LEVELS, _FACTOR = 4, 4
 """Number of sizes of squares, and their ratio."""
@@ -45,9 +45,9 @@ class GroundRays:
         while len(tops) < _LEVELS:
             top = np.maximum.reduceat(tops[-1], np.arange(0, tops[-1].shape[0], _FACTOR), axis=0)
             tops.append(np.maximum.reduceat(top, np.arange(0, top.shape[1], _FACTOR), axis=1))
-        self._top = np.concatenate([each.ravel() for each in tops])
-        self._start = np.cumsum([0, *(each.size for each in tops[:-1])])
-        self._columns = np.array([each.shape[1] for each in tops])
+        self._top = np.concatenate([top.ravel() for top in tops])
+        self._start = np.cumsum([0, *(top.size for top in tops[:-1])])
+        self._columns = np.array([top.shape[1] for top in tops])
 
     def cast(self, origins: Floats, directions: Floats, limits: Floats) -> Floats:
         """Return the distance at which each ray meets the ground [m], its limit where it does not.

@@ -44,7 +44,7 @@ class RayGrid:
         # A ray along an axis never reaches the next square along the other axis.
         step[:2] = np.where(np.abs(step[:2]) < 1e-9, 1e-9, step[:2])
         inverse = 1 / step[:2]
-        edges = [(each[:, None] - position[:2]) * inverse for each in rectangle]
+        edges = [(edge[:, None] - position[:2]) * inverse for edge in rectangle]
         start = np.maximum(np.minimum(*edges).max(axis=0), 0.0)
         stop = np.minimum(np.maximum(*edges).min(axis=0), limits)
         state = np.vstack([position, step, inverse, start, stop])

@@ -78,7 +78,8 @@ def _decompose_component(required: Mask, allowed: Mask) -> list[Span]:
 def _row_bits(mask: Mask) -> list[int]:
     """Return each row as an integer whose bit j is cell j."""
     packed = np.packbits(mask, axis=1, bitorder="little")
-    data, n = packed.tobytes(), packed.shape[1]
+    data = packed.tobytes()
+    n = packed.shape[1]
     return [int.from_bytes(data[i : i + n], "little") for i in range(0, len(data), n)]
 
 
@@ -103,7 +104,10 @@ def _maximal_rectangles(required: list[int], allowed: list[int]) -> Iterator[tup
 
 def _select(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle, int]]:
     """Return rectangles in greedy order, each with the cells that it was the first to cover."""
-    queue = [(-each.required.bit_count(), -each.area, k) for k, each in enumerate(candidates)]
+    queue = [
+        (-candidate.required.bit_count(), -candidate.area, k)
+        for k, candidate in enumerate(candidates)
+    ]
     heapq.heapify(queue)
     selected = []
     while missing:
@@ -123,7 +127,8 @@ def _select(candidates: list[_Rectangle], missing: int) -> list[tuple[_Rectangle
 
 def _drop_redundant(selected: list[tuple[_Rectangle, int]]) -> list[_Rectangle]:
     """Return the chosen rectangles, last first, except those that others cover."""
-    kept, covered = [], 0
+    kept = []
+    covered = 0
     for rectangle, first in reversed(selected):
         # Earlier rectangles do not cover the cells that this one was the first to cover.
         if first & ~(covered >> rectangle.shift):

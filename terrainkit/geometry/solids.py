@@ -183,9 +183,9 @@ def check_solids(solids: object) -> None:
         raise ConfigError(f"solids: got {type(solids).__name__}; expected Solids")
     for name, like in vars(Solids.empty()).items():
         array = np.asarray(getattr(solids, name))
-        kinds = [(each.dtype, each.ndim, each.shape[1:]) for each in (array, like)]
+        kinds = [(values.dtype, values.ndim, values.shape[1:]) for values in (array, like)]
         if kinds[0] != kinds[1]:
-            got, expected = (f"{each.dtype} {each.shape}" for each in (array, like))
+            got, expected = (f"{values.dtype} {values.shape}" for values in (array, like))
             raise ConfigError(f"solids.{name}: got {got}; expected {expected} with any first size")
     shapes, counts = np.concatenate([solids.boxes, solids.cylinders]), solids.hull_counts
     lengths = {len(getattr(solids, name)) for name in _PER_SOLID}
@@ -282,7 +282,7 @@ def make_hulls(
     """
     if not len(points):
         return Solids.empty()
-    hulls = [_hull_vertices(np.asarray(each, dtype=np.float32)) for each in points]
+    hulls = [_hull_vertices(np.asarray(hull, dtype=np.float32)) for hull in points]
     flags = _flags(len(hulls), friction, collides, visible)
     return replace(
         Solids.empty(),
@@ -341,13 +341,19 @@ def quaternions(rotation: ArrayLike) -> NDArray[np.float64]:
     Returns:
         Quaternions (w, x, y, z), shape (n, 4).
     """
-    matrices = np.asarray(rotation, float)
-    if not len(matrices):
-        return np.empty((0, 4))
-    from scipy.spatial.transform import Rotation
-
-    xyzw = np.atleast_2d(Rotation.from_matrix(matrices).as_quat())
-    return xyzw[:, [3, 0, 1, 2]]
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(np.asarray(rotation, float), 0, -1)
+    products = np.array(  # of the components of 2 q
+        [
+            [1 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx],
+            [xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy],
+            [yx - xy, xz + zx, yz + zy, 1 - xx - yy + zz],
+        ]
+    )
+    # Each row is a multiple of q; the largest is the most exact.
+    largest = np.argmax(np.diagonal(products), axis=-1)
+    rows = products[largest, :, np.arange(len(largest))]
+    return np.asarray(rows / np.linalg.norm(rows, axis=-1, keepdims=True))
 
 
 def _make(
@@ -359,17 +365,17 @@ def _make(
     collides: ArrayLike,
     visible: ArrayLike,
 ) -> Solids:
-    vectors = [np.asarray(each, float) for each in (center, half_size, rpy)]
-    vectors = [each if each.size else each.reshape(-1, 3) for each in vectors]
-    flags = [(np.size(each), 1) for each in (friction, collides, visible)]
+    vectors = [np.asarray(values, float) for values in (center, half_size, rpy)]
+    vectors = [vector if vector.size else vector.reshape(-1, 3) for vector in vectors]
+    flags = [(np.size(values), 1) for values in (friction, collides, visible)]
     try:
-        n, _ = np.broadcast_shapes((1, 3), *(each.shape for each in vectors), *flags)
+        n, _ = np.broadcast_shapes((1, 3), *(vector.shape for vector in vectors), *flags)
     except ValueError:
-        given = ", ".join(str(each.shape) for each in vectors)
+        given = ", ".join(str(vector.shape) for vector in vectors)
         raise ConfigError(
             f"center, size and rpy of {kind}: got shapes {given}; expected (3,) or the same (n, 3)"
         ) from None
-    center, half_size, rpy = (np.broadcast_to(each, (n, 3)) for each in vectors)
+    center, half_size, rpy = (np.broadcast_to(vector, (n, 3)) for vector in vectors)
     for name, values in (("center", center), ("size", half_size), ("rpy", rpy)):
         if not (np.abs(values) <= MAX_VALUE).all():
             raise ConfigError(f"{name} of {kind}: expected finite values up to {MAX_VALUE:g}")

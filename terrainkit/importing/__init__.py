@@ -12,7 +12,7 @@ __all__ = ["ImportOptions", "ImportReport", "ImportedMap", "import_map", "import
 
 
 def __getattr__(name: str) -> Any:
-    # They are in terrainkit.map, which imports this package.
+    # They are in packages that import this one.
     if name in __all__:
         return getattr(import_module("terrainkit"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

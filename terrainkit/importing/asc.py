@@ -9,10 +9,10 @@ import numpy as np
 
 from terrainkit.errors import listing
 from terrainkit.importing.georeference import Georeference
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.height_source import decode
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.pixels import pixels_raster
 from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import decode
 from terrainkit.settings.toml_text import read_text
 
 SUFFIXES = (".asc",)

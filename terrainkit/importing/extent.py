@@ -7,7 +7,7 @@ import numpy as np
 
 from terrainkit.errors import HeightFileError
 from terrainkit.files.memory import check_memory
-from terrainkit.importing.source import Source, warn
+from terrainkit.importing.height_source import Source, warn
 
 MIN_CELLS = 10
 """Least number of cells along the longer side."""

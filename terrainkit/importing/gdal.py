@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from terrainkit.importing import asc
 from terrainkit.importing.georeference import Georeference
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.height_source import decode, require
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.pixels import MAX_PIXELS, pixels_raster
 from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import decode, require
 
 _DRIVERS = {".hgt": "SRTMHGT", ".dem": "USGSDEM", ".bil": "EHdr", ".img": "HFA"}
 _DRIVERS |= dict.fromkeys((".dt0", ".dt1", ".dt2"), "DTED")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing.source import warn
+from terrainkit.importing.height_source import warn
 from terrainkit.settings.type_hint import MAX_VALUE, MIN_SIZE
 
 Transform = tuple[float, float, float, float, float, float]
@@ -103,7 +103,8 @@ class Georeference:
             return max(east, 0.0), north, f"{size} degrees at latitude {y:.4g}"
         if self.is_web_mercator:
             sine = math.tanh(y * self.unit / _EARTH_RADIUS)
-            factor, latitude = self.unit * math.sqrt(1 - sine**2), math.degrees(math.asin(sine))
+            factor = self.unit * math.sqrt(1 - sine**2)
+            latitude = math.degrees(math.asin(sine))
             return factor, factor, f"{size} m of web maps at latitude {latitude:.4g}"
         unit = "m" if self.unit == 1 else f"units of {self.unit:g} m"
         return self.unit, self.unit, f"{size} {unit}"

@@ -13,10 +13,10 @@ from terrainkit.errors import HeightFileError, install_command
 from terrainkit.importing.gdal import read_gdal
 from terrainkit.importing.georeference import Georeference
 from terrainkit.importing.geotiff import read_geo_tags
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.height_source import decode, is_installed
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.pixels import MAX_PIXELS, pixels_raster
 from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import decode, is_installed
 from terrainkit.settings.toml_text import read_text
 
 _TIFF_SUFFIXES = (".tif", ".tiff")

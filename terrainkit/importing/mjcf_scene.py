@@ -12,10 +12,10 @@ import numpy as np
 
 from terrainkit.errors import HeightFileError, listing
 from terrainkit.files.child_process import ProcessLimits
-from terrainkit.importing.mesh_file import MeshSource, make_mesh_source
+from terrainkit.importing.height_source import Array, decode, warn
+from terrainkit.importing.import_options import ReadOptions
+from terrainkit.importing.mesh_source import MeshSource, make_mesh_source
 from terrainkit.importing.mjcf_text import read_text
-from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.source import Array, decode, warn
 
 SUFFIXES = (".xml",)
 
@@ -111,7 +111,9 @@ def _geom_meshes(model: Any, data: Any) -> Iterator[tuple[Array, Any]]:
     lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
     order = np.argsort(model.geom_type == Geom.mjGEOM_PLANE, kind="stable")
     for k in order[model.geom_group[order] == 1].tolist():
-        kind, size, asset = Geom(model.geom_type[k]), model.geom_size[k], model.geom_dataid[k]
+        kind = Geom(model.geom_type[k])
+        size = model.geom_size[k]
+        asset = model.geom_dataid[k]
         place, axes = data.geom_xpos[k], data.geom_xmat[k].reshape(3, 3)
         if kind == Geom.mjGEOM_PLANE:
             if lower[0] > upper[0]:

@@ -11,10 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lxml import etree
-
 from terrainkit.errors import HeightFileError, prefixed_errors
-from terrainkit.importing.source import MAX_FILE_BYTES, check_file
+from terrainkit.importing.height_source import MAX_FILE_BYTES, check_file
 
 MAX_ELEMENTS = 100_000
 """Most elements, copies included; MuJoCo needs seconds for this many."""
@@ -59,7 +57,7 @@ def read_text(path: Path) -> MjcfText:
     with prefixed_errors(f"{path}: "):
         try:
             reader.scene.text, _ = reader.model(path, ())
-        except (etree.XMLSyntaxError, ValueError) as error:
+        except (SyntaxError, ValueError) as error:
             raise HeightFileError(f"cannot be read: {error}") from error
     return reader.scene
 
@@ -71,6 +69,8 @@ class _Reader:
 
     def model(self, path: Path, parents: tuple[Path, ...]) -> tuple[str, int]:
         """Return the text of a model, and its number of elements, copies included."""
+        from lxml import etree
+
         root = self._document(path, path.parent, parents)
         if root.tag != "mujoco":
             raise HeightFileError(f"got the root <{root.tag}>; expected <mujoco>")
@@ -89,6 +89,8 @@ class _Reader:
 
     def _document(self, path: Path, folder: Path, parents: tuple[Path, ...]) -> Any:
         """Return the root of a document, with the included documents in their places."""
+        from lxml import etree
+
         if path in parents:
             raise HeightFileError("got a file that includes itself")
         check_file(path)
@@ -107,7 +109,8 @@ class _Reader:
         )
         root = etree.fromstring(data, parser)
         for include in [*root.iter("include")]:
-            name, parent = include.get("file", ""), include.getparent()
+            name = include.get("file", "")
+            parent = include.getparent()
             file = folder / name if (folder / name).exists() else path.parent / name
             with prefixed_errors(f"{name}: "):
                 part = self._document(file, folder, (*parents, path))

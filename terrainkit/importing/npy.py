@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.height_source import decode
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
-from terrainkit.importing.source import decode
 
 SUFFIXES = (".npy", ".npz")
 

@@ -21,8 +21,8 @@ from terrainkit.geometry.solids import (
     make_boxes,
     make_hulls,
 )
-from terrainkit.importing.columns import MIN_GAP, Columns
-from terrainkit.importing.mesh_file import MeshSource
+from terrainkit.importing.mesh_columns import MIN_GAP, Columns
+from terrainkit.importing.mesh_source import MeshSource
 
 PARAMETERS = {**SEARCH, "threshold": 0.03, "max_convex_hull": 32}
 """Parameters of CoACD."""
@@ -165,7 +165,7 @@ def _above(body: Any, cut: NDArray[np.float64], grid: Grid, threshold: float) ->
     low, high = np.array(body.bounding_box()).reshape(2, 3)
     start = np.floor((low[:2] - grid.lower) / grid.cell).astype(int) - 1
     end = np.ceil((high[:2] - grid.lower) / grid.cell).astype(int) + 1
-    start, end = (np.clip(each, 0, grid.shape) for each in (start, end))
+    start, end = (np.clip(index, 0, grid.shape) for index in (start, end))
     block = cut[start[0] : end[0], start[1] : end[1]]
     surface = np.where(np.isnan(block), high[2] + 1.0, block).astype(np.float32)
     if min(surface.shape) < 2 or surface.min() >= high[2]:
@@ -183,6 +183,7 @@ def _above(body: Any, cut: NDArray[np.float64], grid: Grid, threshold: float) ->
 
 def _make_solid(points: NDArray[np.float64]) -> Solids:
     """Return the box that has these corners, or else their convex hull."""
+    # Of a box, the two shortest edges from a corner are along two of its axes.
     edges = points[1:] - points[0]
     lengths = np.linalg.norm(edges, axis=1)
     first, second = edges[np.argsort(lengths)[:2]]

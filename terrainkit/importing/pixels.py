@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.importing.georeference import Georeference
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
 
 MAX_PIXELS = 1 << 28

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing.options import MAX_POSITION, ReadOptions
-from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import (
+from terrainkit.importing.height_source import (
     Array,
     Source,
     VertexSource,
@@ -20,6 +18,8 @@ from terrainkit.importing.source import (
     require,
     with_z_up,
 )
+from terrainkit.importing.import_options import MAX_POSITION, ReadOptions
+from terrainkit.importing.raster import Raster
 
 SUFFIXES = (".xyz", ".pcd", ".las", ".laz")
 
@@ -61,8 +61,9 @@ class PointSource(VertexSource):
             Heights [m], shape (nx, ny), NaN in cells without points.
         """
         inner, number = cover_positions((x, y), self.lower, self.upper)
-        step, shape = x[1] - x[0] if len(x) > 1 else self.cell, tuple(map(len, inner))
-        edges = [np.append(each - step / 2, each[-1] + _BEYOND * step) for each in inner]
+        step = x[1] - x[0] if len(x) > 1 else self.cell
+        shape = tuple(map(len, inner))
+        edges = [np.append(lines - step / 2, lines[-1] + _BEYOND * step) for lines in inner]
         i, j = (np.searchsorted(edges[k], self.vertices[:, k], "right") - 1 for k in (0, 1))
         is_inside = (i >= 0) & (i < shape[0]) & (j >= 0) & (j < shape[1])
         column, z = (i * shape[1] + j)[is_inside], self.vertices[is_inside, 2]
@@ -121,20 +122,20 @@ def _make_raster(points: Array) -> Raster | None:
     values = np.full(tuple(map(len, axes)), np.nan, np.float32)
     if min(values.shape) < 2 or not _FULL * values.size <= len(points) <= values.size:
         return None
-    steps = np.concatenate([np.diff(each) for each in axes])
+    steps = np.concatenate([np.diff(axis) for axis in axes])
     values[index] = points[:, 2]
     # Rounded coordinates in no order may be at the same position.
     if np.ptp(steps) > 1e-3 * steps[0] or np.count_nonzero(~np.isnan(values)) < len(points):
         return None
     cell = round(float(steps.mean()), 9)
-    x, y = (float(each[0]) - cell / 2 for each in axes)
+    x, y = (float(axis[0]) - cell / 2 for axis in axes)
     return Raster(values=values, spacing=(cell, cell), lower=(x, y))
 
 
 def _read_xyz(path: Path) -> dict[str, Any]:
     with path.open(encoding="utf-8", errors="replace") as file:
         first = file.readline()
-    delimiter = next((each for each in ",;" if each in first), None)
+    delimiter = next((character for character in ",;" if character in first), None)
     skip = int(not first.lstrip().startswith(tuple("+-.0123456789")))
     columns: dict[str, Any] = {"usecols": (0, 1, 2), "ndmin": 2, "comments": ("#", "/")}
     return {"points": np.loadtxt(path, delimiter=delimiter, skiprows=skip, **columns)}
@@ -147,7 +148,7 @@ def _read_pcd(path: Path) -> dict[str, Any]:
     rows = [line.split() for line in head.decode("ascii", "replace").splitlines()]
     header = {key: values for key, *values in filter(None, rows)}
     names = header["FIELDS"]
-    counts = [int(each) for each in header.get("COUNT", ["1"] * len(names))]
+    counts = [int(count) for count in header.get("COUNT", ["1"] * len(names))]
     places = [names.index(name) for name in "xyz"]
     if kind.strip() == b"ascii":
         columns = np.cumsum([0, *counts])[places].tolist()

@@ -11,9 +11,9 @@ from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.files.memory import check_memory
 from terrainkit.importing.extent import check_length, check_samples
 from terrainkit.importing.georeference import Georeference
+from terrainkit.importing.height_source import Array, fill_missing, open_source, warn
+from terrainkit.importing.import_options import Missing, ReadOptions
 from terrainkit.importing.nodata import find_nodata
-from terrainkit.importing.options import Missing, ReadOptions
-from terrainkit.importing.source import Array, fill_missing, open_source, warn
 from terrainkit.settings.type_hint import MAX_VALUE
 
 _BYTES_PER_VALUE = 40
@@ -80,7 +80,7 @@ class Raster:
         """
         from scipy.ndimage import map_coordinates, uniform_filter
 
-        step = max(float(np.abs(np.diff(each)).max(initial=0.0)) for each in (x, y))
+        step = max(float(np.abs(np.diff(axis)).max(initial=0.0)) for axis in (x, y))
         widths = [
             2 * int(min(step / side / 2 + _ALIGNED, n)) + 1
             for side, n in zip(self.spacing, self.values.shape, strict=True)
@@ -91,12 +91,12 @@ class Raster:
                 (x, y), self.lower, self.spacing, self.values.shape, strict=True
             )
         ]
-        nearest = [np.rint(each) for each in index]
+        nearest = [np.rint(position) for position in index]
         is_aligned = all(
             np.abs(a - b).max() < _ALIGNED for a, b in zip(index, nearest, strict=True)
         )
         if is_aligned and widths == [1, 1]:
-            i, j = (each.astype(int) for each in nearest)
+            i, j = (position.astype(int) for position in nearest)
             return np.asarray(self.values[np.ix_(i, j)], dtype=float)
         grid = np.meshgrid(*index, indexing="ij")
 
@@ -175,8 +175,11 @@ def make_raster(
         spacing, lower = reference.cells(path, values.T.shape)
     scale, offset = _scale_and_offset(path, values.dtype, options, reference)
     if spacing is None or scale is None:
-        needed = ["--file-cell 0.1 (0.1 m between samples)"] * (spacing is None)
-        needed += [_HEIGHT_OPTIONS.get(kind, "")] * (scale is None)
+        needed = []
+        if spacing is None:
+            needed.append("--file-cell 0.1 (0.1 m between samples)")
+        if scale is None:
+            needed.append(_HEIGHT_OPTIONS.get(kind, ""))
         raise ConfigError(
             f"{path}: got {values.dtype} values without their distance or height in meters; "
             f"expected for example {' '.join(needed)}, or a .json beside it"
@@ -194,7 +197,7 @@ def make_raster(
     sides = [n * length for n, length in zip(values.shape, spacing, strict=True)]
     known = heights[~np.isnan(heights)]
     if known.size and np.ptp(known) > _MAX_RELIEF * max(sides):
-        file_cell = " ".join(f"{111_000 * each:.6g}" for each in spacing)
+        file_cell = " ".join(f"{111_000 * step:.6g}" for step in spacing)
         warn(
             f"{path}: got {sides[0]:.6g} m x {sides[1]:.6g} m with heights over "
             f"{np.ptp(known):.4g} m; are they in centimeters (--scale 0.01), or positions in "

@@ -27,7 +27,7 @@ def column_names(terrain_map: TerrainMap) -> list[str]:
     names: list[str] = []
     for types in terrain_map.patch_names.T:
         name = str(types[0]) if (types == types[0]).all() else "mixed"
-        count = sum(each.split("#")[0] == name for each in names)
+        count = sum(sub_name.split("#")[0] == name for sub_name in names)
         names.append(f"{name}#{count + 1}" if count else name)
     return names
 

@@ -68,7 +68,8 @@ def terrain_importer_cfg(
     terrain_map = TerrainMap.load(path)
     requirements.require_one_friction(terrain_map, "the mesh of Isaac Lab's terrain importer")
     requirements.require_whole_solids(terrain_map, "the mesh of Isaac Lab's terrain importer")
-    config, samples = terrain_map.config, max(terrain_map.heights.shape)
+    config = terrain_map.config
+    samples = max(terrain_map.heights.shape)
     if heightfield is None:
         heightfield = not len(terrain_map.solids) and samples <= _MAX_SAMPLES
     if heightfield:
@@ -145,10 +146,12 @@ class MapGenerator:
         """Configuration of the generator."""
 
         is_heightfield = all(
-            getattr(each, "convert_to_heightfield", False) for each in cfg.sub_terrains.values()
+            getattr(terrain, "convert_to_heightfield", False)
+            for terrain in cfg.sub_terrains.values()
         )
         _require_contacts(terrain_map, is_heightfield=is_heightfield)
-        mesh, center = terrain_map.mesh(), np.array([*terrain_map.grid.center, 0.0])
+        mesh = terrain_map.mesh()
+        center = np.array([*terrain_map.grid.center, 0.0])
         vertices = mesh.vertices - center
         if is_heightfield:
             # Newton samples the mesh from its edge on: the samples of the map, without the rim.
@@ -163,12 +166,12 @@ class MapGenerator:
         points = {"init_pos": terrain_map.spawns, "target": terrain_map.goals}
         self.flat_patches = {
             name: torch.tensor(
-                pad_points(each[..., :3], terrain_map.env_origins) - center,
+                pad_points(poses[..., :3], terrain_map.env_origins) - center,
                 dtype=torch.float,
                 device=device,
             )
-            for name, each in points.items()
-            if each.shape[2]
+            for name, poses in points.items()
+            if poses.shape[2]
         }
         """Spawn positions and goals of each patch [m], shape (rows, cols, k, 3)."""
 

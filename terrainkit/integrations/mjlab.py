@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum import SamplerName
 from terrainkit.errors import ExportError
-from terrainkit.export.mjcf import Collision
-from terrainkit.importing.options import ImportOptions
+from terrainkit.export.mjcf_map import Collision
+from terrainkit.importing.import_options import ImportOptions
 from terrainkit.integrations import column_names, missing
 from terrainkit.integrations.mujoco import make_spec, static_mesh
-from terrainkit.map.import_map import ImportedMap
 from terrainkit.map.terrain_map import TerrainMap
-from terrainkit.map.terrain_mesh import import_terrain_mesh
+from terrainkit.map_import.import_map import ImportedMap
+from terrainkit.map_import.terrain_mesh import import_terrain_mesh
 
 try:
     import mujoco
@@ -49,7 +49,7 @@ def terrain_entity_cfg(
     Args:
         path: Path of a .npz file. mjlab writes its configuration to a file, so a map itself is not
             accepted.
-        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf_map.export`.
         max_init_terrain_level: Highest initial level; None for the last row.
 
     Raises:
@@ -171,13 +171,12 @@ class MapColumnCfg(SubTerrainCfg):
             frame = spec.body("terrain").add_frame(pos=[-x, -y, 0.0])
             spec.attach(child, frame=frame, prefix="map/")
         corner = np.array([*terrain_map.config.patch_grid(row, self.column).lower, 0.0])
-        points = {
-            name: each[row, self.column] - corner for name, each in _point_sets(terrain_map).items()
-        }
+        sets = _point_sets(terrain_map)
+        points = {name: poses[row, self.column] - corner for name, poses in sets.items()}
         return TerrainOutput(
             origin=terrain_map.env_origins[row, self.column] - corner,
             geometries=[],
-            flat_patches={name: each[~np.isnan(each[:, 0])] for name, each in points.items()},
+            flat_patches={name: patch[~np.isnan(patch[:, 0])] for name, patch in points.items()},
         )
 
 
@@ -189,7 +188,7 @@ def _load(path: str) -> TerrainMap:
 def _point_sets(terrain_map: TerrainMap) -> dict[str, NDArray[np.float64]]:
     """Return the spawn positions and the goals, if any, shape (rows, cols, k, 3)."""
     points = {"spawn": terrain_map.spawns, "goal": terrain_map.goals}
-    return {name: each[..., :3].astype(float) for name, each in points.items() if each.shape[2]}
+    return {name: poses[..., :3].astype(float) for name, poses in points.items() if poses.shape[2]}
 
 
 def _with_narrow_border(terrain_map: TerrainMap) -> TerrainMap:
@@ -197,7 +196,7 @@ def _with_narrow_border(terrain_map: TerrainMap) -> TerrainMap:
     if removed <= 0:
         return terrain_map
     config = replace(terrain_map.config, border=_BORDER_CELLS * terrain_map.config.cell)
-    x, y = (each + removed * terrain_map.grid.cell for each in terrain_map.grid.lower)
+    x, y = (edge + removed * terrain_map.grid.cell for edge in terrain_map.grid.lower)
     inside = slice(removed, -removed)
     return replace(
         terrain_map,

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from terrainkit.errors import ExportError
-from terrainkit.export import mjcf
+from terrainkit.export import mjcf_map
 from terrainkit.files.memory import check_memory
 from terrainkit.integrations import load_map
 
@@ -22,20 +22,20 @@ _BYTES_PER_SAMPLE = 24
 
 
 def make_spec(
-    source: "TerrainMap | str | Path", *, collision: mjcf.Collision = "auto"
+    source: "TerrainMap | str | Path", *, collision: mjcf_map.Collision = "auto"
 ) -> "mujoco.MjSpec":
     """Return the map as a MuJoCo model specification.
 
     Args:
         source: Map, or path of a .npz file.
-        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf_map.export`.
     """
     import mujoco
 
     terrain_map = load_map(source)
     samples = terrain_map.heights.size
     check_memory(samples * _BYTES_PER_SAMPLE, f"a MuJoCo model of {samples} samples")
-    model = mjcf.make_model(terrain_map, collision)
+    model = mjcf_map.make_model(terrain_map, collision)
     spec = mujoco.MjSpec()
     spec.modelname = "terrain"
     for name, value in terrain_map.config.contact.items():
@@ -43,22 +43,22 @@ def make_spec(
     default = spec.add_default("terrain", spec.default)
     for name, value in _fields(model.geom_defaults).items():
         setattr(default.geom, name, value)
-    for name, value in _fields(mjcf.SITE_DEFAULTS).items():
+    for name, value in _fields(mjcf_map.SITE_DEFAULTS).items():
         setattr(default.site, name, value)
     for name, vertices in model.hulls().items():
         convex = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         spec.add_mesh(name=name, uservert=vertices.ravel(), inertia=convex)
     for name, (part, _) in model.hfields.items():
-        elevation = mjcf.hfield_elevation(model.heights, part)
+        elevation = mjcf_map.hfield_elevation(model.heights, part)
         nrow, ncol = elevation.shape
-        size = mjcf.hfield_size(model.heights, part, terrain_map.grid.cell)
+        size = mjcf_map.hfield_size(model.heights, part, terrain_map.grid.cell)
         # MuJoCo reads a memoryview twice as fast as an array.
         data = elevation.astype(np.float32).ravel().data
         spec.add_hfield(name=name, nrow=nrow, ncol=ncol, size=size, userdata=data)
-    for each in model.geoms():
-        spec.worldbody.add_geom(default, **_fields(each))
-    for each in model.sites():
-        spec.worldbody.add_site(default, **_fields(each))
+    for geom in model.geoms():
+        spec.worldbody.add_geom(default, **_fields(geom))
+    for site in model.sites():
+        spec.worldbody.add_site(default, **_fields(site))
     return spec
 
 
@@ -75,14 +75,17 @@ def _fields(attributes: dict[str, Any]) -> dict[str, Any]:
 
 
 def add_map(
-    spec: "mujoco.MjSpec", source: "TerrainMap | str | Path", *, collision: mjcf.Collision = "auto"
+    spec: "mujoco.MjSpec",
+    source: "TerrainMap | str | Path",
+    *,
+    collision: mjcf_map.Collision = "auto",
 ) -> None:
     """Add the map to the world body of `spec`, in world coordinates.
 
     Args:
         spec: Specification of a robot or scene.
         source: Map, or path of a .npz file.
-        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf_map.export`.
     """
     frame = spec.worldbody.add_frame()
     spec.attach(make_spec(source, collision=collision), frame=frame, prefix="terrain/")
@@ -154,5 +157,6 @@ def _hfield_mesh(field: Any) -> "trimesh.Trimesh":
     vertices = np.stack([x, y, height * field.data.reshape(rows, columns)], axis=-1)
     k = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = k[:-1, :-1], k[:-1, 1:], k[1:, 1:], k[1:, :-1]
-    faces = np.concatenate([np.stack(each, -1).reshape(-1, 3) for each in ((a, b, c), (a, c, d))])
+    halves = ((a, b, c), (a, c, d))
+    faces = np.concatenate([np.stack(corners, -1).reshape(-1, 3) for corners in halves])
     return trimesh.Trimesh(vertices.reshape(-1, 3), faces, process=False)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from terrainkit.errors import ExportError
-from terrainkit.export.mjcf import Collision
+from terrainkit.export.mjcf_map import Collision
 from terrainkit.integrations import load_map, missing
 from terrainkit.integrations.mujoco import add_map
 from terrainkit.map.terrain_map import TerrainMap
@@ -36,7 +36,7 @@ def write_scene(
         source: Map, or path of a .npz file.
         path: Target.
         assets: Contents of the files that the scene refers to; the result needs them, too.
-        collision: Geometry that robots collide with; see `terrainkit.export.mjcf.export`.
+        collision: Geometry that robots collide with; see `terrainkit.export.mjcf_map.export`.
         num_contacts: Maximum number of contacts that MJX keeps in each step for each kind of pair,
             such as sphere and heightfield. Without a limit, MJX tests every pair of geoms.
 

@@ -35,7 +35,8 @@ class TerrainProgress:
 
     def __call__(self, env: Any, command_name: str, asset_name: str = "robot") -> torch.Tensor:
         """Measure a step, and return False for each environment."""
-        data, term = env.scene[asset_name].data, env.command_manager.get_term(command_name)
+        data = env.scene[asset_name].data
+        term = env.command_manager.get_term(command_name)
         position, yaw = _numpy(data.root_link_pos_w), _numpy(data.heading_w)
         command = _numpy(env.command_manager.get_command(command_name))
         starts = np.flatnonzero(self._starts)
@@ -77,7 +78,7 @@ class TerrainLevels:
 
         self.sampler.levels[:] = _numpy(terrain.terrain_levels)
         self.sampler.columns[:] = _numpy(terrain.terrain_types)
-        names = [each.split("#")[0] for each in terrain.cfg.terrain_generator.sub_terrains]
+        names = [sub_name.split("#")[0] for sub_name in terrain.cfg.terrain_generator.sub_terrains]
         self._names = np.array(names if len(names) == cols else ["terrain"] * cols)
 
     def __call__(self, env: Any, env_ids: Any, sampler: str | None) -> dict[str, float]:  # noqa: ARG002
@@ -87,7 +88,8 @@ class TerrainLevels:
         return self._log()
 
     def _update(self, env: Any, ids: NDArray[np.int64]) -> None:
-        terrain, terminations = env.scene.terrain, env.termination_manager
+        terrain = env.scene.terrain
+        terminations = env.termination_manager
         progress = terminations.get_term_cfg(PROGRESS).func.progress
         size = np.array(terrain.cfg.terrain_generator.size)
         patches = np.multiply(terrain.terrain_origins.shape[:2], size)
@@ -109,8 +111,8 @@ class TerrainLevels:
             parts[name] = levels[of_terrain[self.sampler.columns]]
             parts[f"success/{name}"] = success[:, of_terrain]
         parts |= {f"success/level_{k}": row for k, row in enumerate(success)}
-        known = {name: each[~np.isnan(each)] for name, each in parts.items()}
-        return {name: float(each.mean()) for name, each in known.items() if each.size}
+        known = {name: values[~np.isnan(values)] for name, values in parts.items()}
+        return {name: float(values.mean()) for name, values in known.items() if values.size}
 
 
 def _ids(env: Any, env_ids: Any) -> NDArray[np.int64]:

@@ -1,1 +1,1 @@
-"""Maps: their configuration, generation, import, editing and validation."""
+"""Maps: their configuration, generation, editing and validation."""

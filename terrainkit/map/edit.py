@@ -1,5 +1,6 @@
 """Replace the heights or solids of a map."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -7,12 +8,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.generation import pad_poses
-from terrainkit.map.patch import find_origin, with_heading
-from terrainkit.map.spawn import find_spawn, is_on_floor, sample_spawns
+from terrainkit.map.map_config import MapConfig
+from terrainkit.map.patch import with_heading
+from terrainkit.map.spawn import SpawnGround
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.terrain.patch_geometry import checked_heights
 
@@ -43,7 +43,10 @@ def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None
     for row, col in np.ndindex(spawns.shape):
         old = terrain_map.patch(row, col).spawns
         patch_goals = goals[row, col][~np.isnan(goals[row, col, :, 0])]
-        spawns[row, col] = place_patch_spawns(config, new, solids, row, col, old, patch_goals)
+        ground = SpawnGround.of_map(config, new, solids, (row, col))
+        rng = partial(np.random.default_rng, [config.seed, row, col])
+        positions = _spawn_positions(ground, f"patch ({row}, {col})", old, rng)
+        spawns[row, col] = with_heading(positions, patch_goals)
     return replace(
         terrain_map,
         config=config,
@@ -63,60 +66,29 @@ def assign_solids(config: MapConfig, solids: Solids) -> Solids:
     return replace(solids, patch=patch)
 
 
-def place_patch_spawns(
-    config: MapConfig,
-    heights: NDArray[np.float32],
-    solids: Solids,
-    row: int,
-    col: int,
+def _spawn_positions(
+    ground: SpawnGround,
+    name: str,
     spawns: NDArray[np.float32],
-    goals: NDArray[np.float32],
-) -> NDArray[np.float32]:
-    """Return the spawn positions of a patch, with headings.
+    rng: Callable[[], np.random.Generator],
+) -> NDArray[np.float64]:
+    """Return the spawn positions of a patch [m], shape (n, 3).
 
     Args:
-        config: Configuration of the map.
-        heights: Heights of the map [m].
-        solids: Solids of the map.
-        row: Row of the patch.
-        col: Column of the patch.
+        ground: The ground of the patch.
+        name: Name of the patch, for errors.
         spawns: Earlier spawn positions, which are kept if all of them are flat and free, shape
             (k, 4); x and y of the first are the preferred position otherwise.
-        goals: Goals of the patch, shape (n, 4).
+        rng: Returns the generator of the random numbers.
 
     Raises:
         ConfigError: if the patch has no place to spawn.
     """
-    grid, block, near = patch_ground(config, heights, solids, row, col)
     kept = [
-        (x, y, z)
-        if is_on_floor(config, near, (x, y, z))
-        else find_spawn(config, grid, block, near, (x, y))
+        (x, y, z) if ground.is_on_floor((x, y, z)) else ground.find((x, y))
         for x, y, z in spawns[:, :3].tolist()
     ]
     if None not in kept and np.allclose(np.array(kept)[:, :2], spawns[:, :2], atol=1e-4):
-        positions = np.array(kept)
-    else:
-        x, y = spawns[0, :2].tolist()
-        rng = partial(np.random.default_rng, [config.seed, row, col])
-        origin = find_origin(config, f"patch ({row}, {col})", grid, block, near, (x, y))
-        positions = sample_spawns(config, grid, block, near, origin, rng)
-    return with_heading(positions, goals)
-
-
-def patch_ground(
-    config: MapConfig, heights: NDArray[np.float32], solids: Solids, row: int, col: int
-) -> tuple[Grid, NDArray[np.float32], Solids]:
-    """Return the grid and the heights of a patch, and the solids that reach into it.
-
-    Args:
-        config: Configuration of the map.
-        heights: Heights of the map [m].
-        solids: Solids of the map.
-        row: Row of the patch.
-        col: Column of the patch.
-    """
-    grid = config.patch_grid(row, col)
-    lower, upper = (corner[:, :2] for corner in solids.bounds())
-    reaches = np.all((upper >= grid.lower) & (lower <= grid.upper), axis=1)
-    return grid, heights[config.patch_cells(row, col)], solids.select(np.asarray(reaches))
+        return np.array(kept)
+    x, y = spawns[0, :2].tolist()
+    return ground.sample(ground.find_origin(name, (x, y)), rng)

@@ -15,8 +15,8 @@ from terrainkit.errors import TerrainkitWarning, listing
 from terrainkit.files.memory import check_memory
 from terrainkit.files.parallel_map import parallel_map
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import column_types, terrain_and_difficulty
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch, build_patch
 from terrainkit.map.patch_edges import PatchEdges, cliffs_text
 from terrainkit.map.repeated_levels import repeated_levels
@@ -97,7 +97,8 @@ class _MapBuilder:
         self.moved_spawns: Counter[str] = Counter()
         """Number of patches whose spawn origin was moved, by sub-terrain."""
 
-        grid, size = config.grid, (config.rows, config.cols)
+        grid = config.grid
+        size = (config.rows, config.cols)
         self._config, self._grid = config, grid
         self._heights = config.border_heights()
         # A view of one number takes no memory, and most maps have one friction.
@@ -112,7 +113,8 @@ class _MapBuilder:
 
     def add(self, row: int, col: int, terrain_type: int, patch: Patch) -> None:
         """Add a patch."""
-        config, sub_terrain = self._config, self._config.sub_terrains[terrain_type]
+        config = self._config
+        sub_terrain = self._config.sub_terrains[terrain_type]
         block = config.patch_cells(row, col)
         self._heights[block] = patch.heights
         uniform = self._patch_friction
@@ -142,7 +144,7 @@ class _MapBuilder:
             friction=self._friction,
             spawns=pad_poses(self._spawns),
             terrain_types=self._terrain_types,
-            terrain_names=tuple(each.name for each in self._config.sub_terrains),
+            terrain_names=tuple(sub_terrain.name for sub_terrain in self._config.sub_terrains),
             difficulty=self._difficulty,
             parameters=self._parameters,
             solids=Solids.concatenate(self._solids),
@@ -182,7 +184,7 @@ def pad_poses(poses: NDArray[np.object_]) -> NDArray[np.float32]:
     Returns:
         Poses, shape (rows, cols, max k, 4), padded with NaN.
     """
-    lengths = {len(each) for each in poses.ravel().tolist()}
+    lengths = {len(goals) for goals in poses.ravel().tolist()}
     number = max(lengths)
     if len(lengths) == 1:
         return np.array(poses.tolist(), dtype=np.float32).reshape(*poses.shape, number, 4)

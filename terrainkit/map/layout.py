@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from terrainkit.errors import ConfigError, TerrainkitWarning, listing
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.terrain import Terrain
 
 # The streams of random numbers of a patch are children of the seed sequence [seed, row, col], which
@@ -67,9 +67,9 @@ def column_types(config: MapConfig) -> list[int]:
             "expected mode curriculum, selected or randomized"
         )
     sub_terrains = config.sub_terrains
-    counts = allocate_columns([each.proportion for each in sub_terrains], config.cols)
+    counts = allocate_columns([terrain.proportion for terrain in sub_terrains], config.cols)
     pairs = zip(sub_terrains, counts, strict=True)
-    missing = [each.name for each, n in pairs if n == 0 and each.proportion > 0]
+    missing = [terrain.name for terrain, n in pairs if n == 0 and terrain.proportion > 0]
     if missing and config.mode != "randomized":
         message = (
             f"cols: got {config.cols}, too few for {len(sub_terrains)} sub-terrains at these "

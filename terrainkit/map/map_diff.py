@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from terrainkit.errors import listing
-from terrainkit.map.config import MapConfig
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.toml_text import value_text

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError, plugin_errors, prefixed_errors
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.layout import (
     OVERLAYS_STREAM,
     SOLIDS_STREAM,
@@ -23,7 +22,8 @@ from terrainkit.map.layout import (
     patch_rng,
     terrain_and_difficulty,
 )
-from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
+from terrainkit.map.map_config import MapConfig
+from terrainkit.map.spawn import SpawnGround
 from terrainkit.settings.type_hint import MAX_VALUE
 from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.overlay import Overlay
@@ -167,7 +167,9 @@ def build_patch(
 def _build_patch(
     config: MapConfig, sub_terrain: SubTerrain, difficulty: float, row: int, col: int
 ) -> Patch:
-    grid, name, plugin = config.patch_grid(row, col), sub_terrain.name, sub_terrain.plugin
+    grid = config.patch_grid(row, col)
+    name = sub_terrain.name
+    plugin = sub_terrain.plugin
     terrain = sub_terrain.at(difficulty)
     overlays = []
     for overlay in sub_terrain.overlays:
@@ -191,11 +193,12 @@ def _build_patch(
     heights, position = geometry.heights, geometry.spawn
     solids = _place_solids(name, geometry, (row, col))
     goals = _place_goals(config, name, geometry)
-    origin = find_origin(config, name, grid, heights, solids, position)
+    ground = SpawnGround(config=config, grid=grid, heights=heights, solids=solids)
+    origin = ground.find_origin(name, position)
     spawns_rng = partial(child_rng, SPAWNS_STREAM)
     with plugin_errors(plugin):
         floors = terrain.floors(grid)
-    spawns = sample_spawns(config, grid, heights, solids, origin, spawns_rng, floors)
+    spawns = ground.sample(origin, spawns_rng, floors)
     x, y, _ = spawns[0].tolist()
     requested, realized = _parameters(terrain, grid)
     for k, overlay in enumerate(overlays):
@@ -271,7 +274,8 @@ def _apply_overlays(
     The overlays keep the ground level at the spawn origin of the terrain without overlays.
     """
     grid, position = geometry.grid, geometry.spawn
-    x, y, _ = find_origin(config, name, grid, geometry.heights, geometry.solids, position)
+    ground = SpawnGround(config=config, grid=grid, heights=geometry.heights, solids=geometry.solids)
+    x, y, _ = ground.find_origin(name, position)
     geometry = dataclasses.replace(geometry, spawn=(x, y))
     for k, overlay in enumerate(overlays):
         with plugin_errors(plugin := registry.plugin_name(type(overlay))):
@@ -281,48 +285,6 @@ def _apply_overlays(
         heights = checked_heights(geometry.heights, grid, f"{overlay.kind()}: apply(): got")
         geometry = dataclasses.replace(geometry, heights=heights)
     return geometry, max(abs(x - position[0]), abs(y - position[1]))
-
-
-def find_origin(
-    config: MapConfig,
-    name: str,
-    grid: Grid,
-    heights: NDArray[np.float32],
-    solids: Solids,
-    position: tuple[float, float],
-) -> tuple[float, float, float]:
-    """Return the spawn origin of a patch [m]; see `find_spawn`.
-
-    Args:
-        config: The config of the map.
-        name: Name of the patch, for the error.
-        grid: Grid of the patch.
-        heights: Heights of the ground [m], shape `grid.shape`.
-        solids: Solids of the patch.
-        position: Preferred position, x and y [m].
-
-    Returns:
-        Position on the ground, x, y and z [m].
-
-    Raises:
-        ConfigError: if patch `name` has no place to spawn.
-    """
-    origin = find_spawn(config, grid, heights, solids, position)
-    if origin is None:
-        tolerance = flattest_tolerance(config, grid, heights, solids, position)
-        largest = 0.45 * (min(grid.shape) - 1) * grid.cell
-        if tolerance is not None:
-            expected = f"spawn_tolerance {tolerance:g}, a larger platform or a smaller spawn_radius"
-        else:
-            expected = (
-                f"larger patches, less spawn_headroom or a spawn_radius below {largest:.2g} m"
-            )
-        raise ConfigError(
-            f"{name}: no disk of radius {config.spawn_radius:g} m is flat within "
-            f"{config.spawn_tolerance:g} m and free of solids up to {config.spawn_headroom:g} m in "
-            f"a patch of {grid.size[0]:g} m x {grid.size[1]:g} m; expected {expected}"
-        )
-    return origin
 
 
 def _place_solids(name: str, geometry: PatchGeometry, patch: tuple[int, int]) -> Solids:
@@ -350,9 +312,10 @@ def _place_goals(config: MapConfig, name: str, geometry: PatchGeometry) -> NDArr
     Raises:
         ConfigError: if a goal is not on the patch.
     """
-    grid, goals = geometry.grid, geometry.goals.copy()
+    grid = geometry.grid
+    goals = geometry.goals.copy()
     if len(goals):
-        from terrainkit.geometry.surface import surface_at
+        from terrainkit.geometry.ground_surface import surface_at
 
         index = (goals[:, :2] - grid.lower) / grid.cell - 0.5
         if not ((index >= -0.5) & (index <= np.array(grid.shape) - 0.5)).all():

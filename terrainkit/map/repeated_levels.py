@@ -33,12 +33,13 @@ def repeated_levels(terrain_map: TerrainMap) -> Iterator[str]:
             for name in same:
                 if here.requested[name] != before.requested[name] or len(same) == len(ranges):
                     repeated[name].append(level)
-        found, number = [], len(levels)
+        found = []
+        number = len(levels)
         for name in ranges:
             values = [(level, p.realized[name], p.requested[name]) for level, p in levels]
             zero = [level for level, realized, requested in values if realized == 0 != requested]
             texts = {"is 0": zero, "is the same as before": repeated[name]}
-            said = [f"{text} in {unit} {listing(each)}" for text, each in texts.items() if each]
+            said = [f"{text} in {unit} {listing(cols)}" for text, cols in texts.items() if cols]
             if said:
                 found.append(f"{name} {' and '.join(said)}")
                 number = min(number, len({realized for _, realized, _ in values}))

@@ -22,8 +22,8 @@ from terrainkit.geometry.free_space import Direction, clearance, first_surface, 
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import Solids
-from terrainkit.map.config import MapConfig
 from terrainkit.map.import_report import ImportReport
+from terrainkit.map.map_config import MapConfig
 from terrainkit.map.patch import Patch
 from terrainkit.settings.type_hint import convert
 
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from terrainkit.geometry.box_decomposition import BoxDecomposition
+    from terrainkit.geometry.ground_surface import SurfacePoints
     from terrainkit.geometry.mesh import TriMesh
-    from terrainkit.geometry.surface import SurfacePoints
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -335,7 +335,7 @@ class TerrainMap:
         return SolidIndex(self.solids.select(self.solids.collides))
 
     def _surface_at(self, points: NDArray[np.float64]) -> "SurfacePoints":
-        from terrainkit.geometry.surface import surface_at
+        from terrainkit.geometry.ground_surface import surface_at
 
         index = (points - self.first_sample) / self.grid.cell
         return surface_at(self.heights, index, threshold=self.config.wall_threshold)

@@ -176,7 +176,8 @@ def _check_solids(terrain_map: TerrainMap) -> Iterator[str]:
 
 def _check_goals(terrain_map: TerrainMap) -> Iterator[str]:
     for row, col in np.ndindex(terrain_map.difficulty.shape):
-        grid, goals = terrain_map.config.patch_grid(row, col), terrain_map.goals[row, col]
+        grid = terrain_map.config.patch_grid(row, col)
+        goals = terrain_map.goals[row, col]
         last = np.flatnonzero(~np.isnan(goals).all(axis=1)).max(initial=-1)
         for k, goal in enumerate(goals[: last + 1].astype(np.float64)):
             subject = f"patch ({row}, {col}): goal {k}"

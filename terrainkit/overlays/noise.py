@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.gradient_noise import perlin_noise
-from terrainkit.features.noise import ValueNoise
+from terrainkit.features.value_noise import ValueNoise
 from terrainkit.geometry.free_space import CONTACT
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solid_index import SolidIndex

@@ -43,7 +43,8 @@ class EdgeMap:
 
         to_number("step_height", step_height, 1e-3)
         to_number("headroom", headroom, 1e-3)
-        surface, grid = exact_surface(terrain_map), terrain_map.grid
+        surface = exact_surface(terrain_map)
+        grid = terrain_map.grid
         per_cell = 2 if surface.visible is None else 2 * math.ceil(grid.cell / 2 / PIXEL - 1e-9)
         self._spacing, self._lower = grid.cell / per_cell, np.array(grid.lower)
         shape = tuple(per_cell * n for n in grid.shape)
@@ -89,8 +90,8 @@ class EdgeMap:
         u, v = np.moveaxis(index - low, -1, 0)
         corner, flat = low[..., 0] * (limit[1] + 1) + low[..., 1], self.distances.reshape(-1)
         first, second = (
-            flat.take(each) * (1 - v) + flat.take(each + 1) * v
-            for each in (corner, corner + limit[1] + 1)
+            flat.take(start) * (1 - v) + flat.take(start + 1) * v
+            for start in (corner, corner + limit[1] + 1)
         )
         return like((first * (1 - u) + second * u).astype(np.float32), xy)
 

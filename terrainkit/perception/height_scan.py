@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum.arrays import like, to_numpy
 from terrainkit.errors import ConfigError
+from terrainkit.geometry.ground_surface import HeightfieldSurface, WallTable
 from terrainkit.geometry.solid_raster import SolidRaster
-from terrainkit.geometry.surface import HeightfieldSurface, WallTable
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.settings.type_hint import show
 
@@ -130,7 +130,7 @@ class HeightScan:
         """
         self.surface = exact_surface(surface) if isinstance(surface, TerrainMap) else surface
         axes = (to_floats(name, values, [None]) for name, values in (("x", x), ("y", y)))
-        points = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")])
+        points = np.stack([coordinate.ravel() for coordinate in np.meshgrid(*axes, indexing="ij")])
         self.offsets = points.astype(np.float32)
 
     def points(self, position: Any, yaw: Any) -> tuple[Any, Any, Any]:

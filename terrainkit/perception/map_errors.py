@@ -131,7 +131,8 @@ class MapErrors:
         Raises:
             ConfigError: if a shape is wrong, or a value is not finite.
         """
-        n, options = len(self._age), self._options
+        n = len(self._age)
+        options = self._options
         pos = to_floats("position", position, [n, 3])
         angle = to_floats("yaw", yaw, [n])
         rng = make_rng((self._seed, self._steps, 0))
@@ -178,10 +179,10 @@ def _lattice_noise(x: Floats, y: Floats, side: float, seed: int) -> Floats:
     The integers of the square are hashed as in "Mark Jarzynski and Marc Olano, Hash Functions for
     GPU Rendering, 2020" (pcg2d).
     """
-    i, j = (np.floor(each / side).astype(np.int64).astype(np.uint32) for each in (x, y))
+    i, j = (np.floor(coordinate / side).astype(np.int64).astype(np.uint32) for coordinate in (x, y))
     i, j = (
-        (each + np.uint32(seed % 2**32)) * np.uint32(1664525) + np.uint32(1013904223)
-        for each in (i, j)
+        (index + np.uint32(seed % 2**32)) * np.uint32(1664525) + np.uint32(1013904223)
+        for index in (i, j)
     )
     for _ in range(2):
         i = i + j * np.uint32(1664525)

@@ -38,7 +38,8 @@ class RayCaster:
         Args:
             terrain_map: The map.
         """
-        threshold, solids = terrain_map.config.wall_threshold, terrain_map.solids
+        threshold = terrain_map.config.wall_threshold
+        solids = terrain_map.solids
         first, cell = terrain_map.first_sample, terrain_map.grid.cell
         self._ground = GroundRays(terrain_map.heights, first, cell, threshold)
         self._solids = SolidIndex(solids.select(solids.visible))
@@ -99,7 +100,7 @@ class RayCaster:
         to_number("max_distance", max_distance, 1e-6)
         result = np.empty(len(origins), np.float32)
         for k in range(0, len(origins), _RAYS_AT_ONCE):
-            starts, toward = (each[k : k + _RAYS_AT_ONCE] for each in (origins, directions))
+            starts, toward = (values[k : k + _RAYS_AT_ONCE] for values in (origins, directions))
             limits = np.full(len(starts), float(max_distance))
             ground = self._ground.cast(starts, toward, limits)
             found = self._solids.first_hits(starts, toward, ground)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from terrainkit.curriculum.arrays import like
-from terrainkit.geometry.surface import HeightfieldSurface
+from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.perception.height_scan import HeightScan, exact_surface, to_floats, to_number
 

@@ -7,6 +7,8 @@ from functools import cache
 from itertools import pairwise
 from typing import Any
 
+from terrainkit.errors import one_line
+
 
 @cache
 def field_docs(cls: type[Any]) -> dict[str, str]:
@@ -27,5 +29,5 @@ def field_docs(cls: type[Any]) -> dict[str, str]:
                     ast.AnnAssign(target=ast.Name(id=name)),
                     ast.Expr(value=ast.Constant(value=str(text))),
                 ):
-                    docs[name] = " ".join(text.split())
+                    docs[name] = one_line(text)
     return docs

@@ -197,17 +197,18 @@ def nested_values(path: str, value: Any, hint: Any, default: Any = None) -> Any:
 def _summary(kind: type[Any]) -> str:
     """Return the first line of the docstring of a config, or of its nearest base with one."""
     # A dataclass without a docstring gets its signature as one.
-    docs = {each.__name__: each.__doc__ or "" for each in kind.__mro__}
+    docs = {parent.__name__: parent.__doc__ or "" for parent in kind.__mro__}
     return next(d for name, d in docs.items() if not d.startswith(f"{name}(")).partition("\n")[0]
 
 
 def _toml_lines(path: str, config: Config) -> Iterator[str]:
     """Yield the lines of a config: values first, then a table for each nested config."""
     kind: Any = type(config)
-    docs, tables = field_docs(kind), []
+    docs = field_docs(kind)
+    tables = []
     for key, value in config.to_table().items():
         if isinstance(value, tuple) and value and isinstance(value[0], Config):
-            tables += [(f"[[{path}{key}]]", each) for each in value]
+            tables += [(f"[[{path}{key}]]", item) for item in value]
         elif isinstance(value, Config):
             tables.append((f"[{path}{key}]", value))
         else:

@@ -7,7 +7,7 @@ import stat
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, one_line
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,6 +98,5 @@ def line_text(key: str, value: Any, *comments: str) -> str:
 
 def comment_text(*comments: str) -> str:
     """Return `  # a; b` of the comments that are not empty, without what cannot be printed."""
-    printable = ("".join(c if c.isprintable() else " " for c in text) for text in comments)
-    text = "; ".join(words for text in printable if (words := " ".join(text.split())))
+    text = "; ".join(filter(None, map(one_line, comments)))
     return f"  # {text}" if text else ""

@@ -70,7 +70,8 @@ class TypeHint(NamedTuple):
 
 def parse_hint(hint: Any) -> TypeHint:
     """Return the parts of a type hint, which may be in an `Annotated` and a union with None."""
-    parts, is_optional = (hint,), False
+    parts = (hint,)
+    is_optional = False
     if get_origin(hint) in (typing.Union, types.UnionType):
         parts = tuple(part for part in get_args(hint) if part is not types.NoneType)
         is_optional = types.NoneType in get_args(hint)

@@ -13,22 +13,7 @@ from terrainkit.settings.schema import Config
 from terrainkit.settings.text import expected_names
 from terrainkit.terrain.sub_terrain import SubTerrain
 
-_NAMES = (
-    "legged_gym",
-    "legged_gym_rough",
-    "isaaclab",
-    "mjlab",
-    "humanoid_gym",
-    "extreme_parkour",
-    "robot_parkour_learning",
-    "anymal_parkour",
-    "barkour",
-    "risky_terrains",
-    "beamdojo",
-    "walking_with_terrain_reconstruction",
-    "hiking_in_the_wild",
-    "ame_2",
-)
+_FOLDER = Path(__file__).with_name("papers")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,9 +54,10 @@ class Paper(Config):
     """The sub-terrains of the preset."""
 
 
+@cache
 def paper_names() -> tuple[str, ...]:
     """Return the names of the presets of published work."""
-    return _NAMES
+    return tuple((_FOLDER / "names.txt").read_text(encoding="utf-8").split())
 
 
 @cache
@@ -81,6 +67,7 @@ def get_paper(name: str) -> Paper:
     Raises:
         ConfigError: if there is no such preset.
     """
-    if name not in _NAMES:
-        raise ConfigError(f"no preset of published work {name!r}; {expected_names(name, _NAMES)}")
-    return Paper.load(Path(__file__).with_name("papers") / f"{name}.toml")
+    names = paper_names()
+    if name not in names:
+        raise ConfigError(f"no preset of published work {name!r}; {expected_names(name, names)}")
+    return Paper.load(_FOLDER / f"{name}.toml")

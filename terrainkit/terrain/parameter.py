@@ -208,7 +208,7 @@ def vector(default: tuple[float, ...]) -> Any:
 
     Unlike other numbers, they may be negative.
     """
-    return _field(tuple(float(each) for each in default), allow_range=False)
+    return _field(tuple(float(value) for value in default), allow_range=False)
 
 
 def tables(*default: Any) -> Any:

@@ -49,8 +49,8 @@ def load_plugin(path: str | Path) -> None:
         assert spec.loader is not None
         module = sys.modules[name] = module_from_spec(spec)  # dataclasses look their module up
         spec.loader.exec_module(module)
-        found = [each for each in vars(module).values() if inspect.isclass(each)]
-        parents = {each for item in found for each in item.__mro__[1:]}
+        found = [value for value in vars(module).values() if inspect.isclass(value)]
+        parents = {parent for item in found for parent in item.__mro__[1:]}
         for item in found:
             # A parent of others needs no decorator of its own.
             is_declared = "__dataclass_fields__" in vars(item) or item not in parents

@@ -240,7 +240,7 @@ def _load_class(group: _Group, name: str) -> type[Any]:
     """Return the class in module `name` of the package of a group."""
     module = importlib.import_module(f"{group.package}.{name}")
     found: list[Any] = [value for value in vars(module).values() if inspect.isclass(value)]
-    classes = [each for each in found if issubclass(each, group.parent) and each.kind() == name]
+    classes = [item for item in found if issubclass(item, group.parent) and item.kind() == name]
     if len(classes) != 1:
         raise ConfigError(
             f"{module.__file__}: got {len(classes)} subclasses of {group.parent.__name__} named "

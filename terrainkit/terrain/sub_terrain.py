@@ -208,16 +208,16 @@ def overlay_path(number: int, name: str) -> str:
 
 def _names(value: Any) -> Iterator[str]:
     """Yield the names of the classes in a `[[terrains]]` table."""
-    for key, each in value.items() if isinstance(value, Mapping) else enumerate(value):
-        if key in ("terrain", "overlay") and isinstance(each, str):
-            yield each
-        elif isinstance(each, Mapping | list):
-            yield from _names(each)
+    for key, entry in value.items() if isinstance(value, Mapping) else enumerate(value):
+        if key in ("terrain", "overlay") and isinstance(entry, str):
+            yield entry
+        elif isinstance(entry, Mapping | list):
+            yield from _names(entry)
 
 
 def _read_overlays(tables: Any) -> tuple[Overlay, ...]:
     """Return the overlays that `[[terrains.overlays]]` tables describe."""
-    if not isinstance(tables, list) or not all(isinstance(each, Mapping) for each in tables):
+    if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
         raise ConfigError(f"overlays: got {show(tables)}; expected [[terrains.overlays]] tables")
     overlays = []
     for k, table in enumerate(tables):

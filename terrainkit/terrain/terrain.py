@@ -69,7 +69,8 @@ class Terrain(Parameterized, ABC):
             raise ConfigError(
                 f"{cls.kind()}.difficulty: got {difficulty:g}; expected a number from 0 to 1"
             )
-        known, values = parameters_of(cls), values or {}
+        known = parameters_of(cls)
+        values = values or {}
         fixed = {name: parameter.at(difficulty) for name, parameter in known.items()}
         if values:
             check_names(cls.kind(), values, known)
@@ -98,25 +99,21 @@ class Terrain(Parameterized, ABC):
 
     def _check_fit(self, grid: Grid) -> None:
         """Raise ConfigError if a centered square of this terrain does not fit on `grid`."""
+        x, y = grid.size
         for name, parameter in parameters_of(type(self)).items():
-            if parameter.snap == "centered":
-                self._check_centered(name, getattr(self, name), grid)
-
-    def _check_centered(self, name: str, value: float, grid: Grid) -> None:
-        counts, (x, y) = grid.centered(value), grid.size
-        if value > min(x, y) + grid.cell / 2:
-            raise ConfigError(
-                f"{self.kind()}: {name} {value:g} m does not fit in a patch of {x:g} m x {y:g} m"
-            )
-        if counts[0] >= grid.shape[0] and counts[1] >= grid.shape[1]:
-            raise ConfigError(
-                f"{self.kind()}: {name} {value:g} m fills the whole patch of {x:g} m x {y:g} m"
-            )
-        if min(counts) == 0:
-            raise ConfigError(
-                f"{self.kind()}: {name} {value:g} m is smaller than a cell; "
-                f"expected at least {grid.cell:g} m"
-            )
+            if parameter.snap != "centered":
+                continue
+            value = getattr(self, name)
+            counts = grid.centered(value)
+            problem = ""
+            if value > min(x, y) + grid.cell / 2:
+                problem = f"does not fit in a patch of {x:g} m x {y:g} m"
+            elif counts[0] >= grid.shape[0] and counts[1] >= grid.shape[1]:
+                problem = f"fills the whole patch of {x:g} m x {y:g} m"
+            elif min(counts) == 0:
+                problem = f"is smaller than a cell; expected at least {grid.cell:g} m"
+            if problem:
+                raise ConfigError(f"{self.kind()}: {name} {value:g} m {problem}")
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
         """Return the preferred spawn position, x and y [m]; by default the center of the patch."""

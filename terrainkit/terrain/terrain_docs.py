@@ -76,7 +76,8 @@ def _summary(kind: Any) -> str:
 
 def _class_doc(name: str, kind: Any) -> TerrainDoc:
     with plugin_errors(registry.plugin_name(kind)):
-        text, texts = inspect.getdoc(kind) or "", field_docs(kind)
+        text = inspect.getdoc(kind) or ""
+        texts = field_docs(kind)
     return TerrainDoc(
         name=name,
         text=text,
@@ -104,10 +105,11 @@ def parameter_texts(sub_terrain: SubTerrain) -> list[str]:
 
     Parameters of the elements of a course are preceded by the terrain of the element.
     """
-    declared, texts = parameters_of(sub_terrain.terrain_class), []
+    declared = parameters_of(sub_terrain.terrain_class)
+    texts = []
     for name, value in sub_terrain.parameters.items():
         if declared[name].table:
-            texts += [f"{each.terrain}.{text}" for each in value for text in parameter_texts(each)]
+            texts += [f"{part.terrain}.{text}" for part in value for text in parameter_texts(part)]
         elif isinstance(value, tuple) and not declared[name].is_vector:
             texts.append(f"{name}={':'.join(map(format_value, value))}")
         else:

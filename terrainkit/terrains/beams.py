@@ -7,15 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane, lane_goals
-from terrainkit.features.pit_ground import pit_between
+from terrainkit.features.pit_ground import PitLane
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Beams(Lane):
+class Beams(PitLane):
     """Narrow beams over a pit, one behind the other along x, with gaps between them.
 
     The robot is spawned at low x. There is a goal on each beam, and one behind the pit. The beams
@@ -24,7 +23,6 @@ class Beams(Lane):
     """
 
     has_column_seed: ClassVar[bool] = True
-    has_random_heights: ClassVar[bool] = False
 
     # Width, gap and yaw (15 degrees) are in the range of Isaac Lab's and BeamDojo's beams.
     width: float = parameter.size(0.5, 0.2)
@@ -48,11 +46,6 @@ class Beams(Lane):
     end: float = parameter.size(1.2)
     """Minimum length along x behind the last beam, with its gap [m]."""
 
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return 0, and `-depth` in the pit."""
-        edges = self._slots(grid)
-        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
-
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a box for each beam, down to the floor of the pit."""
         first, last = self._beams(grid, rng)
@@ -66,20 +59,18 @@ class Beams(Lane):
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each beam, and one behind the pit."""
         first, last = self._beams(grid, rng)
-        behind = (last[-1] + self.gap + grid.upper[0]) / 2
-        goals = lane_goals(grid, np.append((first + last) / 2, behind))
-        goals[:-1, 2] = 0.0  # the beams; noise may change the ground behind the pit
-        return goals
+        return self.pit_goals(grid, (first + last) / 2)
 
     def _beams(
         self, grid: Grid, rng: np.random.Generator
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the x of both ends of each beam [m]."""
-        edges = self._slots(grid)
+        edges = self.slot_edges(grid)
         change = (self.max_spacing - self.min_spacing) / 2
         edges[1:-1] += change * (rng.random(len(edges) - 2) - 0.5)
         return edges[:-1] + self.gap, edges[1:]
 
-    def _slots(self, grid: Grid) -> NDArray[np.float64]:
-        spacing, end = (self.min_spacing, self.max_spacing), max(self.end, self.gap + grid.cell)
-        return self.slots(grid, spacing, element="gaps", length=self.gap, end=end)
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
+        spacing = self.min_spacing, self.max_spacing
+        return self.pit_slots(grid, spacing, element="gaps", length=self.gap)

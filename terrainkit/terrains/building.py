@@ -129,7 +129,7 @@ class Building(FlatTerrain, Stairway):
         for k, plan in enumerate(plans):
             floor, ceiling = self._storey * k, self._storey * (k + 1)
             for wall in plan.walls():
-                doors = [each for each in plan.doors if _is_in(each, wall)]
+                doors = [door for door in plan.doors if _is_in(door, wall)]
                 blocks += self._wall(wall, doors, floor - (0 if k else SINK), floor, ceiling)
         parts = [make_blocks(*np.transpose(blocks, (1, 0, 2)))]
         for k in range(self.storeys - 1):
@@ -287,7 +287,8 @@ class Building(FlatTerrain, Stairway):
     def _floors(self, grid: Grid) -> list[list[list[float]]]:
         """Return the lower and upper corners of the floors above the ground, and of the roof."""
         x, y, end, _ = self._bounds(grid)
-        low, floors = self._stairwell_y, []
+        low = self._stairwell_y
+        floors = []
         for z in self.floors(grid)[1:]:
             parts = [(0.0, 0.0, self._level, low), (0.0, low, x, y)]
             parts += [(end, 0.0, x, low)] if end < x else []
@@ -302,8 +303,8 @@ class Building(FlatTerrain, Stairway):
     ) -> list[list[list[float]]]:
         """Return the lower and upper corners of a wall with doors, their lintels and sills."""
         along, half = 1 - line.axis, self.thickness / 2
-        centers = sorted((each.x, each.y)[along] for each in doors)
-        spans = [(each - self.door / 2, each + self.door / 2) for each in centers]
+        centers = sorted((door.x, door.y)[along] for door in doors)
+        spans = [(center - self.door / 2, center + self.door / 2) for center in centers]
         edges = [line.start, *(edge for span in spans for edge in span), line.end]
         # One lintel and one sill along the whole wall are fewer solids than one for each door.
         over = [(line.start, line.end)] if len(spans) > 1 else spans

@@ -43,7 +43,7 @@ class Element(SubTerrain):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if any(each.table for each in parameters_of(self.terrain_class).values()):
+        if any(parameter.table for parameter in parameters_of(self.terrain_class).values()):
             raise ConfigError(f"terrain: got {self.terrain}; expected a terrain without elements")
         own = {"name": self.name != self.terrain, "overlays": self.overlays}
         for key, value in {**own, "friction": self.friction is not None}.items():
@@ -124,7 +124,7 @@ class Course(Lane):
 
     def requested(self) -> dict[str, Value]:
         """Return the parameters before snapping; parameters of elements have paths as keys."""
-        names = ", ".join(each.terrain for each in self.elements)
+        names = ", ".join(element.terrain for element in self.elements)
         return {**super().requested(), "elements": names, **dict(self._element_values(None))}
 
     def realized(self, grid: Grid) -> dict[str, Value]:
@@ -138,7 +138,8 @@ class Course(Lane):
             if element.element_length is not None:
                 declared[_path(k, "element_length")] = _ELEMENT_LENGTH
             with _element_errors(k, terrain):
-                declared |= {_path(k, name): each for name, each in terrain.declarations().items()}
+                declarations = terrain.declarations().items()
+                declared |= {_path(k, name): parameter for name, parameter in declarations}
         return declared
 
     def spawn(self, grid: Grid) -> tuple[float, float]:
@@ -170,7 +171,7 @@ class Course(Lane):
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each platform except the spawn platform."""
         spans = [span for _, span in self._element_slices(grid, rng)]
-        begin, end = [0, *(each.stop for each in spans)], [*(each.start for each in spans)]
+        begin, end = [0, *(span.stop for span in spans)], [*(span.start for span in spans)]
         middle = np.add(begin, [*end, grid.shape[0]]) / 2
         goals = lane_goals(grid, grid.lower[0] + grid.cell * middle)
         if self.backward:
@@ -179,7 +180,7 @@ class Course(Lane):
 
     @cached_property
     def _terrains(self) -> tuple[Terrain, ...]:
-        return tuple(each.at(1.0) for each in self.elements)
+        return tuple(element.at(1.0) for element in self.elements)
 
     def _element_slices(self, grid: Grid, rng: np.random.Generator) -> list[tuple[int, slice]]:
         """Return the elements along the lane: index into `elements`, and cells along x."""
@@ -190,7 +191,7 @@ class Course(Lane):
             slot = grid.cells(self.slot_length)
             free = grid.length(grid.shape[0] - 2 * start + platform)
             number = max_number("course", grid.length(slot + platform), free)
-            weights = np.array([each.proportion for each in self.elements])
+            weights = np.array([element.proportion for element in self.elements])
             order = rng.choice(len(cells), number, p=weights / weights.sum()).tolist()
             slots = [slot] * number
         first = start + np.cumsum(np.add(slots, platform)) - np.add(slots, platform)
@@ -202,9 +203,10 @@ class Course(Lane):
         Raises:
             ConfigError: if they do not fit in the patch.
         """
-        lengths = [each.element_length for each in self.elements]
-        cells = np.array([0 if each is None else grid.cells(each) for each in lengths])
-        is_share, total = cells == 0, int(cells.sum())
+        lengths = [element.element_length for element in self.elements]
+        cells = np.array([0 if length is None else grid.cells(length) for length in lengths])
+        is_share = cells == 0
+        total = int(cells.sum())
         free = grid.shape[0] - 2 * grid.cells(self.start)
         if self.order == "random":
             cells[is_share] = slot = grid.cells(self.slot_length)
@@ -215,10 +217,10 @@ class Course(Lane):
                     "ends; expected no element longer than slot_length, which has to fit in a "
                     f"patch {grid.size[0]:g} m long"
                 )
-            return [int(each) for each in cells]
+            return [int(number) for number in cells]
         free -= grid.cells(self.platform) * (len(cells) - 1)
         if is_share.any():
-            shares = is_share * np.array([each.proportion for each in self.elements])
+            shares = is_share * np.array([element.proportion for element in self.elements])
             ends = np.rint(np.cumsum(shares) / shares.sum() * max(free - total, 0))
             cells += np.diff(ends, prepend=0).astype(np.int64)
         if min(cells) < 1 or sum(cells) > free:
@@ -227,7 +229,7 @@ class Course(Lane):
                 f"platforms of {self.platform:g} m and a start of {self.start:g} m at both ends; "
                 f"expected elements that fit in a patch {grid.size[0]:g} m long"
             )
-        return [int(each) for each in cells]
+        return [int(number) for number in cells]
 
     def _element_values(self, grid: Grid | None) -> Iterator[tuple[str, Value]]:
         """Yield the parameters of the elements by path, requested or realized on `grid`."""

@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.pit_ground import pit_around
+from terrainkit.features.pit_ground import PitTerrain
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class FloatingIslands(Terrain):
+class FloatingIslands(PitTerrain):
     """Round islands that float over a pit around a platform, joined by straight walkways.
 
     The walkways are the shortest that join all islands. The goals lead over them from the platform
@@ -24,7 +24,6 @@ class FloatingIslands(Terrain):
     """
 
     has_column_seed: ClassVar[bool] = True
-    has_random_heights: ClassVar[bool] = False
 
     # Isaac Lab: 8 to 5 platforms with a radius of 0.9 m, walkways of 0.4 m to 0.25 m.
     walkway: float = parameter.size(0.4, 0.25)
@@ -47,10 +46,6 @@ class FloatingIslands(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the flat square at the center [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the pit around the platform."""
-        return pit_around(grid, self.depth, self.platform)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the islands and the walkways, level with the platform."""

@@ -6,13 +6,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.lane import Lane, lane_goals, slot_centers
+from terrainkit.features.lane import SlotLane, slot_centers
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class GapTrack(Lane):
+class GapTrack(SlotLane):
     """Gaps across a lane along x, at random distances.
 
     The robot is spawned at low x. The gaps span the width of the patch, and there is a goal behind
@@ -38,17 +38,12 @@ class GapTrack(Lane):
         """Return 0, and `-depth` in the gaps."""
         ground = np.zeros(grid.shape)
         spacing = self.min_spacing, self.max_spacing
-        for center in slot_centers(self._slots(grid), spacing, rng):
+        for center in slot_centers(self.slot_edges(grid), spacing, rng):
             ground[grid.slice_along_x(center, grid.cells(self.length))] = -self.depth
         return ground
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
-        """Return a goal at the end of the slot of each gap."""
-        return lane_goals(grid, self._slots(grid)[1:])
-
-    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
         spacing = self.min_spacing, self.max_spacing
         length = grid.length(grid.cells(self.length))
         return self.slots(grid, spacing, element="gaps", length=length)

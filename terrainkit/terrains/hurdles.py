@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
-from terrainkit.features.lane import Lane, lane_goals, slot_centers
+from terrainkit.features.lane import SlotLane, slot_centers
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders
 from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hurdles(Lane):
+class Hurdles(SlotLane):
     """Hurdles across a lane along x, at random distances and of random thickness.
 
     The robot is spawned at low x. The hurdles span the width of the patch, and there is a goal
@@ -46,7 +46,7 @@ class Hurdles(Lane):
 
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return 0, and the heights of the walls of the hurdles, without their pipes."""
-        edges = self._slots(grid)
+        edges = self.slot_edges(grid)
         centers = slot_centers(edges, (self.min_spacing, self.max_spacing), rng)
         low, high = grid.cells(self.min_thickness), grid.cells(self.max_thickness)
         cells = low + (rng.random(len(centers)) * (max(high - low, 0) + 1)).astype(np.int64)
@@ -73,13 +73,8 @@ class Hurdles(Lane):
         radius = grid.cell * (last - first) / 2
         return make_cylinders(center, radius, grid.size[1], rpy=(np.pi / 2, 0, 0))
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
-        """Return a goal at the end of the slot of each hurdle."""
-        return lane_goals(grid, self._slots(grid)[1:])
-
-    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
         spacing = self.min_spacing, self.max_spacing
         length = max(self.min_thickness, self.max_thickness)
         return self.slots(grid, spacing, element="hurdles", length=length)

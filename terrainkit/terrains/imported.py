@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from terrainkit.errors import ConfigError
 from terrainkit.features.gradient_noise import fade_heights
 from terrainkit.geometry.grid import Grid
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.height_source import check_file
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.raster import Raster, read_raster
-from terrainkit.importing.source import check_file
 from terrainkit.terrain import Terrain, parameter
 from terrainkit.terrain.parameter import Range, Value
 

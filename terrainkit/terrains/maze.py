@@ -47,7 +47,8 @@ class Maze(FlatTerrain):
         """Return the walls, one box for each straight run."""
         maze = self._sample(grid, rng)
         pitch, half = self.corridor + self.thickness, self.thickness / 2
-        parts, size = [], (self.thickness, self.height)
+        parts = []
+        size = (self.thickness, self.height)
         for axis, walls in ((0, maze.walls_x), (1, maze.walls_y.T)):
             edges = np.diff(np.pad(walls.astype(np.int8), ((0, 0), (1, 1))), axis=1)
             (line, first), (_, last) = np.nonzero(edges == 1), np.nonzero(edges == -1)

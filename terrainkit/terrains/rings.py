@@ -1,22 +1,25 @@
 """Nested rings."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.pit_ground import pit_around
+from terrainkit.features.pit_ground import PitTerrain
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rings(Terrain):
+class Rings(PitTerrain):
     """Nested square rings at random heights in a pit around a platform.
 
     The robot crosses the gaps between them on its way outward. The outermost cells of the patch are
     at height 0.
     """
+
+    has_random_heights: ClassVar[bool] = True
 
     gap: float = parameter.length(0.1, 0.4)
     """Width of the gaps [m]."""
@@ -38,7 +41,7 @@ class Rings(Terrain):
         gap, width = grid.cells(self.gap), grid.cells(self.width)
         number, place = np.divmod(grid.rings(grid.centered(self.platform)) - 1, gap + width)
         tops = self.variation * (2 * rng.random(max(grid.shape)) - 1)
-        ground = pit_around(grid, self.depth, self.platform)
+        ground = super().heights(grid, rng)
         is_ring = (ground < 0) & (place >= gap)
         ground[is_ring] = tops[number[is_ring]]
         return ground

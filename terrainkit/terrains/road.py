@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import SINK
-from terrainkit.features.lane import Lane, lane_goals
+from terrainkit.features.lane import SlotLane
 from terrainkit.features.scatter import scatter
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_hulls
@@ -20,7 +20,7 @@ _ARC = np.linspace(-1.0, 1.0, 13)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Road(Lane):
+class Road(SlotLane):
     """A lane along x with speed bumps across it and potholes between them.
 
     The robot is spawned at low x, and there is a goal between two speed bumps. Potholes are flat in
@@ -65,7 +65,7 @@ class Road(Lane):
         x, y = np.meshgrid(grid.axis(0), grid.axis(1), indexing="ij")
         ground, bump = np.zeros(grid.shape), math.ceil(self.bump_length / grid.cell)
         cells = grid.cells(self.spacing)
-        for k in range(len(self._bumps(grid)) - 1):
+        for k in range(len(self.slot_edges(grid)) - 1):
             first = grid.cells(self.start) + k * cells + bump
             section = grid.block((first, 0), (cells - bump, grid.shape[1]))
             centers, radii = scatter(
@@ -93,16 +93,10 @@ class Road(Lane):
         x = half * np.append(_ARC, [-1.0, 1.0])
         z = np.append(self.bump_height * (1 - _ARC**2), [-SINK, -SINK])
         y = np.repeat([low, high], len(x))
-        middle = self._bumps(grid)[:-1] + half
+        middle = self.slot_edges(grid)[:-1] + half
         return make_hulls([np.column_stack([np.tile(x, 2) + m, y, np.tile(z, 2)]) for m in middle])
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
-        """Return a goal at the end of each section."""
-        return lane_goals(grid, self._bumps(grid)[1:])
-
-    def _bumps(self, grid: Grid) -> NDArray[np.float64]:
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
         """Return where the sections begin, each with a speed bump, and the end of the last [m]."""
         spacing = grid.length(grid.cells(self.spacing))
         return self.slots(

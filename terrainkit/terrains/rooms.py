@@ -45,7 +45,8 @@ class Rooms(FlatTerrain):
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the walls, two boxes beside each door."""
-        parts, size = [], (self.thickness, self.height)
+        parts = []
+        size = (self.thickness, self.height)
         for axis, (line, first, door) in enumerate(self._lines(grid, rng)):
             last = first + self.side + 2 * self.thickness
             middle = (line + self.thickness / 2).ravel()

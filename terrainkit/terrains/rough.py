@@ -5,14 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.noise import STEP, ValueNoise
+from terrainkit.features.value_noise import STEP, RoughGround
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Value
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rough(Terrain):
+class Rough(RoughGround):
     """Uniform noise around height 0, with a flat platform at the center."""
 
     # legged_gym's noise of its rough slope, 0.05 m, is within the range; step and spacing are the
@@ -29,14 +28,6 @@ class Rough(Terrain):
     platform: float = parameter.platform(2.0, sloped_edge=True)
     """Side of the flat square at the center [m]."""
 
-    def realized(self, grid: Grid) -> dict[str, Value]:
-        """Return the realized parameters: whole steps, and whole intervals across the patch."""
-        return super().realized(grid) | self._noise().realized(grid)
-
-    def _noise(self) -> ValueNoise:
-        return ValueNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
-
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the noise, which fades to 0 at the platform over one spacing."""
-        noise = self._noise().heights(grid, rng)
-        return noise * grid.fade(grid.centered(self.platform), self.spacing)
+        return self.noise(grid, rng)

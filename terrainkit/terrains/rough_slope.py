@@ -5,15 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.features.noise import STEP, ValueNoise
+from terrainkit.features.value_noise import STEP, RoughGround
 from terrainkit.geometry.grid import Grid
-from terrainkit.terrain import Terrain, parameter
-from terrainkit.terrain.parameter import Value
+from terrainkit.terrain import parameter
 from terrainkit.terrains.pyramid_slope import PyramidSlope
 
 
 @dataclass(frozen=True, kw_only=True)
-class RoughSlope(Terrain):
+class RoughSlope(RoughGround):
     """A pyramid slope with uniform noise on its sides; the platform is flat.
 
     The rim of the patch is at height 0, plus the noise.
@@ -38,16 +37,7 @@ class RoughSlope(Terrain):
     inverted: bool = parameter.switch()
     """Invert the heights: the platform is the lowest part, and the robot climbs to leave it."""
 
-    def realized(self, grid: Grid) -> dict[str, Value]:
-        """Return the realized parameters: whole steps, and whole intervals across the patch."""
-        return super().realized(grid) | self._noise().realized(grid)
-
-    def _noise(self) -> ValueNoise:
-        return ValueNoise(amplitude=self.amplitude, step=self.step, spacing=self.spacing)
-
     def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
         """Return the slope plus noise, which fades to 0 at the platform."""
         slope = PyramidSlope(grade=self.grade, platform=self.platform, inverted=self.inverted)
-        noise = self._noise().heights(grid, rng)
-        fade = grid.fade(grid.centered(self.platform), self.spacing)
-        return slope.heights(grid, rng) + noise * fade
+        return slope.heights(grid, rng) + self.noise(grid, rng)

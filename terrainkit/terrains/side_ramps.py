@@ -1,30 +1,26 @@
 """Ramps that are tilted sideways."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_ramps
-from terrainkit.features.lane import Lane, lane_goals
-from terrainkit.features.pit_ground import pit_between
+from terrainkit.features.pit_ground import PitLane
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SideRamps(Lane):
+class SideRamps(PitLane):
     """Ramps over a pit along x, tilted to the left and to the right in turn.
 
     Each ramp is beside the middle of the lane and leans toward it; its middle is at height 0. The
     robot is spawned at low x. There is a goal on each ramp, and one behind the pit. The ramps are
     solids, so that their angles and the gaps are exact, but for the last gap, which ends at a cell.
     """
-
-    has_random_heights: ClassVar[bool] = False
 
     # 10 to 30 degrees, and gaps up to 0.4 m, span Extreme Parkour and Robot Parkour Learning.
     roll: float = parameter.scalar(0.175, 0.524)
@@ -51,11 +47,6 @@ class SideRamps(Lane):
     first_side: str = parameter.choice("left", "right")
     """Side of the first ramp."""
 
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return 0, and `-depth` in the pit."""
-        edges = self._slots(grid)
-        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
-
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a solid for each ramp, down to the floor of the pit."""
         rise = self.width / 2 * np.tan(self.roll)
@@ -64,7 +55,7 @@ class SideRamps(Lane):
                 f"side_ramps: got roll {self.roll:g} rad and width {self.width:g} m; expected a "
                 f"lower side above the floor of the pit, {self.depth:g} m deep"
             )
-        edges = self._slots(grid)
+        edges = self.slot_edges(grid)
         side = self._side_signs(edges)
         low, high = (grid.center[1] + side * self.offset + w * self.width / 2 for w in (-1, 1))
         return make_ramps(
@@ -78,11 +69,9 @@ class SideRamps(Lane):
         self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
     ) -> NDArray[np.floating]:
         """Return a goal in the middle of each ramp, and one behind the pit."""
-        edges = self._slots(grid)
-        x = [*(edges[:-1] + self.gap + edges[1:]) / 2, (edges[-1] + self.gap + grid.upper[0]) / 2]
-        goals = lane_goals(grid, x)
+        edges = self.slot_edges(grid)
+        goals = self.pit_goals(grid, (edges[:-1] + self.gap + edges[1:]) / 2)
         goals[:-1, 1] += self._side_signs(edges) * self.offset
-        goals[:-1, 2] = 0.0  # the ramps; noise may change the ground behind the pit
         return goals
 
     def _side_signs(self, edges: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -90,6 +79,7 @@ class SideRamps(Lane):
         is_first = np.arange(len(edges) - 1) % 2 == 0
         return np.where(is_first == (self.first_side == "left"), 1.0, -1.0)
 
-    def _slots(self, grid: Grid) -> NDArray[np.float64]:
-        spacing, end = (self.spacing, self.spacing), max(self.end, self.gap + grid.cell)
-        return self.slots(grid, spacing, element="gaps", length=self.gap, end=end)
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
+        spacing = self.spacing, self.spacing
+        return self.pit_slots(grid, spacing, element="gaps", length=self.gap)

@@ -36,7 +36,7 @@ class Sidewalk(Curbside):
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the grating, a strip at each curb, and the sidewalk between them."""
         cells = self.curb_cell(grid), self._last(grid)
-        first, last = (grid.lower[0] + grid.length(each) for each in cells)
+        first, last = (grid.lower[0] + grid.length(number) for number in cells)
         strips = [self.curb_strip(grid, rng) for _ in range(2)]
         middle = (first + self.strip, grid.lower[1], last - self.strip, grid.upper[1])
         return Solids.concatenate(

@@ -76,8 +76,8 @@ class SpiralStairs(FlatTerrain, Stairway):
         r = np.array([*[self.radius] * _ARC_POINTS, *[0.5 * self.column] * 2])
         xy = np.stack([x + r * np.cos(theta), y + r * np.sin(theta)], axis=-1)
         hulls = [
-            np.column_stack([np.vstack([each, each]), np.repeat([z, z - self.thickness], len(r))])
-            for each, z in zip(xy[:-1], top, strict=True)
+            np.column_stack([np.vstack([line, line]), np.repeat([z, z - self.thickness], len(r))])
+            for line, z in zip(xy[:-1], top, strict=True)
         ]
         length = top[-1] + SINK
         column = make_cylinders([[x, y, length / 2 - SINK]], self.column, length)

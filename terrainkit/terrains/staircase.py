@@ -141,7 +141,7 @@ class Staircase(FlatTerrain, Stairway):
             unit: Random numbers, at least one for each riser; None for equal risers.
         """
         sections = self._sections(number)
-        count = sum(each.number for each in sections)
+        count = sum(section.number for section in sections)
         risers = np.full(count, self.riser)
         if unit is not None and self.riser_difference:
             up = number + 1 if self.shape == "straight" else count

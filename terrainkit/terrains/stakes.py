@@ -2,26 +2,23 @@
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.blocks import SINK, max_number
-from terrainkit.features.pit_ground import pit_around, pit_bounds
+from terrainkit.features.pit_ground import PitTerrain, pit_bounds
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_cylinders
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stakes(Terrain):
+class Stakes(PitTerrain):
     """Round stakes (plum-blossom piles) in staggered rows, in a pit around a platform.
 
     Each stake has the same distance from its six neighbors.
     """
-
-    has_random_heights: ClassVar[bool] = False
 
     # The plum-blossom piles of Unitree's demonstrations and of BeamDojo.
     diameter: float = parameter.size(0.3, 0.15)
@@ -38,10 +35,6 @@ class Stakes(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the flat square at the center [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the pit around the platform."""
-        return pit_around(grid, self.depth, self.platform)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the stakes that fit in the pit, level with the platform where they touch it."""

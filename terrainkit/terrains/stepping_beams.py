@@ -8,15 +8,14 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane, lane_goals
-from terrainkit.features.pit_ground import pit_between
+from terrainkit.features.pit_ground import PitLane
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
 from terrainkit.terrain import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class SteppingBeams(Lane):
+class SteppingBeams(PitLane):
     """Narrow beams over a pit across a lane along x, on which the robot steps.
 
     The robot is spawned at low x, and there is a goal behind the pit. The beams are solids of
@@ -25,7 +24,6 @@ class SteppingBeams(Lane):
     """
 
     has_column_seed: ClassVar[bool] = True
-    has_random_heights: ClassVar[bool] = False
 
     # Width, gap, yaw and length are in the range of Isaac Lab's and BeamDojo's beams.
     width: float = parameter.size(0.5, 0.2)
@@ -52,11 +50,6 @@ class SteppingBeams(Lane):
     end: float = parameter.size(1.0)
     """Minimum length along x behind the last beam, with its gap [m]."""
 
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return 0, and `-depth` in the pit."""
-        edges = self._slots(grid)
-        return pit_between(grid, self.depth, edges[0], edges[-1] + self.gap)
-
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return a box for each beam, down to the floor of the pit."""
         if not self.min_length <= self.max_length:
@@ -64,7 +57,7 @@ class SteppingBeams(Lane):
                 f"stepping_beams.min_length: got {self.min_length:g} m; expected at most "
                 f"max_length, {self.max_length:g} m"
             )
-        edges = self._slots(grid)
+        edges = self.slot_edges(grid)
         share, side, turn = rng.random((3, len(edges) - 1))
         length = self.min_length + (self.max_length - self.min_length) * share
         y = grid.center[1] + self.offset * (2 * side - 1)
@@ -76,12 +69,7 @@ class SteppingBeams(Lane):
             yaw=self.yaw * (2 * turn - 1),
         )
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
-        """Return a goal behind the pit."""
-        return lane_goals(grid, (self._slots(grid)[-1] + self.gap + grid.upper[0]) / 2)
-
-    def _slots(self, grid: Grid) -> NDArray[np.float64]:
-        pitch, end = self.width + self.gap, max(self.end, self.gap + grid.cell)
-        return self.slots(grid, (pitch, pitch), element="beams", length=self.width, end=end)
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
+        pitch = self.width + self.gap
+        return self.pit_slots(grid, (pitch, pitch), element="beams", length=self.width)

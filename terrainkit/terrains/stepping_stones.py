@@ -93,13 +93,14 @@ def _offsets(
         expected: Area of the holes of each row on an endless field [cells], shape (rows,).
         samples: Random numbers from 0 to 1.
     """
-    shifts, missing = [], 0.0
+    shifts = []
+    missing = 0.0
     # Lists, since a row has few offsets.
     for k, (area, share) in enumerate(zip(areas.tolist(), expected.tolist(), strict=True)):
         missing += share
-        error = [abs(each - missing) for each in area]
+        error = [abs(value - missing) for value in area]
         limit = min(error) + 1e-9
-        nearest = [offset for offset, each in enumerate(error) if each <= limit]
+        nearest = [offset for offset, value in enumerate(error) if value <= limit]
         shifts.append(nearest[int(samples[k % len(samples)] * len(nearest))])
         missing -= area[shifts[k]]
     return np.array(shifts)

@@ -1,29 +1,26 @@
 """Stones with random offsets all around a platform."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.features.blocks import SINK, make_blocks, max_number
-from terrainkit.features.pit_ground import pit_around, pit_bounds
+from terrainkit.features.pit_ground import PitTerrain, pit_bounds
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids
-from terrainkit.terrain import Terrain, parameter
+from terrainkit.terrain import parameter
 
 _MIN_SIDE = 0.02
 """Narrower rests of truncated stones are left out [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class StonesEverywhere(Terrain):
+class StonesEverywhere(PitTerrain):
     """Square stones of exact size with random offsets and heights, in a pit around a platform.
 
     Stones are truncated at the platform and at the edges of the pit.
     """
-
-    has_random_heights: ClassVar[bool] = False
 
     # The ranges of Isaac Lab's development branch.
     stone: float = parameter.size(0.96, 0.2)
@@ -43,10 +40,6 @@ class StonesEverywhere(Terrain):
 
     platform: float = parameter.platform(2.0)
     """Side of the flat square at the center [m]."""
-
-    def heights(self, grid: Grid, rng: np.random.Generator) -> NDArray[np.floating]:
-        """Return the pit around the platform."""
-        return pit_around(grid, self.depth, self.platform)
 
     def solids(self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator) -> Solids:
         """Return the stones, on a lattice around the center of the patch."""

@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError
 from terrainkit.features.blocks import make_standing_boxes
-from terrainkit.features.lane import Lane, lane_goals
+from terrainkit.features.lane import SlotLane
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.terrain import FlatTerrain, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tunnel(FlatTerrain, Lane):
+class Tunnel(FlatTerrain, SlotLane):
     """Tunnels along a lane along x, with walls up to the sides of the patch.
 
     The robot is spawned at low x, and there is a goal behind each tunnel. The tunnels are solids;
@@ -45,7 +45,7 @@ class Tunnel(FlatTerrain, Lane):
                 f"tunnel: got width {self.width:g} m; expected less than the width of the patch, "
                 f"{grid.size[1]:g} m"
             )
-        edges = self._slots(grid)
+        edges = self.slot_edges(grid)
         x = (edges[:-1] + edges[1:]) / 2
         walls = [
             make_standing_boxes(np.column_stack([x, 0 * x + y]), (self.depth, wall), self.clearance)
@@ -56,12 +56,7 @@ class Tunnel(FlatTerrain, Lane):
         size = self.depth, grid.size[1], self.thickness
         return Solids.concatenate([*walls, make_boxes(roof, size)])
 
-    def goals(
-        self, grid: Grid, heights: NDArray[np.float32], rng: np.random.Generator
-    ) -> NDArray[np.floating]:
-        """Return a goal behind each tunnel."""
-        return lane_goals(grid, self._slots(grid)[1:])
-
-    def _slots(self, grid: Grid) -> NDArray[np.float64]:
+    def slot_edges(self, grid: Grid) -> NDArray[np.float64]:
+        """Return the edges of the slots along x [m], shape (n + 1,); see `slots`."""
         spacing = self.spacing, self.spacing
         return self.slots(grid, spacing, element="tunnels", length=self.depth)

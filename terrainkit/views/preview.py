@@ -17,7 +17,7 @@ from terrainkit.views.preview_layout import ABOVE, BELOW, LEFT, RIGHT, Block, ma
 
 if TYPE_CHECKING:
     from terrainkit.geometry.mesh.tri_mesh import TriMesh
-    from terrainkit.map.config import MapConfig
+    from terrainkit.map.map_config import MapConfig
     from terrainkit.map.terrain_map import TerrainMap
 
 Picture = NDArray[np.uint8]
@@ -142,7 +142,7 @@ def render_preview(
     blocks, axis = make_blocks(terrain_map, width)
     levels = map_levels(terrain_map.heights)
     pictures = [_draw_block(terrain_map, block, routes, levels) for block in blocks]
-    sizes = np.array([each.shape[:2] for each in pictures])
+    sizes = np.array([picture.shape[:2] for picture in pictures])
     height, span = np.where(np.arange(2) == axis, sizes.sum(axis=0), sizes.max(axis=0)).tolist()
     image = np.full((height + ABOVE, span + RIGHT, 3), _BACKGROUND, dtype=np.uint8)
     corner = [ABOVE, 0]
@@ -153,9 +153,9 @@ def render_preview(
     _write(image, "columns (y): terrain", (10, ABOVE - 14))
     _write(image, map_title(terrain_map.config), (LEFT, 40), 0.7)
     tops = terrain_map.solids.bounds()[1][:, 2]  # the color of a solid shows the height of its top
-    shown = [terrain_map.heights[each.cells] for each in blocks]
-    low = min([*(float(each.min()) for each in shown), tops.min(initial=np.inf)])
-    high = max([*(float(each.max()) for each in shown), tops.max(initial=-np.inf)])
+    shown = [terrain_map.heights[block.cells] for block in blocks]
+    low = min([*(float(heights.min()) for heights in shown), tops.min(initial=np.inf)])
+    high = max([*(float(heights.max()) for heights in shown), tops.max(initial=-np.inf)])
     _draw_color_bar(image[:, span:], low, high, blocks[0].size[1], levels)
     if _is_hanging(terrain_map, terrain_map.solids).any():
         y = ABOVE + min(blocks[0].size[1], _MAX_BAR_HEIGHT)
@@ -323,7 +323,7 @@ def _draw_solids(image: Picture, terrain_map: "TerrainMap", block: Block, levels
     is_near = np.all((lower < block.grid.upper) & (upper > block.grid.lower), axis=1)
     solids = terrain_map.solids.select(np.asarray(is_near))
     meshes = zip(solid_meshes(solids), _is_hanging(terrain_map, solids), strict=True)
-    for mesh, hangs in sorted(meshes, key=lambda each: each[0].vertices[:, 2].max()):
+    for mesh, hangs in sorted(meshes, key=lambda item: item[0].vertices[:, 2].max()):
         outline = cv2.convexHull(block.pixels(mesh.vertices[:, :2]))
         first = np.maximum(outline.min(axis=(0, 1)), 0)
         x, y = first.tolist()
@@ -364,10 +364,10 @@ def _facets(
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     light = LIGHT / LIGHT[2]
-    for each in np.unique(normal[normal[:, 2] > 1e-3].round(3), axis=0):
-        points = mesh.vertices[mesh.triangles[(np.abs(normal - each) < 1e-3).all(axis=1)].ravel()]
+    for facet in np.unique(normal[normal[:, 2] > 1e-3].round(3), axis=0):
+        points = mesh.vertices[mesh.triangles[(np.abs(normal - facet) < 1e-3).all(axis=1)].ravel()]
         color = height_colors(points[:, 2].mean(), levels)
-        yield points, shaded_colors(color, np.asarray(each @ light))
+        yield points, shaded_colors(color, np.asarray(facet @ light))
 
 
 def _draw_labels(image: Picture, terrain_map: "TerrainMap", block: Block) -> None:
@@ -419,6 +419,7 @@ def _draw_route(image: Picture, route: Route, block: Block) -> None:
     if route.place is not None:
         x, y = block.pixels(route.place).tolist()
         cv2.drawMarker(image, (x, y), color, cv2.MARKER_TILTED_CROSS, 14, 3, cv2.LINE_AA)
-        at, font = (min(x + 10, image.shape[1] - 36), y - 6), cv2.FONT_HERSHEY_SIMPLEX
+        at = (min(x + 10, image.shape[1] - 36), y - 6)
+        font = cv2.FONT_HERSHEY_SIMPLEX
         cv2.putText(image, route.label, at, font, 0.5, _BACKGROUND, 4, cv2.LINE_AA)
         _write(image, route.label, at)

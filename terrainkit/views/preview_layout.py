@@ -70,16 +70,16 @@ def make_blocks(terrain_map: "TerrainMap", width: int) -> tuple[list[Block], int
     for axis in (1, 0):
         for number in range(1, min(terrain_map.difficulty.shape[axis], _MAX_PARTS) + 1):
             blocks = list(_parts(terrain_map, axis, number))
-            size = np.max([each.grid.size for each in blocks], axis=0)
+            size = np.max([block.grid.size for block in blocks], axis=0)
             size[1 - axis] *= len(blocks)
             free = np.array([width, MAX_ASPECT * width])
             free[1 - axis] -= (len(blocks) - 1) * (BELOW, LEFT)[axis]
             scale = float((free / size).min())
             gain = scale * (_MIN_GAIN if len(blocks) == 1 else 1.0)
             found = (gain, scale, axis, blocks)
-            best = max(best, found, key=lambda each: (*each[:3], len(each[3])))
+            best = max(best, found, key=lambda layout: (*layout[:3], len(layout[3])))
     _, scale, axis, blocks = best
-    return [replace(each, scale=scale) for each in blocks], axis
+    return [replace(block, scale=scale) for block in blocks], axis
 
 
 def _parts(terrain_map: "TerrainMap", axis: int, number: int) -> Iterator[Block]:
@@ -90,7 +90,8 @@ def _parts(terrain_map: "TerrainMap", axis: int, number: int) -> Iterator[Block]
         axis: The axis that is divided.
         number: Number of the parts; fewer if they are all full.
     """
-    config, total = terrain_map.config, terrain_map.difficulty.shape[axis]
+    config = terrain_map.config
+    total = terrain_map.difficulty.shape[axis]
     cut = max(0, config.border_cells - round(1.0 / config.cell))
     length = -(-total // number)
     for first in range(0, total, length):

@@ -15,7 +15,8 @@ from stand_ins import StandIns
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.isaaclab import config_text
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 
 STAND_INS = ("carb", "cv2", "flatdict", "h5py", "hid", "isaacsim", "omni", "onnx", "pxr", "usdrt")
 STAND_INS += ("einops", "matplotlib", "prettytable", "toml", "transformers", "warp", "yaml")

@@ -44,7 +44,8 @@ import terrainkit
 from terrainkit.geometry.box_decomposition import neighborhood
 from terrainkit.integrations.isaaclab import terrain_importer_cfg
 from terrainkit_robots.description import bundled
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 
 folder = Path(sys.argv[1])
 os.chdir(folder)

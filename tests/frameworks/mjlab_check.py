@@ -24,7 +24,8 @@ from terrainkit.integrations.mjlab import import_terrain
 from terrainkit.integrations.mujoco import make_spec
 from terrainkit.map.validate import validate
 from terrainkit_robots.description import bundled
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 
 folder = Path(sys.argv[1])
 os.chdir(folder)

@@ -33,6 +33,8 @@ dunes = dune_pack:Dunes
 ripples = dune_pack:Dunes
 [terrainkit.tasks]
 rover = dune_pack
+[terrainkit.rules]
+DUN = dune_pack
 """
 
 
@@ -59,6 +61,11 @@ BUILD = "patch (0, 0): terrain dunes (dune_pack:Dunes): SystemExit: 0"
     [
         ("import", ("generate", *SMALL), IMPORT),
         ("import", ("list", "dunes"), IMPORT),
+        (
+            "import",
+            ("check-robot", "quadruped"),
+            "rules DUN (dune_pack) cannot be loaded: SystemExit: 0",
+        ),
         ("import", ("train", "rover"), "task rover (dune_pack) cannot be loaded: SystemExit: 0"),
         (
             "",

@@ -146,7 +146,7 @@ def test_view_needs_an_address_of_this_machine():
 @pytest.mark.usefixtures("map_file")
 def test_view_without_viser_names_the_extra(rejected, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
-    monkeypatch.delitem(sys.modules, "terrainkit.views.viewer_server", raising=False)
+    monkeypatch.delitem(sys.modules, "terrainkit.viewer.viewer_server", raising=False)
     assert "pip install '.[view]'" in rejected("view map.npz")
 
 

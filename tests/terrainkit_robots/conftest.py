@@ -1,6 +1,5 @@
 """Fixtures for the tests of terrainkit_robots."""
 
-import os
 import re
 import shutil
 from collections.abc import Callable
@@ -15,29 +14,24 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled as bundled_robots
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.onboarding.result import OnboardResult
 from terrainkit_robots.simulation.standing import StandResult
-from terrainkit_robots.spec.robot import SPEC_FILE, Robot
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
-_PROJECT = Path(__file__).resolve().parents[2]
-ROBOTS = Path(os.environ.get("TERRAINKIT_ROBOTS", _PROJECT.parent / "shared" / "robots"))
+ROBOTS = Path(__file__).with_name("robots")
+"""Folder of the robots of the tests."""
 
 
 @pytest.fixture(scope="session")
 def robot_file() -> Callable[[str], Path]:
-    """Return the path of a robot file, such as the bundled `quadruped.xml` or `go2/urdf/go2.urdf`.
-
-    The test is skipped if a robot that is not bundled is missing.
-    """
+    """Return the path of a robot file by its name, such as `quadruped.xml` or `tilted.urdf`."""
 
     def find(name: str) -> Path:
-        if "/" not in name:
-            return bundled_robots.urdf_path(Path(name).stem).with_suffix(Path(name).suffix)
-        if not (ROBOTS / name).exists():
-            pytest.skip(f"{name} is not in {ROBOTS}; set TERRAINKIT_ROBOTS to a folder with robots")
-        return ROBOTS / name
+        own = ROBOTS / name
+        return own if own.exists() else bundled_robots.urdf_path(own.stem).with_name(name)
 
     return find
 

@@ -9,7 +9,7 @@ from terrainkit_robots.analysis.bodies.bodies import Body, merge_bodies, physica
 from terrainkit_robots.analysis.bodies.bounds import BodyBounds
 from terrainkit_robots.analysis.bodies.overlap import OverlapScene
 from terrainkit_robots.analysis.bodies.tree import Tree, build_tree
-from terrainkit_robots.analysis.inertia.repair import InertiaRepair
+from terrainkit_robots.analysis.inertia.inertia_repair import InertiaRepair
 from terrainkit_robots.analysis.legs.default_pose import default_positions
 from terrainkit_robots.analysis.legs.joint_roles import leg_joints, robot_joints
 from terrainkit_robots.analysis.legs.leg_model import LegModel

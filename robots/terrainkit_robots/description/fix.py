@@ -1,11 +1,24 @@
-"""Fixes as data: edits of XML elements, and new files."""
+"""Locations in files, and fixes as data: edits of XML elements, and new files."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from terrainkit_robots.description.model import Source
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """Location of an element in a file."""
+
+    file: Path
+    """Path of the file, as given or as included."""
+
+    line: int
+    """Line on which the element starts, counted from 1; 0 stands for the whole file."""
+
+    element: int | None = None
+    """Index of the element in the file, in document order. None if the element cannot be edited,
+    because the file is malformed or was expanded from xacro."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +90,12 @@ class Fix:
     """What the fix does, as a sentence."""
 
     edits: tuple[Edit, ...]
+
+
+def number_fix(source: Source, attribute: str, text: str) -> Fix | None:
+    """Return the fix that writes an attribute as `text`; None if it cannot be repaired."""
+    edits = [SetAttribute(source=source, name=attribute, value=text)] if text else []
+    return make_fix("safe", f'Set {attribute}="{text}".', edits)
 
 
 def make_fix(

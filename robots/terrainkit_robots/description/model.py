@@ -11,6 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from terrainkit_robots.description.fix import Fix
+from terrainkit_robots.description.fix import Source as Source
 from terrainkit_robots.transforms import Matrix
 
 Kind = Literal["urdf", "xacro", "mjcf"]
@@ -23,21 +25,6 @@ WORLD = "world"
 """Name of the world: the parent of the root bodies of an MJCF, or a root link of a URDF."""
 
 JOINT_TYPES = MOVING | {"fixed", "floating", "planar", "ball"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Source:
-    """Location of an element in a file."""
-
-    file: Path
-    """Path of the file, as given or as included."""
-
-    line: int
-    """Line on which the element starts, counted from 1; 0 stands for the whole file."""
-
-    element: int | None = None
-    """Index of the element in the file, in document order. None if the element cannot be edited,
-    because the file is malformed or was expanded from xacro."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,8 +43,14 @@ class Problem:
     subject: str = ""
     """Name of the link, joint or file that the problem belongs to."""
 
-    details: Mapping[str, str] = field(default_factory=dict)
-    """Data for an automatic fix, such as the name of the attribute."""
+    attribute: str = ""
+    """Name of the attribute that is invalid or missing."""
+
+    severity: Literal["error", "warning"] | None = None
+    """By default, the severity of the rule."""
+
+    fix: Fix | None = None
+    """The edits that correct it, if it can be corrected automatically."""
 
 
 def _identity() -> Matrix:

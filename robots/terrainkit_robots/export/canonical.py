@@ -24,7 +24,6 @@ from terrainkit_robots.description.model import (
     Joint,
     Limit,
     Link,
-    Mimic,
     RobotModel,
 )
 from terrainkit_robots.description.xml.document import RobotFileError
@@ -76,7 +75,7 @@ def to_canonical(facts: "Facts", *, floating: bool | None = None) -> CanonicalRo
         else:
             attached = names(joint.name for joint, _ in joints if joint.parent == WORLD)
             changes.append(f"added the base link {new_name} for the world, with joints {attached}")
-        links = [replace(each, name=new_name) if each.name == WORLD else each for each in links]
+        links = [replace(link, name=new_name) if link.name == WORLD else link for link in links]
         joints = [(_rename_world(joint, new_name), before) for joint, before in joints]
     imu = facts.model.imu
     model = RobotModel(
@@ -192,9 +191,10 @@ def _joints(facts: "Facts", changes: list[str]) -> list[tuple[Joint, str]]:
         used_names.add(name)
         mimic = joint.mimic if joint.name in mimic_joint_names else None
         if joint.mimic is not None and mimic is None and joint.moves:
-            changes.append(
-                f"removed the mimic of {joint.name}: {_mimic_problem(facts, joint.mimic)}"
-            )
+            is_cycle = any(joint.mimic.joint == other.name for other in facts.joints)
+            missing = f"there is no joint {joint.mimic.joint!r}"
+            problem = "it is part of a cycle" if is_cycle else missing
+            changes.append(f"removed the mimic of {joint.name}: {problem}")
         moved = _canonical_joint(replace(joint, mimic=mimic), bodies.get(joint.child), changes)
         result.append((replace(moved, name=name), joint.name))
     return result
@@ -230,13 +230,6 @@ def _canonical_joint(joint: Joint, body: Body | None, changes: list[str]) -> Joi
         ),
         armature=_positive(joint.armature) or 0.0,
     )
-
-
-def _mimic_problem(facts: "Facts", mimic: Mimic) -> str:
-    """Return why a mimic is not valid."""
-    if any(mimic.joint == joint.name for joint in facts.joints):
-        return "it is part of a cycle"
-    return f"there is no joint {mimic.joint!r}"
 
 
 def _positive(value: float | None) -> float | None:

@@ -95,5 +95,5 @@ def _base(facts: "Facts") -> Body:
 
 def pose_in_body(body: Body, link: str) -> Matrix:
     """Return the pose of a link in the frame of its body."""
-    names = [each.name for each in body.links]
+    names = [link.name for link in body.links]
     return body.poses[names.index(link)]

@@ -23,7 +23,7 @@ def unsupported_elements(model: RobotModel) -> tuple[str, ...]:
         if root is None:
             continue
         for section in _SECTIONS:
-            ignored[f"<{section}>"] += sum(len(each) for each in root.iter(section))
+            ignored[f"<{section}>"] += sum(len(element) for element in root.iter(section))
         ignored["stiffness of joints"] += sum(
             _is_set(joint.get("stiffness")) for joint in root.iter("joint")
         )

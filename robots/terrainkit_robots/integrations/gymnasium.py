@@ -19,7 +19,7 @@ from terrainkit_robots.rl.scene import drawn_model
 from terrainkit_robots.rl.simulation import Ids
 from terrainkit_robots.rl.tasks import get_task, task_names
 from terrainkit_robots.rl.terrain import load_terrain
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
 try:

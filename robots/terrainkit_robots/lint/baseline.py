@@ -102,13 +102,13 @@ class Baseline:
         known = {key for key in found if found[key] <= recorded[key]}
         reason = f"{count(sum(found[key] for key in known), 'finding')} accepted in {file}"
         kept, skipped = list[Finding](), list(report.skipped)
-        for each in report.findings:
-            if each.severity != "note" and (each.code, each.subject) in known:
+        for finding in report.findings:
+            if finding.severity != "note" and (finding.code, finding.subject) in known:
                 skipped.append(
-                    Suppressed(code=each.code, kind="suppressed", reason=reason, finding=each)
+                    Suppressed(code=finding.code, kind="suppressed", reason=reason, finding=finding)
                 )
             else:
-                kept.append(each)
+                kept.append(finding)
         unused = _group(key for key in recorded - found if key[0] in report.completed)
         for code, subjects in unused.items():
             reason = f"no longer needed in {file}: {names(subjects)}"

@@ -16,6 +16,9 @@ rule, and the sections `Fix:` and `Source:`.
         Source:
             Where the problem and the threshold are documented.
         '''
+
+Other packages add rules as entry points of the group `terrainkit.rules`. The name of an entry point
+is the family of its rules, three capital letters, and its value the module that declares them.
 """
 
 import importlib
@@ -28,12 +31,14 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Protocol, get_args
 
-from terrainkit.errors import ConfigError
+from terrainkit.errors import ConfigError, one_line, plugin_errors
 from terrainkit.settings.text import closest, expected_names
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import Source
 
 if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
     from terrainkit_robots.analysis.facts import Facts
 
 Severity = Literal["error", "warning", "note"]
@@ -43,27 +48,70 @@ SEVERITIES: tuple[Severity, ...] = get_args(Severity)
 Certainty = Literal["proven", "likely"]
 Measured = Mapping[str, float | int | str]
 
-Need = Literal["mjcf", "legs", "simulation", "against", "spec"]
-"""Input that a rule requires: an MJCF file, detected legs, permission to simulate, a second
-description of the robot, or its robot.toml."""
+Unit = Literal["mass-unit", "length-unit", "inertia-unit", "angle-unit", "effort-unit"]
+"""Names of the rules on units."""
+
+Need = Literal["all-files", "complete-tree", Unit, "mjcf", "simulation", "against", "spec", "legs"]
+"""Input that a rule requires: every included file, a kinematic tree without rejected links, a
+quantity without a wrong unit, an MJCF file, permission to simulate, a second description of the
+robot, its robot.toml, or detected legs."""
+
+COMPLETE: tuple[Need, ...] = ("all-files", "complete-tree")
+"""Needs of rules that compare limbs or simulate. On an incomplete robot they would report
+consequences of the errors of the tree, or what a missing file may contain."""
+
+UNITS: tuple[Need, ...] = get_args(Unit)
+"""Needs of rules that would report a wrong unit of any quantity once more."""
+
+Onboarding = Literal["blocks", "repairs", "converts", "warns", "reports"]
+"""What onboarding does about a finding:
+
+- `blocks`: an error prevents onboarding, since the written files would describe another robot, or
+  MuJoCo would reject them.
+- `repairs`: as `blocks`, but onboarding corrects it where it can: the path of a mesh, a negligible
+  inertia, a placeholder of an effort.
+- `converts`: an error cannot occur in the written files, since the export rewrites that part.
+- `warns`: it is repeated as a warning.
+- `reports`: it is listed in report.md.
+"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Family:
+    """Rules on one topic, and what all of them have in common."""
+
+    title: str
+    """The topic."""
+
+    onboarding: Onboarding = "reports"
+    """What onboarding does about a finding, unless the rule declares something else."""
+
+    needs: tuple[Need, ...] = ()
+    """Inputs that each rule requires, besides its own."""
+
+    certainty: Certainty = "proven"
+    """Certainty of a violation, unless the rule declares another one."""
+
 
 FAMILIES = {
-    "XML": "XML syntax and schema",
-    "UNI": "units",
-    "MSH": "mesh files",
-    "TRE": "kinematic tree",
-    "JNT": "joints",
-    "INR": "mass and inertia",
-    "COL": "collision geometry",
-    "LEG": "legs",
-    "SYM": "left-right symmetry",
-    "NAM": "names",
-    "XRF": "comparison with another file or with the spec",
-    "SIM": "simulator compatibility",
-    "OPT": "physics options of MJCF",
-    "DYN": "simulation",
+    "XML": Family(title="XML syntax and schema", onboarding="blocks"),
+    "UNI": Family(title="units", certainty="likely"),
+    "MSH": Family(title="mesh files", onboarding="blocks"),
+    "TRE": Family(title="kinematic tree", onboarding="blocks"),
+    "JNT": Family(title="joints"),
+    "INR": Family(title="mass and inertia"),
+    "COL": Family(title="collision geometry", needs=("all-files", "length-unit")),
+    "LEG": Family(title="legs", needs=(*COMPLETE, "legs"), certainty="likely"),
+    "SYM": Family(
+        title="left-right symmetry", needs=(*COMPLETE, "length-unit"), certainty="likely"
+    ),
+    "NAM": Family(title="names"),
+    "XRF": Family(title="comparison with another file or with the spec"),
+    "SIM": Family(title="simulator compatibility"),
+    "OPT": Family(title="physics options of MJCF", needs=("all-files",)),
+    "DYN": Family(title="simulation", needs=(*COMPLETE, *UNITS)),
 }
-
+"""The families by the letters of their codes, in the order in which their rules run."""
 
 IMPORTANCE = (
     "UNI",  # one cause of many findings
@@ -118,6 +166,9 @@ class Violation:
     fix: Fix | None = None
     """The edits that correct it, if it can be corrected automatically."""
 
+    is_written: bool = True
+    """Whether onboarding writes the element. If not, an error does not prevent onboarding."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Finding(Violation):
@@ -133,6 +184,19 @@ class Finding(Violation):
     source: Source
     severity: Severity
     certainty: Certainty
+    onboarding: Onboarding = "reports"
+    """What onboarding does about it."""
+
+    @property
+    def family(self) -> str:
+        """Letters of the code."""
+        return self.code[:3]
+
+    @property
+    def is_blocking(self) -> bool:
+        """Whether it prevents onboarding."""
+        is_severe = self.severity == "error" and self.is_written
+        return is_severe and self.onboarding in ("blocks", "repairs")
 
     @property
     def file(self) -> Path:
@@ -147,7 +211,8 @@ class Finding(Violation):
 
 Violations = Iterator[Violation]
 
-Check = Callable[["Facts"], Violations]
+Check = Callable[["Facts"], Violations | None]
+"""A generator of violations. A function without code reports what the readers recorded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,14 +234,20 @@ class Rule:
     """Whether some violations can be fixed automatically."""
 
     needs: tuple[Need, ...] = ()
-    """Inputs that the rule requires."""
+    """Inputs that the rule requires. The first one that is missing is the reason in the report."""
 
     certainty: Certainty = "proven"
     """Default certainty of a violation."""
 
+    onboarding: Onboarding = "reports"
+    """What onboarding does about a violation."""
+
+    is_fatal: bool = False
+    """Whether a file with a violation may contain no robot."""
+
     def findings(self, robot: "Facts") -> Iterator[Finding]:
         """Yield the violations on a robot with their defaults filled in."""
-        for violation in self.check(robot):
+        for violation in self._violations(robot):
             element, subject = violation.element, violation.subject
             if subject is None:
                 subject = robot.model.title if element is None else element.name
@@ -191,7 +262,22 @@ class Rule:
                 certainty=violation.certainty or self.certainty,
                 measured=violation.measured,
                 fix=violation.fix,
+                is_written=violation.is_written,
+                onboarding=self.onboarding,
             )
+
+    def _violations(self, robot: "Facts") -> Violations:
+        """Yield what the readers recorded under the code, then what the check finds."""
+        for problem in robot.model.problems:
+            if problem.code == self.code:
+                yield Violation(
+                    subject=problem.subject or robot.model.name or problem.source.file.name,
+                    source=problem.source,
+                    message=problem.message,
+                    severity=problem.severity,
+                    fix=problem.fix,
+                )
+        yield from self.check(robot) or ()
 
     @property
     def family(self) -> str:
@@ -229,12 +315,14 @@ class Rule:
             raise ConfigError(
                 f"docstring of rule {self.code}: expected a title, a reason, Fix: and Source:"
             )
-        why = "\n\n".join(_join_lines(paragraph) for paragraph in match["why"].split("\n\n"))
-        return match["title"], why, _join_lines(match["fix"]), _join_lines(match["source"])
+        why = "\n\n".join(one_line(paragraph) for paragraph in match["why"].split("\n\n"))
+        return match["title"], why, one_line(match["fix"]), one_line(match["source"])
 
 
-def _join_lines(text: str) -> str:
-    return " ".join(text.split())
+def _need_order(need: Need) -> int:
+    """Return the sort key of an input: one whose lack makes results wrong is the first reason."""
+    first = (*COMPLETE, *UNITS)
+    return first.index(need) if need in first else len(first)
 
 
 def _path(check: Check) -> str:
@@ -244,6 +332,20 @@ def _path(check: Check) -> str:
 _RULES: dict[str, Rule] = {}
 
 
+@cache
+def _plugins() -> tuple["EntryPoint", ...]:
+    """Return the modules with rules in other packages, whose names are families."""
+    from importlib.metadata import entry_points
+
+    return tuple(entry_points(group="terrainkit.rules"))
+
+
+def families() -> Mapping[str, Family]:
+    """Return the families by the letters of their codes, other packages' last."""
+    plugins = {point.name: Family(title=f"rules of {point.module}") for point in _plugins()}
+    return FAMILIES | {name: family for name, family in plugins.items() if name not in FAMILIES}
+
+
 def rule(
     code: str,
     name: str,
@@ -251,12 +353,15 @@ def rule(
     *,
     fixes: Literal["safe", "unsafe", "no"] = "no",
     needs: tuple[Need, ...] = (),
-    certainty: Certainty = "proven",
+    certainty: Certainty | None = None,
+    onboarding: Onboarding | None = None,
+    is_fatal: bool = False,
 ) -> Callable[[Check], Check]:
-    """Return a decorator that registers a function as the rule `code`."""
-    if code[:3] not in FAMILIES or not re.fullmatch(r"\d{3}", code[3:]):
-        families = ", ".join(FAMILIES)
-        raise ConfigError(f"rule code: got {code}; expected a family ({families}) and three digits")
+    """Return a decorator that registers a function as the rule `code`; see the fields of `Rule`."""
+    family = families().get(code[:3])
+    if family is None or not re.fullmatch(r"\d{3}", code[3:]):
+        known = ", ".join(families())
+        raise ConfigError(f"rule code: got {code}; expected a family ({known}) and three digits")
 
     def register(check: Check) -> Check:
         # A module that is loaded again replaces its rules.
@@ -270,8 +375,10 @@ def rule(
             severity=severity,
             check=check,
             fixes=fixes,
-            needs=needs,
-            certainty=certainty,
+            needs=tuple(sorted((*needs, *family.needs), key=_need_order)),
+            certainty=certainty or family.certainty,
+            onboarding=onboarding or family.onboarding,
+            is_fatal=is_fatal,
         )
         return check
 
@@ -280,12 +387,25 @@ def rule(
 
 @cache
 def rules() -> tuple[Rule, ...]:
-    """Return all rules, sorted by family in the order of FAMILIES, then by number."""
+    """Return all rules, sorted by family, then by number.
+
+    Raises:
+        ConfigError: if the rules of another package cannot be loaded.
+    """
     from terrainkit_robots.lint import rules as package
 
     for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
         importlib.import_module(module.name)
-    order = list(FAMILIES)
+    for point in _plugins():
+        with plugin_errors(f"rules {point.name} ({point.value}) cannot be loaded"):
+            if point.name in FAMILIES or not re.fullmatch("[A-Z]{3}", point.name):
+                raise ConfigError(f"family: got {point.name}; expected three other capital letters")
+            known = set(_RULES)
+            point.load()
+            for code in _RULES.keys() - known:
+                if not code.startswith(point.name):
+                    raise ConfigError(f"rule code: got {code}; expected {point.name} and digits")
+    order = list(families())
     return tuple(sorted(_RULES.values(), key=lambda r: (order.index(r.family), r.code)))
 
 
@@ -305,7 +425,7 @@ def get_rule(code_or_name: str) -> Rule:
     names = [rule.code for rule in rules() if code_or_name.upper().startswith(rule.family)]
     prefix = "there are" if names else "expected a code or a name of the families"
     suggestion = expected_names(
-        code_or_name, names or FAMILIES, prefix, closest(code_or_name, known)
+        code_or_name, names or families(), prefix, closest(code_or_name, known)
     )
     raise ConfigError(f"no rule {code_or_name!r}; {suggestion}")
 

@@ -1,13 +1,13 @@
 """Run rules on a robot and collect their findings in a report."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Literal
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.rule import IMPORTANCE, SEVERITIES, Finding, Need, Rule
+from terrainkit_robots.lint.rule import IMPORTANCE, SEVERITIES, UNITS, Finding, Need, Rule, get_rule
 
 Verdict = Literal["pass", "warn", "fail"]
 
@@ -70,7 +70,7 @@ class Report:
     @property
     def crashed(self) -> tuple[Skipped, ...]:
         """The rules that raised an unexpected exception."""
-        return tuple(each for each in self.skipped if each.kind == "crashed")
+        return tuple(rule for rule in self.skipped if rule.kind == "crashed")
 
     @property
     def verdict(self) -> Verdict:
@@ -81,28 +81,6 @@ class Report:
 
 MAX_FINDINGS = 50
 """Maximum number of findings of one rule."""
-
-_UNREADABLE = ("XML001", "XML002", "XML005", "XML011")
-"""Problems after which a file may contain no robot."""
-
-_NEEDS_ALL_FILES = ("TRE006", "TRE007", "INR001", "COL", "LEG", "SYM", "DYN", "OPT")
-"""Families and rules that would report what a missing included file may contain."""
-
-_NEEDS_COMPLETE_TREE = ("LEG", "SYM", "DYN")
-"""Families that compare limbs or simulate. On an incomplete tree they would report consequences of
-the tree's own errors."""
-
-_UNIT_CONSEQUENCES: Mapping[str, tuple[str, ...]] = {
-    "UNI001": ("INR006", "INR007", "INR009", "INR010", "INR011", "JNT011", "JNT015", "JNT026"),
-    "UNI002": (
-        *("INR006", "INR007", "INR008", "INR010", "INR011", "MSH011", "JNT011", "JNT015", "JNT026"),
-        *("COL", "SYM", "LEG005", "LEG006", "LEG007"),
-    ),
-    "UNI003": ("INR006", "INR007", "JNT023"),
-    "UNI004": ("JNT008", "JNT012", "JNT015", "JNT018", "JNT019", "LEG005", "LEG006", "LEG007"),
-    "UNI005": ("JNT011", "JNT015", "JNT021", "JNT022", "JNT026"),
-}
-"""Families and rules that would report consequences of a wrong unit, besides DYN and SIM003."""
 
 
 def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Report:
@@ -117,16 +95,13 @@ def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Re
     """
     findings: list[Finding] = []
     skipped: list[Skipped] = []
-    if not facts.model.links and any(p.code in _UNREADABLE for p in facts.model.problems):
+    if not facts.model.links and any(get_rule(p.code).is_fatal for p in facts.model.problems):
         selected = [rule for rule in selected if rule.family == "XML"]  # no robot was read
     for rule in selected:
         try:
-            _require_complete(rule, facts)
-            _require_units(rule, findings)
-            missing = _missing_need(rule, facts, simulate=simulate)
-            if missing is not None:
-                kind: SkipKind = "no-legs" if missing == "legs" else "no-input"
-                skipped.append(Skipped(code=rule.code, kind=kind, reason=_MISSING[missing]))
+            skip = _why_skipped(rule, facts, findings, simulate=simulate)
+            if skip is not None:
+                skipped.append(skip)
                 continue
             found = list(islice(rule.findings(facts), MAX_FINDINGS + 1))
             findings += found[:MAX_FINDINGS]
@@ -147,35 +122,16 @@ def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Re
     )
 
 
-def _require_complete(rule: Rule, facts: Facts) -> None:
-    """Raise CannotCheckError if a rule would report consequences of other errors."""
-    lacks_file = any(problem.code == "XML012" for problem in facts.model.problems)
-    if lacks_file and rule.code.startswith(_NEEDS_ALL_FILES):
-        raise CannotCheckError("an included file cannot be read (XML012)")
-    if rule.family in _NEEDS_COMPLETE_TREE and facts.tree.rejected:
-        raise CannotCheckError("links or joints are missing from the kinematic tree")
-
-
-def _require_units(rule: Rule, findings: Sequence[Finding]) -> None:
-    """Raise CannotCheckError if a rule would report consequences of a wrong unit."""
-    for code in {finding.code for finding in findings} & _UNIT_CONSEQUENCES.keys():
-        if rule.code.startswith((*_UNIT_CONSEQUENCES[code], "DYN", "SIM003")):
-            raise CannotCheckError(f"a quantity has another unit ({code})")
-
-
 def _importance(finding: Finding) -> tuple[int, int, str, str, int]:
     """Return the sort key of a finding."""
     severity = SEVERITIES.index(finding.severity)
-    family = IMPORTANCE.index(finding.code[:3])
+    family = (*IMPORTANCE, finding.family).index(finding.family)
     return severity, family, finding.code, str(finding.file), finding.line
 
 
-def has_inputs(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
-    """Return whether the user provided the inputs of a rule: other file, spec, simulation."""
-    return _missing_need(rule, facts, simulate=simulate) in (None, "legs")
-
-
-_MISSING: dict[Need, str] = {
+_REASONS: Mapping[Need, str] = {
+    "all-files": "an included file cannot be read (XML012)",
+    "complete-tree": "links or joints are missing from the kinematic tree",
     "mjcf": "only MJCF has physics settings",
     "simulation": "simulation is disabled",
     "against": "no second file to compare with; use --against FILE",
@@ -184,14 +140,53 @@ _MISSING: dict[Need, str] = {
 }
 """Reason for not running a rule that lacks an input."""
 
+_KINDS: Mapping[Need, SkipKind] = {
+    "all-files": "cannot-check",
+    "complete-tree": "cannot-check",
+    "legs": "no-legs",
+}
+"""Kind of that reason. The user provides the other inputs."""
 
-def _missing_need(rule: Rule, facts: Facts, *, simulate: bool) -> Need | None:
-    """Return the first input that a rule lacks, or None if it can run."""
-    lacks: dict[Need, Callable[[], bool]] = {
-        "mjcf": lambda: facts.model.kind != "mjcf",
-        "simulation": lambda: not simulate,
-        "against": lambda: facts.against is None,
-        "spec": lambda: facts.spec is None,
-        "legs": lambda: not facts.legs,
-    }
-    return next((need for need in rule.needs if lacks[need]()), None)
+
+def has_inputs(rule: Rule, facts: Facts, *, simulate: bool) -> bool:
+    """Return whether the user provided the inputs of a rule: other file, spec, simulation.
+
+    A rule whose first missing input is legs is in the report, as skipped.
+    """
+    lacks = (n for n in rule.needs if _is_missing(n, facts, simulate=simulate))
+    return next((n for n in lacks if _KINDS.get(n) != "cannot-check"), "legs") == "legs"
+
+
+def _why_skipped(
+    rule: Rule, facts: Facts, findings: Sequence[Finding], *, simulate: bool
+) -> Skipped | None:
+    """Return why a rule does not run, or None if it does."""
+    wrong_units = {finding.name: finding.code for finding in findings if finding.name in UNITS}
+    for need in rule.needs:
+        if need in wrong_units:
+            reason = f"a quantity has another unit ({wrong_units[need]})"
+            return Skipped(code=rule.code, kind="cannot-check", reason=reason)
+        if _is_missing(need, facts, simulate=simulate):
+            kind = _KINDS.get(need, "no-input")
+            return Skipped(code=rule.code, kind=kind, reason=_REASONS[need])
+    return None
+
+
+def _is_missing(need: Need, facts: Facts, *, simulate: bool) -> bool:
+    """Return whether an input of rules is missing."""
+    match need:
+        case "all-files":
+            return any(problem.code == "XML012" for problem in facts.model.problems)
+        case "complete-tree":
+            return bool(facts.tree.rejected)
+        case "mjcf":
+            return facts.model.kind != "mjcf"
+        case "simulation":
+            return not simulate
+        case "against":
+            return facts.against is None
+        case "spec":
+            return facts.spec is None
+        case "legs":
+            return not facts.legs
+    return False  # a unit, of which rules report the errors

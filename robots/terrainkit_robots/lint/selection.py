@@ -86,9 +86,9 @@ def _apply_suppressions(
 ) -> tuple[list[Finding], list[Suppressed]]:
     """Split the findings of a report into remaining and suppressed findings."""
     by_rule: dict[tuple[Path, str], list[SuppressionComment]] = {}
-    for each in comments:
-        if each.error is None:
-            by_rule.setdefault((each.file, each.code), []).append(each)
+    for suppression in comments:
+        if suppression.error is None:
+            by_rule.setdefault((suppression.file, suppression.code), []).append(suppression)
     kept: list[Finding] = []
     suppressed: list[Suppressed] = []
     for finding in report.findings:
@@ -116,7 +116,7 @@ def _unused_suppressions(
     comments: Sequence[SuppressionComment], completed: Set[str], suppressed: Sequence[Suppressed]
 ) -> Iterator[Skipped]:
     """Yield the comments that suppress nothing although their rule ran."""
-    used = {id(each.comment) for each in suppressed}
+    used = {id(finding.comment) for finding in suppressed}
     for comment in comments:
         error = comment.error
         if error is None and comment.code in completed and id(comment) not in used:

@@ -23,7 +23,7 @@ from terrainkit.settings.schema import Config
 from terrainkit.settings.text import closest
 from terrainkit.settings.toml_text import parse_toml, read_text
 from terrainkit.settings.type_hint import show
-from terrainkit_robots.lint.rule import FAMILIES, Rule, rules
+from terrainkit_robots.lint.rule import Rule, families, rules
 
 Reason = Annotated[str, Meta(pattern=r"\S", description="a reason, as a string")]
 
@@ -97,7 +97,7 @@ def matching(word: str) -> tuple[Rule, ...]:
         meant = f"did you mean {near}? Expected" if near else "expected"
         raise ConfigError(
             f"no rule {word!r}; {meant} a code, a prefix of one, or a name, of the families "
-            f"{listing(FAMILIES)} (terrainkit rule --all lists them)"
+            f"{listing(families())} (terrainkit rule --all lists them)"
         )
     return found
 

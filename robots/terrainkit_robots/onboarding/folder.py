@@ -8,7 +8,7 @@ from terrainkit.errors import ExportError
 from terrainkit.files.atomic_write import atomic_folder, check_parents
 from terrainkit_robots.files import require_utf8
 from terrainkit_robots.onboarding.frameworks.frameworks import framework_names
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.text import free_name, names
 
 _BACKUP_SUFFIX = ".before"

@@ -1,7 +1,7 @@
 """The joint table of report.md: limits, gains and torques of each actuated joint."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from terrainkit_robots.simulation.declared_gains import declared_gains
@@ -37,56 +37,48 @@ def joint_table(facts: "Facts", spec: "RobotSpec") -> list[tuple[str, ...]]:
     """
     joints = {joint.name: joint for joint in facts.joints}
     order = spec.joint_order
-    joint_types = {joints[name].kind for name in order if name in joints}
+    kinds = {joints[name].kind for name in order if name in joints}
     values = {name: match_joints(getattr(spec, name), order).values for name in _COLUMNS}
-    roles = {
-        joint.name: role
-        for leg in facts.legs
-        for joint, role in zip(leg.joints, leg.roles, strict=True)
+    limits = {
+        name: "none" if joint.range is None else " to ".join(map(format_number, joint.range))
+        for name, joint in joints.items()
     }
-    torques = {} if facts.stance is None else facts.stance.torques
-    gain_sets = _gain_sets(facts)
-    rows = [_header(joint_types, has_legs=bool(facts.legs), has_gain_sets=bool(gain_sets))]
-    for index, name in enumerate(order):
-        joint = joints.get(name)
-        cells = [str(index), name]
-        if facts.legs:
-            cells.append(roles.get(name, ""))
-        cells.append("" if joint is None else _format_limits(joint.range))
-        cells += [format_number(values[column].get(name)) for column in _COLUMNS]
-        cells += [_format_gain(gains.get(name)) for gains in gain_sets]
-        if facts.legs:
-            cells.append(_format_torque(torques.get(name), values["effort"].get(name)))
-        rows.append(tuple(cells))
-    return rows
+    columns = [["#", *map(str, range(len(order)))], ["joint", *order]]
+    if facts.legs:
+        roles = {
+            joint.name: role
+            for leg in facts.legs
+            for joint, role in zip(leg.joints, leg.roles, strict=True)
+        }
+        columns.append(["role", *(roles.get(name, "") for name in order)])
+    title = _with_units("limits", ("rad", "m"), kinds)
+    columns.append([title, *(limits.get(name, "") for name in order)])
+    for field, (title, *units) in _COLUMNS.items():
+        cells = (format_number(values[field].get(name)) for name in order)
+        columns.append([_with_units(title, units, kinds), *cells])
+    if any(joint.position_gains is not None for joint in facts.actuated):
+        declared, suggested = declared_gains(facts).gains, suggest_gains(facts)
+        for title, gains in (("declared kp, kd", declared), ("suggested kp, kd", suggested)):
+            columns.append([title, *(_format_gain(gains.get(name)) for name in order)])
+    if facts.legs:
+        torques = {} if facts.stance is None else facts.stance.torques
+        efforts = values["effort"]
+        cells = (_format_torque(torques.get(name), efforts.get(name)) for name in order)
+        columns.append([_with_units("holding torque", ("N m", "N"), kinds), *cells])
+    return list(zip(*columns, strict=True))
 
 
-def _gain_sets(facts: "Facts") -> list[Mapping[str, "Gain"]]:
-    """Return the declared and the suggested gains, or nothing if the file declares none."""
-    if all(joint.position_gains is None for joint in facts.actuated):
-        return []
-    return [declared_gains(facts).gains, suggest_gains(facts)]
+def _with_units(title: str, units: Sequence[str], kinds: set[str]) -> str:
+    """Return a title with the units of revolute and prismatic joints, where there are any."""
+    revolute, prismatic = units
+    used = [revolute] if kinds - {"prismatic"} else []
+    if "prismatic" in kinds:
+        used.append(prismatic)
+    return f"{title} [{' or '.join(used)}]" if used else title
 
 
 def _format_gain(gain: "Gain | None") -> str:
     return "" if gain is None else f"{format_number(gain.stiffness)}, {format_number(gain.damping)}"
-
-
-def _header(joint_types: set[str], *, has_legs: bool, has_gain_sets: bool) -> tuple[str, ...]:
-    def with_unit(title: str, revolute_unit: str, prismatic_unit: str) -> str:
-        units = [revolute_unit] * bool(joint_types - {"prismatic"})
-        units += [prismatic_unit] * ("prismatic" in joint_types)
-        return f"{title} [{' or '.join(units)}]" if units else title
-
-    titles = ["#", "joint", *["role"] * has_legs, with_unit("limits", "rad", "m")]
-    titles += [with_unit(*column) for column in _COLUMNS.values()]
-    titles += ["declared kp, kd", "suggested kp, kd"] * has_gain_sets
-    titles += [with_unit("holding torque", "N m", "N")] * has_legs
-    return tuple(titles)
-
-
-def _format_limits(limits: tuple[float, float] | None) -> str:
-    return "none" if limits is None else " to ".join(map(format_number, limits))
 
 
 def _format_torque(torque: float | None, effort: float | None) -> str:

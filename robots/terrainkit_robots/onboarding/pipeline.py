@@ -1,100 +1,20 @@
-"""The onboarding pipeline: check a robot file, fix it, write its folder and verify the result."""
+"""The onboarding pipeline: check a robot file, repair, convert and verify it, and report."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit_robots.export.canonical import plain_name
-from terrainkit_robots.lint.check import check_robot
-from terrainkit_robots.lint.rule import Finding
-from terrainkit_robots.lint.runner import Report
-from terrainkit_robots.lint.settings import Settings, read_settings
+from terrainkit_robots.lint.settings import read_settings
+from terrainkit_robots.onboarding.convert import MJCF, convert
 from terrainkit_robots.onboarding.folder import check_folder, find_edits, new_folder, write_files
 from terrainkit_robots.onboarding.frameworks.frameworks import check_framework, robot_config_files
 from terrainkit_robots.onboarding.frameworks.naming import package_name
-from terrainkit_robots.onboarding.placeholder_effort import placeholder_effort
-from terrainkit_robots.onboarding.repairs import with_repairs_marked_safe
-from terrainkit_robots.onboarding.report_md import report_markdown
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.repair import check_and_repair
 from terrainkit_robots.onboarding.result import OnboardResult
-from terrainkit_robots.onboarding.robot_files import (
-    MJCF,
-    RobotFiles,
-    SpecOverride,
-    make_robot_files,
-)
-
-if TYPE_CHECKING:
-    from terrainkit_robots.export.collision_simplification.simplify import CollisionMethod, Progress
-    from terrainkit_robots.simulation.gain import GainSet
-
-_BLOCKING_RULES = (
-    *("XML", "MSH", "TRE", "INR001", "INR002", "INR003", "INR004", "INR011"),
-    *("JNT001", "JNT004", "JNT007", "JNT013"),
-)
-"""Codes, or starts of codes, of rules whose errors change the robot that would be written, or that
-MuJoCo rejects. For example, a joint of an unknown type would become fixed."""
-
-_FIXED_BY_EXPORT = frozenset({"INR011", "MSH002", "MSH004", "MSH005", "MSH007", "MSH008", "XML014"})
-"""Rules whose errors cannot occur in the written files: each link has an <inertial>, meshes are
-converted and renamed, and rotations are written as roll, pitch and yaw."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class OnboardOptions:
-    """Options of `onboard`."""
-
-    settings: Settings = field(default_factory=Settings)
-    """ROS packages, xacro arguments and ignored rules; the settings files above the robot file are
-    added. A selection of rules has no effect."""
-
-    collision: "CollisionMethod" = "keep"
-    """How collision meshes are simplified."""
-
-    frameworks: tuple[str, ...] = ()
-    """Training frameworks to write a configuration for."""
-
-    name: str = ""
-    """Name of the robot and of its tasks; by default the robot's name in the file."""
-
-    floating: bool | None = None
-    """Whether the base is floating; None to decide from the file and the legs."""
-
-    spec: Path | None = None
-    """A robot.toml whose values override the derived values."""
-
-    gains: "GainSet" = "stand"
-    """PD gains to suggest: `stand` holds the default pose without a policy; `train` is as soft as
-    published training configurations, with action scales of about 0.25 rad."""
-
-    unsafe_fixes: bool = False
-    """Whether to apply fixes that change a number, a shape or a mesh."""
-
-    force: bool = False
-    """Whether to continue despite blocking errors."""
-
-    overwrite: bool = False
-    """Whether to replace a folder that contains an onboarded robot."""
-
-    render_images: bool = True
-    """Whether to render pictures for the report."""
-
-    cache_dir: Path | None = None
-    """Folder that caches convex decompositions between runs."""
-
-    progress: "Progress" = lambda items, _: items
-    """Wraps an iterable of collision meshes to display a progress bar."""
-
-    on_step: Callable[[str], None] = lambda _: None
-    """Called with the name of each step when it starts."""
-
-
-def is_blocking(finding: Finding) -> bool:
-    """Return whether a finding means that the written files would describe another robot."""
-    if finding.code == "MSH001" and not finding.measured.get("collisions"):
-        return False  # the written files have no visual mesh for it
-    return finding.severity == "error" and finding.code.startswith(_BLOCKING_RULES)
+from terrainkit_robots.onboarding.statements import report_markdown
 
 
 def onboard(
@@ -130,81 +50,45 @@ def onboard(
         )
     if output is not None:
         check_folder(Path(output), overwrite=options.overwrite)
-    user_spec = None
-    if options.spec is not None:
-        user_spec = SpecOverride(spec=RobotSpec.load(options.spec), file=str(options.spec))
+    user_spec = None if options.spec is None else RobotSpec.load(options.spec)
     options.on_step(f"checking {path.name}")
-    report, fixed = _fix_in_memory(path, options)
-    for rule in report.crashed:
+    # All rules are needed to find blocking errors. The written files are simulated, not this one.
+    settings = options.settings.over(read_settings(path.parent))
+    settings = replace(settings, select=(), simulate=False)
+    report, fixed = check_and_repair(path, settings, unsafe=options.unsafe_fixes)
+    result = OnboardResult(report=report, fixed=fixed)
+    for rule in result.report.crashed:
         raise TerrainkitError(f"{path}: {rule.code}: {rule.reason}")
-    if not options.force and any(map(is_blocking, report.findings)):
-        return OnboardResult(report=report, fixed=fixed)
-    target = Path(output or options.name or plain_name(report.facts.model))
+    if not options.force and any(finding.is_blocking for finding in result.report.findings):
+        return result
+    target = Path(output or options.name or plain_name(result.report.facts.model))
     check_folder(target, overwrite=options.overwrite)
     options.on_step("deriving the default pose and the gains")
-    robot_files = make_robot_files(
-        report.facts,
-        name=options.name,
-        collision=options.collision,
-        floating=options.floating,
-        user_spec=user_spec,
-        gain_set=options.gains,
-        unknown_effort=placeholder_effort(report.facts, report.findings),
-        cache_dir=options.cache_dir,
-        progress=options.progress,
-    )
-    configs, skipped_configs = _config_files(options.frameworks, robot_files)
-    files = {name: data for each in configs.values() for name, data in each.items()}
-    if len(files) < sum(map(len, configs.values())):
-        raise ConfigError(f"name: got {robot_files.spec.name!r}, a framework; expected another one")
-    result = OnboardResult(
-        report=report,
-        fixed=fixed,
-        folder=target,
-        robot=robot_files,
-        configs={framework: tuple(each) for framework, each in configs.items()},
-        skipped_configs=skipped_configs,
-    )
-    return _write_folder(result, target, {**robot_files.files, **files}, options)
+    robot = convert(result.report, options, user_spec)
+    result, files = _with_configs(replace(result, folder=target, robot=robot), options)
+    return _write_folder(result, target, {**robot.files, **files}, options)
 
 
-def _fix_in_memory(path: Path, options: OnboardOptions) -> tuple[Report, tuple[Finding, ...]]:
-    """Return the report after all fixes, and the findings that were fixed."""
-    from terrainkit_robots.lint.fixes.apply import fix_robot
-
-    settings = options.settings.over(read_settings(path.parent))
-    # All rules are needed to find blocking errors. The written files are simulated, not this one.
-    settings = replace(settings, select=(), simulate=False)
-    report = with_repairs_marked_safe(check_robot(path, settings))
-    fixed: tuple[Finding, ...] = ()
-    if report.facts.model.kind != "xacro" and any(f.fix is not None for f in report.findings):
-
-        def check(contents: Mapping[Path, bytes]) -> Report:
-            return with_repairs_marked_safe(check_robot(path, settings, contents=contents))
-
-        result = fix_robot(path, check, report=report, unsafe=options.unsafe_fixes)
-        report, fixed = result.report, result.fixed
-    by_export = [f for f in report.findings if f.severity == "error" and f.code in _FIXED_BY_EXPORT]
-    remaining = tuple(f for f in report.findings if f not in by_export)
-    # The fix of the lint rule is not applied, so its description is removed.
-    fixed = (*fixed, *(replace(finding, fix=None) for finding in by_export))
-    return replace(report, findings=remaining), fixed
-
-
-def _config_files(
-    frameworks: Iterable[str], robot_files: RobotFiles
-) -> tuple[dict[str, dict[str, bytes]], dict[str, str]]:
-    """Return the files for each framework by name, and why frameworks are skipped."""
-    configs: dict[str, dict[str, bytes]] = {}
+def _with_configs(
+    result: OnboardResult, options: OnboardOptions
+) -> tuple[OnboardResult, dict[str, bytes]]:
+    """Return the result with the names of the configurations, and their files by name."""
+    assert result.robot is not None
+    spec = result.robot.spec
+    files: dict[str, bytes] = {}
+    configs: dict[str, tuple[str, ...]] = {}
     skipped: dict[str, str] = {}
-    for framework in frameworks:
+    for framework in options.frameworks:
         try:
-            texts = robot_config_files(framework, robot_files.facts, robot_files.spec)
+            texts = robot_config_files(framework, result.robot.facts, spec)
         except ConfigError as error:
             skipped[framework] = str(error)
-        else:
-            configs[framework] = {name: text.encode() for name, text in texts.items()}
-    return configs, skipped
+            continue
+        if not files.keys().isdisjoint(texts) and framework not in configs:
+            raise ConfigError(f"name: got {spec.name!r}, a framework; expected another one")
+        configs[framework] = tuple(texts)
+        files |= {name: text.encode() for name, text in texts.items()}
+    return replace(result, configs=configs, skipped_configs=skipped), files
 
 
 def _write_folder(

@@ -9,7 +9,7 @@ from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
 
 if TYPE_CHECKING:
-    from terrainkit_robots.onboarding.robot_files import RobotFiles
+    from terrainkit_robots.onboarding.convert import RobotFiles
     from terrainkit_robots.onboarding.verify import Verification
 
 

@@ -6,22 +6,22 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from terrainkit.errors import ExportError
+from terrainkit.errors import ExportError, one_line
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.legs.stance import is_statically_stable
 from terrainkit_robots.export.base_link import with_world_base
+from terrainkit_robots.onboarding.convert import MJCF, SCENE, URDF
 from terrainkit_robots.onboarding.equivalence import (
     Equivalence,
     compare_models,
     reference_kinematics,
 )
-from terrainkit_robots.onboarding.robot_files import MJCF, SCENE, URDF
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.assessment import assess
 
 if TYPE_CHECKING:
     from terrainkit_robots.analysis.facts import Facts
-    from terrainkit_robots.onboarding.robot_files import RobotFiles
+    from terrainkit_robots.onboarding.convert import RobotFiles
     from terrainkit_robots.simulation.gain import Gain
     from terrainkit_robots.simulation.standing import StandResult
     from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -99,9 +99,11 @@ def verify(
         reference = reference_kinematics(with_world_base(source, floating=floating), robot.facts)
     (_, urdf_model), (scene_spec, scene_model) = urdf.result(), scene.result()
     equivalences = compare_models(reference, {URDF: urdf_model, MJCF: scene_model})
-    for each in equivalences:
-        if each.failures:
-            raise ExportError(f"{each.file} differs from the source: {'; '.join(each.failures)}")
+    for equivalence in equivalences:
+        if equivalence.failures:
+            raise ExportError(
+                f"{equivalence.file} differs from the source: {'; '.join(equivalence.failures)}"
+            )
     if not robot.facts.legs or not floating:
         return Verification(equivalences=equivalences)
     joints_locked = not is_statically_stable(robot.facts.legs)
@@ -140,7 +142,7 @@ def _load_model(path: Path) -> tuple[Any, Any]:
         spec = mujoco.MjSpec.from_file(str(path))
         return spec, spec.compile()
     except ValueError as error:
-        reason = " ".join(str(error).split())
+        reason = one_line(str(error))
         raise ExportError(f"MuJoCo cannot load the written {path.name}: {reason}") from None
 
 

@@ -16,7 +16,7 @@ from terrainkit_robots.rl.run import (
     write_run_folder,
 )
 from terrainkit_robots.rl.tasks import task_names
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 
 
 def bundle_policy(run: Run, folder: Path) -> Run:

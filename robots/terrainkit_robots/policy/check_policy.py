@@ -29,7 +29,7 @@ from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rl.config import Commands, Task
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
 SECONDS = 4.0

@@ -23,7 +23,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.observations import ObservationTerm, ObsTerms, PolicyInterface
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray, projected_gravity
 
 _SOURCES = {"absolute_dof_pos": "dof_pos", "grid_height_scan": "height_scan"}

@@ -33,7 +33,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 
 @dataclass(frozen=True, kw_only=True)

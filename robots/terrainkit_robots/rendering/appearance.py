@@ -20,7 +20,7 @@ def set_appearance(spec: Any) -> None:
     import mujoco
 
     sky, visual = mujoco.mjtTexture.mjTEXTURE_SKYBOX, spec.visual
-    for element in (*spec.lights, *(each for each in spec.textures if each.type == sky)):
+    for element in (*spec.lights, *(texture for texture in spec.textures if texture.type == sky)):
         spec.delete(element)
     texture = spec.add_texture(name="terrainkit_sky", type=sky, width=8, height=8)
     texture.builtin = mujoco.mjtBuiltin.mjBUILTIN_FLAT

@@ -7,7 +7,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.rl.config import Control
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 
 

@@ -27,7 +27,7 @@ from terrainkit_robots.rl.state import Sensors, State
 from terrainkit_robots.rl.symmetry import MirrorMaps, mirror_maps
 from terrainkit_robots.rl.terminations import TERMINATIONS
 from terrainkit_robots.rl.terrain import Ground
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray, quat_to_yaw
 
 

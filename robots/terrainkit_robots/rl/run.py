@@ -33,7 +33,7 @@ from terrainkit_robots.checkpoint import TRAINING_KEYS, read_checkpoint
 from terrainkit_robots.files import require_utf8
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.spec.robot import SPEC_FILE, Robot
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE, Robot
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.text import free_name
 

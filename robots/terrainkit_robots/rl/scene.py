@@ -16,7 +16,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.simulation.geoms import collides, lowest_point
 from terrainkit_robots.simulation.near_terrain import add_near_geoms, find_near_terrain
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 
 CONTACT_FORCE_BIT, NET_FORCE = 2, 3

@@ -13,7 +13,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.simulation.near_terrain import NearGeoms
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 Ids = NDArray[np.int64]
 

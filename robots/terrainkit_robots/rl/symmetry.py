@@ -18,7 +18,7 @@ from terrainkit.errors import ConfigError, PluginError, listing
 from terrainkit_robots.rl.config import Terrain
 from terrainkit_robots.rl.observations import SignedPermutation
 from terrainkit_robots.rl.scene import Scene
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 
 if TYPE_CHECKING:

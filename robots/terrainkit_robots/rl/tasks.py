@@ -22,7 +22,7 @@ from terrainkit.errors import ConfigError, plugin_errors
 from terrainkit.settings.text import expected_names, truncate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.rl.config import Observations, Task
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 ENTRY_POINTS = "terrainkit.tasks"

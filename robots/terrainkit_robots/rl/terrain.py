@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from terrainkit import MapConfig, TerrainMap, generate
 from terrainkit.errors import ConfigError
-from terrainkit.export.mjcf import collision_surface
-from terrainkit.geometry.surface import HeightfieldSurface
+from terrainkit.export.mjcf_map import collision_surface
+from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit.integrations.mujoco import make_spec
 from terrainkit.settings.text import closest
 from terrainkit_robots.transforms import FloatArray

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from terrainkit.errors import ConfigError, ExportError, TerrainkitError
 from terrainkit_robots.rl import run, tasks
 from terrainkit_robots.rl.config import Task
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 if TYPE_CHECKING:
     from terrainkit_robots.rl.runner import LeggedRunner

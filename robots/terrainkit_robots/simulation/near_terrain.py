@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.geometry.surface import HeightfieldSurface
+from terrainkit.geometry.ground_surface import HeightfieldSurface
 from terrainkit_robots.simulation.geoms import collides
 from terrainkit_robots.transforms import FloatArray
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from terrainkit.errors import ConfigError, one_line
-from terrainkit.feasibility.limits import RobotLimits
+from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import box_corners, collides
-from terrainkit_robots.spec.robot import SPEC_FILE
+from terrainkit_robots.spec.robot_arrays import SPEC_FILE
 from terrainkit_robots.spec.robot_spec import RobotSpec
 
 STEP_UP = 0.4

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from terrainkit.errors import one_line
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.bodies import merge_bodies
 from terrainkit_robots.analysis.bodies.tree import build_tree
@@ -25,7 +26,7 @@ from terrainkit_robots.export.mjcf import Extras, floor_text, mjcf_text
 from terrainkit_robots.mesh.mesh_cache import MeshError
 from terrainkit_robots.mesh.surface import binary_stl
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
-from terrainkit_robots.simulation.units import PRISMATIC, REVOLUTE, JointUnits
+from terrainkit_robots.simulation.joint_units import PRISMATIC, REVOLUTE, JointUnits
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -166,8 +167,8 @@ def _compiler_message(error: str) -> str:
     """Return an error of the compiler on one line, with the element but without line numbers."""
     message, _, location = error.partition("\nElement ")
     name = re.match(r"name '(.*?)(?:', id -?\d+(?:, line -?\d+)?)?$", location, re.DOTALL)
-    subject = f"{truncate(' '.join(name[1].split()))}: " if name else ""
-    return subject + " ".join(message.removeprefix("Error: ").split())
+    subject = f"{truncate(one_line(name[1]))}: " if name else ""
+    return subject + one_line(message.removeprefix("Error: "))
 
 
 def _compile(model: RobotModel, extras: Extras, assets: Mapping[str, bytes]) -> SimModel:

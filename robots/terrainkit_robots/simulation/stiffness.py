@@ -14,13 +14,13 @@ from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.stance import GRAVITY, is_statically_stable
 from terrainkit_robots.simulation.gain import GainSet
+from terrainkit_robots.simulation.joint_units import PRISMATIC, JointUnits
 from terrainkit_robots.simulation.sim_model import TIME_STEP, SimModel
 from terrainkit_robots.simulation.time_step import (
     JointInertia,
     max_stable_stiffness,
     min_stable_inertia,
 )
-from terrainkit_robots.simulation.units import PRISMATIC, JointUnits
 
 _UPRIGHT_FACTOR = 1.5
 """Stiffness of a leg over m g l / n, the rate at which gravity tips it over: weight times leg
@@ -168,7 +168,7 @@ def _make_target(
     """Return the largest required stiffness within the effort limit and the time step."""
     effort = min(sim.effort_limit(name) for name in joints)
     units = sim.units(joints[0])
-    stiffness, reason = max(_limit_by_effort(each, effort, units) for each in required)
+    stiffness, reason = max(_limit_by_effort(need, effort, units) for need in required)
     if not math.isfinite(stiffness):
         raise CannotCheckError(f"the load of joint {joints[0]} is too large to compute its gains")
     free = min(inertia[name].free for name in joints)

@@ -23,7 +23,7 @@ def weld_joints(sim: SimModel, positions: Mapping[str, float]) -> SimModel:
     for element in (*spec.actuators, *spec.sensors, *spec.equalities, *spec.keys):
         spec.delete(element)
     for body in spec.bodies:
-        joints = [each for each in body.joints if each.type != mujoco.mjtJoint.mjJNT_FREE]
+        joints = [joint for joint in body.joints if joint.type != mujoco.mjtJoint.mjJNT_FREE]
         if joints:
             index = model.body(body.name).id
             parent = model.body_parentid[index]

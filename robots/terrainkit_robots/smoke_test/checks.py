@@ -12,7 +12,8 @@ import torch
 
 from terrainkit.errors import TerrainkitError
 from terrainkit_robots.description.robot_file import is_description
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, is_blocking, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.policy.evaluate import eval_task
 from terrainkit_robots.policy.load_policy import single_torch_thread
 from terrainkit_robots.policy.policy_rollout import Progress
@@ -27,7 +28,7 @@ from terrainkit_robots.rl.tasks import default_task, get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.simulation.geoms import lowest_point
 from terrainkit_robots.smoke_test.short_training import TrainingRecord, train_briefly
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.text import count
 
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
@@ -93,7 +94,7 @@ def smoke_test(
     options = replace(options or OnboardOptions(), render_images=False)
     with tempfile.TemporaryDirectory() as folder:
         onboarded = onboard(name, Path(folder) / "robot", options)
-        codes = [finding.code for finding in onboarded.report.findings if is_blocking(finding)]
+        codes = [finding.code for finding in onboarded.report.findings if finding.is_blocking]
         measured = f"{len(codes)} errors: {', '.join(dict.fromkeys(codes))}" if codes else "yes"
         passed = onboarded.folder is not None
         check = Check("can be onboarded", passed, measured, "no errors that change the robot")

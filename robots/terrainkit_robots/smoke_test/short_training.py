@@ -12,7 +12,7 @@ from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv, make_env
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
 NUM_ENVS = 128

@@ -60,7 +60,8 @@ def find_patterns(names: Sequence[str], all_names: Sequence[str]) -> list[str]:
     patterns: dict[str, str] = {}  # by the first name that each one matches
     while remaining:
         parts, matched = _best_parts(remaining, others)
-        patterns[matched[0]] = ".*".join(map(_escape, parts)) if len(matched) > 1 else matched[0]
+        escaped = (_SPECIAL.sub(r"\\\g<0>", part) for part in parts)
+        patterns[matched[0]] = ".*".join(escaped) if len(matched) > 1 else matched[0]
         others += matched
         remaining = [name for name in remaining if name not in matched]
     return [patterns[name] for name in names if name in patterns]
@@ -108,7 +109,3 @@ def _has_parts(name: str, parts: _Parts) -> bool:
         and name.endswith(last)
         and all(part in inner for part in middle)
     )
-
-
-def _escape(text: str) -> str:
-    return _SPECIAL.sub(r"\\\g<0>", text)

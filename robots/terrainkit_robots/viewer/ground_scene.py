@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit.views.viewer import FIELD_OF_VIEW, show_map
+from terrainkit.viewer.map_scene import FIELD_OF_VIEW, show_map
 from terrainkit_robots.rl.terrain import Ground, MapGround
 from terrainkit_robots.transforms import FloatArray
 

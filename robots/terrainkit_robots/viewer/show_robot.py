@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from terrainkit.views.viewer import add_checkbox
+from terrainkit.viewer.map_scene import add_checkbox
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Source
 from terrainkit_robots.lint.rule import Finding

@@ -65,7 +65,7 @@ def _merge_quads(node_grid: NodeGrid) -> tuple[Mask, list[Rectangles], list[Wall
     walls_y &= node_grid.walls_y[1:]
     # Each of these clears the mask where there is nothing to merge.
     rectangles = [Rectangles.flat(flat), Rectangles.along_y(rows_y), Rectangles.along_x(rows_x)]
-    runs = [WallRuns.from_mask(node_grid, each, k) for k, each in enumerate((walls_x, walls_y))]
+    runs = [WallRuns.from_mask(node_grid, walls, k) for k, walls in enumerate((walls_x, walls_y))]
     merged = flat
     for mask in (rows_x, rows_y, walls_x, walls_y):
         merged |= mask
@@ -82,14 +82,14 @@ def _faces(
     for run in runs:
         run.keep_endpoints(kept)
     # A rectangle adds its center; a wall the midpoints at its ends, and the centers of two strips.
-    num_vertices = sum(len(each.i0) for each in rectangles) + 6 * sum(len(run.i) for run in runs)
+    num_vertices = sum(len(part.i0) for part in rectangles) + 6 * sum(len(run.i) for run in runs)
     node_grid.check_memory(num_vertices + int(np.count_nonzero(kept)), single)
 
     triangles, extra = quad_faces(node_grid, single)
     for run in runs:
         triangles.append(run.triangles())
     for polygons in itertools.chain(
-        (part.polygons(node_grid, kept) for each in rectangles for part in each.blocks()),
+        (part.polygons(node_grid, kept) for rectangle in rectangles for part in rectangle.blocks()),
         *(run.strips(kept) for run in runs),
     ):
         faces, centers = polygons.triangles(node_grid.vertex_count + len(extra))

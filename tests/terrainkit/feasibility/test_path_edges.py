@@ -9,7 +9,7 @@ from terrainkit.feasibility import assess_patch
 from terrainkit.feasibility.bottleneck import bottleneck
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
-from terrainkit.feasibility.gaps import gap_edges
+from terrainkit.feasibility.gap_edges import gap_edges
 from terrainkit.feasibility.path_edges import MAX_DEMAND, path_edges
 from terrainkit.terrain.registry import make_overlay
 from tests.limits import LIMITS, columns_of

@@ -10,7 +10,7 @@ from terrainkit.geometry.box_decomposition import (
     neighborhood,
 )
 from terrainkit.geometry.grid import Grid
-from terrainkit.geometry.surface import surface_at
+from terrainkit.geometry.ground_surface import surface_at
 from tests.terrainkit.geometry.heightfields import HEIGHTFIELDS, for_any, samples
 
 any_walls = for_any(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))

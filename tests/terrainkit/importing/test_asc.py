@@ -5,7 +5,7 @@ import pytest
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing.asc import read
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.import_options import ReadOptions
 
 GRID = """ncols 3
 nrows 2

@@ -6,9 +6,9 @@ import pytest
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing.extent import MAX_SAMPLES, check_length, check_samples
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.height_source import VertexSource
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.raster import read_raster
-from terrainkit.importing.source import VertexSource
 from tests.meshes import box
 
 

@@ -7,8 +7,8 @@ import pytest
 from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing.gdal import read_gdal
 from terrainkit.importing.geotiff import read_geo_tags
-from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.source import open_source
+from terrainkit.importing.height_source import open_source
+from terrainkit.importing.import_options import ReadOptions
 from tests.terrainkit.importing import test_geotiff as geotiff
 
 

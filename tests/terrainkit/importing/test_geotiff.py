@@ -7,7 +7,7 @@ import pytest
 from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing import geotiff, image
 from terrainkit.importing.image import read
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.import_options import ReadOptions
 
 # Two rows of three cells of 2 m; the upper left corner is at (500000, 4649776).
 HEIGHTS = np.array([[1, 2, 3], [4, -9999, 6]], dtype=np.float32)

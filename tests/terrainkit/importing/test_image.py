@@ -9,7 +9,7 @@ import terrainkit as tk
 from terrainkit.errors import ConfigError, HeightFileError
 from terrainkit.importing import image
 from terrainkit.importing.image import read
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.import_options import ReadOptions
 
 # Three columns along x and two rows along y. The upper row of the image has the higher y.
 PIXELS = np.array([[0, 13107, 26214], [39321, 52428, 65535]], dtype=np.uint16)

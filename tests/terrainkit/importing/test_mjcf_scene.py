@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import HeightFileError, TerrainkitWarning
-from terrainkit.importing.options import ReadOptions
-from terrainkit.importing.source import open_source
+from terrainkit.importing.height_source import open_source
+from terrainkit.importing.import_options import ReadOptions
 from tests.rays import cast_rays
 
 SCENE = """

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import HeightFileError
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.npy import read
-from terrainkit.importing.options import ReadOptions
 
 METER = ReadOptions(file_cell=1.0)
 

@@ -3,11 +3,11 @@ import pytest
 import trimesh
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing import source as source_module
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing import height_source as source_module
+from terrainkit.importing.height_source import open_source
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.point_cloud import PointSource, read
 from terrainkit.importing.raster import Raster
-from terrainkit.importing.source import open_source
 
 X = np.array([0.5, 1.5, 2.5])
 

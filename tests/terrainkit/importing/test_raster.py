@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from terrainkit.errors import TerrainkitWarning
-from terrainkit.importing.options import ReadOptions
+from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.raster import Raster, make_raster
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
-from terrainkit.map.config import MapConfig
-from terrainkit.map.spawn import find_spawn, flattest_tolerance, sample_spawns
+from terrainkit.map.map_config import MapConfig
+from terrainkit.map.spawn import SpawnGround
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
 EVERY = slice(None)
@@ -22,10 +22,15 @@ def ground(*blocks, level=0.0):
     return heights
 
 
+def ground_of(config, heights, solids=None, grid=PLOT):
+    solids = solids or Solids.empty()
+    return SpawnGround(config=config, grid=grid, heights=heights, solids=solids)
+
+
 def spawn(heights, wanted=(2.0, 2.0), *, radius=0.5, tolerance=0.01, walls=True, solids=None):
     threshold = 0.75 if walls else None
     config = MapConfig(spawn_radius=radius, spawn_tolerance=tolerance, slope_threshold=threshold)
-    return find_spawn(config, PLOT, heights, solids or Solids.empty(), wanted)
+    return ground_of(config, heights, solids).find(wanted)
 
 
 @pytest.mark.parametrize(
@@ -60,7 +65,7 @@ def test_find_spawn_is_at_or_nearest_to_the_preferred_point(heights, wanted, fou
 
 def test_find_spawn_is_in_the_map_frame():
     grid = Grid(shape=(40, 40), cell=0.1, lower=(-10.0, 5.0))
-    assert find_spawn(MapConfig(), grid, ground(), Solids.empty(), (-8.0, 7.0)) == (-8.0, 7.0, 0.0)
+    assert ground_of(MapConfig(), ground(), grid=grid).find((-8.0, 7.0)) == (-8.0, 7.0, 0.0)
 
 
 def test_find_spawn_accepts_slope_within_tolerance():
@@ -115,13 +120,14 @@ def test_flattest_tolerance_of_a_slope(grade, cell, tolerance):
     grid = Grid(shape=(10, 10) if cell > 0.1 else (40, 40), cell=cell)
     heights = np.broadcast_to((grade * grid.axis(0)).astype(np.float32), grid.shape)
     config, center = MapConfig(cell=cell, patch_size=(10 * cell, 10 * cell), border=0), grid.center
-    ground = grid, heights, Solids.empty(), center
-    assert flattest_tolerance(config, *ground) == pytest.approx(tolerance, rel=1e-6)
+    needed = ground_of(config, heights, grid=grid).flattest_tolerance(center)
+    assert needed == pytest.approx(tolerance, rel=1e-6)
     works = dataclasses.replace(config, spawn_tolerance=tolerance * (1 + 1e-5))
-    assert find_spawn(works, *ground) == pytest.approx((*center, grade * center[1]), rel=1e-4)
+    found = ground_of(works, heights, grid=grid).find(center)
+    assert found == pytest.approx((*center, grade * center[1]), rel=1e-4)
     if grade:
         fails = dataclasses.replace(config, spawn_tolerance=tolerance * 0.9)
-        assert find_spawn(fails, *ground) is None
+        assert ground_of(fails, heights, grid=grid).find(center) is None
 
 
 def test_flattest_tolerance_is_of_the_flattest_free_disk():
@@ -133,12 +139,12 @@ def test_flattest_tolerance_is_of_the_flattest_free_disk():
         (Solids.empty(), 0.1),
         (make_boxes((2.85, 2.85, 0.5), (0.1, 0.1, 1.0)), 0.2),
     ):
-        needed = flattest_tolerance(config, PLOT, heights, solids, (2.0, 2.0))
+        needed = ground_of(config, heights, solids).flattest_tolerance((2.0, 2.0))
         assert 0.9 * highest < needed <= highest
     roof = make_boxes((2.0, 2.0, 1.0), (4.0, 4.0, 0.2))
-    assert flattest_tolerance(config, PLOT, heights, roof, (2.0, 2.0)) is None
+    assert ground_of(config, heights, roof).flattest_tolerance((2.0, 2.0)) is None
     large = MapConfig(spawn_radius=2.0)
-    assert flattest_tolerance(large, PLOT, heights, Solids.empty(), (2.0, 2.0)) is None
+    assert ground_of(large, heights).flattest_tolerance((2.0, 2.0)) is None
 
 
 @pytest.mark.parametrize(("bottom", "is_free"), [(1.12, True), (1.1, False)])
@@ -162,7 +168,7 @@ def test_find_spawn_avoids_a_post_below_its_center(top, is_free):
 def sampled(heights, number, *, origin=(2.0, 2.0, 0.0), radius=0.5, solids=None, seed=0):
     config = MapConfig(spawn_radius=radius, spawns_per_patch=number)
     rng = partial(np.random.default_rng, seed)
-    return sample_spawns(config, PLOT, heights, solids or Solids.empty(), origin, rng)
+    return ground_of(config, heights, solids).sample(origin, rng)
 
 
 @pytest.mark.parametrize("number", [1, 2, 4])

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from terrainkit.features.noise import ValueNoise
+from terrainkit.features.value_noise import ValueNoise
 from terrainkit.geometry.solids import make_boxes
 from terrainkit.overlays.noise import Noise
 

@@ -5,8 +5,8 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.solids import Solids, make_hulls
-from terrainkit.geometry.surface import surface_at
 from terrainkit.terrain.patch_geometry import PatchGeometry, checked_geometry
 
 QUARTER = np.array([[0, -1], [1, 0]])

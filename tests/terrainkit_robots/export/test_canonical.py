@@ -7,7 +7,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.xml.document import RobotFileError
 from terrainkit_robots.export.canonical import has_unknown_inertia, to_canonical
-from tests.robots import BUNDLED, REAL_ROBOTS
+from tests.robots import ROBOTS
 from tests.terrainkit_robots.export.made_models import MJCF_MASS, inertial, urdf_link
 
 
@@ -35,7 +35,7 @@ def link_poses(facts, positions):
     }
 
 
-@pytest.mark.parametrize("name", BUNDLED + REAL_ROBOTS)
+@pytest.mark.parametrize("name", ROBOTS)
 def test_canonical_robot_is_equivalent(name, robot_file):
     source = Facts(load_robot(robot_file(name)))
     form = to_canonical(source)

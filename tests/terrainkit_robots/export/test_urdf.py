@@ -16,7 +16,7 @@ from terrainkit_robots.export.mesh_export.mesh_export import export_meshes
 from terrainkit_robots.export.urdf import urdf_text
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.transforms import quat_to_matrix, rpy_to_matrix
-from tests.robots import BUNDLED
+from tests.robots import ROBOTS
 from tests.terrainkit_robots.export.made_models import (
     SOURCE,
     at,
@@ -256,7 +256,7 @@ def test_rounding_errors_of_inertia_are_zero():
     assert [written.get(name) for name in ("ixx", "ixy", "ixz")] == ["1", "0", "1.1e-12"]
 
 
-@pytest.fixture(scope="module", params=BUNDLED)
+@pytest.fixture(scope="module", params=ROBOTS)
 def written(request, robot_file, tmp_path_factory):
     """Return a robot, and the URDF that is written of it."""
     source = Facts(load_robot(robot_file(request.param)))

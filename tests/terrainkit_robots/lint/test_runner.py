@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -10,13 +11,14 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
-from terrainkit_robots.lint.rule import Rule, Violation, rules
+from terrainkit_robots.lint.rule import FAMILIES, Rule, Violation, rules
 from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, Skipped, has_inputs, lint
 from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from tests.small_robots import URDF, facts, joint, link
 
 LINK = link("a", mass=None)
+UNITS = ((1, "mass"), (2, "length"))
 
 
 def violation(subject="a", line=1, **more):
@@ -134,7 +136,7 @@ def test_rules_need_their_input(needs, reason):
 @pytest.mark.parametrize("family", ["LEG", "SYM", "DYN"])
 def test_limb_rules_need_complete_tree(family):
     robot = facts(LINK, joint("a", "lost", kind="fixed"))
-    made = report(rule([violation()], f"{family}099"), robot=robot)
+    made = report(rule([violation()], needs=FAMILIES[family].needs), robot=robot)
     assert made.findings == ()
     assert "missing from the kinematic tree" in made.skipped[0].reason
     assert len(report(rule([violation()], "INR099"), robot=robot).findings) == 1
@@ -142,7 +144,8 @@ def test_limb_rules_need_complete_tree(family):
 
 def test_references_are_checked_only_with_all_included_files():
     robot = facts('<mujoco><include file="gone.xml"/><worldbody><body/></worldbody></mujoco>')
-    made = report(rule([violation()], "COL099"), rule([violation()], "INR099"), robot=robot)
+    shapes = rule([violation()], "COL099", needs=FAMILIES["COL"].needs)
+    made = report(shapes, rule([violation()], "INR099"), robot=robot)
     assert [each.code for each in made.findings] == ["INR099"]
     assert made.skipped[0].reason == "an included file cannot be read (XML012)"
 
@@ -201,3 +204,14 @@ def test_wrong_unit_is_first_and_hides_its_consequences():
     assert {finding.code for finding in report.findings if finding.severity != "note"} == {"UNI001"}
     reasons = {each.code: each.reason for each in report.skipped}
     assert reasons["INR010"] == reasons["JNT015"] == "a quantity has another unit (UNI001)"
+
+
+def test_first_missing_input_is_the_reason():
+    """The needs of a rule are in order, whichever unit was found to be wrong first."""
+    units = [replace(rule([violation()], f"UNI00{k}"), name=f"{what}-unit") for k, what in UNITS]
+    selected = [*units, rule([violation()], needs=("length-unit", "mass-unit", "legs"))]
+    made = report(*selected)
+    assert [each.code for each in made.findings] == ["UNI001", "UNI002"]
+    (skipped,) = made.skipped
+    assert (skipped.code, skipped.kind) == ("INR099", "cannot-check")
+    assert skipped.reason == "a quantity has another unit (UNI002)"

@@ -3,15 +3,22 @@ from types import SimpleNamespace
 
 import pytest
 
-from terrainkit_robots.onboarding import summary
-from terrainkit_robots.onboarding.summary import summarize
+from terrainkit_robots.onboarding import statements
+from terrainkit_robots.onboarding.equivalence import NUM_POSES
+from terrainkit_robots.onboarding.statements import summarize
 from terrainkit_robots.onboarding.verify import Verification
+
+
+def finding(code, subject, onboarding="repairs"):
+    return SimpleNamespace(
+        code=code, family=code[:3], subject=subject, onboarding=onboarding, fix=None, message=""
+    )
 
 
 @pytest.fixture
 def lines(monkeypatch, stood):
     """Return a function that summarizes a robot that stood; keywords replace results."""
-    monkeypatch.setattr(summary, "summarize_findings", lambda _: "2 findings")
+    monkeypatch.setattr(statements, "summarize_findings", lambda _: "2 findings")
     equivalences = (
         SimpleNamespace(file="robot.urdf", distance=2e-6, mass=-3e-9),
         SimpleNamespace(file="robot.xml", distance=1e-6, mass=1e-9),
@@ -19,7 +26,7 @@ def lines(monkeypatch, stood):
 
     def run(standing=stood, files=(), legs=(1,), changes=(), missing=0, verified=None, **given):
         checks = Verification(equivalences=equivalences, standing=standing, **(verified or {}))
-        findings = [SimpleNamespace(code="MSH001")] * missing + [SimpleNamespace(code="MSH002")]
+        findings = [finding("MSH001", "")] * missing + [finding("MSH002", "", "converts")]
         result = {
             "report": SimpleNamespace(findings=findings),
             "fixed": (),
@@ -44,7 +51,7 @@ def test_summary_of_a_plain_robot(lines):
         "checked": "2 findings",
         "wrote": "robot.urdf, 2 mesh files (1.5 MB)",
         "compared": "robot.urdf and robot.xml match the source: link positions within 0.002 mm at "
-        f"{summary.NUM_POSES} poses, mass within 3e-09",
+        f"{NUM_POSES} poses, mass within 3e-09",
         "standing": "yes: 5 s with the gains of robot.toml, tilt 0.6 degrees, only the feet touch "
         "the ground",
         "pictures": "none: no display",
@@ -52,14 +59,16 @@ def test_summary_of_a_plain_robot(lines):
 
 
 def test_summary_without_files_ends_after_the_fixes(lines):
-    fixed = [SimpleNamespace(code="INR003", subject=name) for name in "abcd"]
+    fixed = [finding("INR003", name) for name in "abcd"]
     assert lines(robot=None, fixed=fixed) == {
         "checked": "2 findings",
         "fixed": "4 findings: INR003",
         "repaired": "the inertias of a, b, c, ...; see report.md",
     }
-    one = SimpleNamespace(code="MSH001", subject="a.stl")
-    assert lines(robot=None, fixed=[one])["repaired"] == "the path of a.stl; see report.md"
+    assert (
+        lines(robot=None, fixed=[finding("MSH001", "a.stl")])["repaired"]
+        == "the path of a.stl; see report.md"
+    )
 
 
 def test_summary_lists_what_else_happened(lines):

@@ -7,7 +7,7 @@ from terrainkit_robots.policy.check_policy import check_contract, check_values
 from terrainkit_robots.policy.contracts.contract_repairs import Repair
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from terrainkit_robots.policy.policy_rollout import rollout
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 COMMANDS = np.array([[0.5, 0, 0.3], [0, 0, 0]], np.float32)
 

@@ -31,7 +31,7 @@ from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.run import create_run, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 FILES = ["policy.json", "policy.onnx", "policy.pt", "robot.xml"]
 EXAMPLE = "run_policy.py"

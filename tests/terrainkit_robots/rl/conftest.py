@@ -27,7 +27,7 @@ from terrainkit_robots.rl.config import (
 )
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import Ground, MapGround, Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 torch.set_num_threads(1)
 

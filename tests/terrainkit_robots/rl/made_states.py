@@ -7,7 +7,7 @@ import numpy as np
 
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.state import State
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 FLAGS = ("fallen",)
 

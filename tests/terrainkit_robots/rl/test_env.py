@@ -23,7 +23,7 @@ from terrainkit_robots.rl.env_state import env_state, load_env_state
 from terrainkit_robots.rl.observations import ObservationTerm
 from terrainkit_robots.rl.symmetry import has_symmetry
 from terrainkit_robots.rl.terrain import MapGround, Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
 

@@ -25,7 +25,7 @@ from terrainkit_robots.rl.run import (
     prepare_run_folder,
 )
 from terrainkit_robots.rl.terrain import load_terrain
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 
 @pytest.fixture

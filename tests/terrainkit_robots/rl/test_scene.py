@@ -10,7 +10,7 @@ from terrainkit_robots.rl.config import Asset, Sim
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapGround, Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES
 
 

@@ -111,7 +111,7 @@ from pathlib import Path
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.rl.tasks import get_task
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.config import Algorithm, Env, Runner, Task, Terrain
 

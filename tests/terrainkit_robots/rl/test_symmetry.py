@@ -10,7 +10,7 @@ from terrainkit_robots.rl.config import Commands, DomainRand, Observations, Sim
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.symmetry import augment
 from terrainkit_robots.rl.terrain import Plane
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.spec.robot_spec import MirrorJoint
 
 _PAIRS = 4

@@ -15,7 +15,7 @@ from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.smoke_test import checks as module
 from terrainkit_robots.smoke_test.short_training import TrainingRecord
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from tests.robots import QUADRUPED
 
 RECORD = TrainingRecord(

@@ -13,7 +13,7 @@ import pytest
 from websockets.sync.server import serve
 
 import terrainkit as tk
-from terrainkit.views.viewer import show_map
+from terrainkit.viewer.map_scene import show_map
 from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.rl.run import open_run

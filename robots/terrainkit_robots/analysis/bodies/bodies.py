@@ -199,3 +199,12 @@ def center_of_mass(bodies: Sequence[Body], poses: Sequence[Matrix]) -> Matrix:
     return np.asarray(
         sum((b.mass * c for b, c in zip(bodies, centers, strict=True)), np.zeros(3)) / total
     )
+
+
+def subtree_of(bodies: Sequence[Body], index: int) -> set[int]:
+    """Return the indices of a body and its descendants."""
+    found = {index}
+    for body in bodies[index + 1 :]:  # parents come first
+        if body.parent in found:
+            found.add(body.index)
+    return found

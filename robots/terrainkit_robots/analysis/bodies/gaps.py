@@ -26,8 +26,8 @@ def box_at_zero(body: Body, shapes: Sequence[BodyShape], meshes: Meshes) -> Matr
     if not all(has_bounds(shape.geometry, meshes) for shape in shapes):
         return None
     placed = (
-        BodyShape(geometry=each.geometry, link=each.link, pose=body.zero_pose @ each.pose)
-        for each in shapes
+        BodyShape(geometry=shape.geometry, link=shape.link, pose=body.zero_pose @ shape.pose)
+        for shape in shapes
     )
     return bounds(placed, meshes)
 
@@ -44,5 +44,5 @@ def box_distance(a: Matrix, b: Matrix) -> float:
 
 def gap_between(bodies: Sequence[Body], meshes: Meshes) -> float | None:
     """Return the gap between two bodies [m], or None if it is unknown."""
-    a, b = (box_at_zero(each, shapes_of(each), meshes) for each in bodies)
+    a, b = (box_at_zero(body, shapes_of(body), meshes) for body in bodies)
     return None if a is None or b is None else box_distance(a, b)

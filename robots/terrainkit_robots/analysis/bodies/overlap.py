@@ -101,8 +101,8 @@ class OverlapScene:
 
         model, data = self._model_and_data
         body = body_poses(self._bodies, positions)
-        each = [np.broadcast_to(body[b.index], (count, 4, 4)) for b, _ in self._shapes]
-        for poses in np.stack(each, axis=1):
+        shape_poses = [np.broadcast_to(body[b.index], (count, 4, 4)) for b, _ in self._shapes]
+        for poses in np.stack(shape_poses, axis=1):
             world = poses @ self._geom_poses
             data.geom_xpos[:] = world[:, :3, 3]
             data.geom_xmat[:] = world[:, :3, :3].reshape(-1, 9)

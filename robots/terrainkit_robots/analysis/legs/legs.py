@@ -120,7 +120,11 @@ def _make_leg(limb: Limb, bodies: Sequence[Body], shared: Sequence[bool]) -> Leg
     return Leg(
         limb=limb,
         foot=_foot_link(limb, bodies),
-        roles=(*[_WAIST] * waist, *_roles(own, bending, path, names), *[_WHEEL] * limb.has_wheel),
+        roles=(
+            *itertools.repeat(_WAIST, waist),
+            *_roles(own, bending, path, names),
+            *([_WHEEL] if limb.has_wheel else []),
+        ),
         pitch=pitch,
         length=float(sum(np.linalg.norm(b - a) for a, b in itertools.pairwise(path))),
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass
+from terrainkit_robots.analysis.bodies.bodies import Body, center_of_mass, subtree_of
 from terrainkit_robots.analysis.bodies.contact import contact_points, convex_hull, margin
 from terrainkit_robots.analysis.bodies.kinematics import body_poses, joint_axis
 from terrainkit_robots.analysis.bodies.shapes import min_height
@@ -141,7 +141,7 @@ def _static_torques(
             for leg, point, force in zip(legs, force_points, forces, strict=True)
             if index in leg.limb.chain
         ]
-        for descendant in _subtree(bodies, index):
+        for descendant in sorted(subtree_of(bodies, index)):
             body, pose = bodies[descendant], poses[descendant]
             loads.append((pose[:3, :3] @ body.center + pose[:3, 3], -body.mass * GRAVITY * up))
         origin, axis = joint_axis(bodies[index], poses[index])
@@ -150,15 +150,6 @@ def _static_torques(
         else:
             torques[joint.name] = -float(sum(axis @ np.cross(p - origin, f) for p, f in loads))
     return torques
-
-
-def _subtree(bodies: Sequence[Body], index: int) -> list[int]:
-    """Return the indices of a body and its descendants, parents first."""
-    found = {index}
-    for body in bodies[index + 1 :]:
-        if body.parent in found:
-            found.add(body.index)
-    return sorted(found)
 
 
 def ground_forces(points: Matrix, center: Matrix, weight: float) -> Matrix:

@@ -75,7 +75,7 @@ def is_leg_wheel(body: Body, meshes: Meshes) -> bool:
         pose = np.eye(4)
         pose[:3, :3] = rotation @ upright
         pose[:3, 3] = -pose[:3, :3] @ joint.anchor
-        radii.append(max(-min_height(each, pose, meshes) for each in shapes))
+        radii.append(max(-min_height(shape, pose, meshes) for shape in shapes))
     return min(radii) > 0 and max(radii) <= _MAX_RADIUS_RATIO * min(radii)
 
 

@@ -103,7 +103,7 @@ def meshes_by_name(model: RobotModel, meshes: Meshes) -> list[UsedMesh]:
 def meshes_by_file(model: RobotModel, meshes: Meshes) -> list[UsedMesh]:
     """Return the meshes of a robot, one for each file, without the files that MSH001 reports."""
     used = _group(model, meshes, lambda mesh: mesh.path)
-    return [each for each in used if not is_missing(each)]
+    return [mesh for mesh in used if not is_missing(mesh)]
 
 
 def _group(model: RobotModel, meshes: Meshes, key: Callable[[MeshFile], object]) -> list[UsedMesh]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from terrainkit.errors import one_line
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.bodies.tree import Tree
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS, is_allowed
@@ -151,7 +152,7 @@ def _without_repeated_names(model: RobotModel) -> dict[str, bytes]:
     """
     from lxml import etree
 
-    shapes = [each for link in model.links for each in (*link.collisions, *link.visuals)]
+    shapes = [shape for link in model.links for shape in (*link.collisions, *link.visuals)]
     names = [shape.name for shape in shapes if shape.name]
     if model.kind != "urdf" or len(set(names)) == len(names):
         return {}
@@ -216,7 +217,7 @@ def yourdfpy_load_error(model: RobotModel, tree: Tree) -> LoadError | None:
     except MemoryError:
         raise
     except Exception as error:  # yourdfpy has no common base class of its errors
-        text = " ".join(str(error).split()) or "no message"
+        text = one_line(str(error)) or "no message"
         return LoadError(message=truncate(f"{type(error).__name__}: {text}", 200))
     finally:
         log.setLevel(level)
@@ -266,7 +267,7 @@ def _relevant_elements(root: "etree._Element | None") -> Iterator["etree._Elemen
     yield root
     for child in root:
         if not is_urdf or child.tag in _URDF_TAGS or child.tag == "mujoco":
-            yield from (each for each in child.iter() if isinstance(each.tag, str))
+            yield from (element for element in child.iter() if isinstance(element.tag, str))
 
 
 def _check_element(element: "etree._Element") -> None:

@@ -68,26 +68,28 @@ def read_actuators(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> Ite
     import mujoco
 
     joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    for each in spec.actuators:
-        node = node_of(each)
-        gear = float(each.gear[0])
-        joint = each.target if each.trntype in joints else ""
-        commanded = None if "plugin" in node.written else _max_commanded_force(each)
-        limit = _max_magnitude(each.forcelimited, each.forcerange, each.compiler.autolimits)
+    for actuator in spec.actuators:
+        node = node_of(actuator)
+        gear = float(actuator.gear[0])
+        joint = actuator.target if actuator.trntype in joints else ""
+        commanded = None if "plugin" in node.written else _max_commanded_force(actuator)
+        limit = _max_magnitude(
+            actuator.forcelimited, actuator.forcerange, actuator.compiler.autolimits
+        )
         force = min((f for f in (commanded, limit) if f is not None), default=None)
         yield ActuatorData(
-            name=each.name or (f"{joint}_actuator" if joint else node.tag),
+            name=actuator.name or (f"{joint}_actuator" if joint else node.tag),
             source=node.source,
             joint=joint,
             effort=None if force is None else force * abs(gear),
-            armature=float(getattr(each, "armature", 0.0)) * gear**2,
+            armature=float(getattr(actuator, "armature", 0.0)) * gear**2,
             gear=gear,
-            stiffness=_stiffness(each, gear),
+            stiffness=_stiffness(actuator, gear),
             # A positive value is a damping ratio.
-            damping=-float(each.biasprm[2]) * gear**2 if each.biasprm[2] < 0 else None,
+            damping=-float(actuator.biasprm[2]) * gear**2 if actuator.biasprm[2] < 0 else None,
             commands=None
             if commanded is None
-            else (float(each.ctrlrange[0]), float(each.ctrlrange[1])),
+            else (float(actuator.ctrlrange[0]), float(actuator.ctrlrange[1])),
         )
 
 
@@ -178,18 +180,18 @@ def read_mimics(spec: "mujoco.MjSpec", node_of: Callable[[Any], Node]) -> dict[s
 
     joints = {joint.name: joint for joint in spec.joints}
     mimics: dict[str, Mimic] = {}
-    for each in spec.equalities:
-        follower, target = joints.get(each.name1), joints.get(each.name2)
-        tied = each.type == mujoco.mjtEq.mjEQ_JOINT and each.active
-        if not tied or follower is None or target is None or not each.name2:
+    for equality in spec.equalities:
+        follower, target = joints.get(equality.name1), joints.get(equality.name2)
+        tied = equality.type == mujoco.mjtEq.mjEQ_JOINT and equality.active
+        if not tied or follower is None or target is None or not equality.name2:
             continue
-        offset, factor, *higher = map(float, each.data[:5])
+        offset, factor, *higher = map(float, equality.data[:5])
         if any(higher) or not (math.isfinite(offset) and math.isfinite(factor)):
             continue
         ends = [float(joint.ref) * _unit(joint) for joint in (follower, target)]
-        mimics[each.name1] = Mimic(
-            source=node_of(each).source,
-            joint=each.name2,
+        mimics[equality.name1] = Mimic(
+            source=node_of(equality).source,
+            joint=equality.name2,
             multiplier=factor,
             offset=offset + ends[0] - factor * ends[1],
         )

@@ -267,7 +267,7 @@ class CompiledBodies:
         mean = float(np.cbrt(np.abs(scale).prod())) or 1.0
         self._report(
             self._node_of(frame),
-            f"scale of <frame>: got {' '.join(f'{each:g}' for each in scale)}; expected equal "
+            f"scale of <frame>: got {' '.join(f'{factor:g}' for factor in scale)}; expected equal "
             f"positive factors; {mean:g} is used for all axes",
         )
         return mean
@@ -291,7 +291,7 @@ class CompiledBodies:
 
     def _report_rejected(self, element: Any, message: str, child: str = "") -> None:
         node = self._node_of(element)
-        node = next((each for each in node.elements() if each.tag == child), node)
+        node = next((part for part in node.elements() if part.tag == child), node)
         self._report(node, f"<{node.tag}>: {message}; MuJoCo rejects the file")
 
 

@@ -14,17 +14,17 @@ def coupled_joints(spec: "mujoco.MjSpec") -> set[str]:
     bodies = {body.name: body for body in spec.bodies if body.name}
     sites = {site.name: site.parent for site in spec.sites}
     found: list[Any] = []
-    for each in spec.equalities:
-        held = sites if each.objtype == mujoco.mjtObj.mjOBJ_SITE else bodies
-        chains = [_ancestors(held.get(name)) for name in (each.name1, each.name2)]
+    for equality in spec.equalities:
+        held = sites if equality.objtype == mujoco.mjtObj.mjOBJ_SITE else bodies
+        chains = [_ancestors(held.get(name)) for name in (equality.name1, equality.name2)]
         # A body that is held by the world or by a mocap body closes no loop.
-        if each.type in kinds and each.active and chains[0][-1:] == chains[1][-1:] != []:
+        if equality.type in kinds and equality.active and chains[0][-1:] == chains[1][-1:] != []:
             for chain, other in (chains, chains[::-1]):
                 found += [joint for body in chain if body not in other for joint in body.joints]
     names = {joint.name for joint in found}
     for tendon in spec.tendons:
-        wraps = [each for each in tendon.path if each.type == mujoco.mjtWrap.mjWRAP_JOINT]
-        names |= {each.target.name for each in wraps if each.target is not None}
+        wraps = [wrap for wrap in tendon.path if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT]
+        names |= {wrap.target.name for wrap in wraps if wrap.target is not None}
     return names - {""}
 
 

@@ -69,7 +69,7 @@ class MeshMasses:
                 mass = float(trial.compile().body_mass[1])
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError):
             return False
-        if geom.meshname not in {each.name for each in self._copy.meshes}:
+        if geom.meshname not in {mesh.name for mesh in self._copy.meshes}:
             self._write(self._copy, mesh, geom.meshname)
         return 0 < mass < math.inf
 

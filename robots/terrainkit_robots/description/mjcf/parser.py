@@ -12,6 +12,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from terrainkit.settings.text import closest, truncate
+from terrainkit_robots.description.fix import number_fix
 from terrainkit_robots.description.mjcf.tree import MjcfTree, Node, is_allowed, limit_size
 from terrainkit_robots.description.xml.numbers import parse_numbers, replace_commas
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
@@ -134,7 +135,7 @@ def _check_numbers(tree: MjcfTree, node: Node) -> None:
             f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
             + (", with decimal points and separated by spaces" if repaired else ""),
             attribute=name,
-            repaired=repaired,
+            fix=number_fix(node.source, name, repaired),
         )
         if repaired:
             node.attributes[name] = repaired
@@ -219,14 +220,12 @@ def _unknown_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean {suggestion}?" if suggestion else ""),
         attribute=name,
-        found=name,
-        known=suggestion,
-        refused="mujoco",
+        severity="error",
     )
-    for each in nodes:
-        value = each.attributes.pop(name)
-        if suggestion and suggestion not in each.attributes and is_allowed(each.tag, suggestion):
-            each.attributes[suggestion] = value  # otherwise it would be reported as missing
+    for node in nodes:
+        value = node.attributes.pop(name)
+        if suggestion and suggestion not in node.attributes and is_allowed(node.tag, suggestion):
+            node.attributes[suggestion] = value  # otherwise it would be reported as missing
     return True
 
 
@@ -243,20 +242,17 @@ def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         node,
         "XML007",
         what + _count_suffix(nodes) + (f"; did you mean <{suggestion}>?" if suggestion else ""),
-        attribute="",
-        found=node.tag,
-        known=suggestion,
-        refused="mujoco",
+        severity="error",
     )
-    for each in nodes:
+    for node in nodes:
         if (
             suggestion
             and is_allowed(suggestion)
-            and all(is_allowed(suggestion, k) for k in each.attributes)
+            and all(is_allowed(suggestion, k) for k in node.attributes)
         ):
-            each.tag = suggestion  # its children are read as well
+            node.tag = suggestion  # its children are read as well
         else:
-            each.remove()
+            node.remove()
     return True
 
 
@@ -278,7 +274,7 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     else:
         expected = f"{counts[0]} numbers" if counts[0] > 1 else "a number"
     message = f"{name} of <{node.tag}>: got {truncate(text, 40)!r}; expected {expected}"
-    tree.add_problem(node, "XML006", message, attribute=name, repaired="")
+    tree.add_problem(node, "XML006", message, attribute=name)
     return True
 
 
@@ -313,8 +309,8 @@ def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         _report_rejected(tree, node, match[0])
     taken = {n.attributes.get("name") for n in tree.nodes()}
     numbers = itertools.count(2)
-    for each in duplicates:
-        each.attributes["name"] = next(new for k in numbers if (new := f"{name}_{k}") not in taken)
+    for node in duplicates:
+        node.attributes["name"] = next(new for k in numbers if (new := f"{name}_{k}") not in taken)
     return True
 
 
@@ -326,8 +322,8 @@ def _invalid_value(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         return False
     nodes = _similar_nodes(tree, node, attribute=name, value=value)
     _report_rejected(tree, node, f"{match[0]} in {name}{_count_suffix(nodes)}")
-    for each in nodes:
-        del each.attributes[name]
+    for node in nodes:
+        del node.attributes[name]
     return True
 
 
@@ -370,8 +366,8 @@ def _unknown_childclass(tree: MjcfTree, node: Node, match: re.Match[str]) -> boo
         return False
     nodes = _similar_nodes(tree, node, attribute="childclass", value=value)
     _report_rejected(tree, node, f"{match[0]} {value!r}{_count_suffix(nodes)}")
-    for each in nodes:
-        del each.attributes["childclass"]
+    for node in nodes:
+        del node.attributes["childclass"]
     return True
 
 

@@ -130,7 +130,7 @@ class _SpecReader:
         links, joints = self._read_bodies()
         compiler = self._spec.compiler
         bounds = float(compiler.boundmass), float(compiler.boundinertia)
-        links = [replace(each, inertial=apply_minimums(each, *bounds)) for each in links]
+        links = [replace(link, inertial=apply_minimums(link, *bounds)) for link in links]
         dangling_references(self._mjcf, self._spec)
         if not compiler.degree:
             self._check_euler_angles()
@@ -143,9 +143,9 @@ class _SpecReader:
             keyframe=self._keyframe_positions(joints),
             imu=imu and (self._links[imu.parent], self._compiled.shape_pose(imu)),
             excluded=frozenset(
-                frozenset((each.bodyname1, each.bodyname2))
-                for each in self._spec.excludes
-                if each.bodyname1 != each.bodyname2
+                frozenset((pair.bodyname1, pair.bodyname2))
+                for pair in self._spec.excludes
+                if pair.bodyname1 != pair.bodyname2
             ),
         )
 
@@ -243,7 +243,7 @@ class _SpecReader:
             if body.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE:
                 return None
             return geom_inertial(node.source, compiled, self._compiled.missing_masses(body))
-        written = next((each for each in node.elements() if each.tag == "inertial"), node)
+        written = next((element for element in node.elements() if element.tag == "inertial"), node)
         mass_scale, origin, moments = compiled
         inertia = None
         if not math.isnan(body.fullinertia[0]):
@@ -391,7 +391,7 @@ class _SpecReader:
         sizes = {"floating": 7, "ball": 4, "fixed": 0}
         expected = sum(sizes.get(joint.kind, 1) for joint in joints)
         for key in self._spec.keys:
-            positions = [float(each) for each in key.qpos]
+            positions = [float(value) for value in key.qpos]
             if not positions:
                 continue
             if len(positions) != expected:

@@ -47,13 +47,13 @@ def dangling_references(tree: MjcfTree, spec: "mujoco.MjSpec") -> None:
     if not tree.complete or len(spec.bodies) < 2:
         return
     names = {
-        "joint": {each.name for each in spec.joints},
-        "body": {each.name for each in spec.bodies},
-        "geom": {each.name for each in spec.geoms},
-        "site": {each.name for each in spec.sites},
-        "tendon": {each.name for each in spec.tendons},
-        "mesh": {mesh_name(each) for each in spec.meshes},
-        "material": {each.name for each in spec.materials},
+        "joint": {joint.name for joint in spec.joints},
+        "body": {body.name for body in spec.bodies},
+        "geom": {geom.name for geom in spec.geoms},
+        "site": {site.name for site in spec.sites},
+        "tendon": {tendon.name for tendon in spec.tendons},
+        "mesh": {mesh_name(mesh) for mesh in spec.meshes},
+        "material": {material.name for material in spec.materials},
     }
     has_ground = len(spec.worldbody.geoms) > 0
     for node in _iter_references(tree, has_ground):

@@ -52,9 +52,9 @@ def color_of(geom: Any, materials: Mapping[str, Any]) -> tuple[float, float, flo
         if geom.material not in materials:
             return None
         rgba = materials[geom.material].rgba
-    red, green, blue, opacity = (round(float(each), 6) for each in rgba)
+    red, green, blue, opacity = (round(float(value), 6) for value in rgba)
     color = (red, green, blue, opacity)
-    return color if all(0 <= each <= 1 for each in color) else None
+    return color if all(0 <= value <= 1 for value in color) else None
 
 
 def mesh_name(mesh: Any) -> str:

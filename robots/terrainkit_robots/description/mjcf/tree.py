@@ -9,9 +9,11 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from lxml import etree
 
+from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import Problem, Source
 from terrainkit_robots.description.package_resolver import exists
 from terrainkit_robots.description.xml.document import (
@@ -121,7 +123,15 @@ class MjcfTree:
     """Whether the trees contain the whole file; False if elements were skipped."""
 
     def add_problem(
-        self, node: Node, code: str, message: str, *, subject: str | None = None, **details: str
+        self,
+        node: Node,
+        code: str,
+        message: str,
+        *,
+        subject: str | None = None,
+        attribute: str = "",
+        severity: Literal["error"] | None = None,
+        fix: Fix | None = None,
     ) -> None:
         """Add a problem at a node; its subject is the owner of the node unless it is given."""
         self.problems.append(
@@ -130,7 +140,9 @@ class MjcfTree:
                 message=message,
                 source=node.source,
                 subject=node.owner if subject is None else subject,
-                details=details,
+                attribute=attribute,
+                severity=severity,
+                fix=fix,
             )
         )
 

@@ -14,6 +14,14 @@ import numpy as np
 from lxml import etree
 
 from terrainkit.settings.text import truncate
+from terrainkit_robots.description.fix import (
+    Fix,
+    RemoveAttribute,
+    RemoveElement,
+    SetAttribute,
+    make_fix,
+    number_fix,
+)
 from terrainkit_robots.description.model import (
     Dynamics,
     Geometry,
@@ -27,6 +35,7 @@ from terrainkit_robots.description.model import (
     Problem,
     RobotModel,
     SafetyController,
+    Source,
 )
 from terrainkit_robots.description.package_resolver import PackageResolver
 from terrainkit_robots.description.urdf.colors import (
@@ -77,7 +86,10 @@ class _Reader:
         assert root is not None
         source = self._doc.source(root)
         if not root.get("name", "").strip():
-            self._report("XML003", root, "the robot has no name; expected <robot name=...>")
+            fix = _name_fix(source, self._doc.file.stem)
+            self._report(
+                "XML003", root, "the robot has no name; expected <robot name=...>", fix=fix
+            )
         self._check_names(root)
         self._colors = named_colors(root)
         self._controlled = {
@@ -99,17 +111,27 @@ class _Reader:
         )
 
     def _report(
-        self, code: str, element: "etree._Element", message: str, subject: str = "", **details: str
+        self,
+        code: str,
+        element: "etree._Element",
+        message: str,
+        *,
+        attribute: str = "",
+        fix: Fix | None = None,
     ) -> None:
         self._problems.append(
             Problem(
                 code=code,
                 message=message,
                 source=self._doc.source(element),
-                subject=subject or _owner(element),
-                details=details,
+                subject=_owner(element),
+                attribute=attribute,
+                fix=fix,
             )
         )
+
+    def _removal(self, element: "etree._Element", description: str) -> Fix | None:
+        return make_fix("safe", description, [RemoveElement(source=self._doc.source(element))])
 
     def _check_names(self, root: "etree._Element") -> None:
         """Report unexpanded xacro and misspelled names."""
@@ -118,12 +140,13 @@ class _Reader:
         for element, attribute, known in misspelled_names(root):
             what = f"attribute {attribute} of <{element.tag}>" if attribute else f"<{element.tag}>"
             message = f"{what} is unknown and ignored; did you mean {known}?"
-            self._report("XML007", element, message, attribute=attribute, known=known)
+            self._report("XML007", element, message, attribute=attribute)
         for element in repeated_children(root):
             parent = element.getparent()
             message = f"second <{element.tag}> in a <{parent.tag}>; expected one, and the first is "
             is_copy = _same_content(parent.find(element.tag), element)
-            self._report("XML015", element, f"{message}read", copy="1" if is_copy else "")
+            fix = self._removal(element, "Remove the copy.") if is_copy else None
+            self._report("XML015", element, f"{message}read", fix=fix)
         for element in undefined_materials(root):
             name = truncate(element.get("name", ""))
             message = f"material {name}: has no color or texture anywhere; expected a definition"
@@ -152,7 +175,7 @@ class _Reader:
             element,
             f"{name} of <{element.tag}>: got {truncate(text, 40)!r}; expected {expected}{hint}",
             attribute=name,
-            repaired=repaired,
+            fix=number_fix(self._doc.source(element), name, repaired),
         )
         return parse_numbers(repaired, count) if repaired else None
 
@@ -208,7 +231,13 @@ class _Reader:
         rpy = place_text(matrix_to_rpy(rotation))
         if rpy != "0 0 0":
             message = f'simulators ignore quat_xyzw of <origin>; expected rpy="{rpy}"'
-            self._report("XML014", origin, message, rpy=rpy)
+            source = self._doc.source(origin)
+            edits = (
+                SetAttribute(source=source, name="rpy", value=rpy),
+                RemoveAttribute(source=source, name="quat_xyzw"),
+            )
+            fix = make_fix("unsafe", f'Set rpy="{rpy}".', edits)
+            self._report("XML014", origin, message, fix=fix)
         return rotation
 
     # Links
@@ -249,12 +278,16 @@ class _Reader:
         missing = [name for name in _PRODUCTS if tensor.get(name) is None]
         if missing and set(tensor.keys()) >= set(_DIAGONAL):
             message = f"<inertia> has no {', '.join(missing)}; MuJoCo rejects the file"
-            self._report("XML013", tensor, message, attributes=" ".join(missing))
+            source = self._doc.source(tensor)
+            edits = [SetAttribute(source=source, name=name, value="0") for name in missing]
+            what = f"Set {', '.join(missing)} to 0, which lenient readers assume."
+            self._report("XML013", tensor, message, fix=make_fix("safe", what, edits))
 
     def _geometries(self, link: "etree._Element", tag: str) -> Iterator[Geometry]:
         for element in link.iterchildren(tag):
             for extra in element.findall("material")[1:]:
-                self._report("XML008", extra, f"<{tag}> has two materials; expected one")
+                fix = self._removal(extra, "Remove the second material.")
+                self._report("XML008", extra, f"<{tag}> has two materials; expected one", fix=fix)
             geometry = self._geometry(element)
             color = color_of(element, self._colors) if tag == "visual" else None
             yield geometry if color is None else replace(geometry, color=color)
@@ -351,7 +384,7 @@ class _Reader:
         """Return an element whose attributes are numbers, named like the fields of `kind`."""
         if element is None:
             return None
-        names = (each.name for each in fields(kind) if each.name != "source")
+        names = (part.name for part in fields(kind) if part.name != "source")
         numbers = {name: self._parse_number(element, name) for name in names}
         return kind(source=self._doc.source(element), **numbers)
 
@@ -383,6 +416,14 @@ _SIZES = {
 }
 
 
+def _name_fix(robot: Source, stem: str) -> Fix | None:
+    """Return the fix that names a robot after its file."""
+    name = "".join(c if c.isalnum() and c.isascii() else "_" for c in stem)
+    name = name if name[:1].isalpha() else f"robot_{name}"
+    edit = SetAttribute(source=robot, name="name", value=name)
+    return make_fix("safe", f'Add name="{name}", from the file name.', [edit])
+
+
 def _symmetric(values: list[float | None]) -> Matrix | None:
     """Return the symmetric matrix of the values xx, yy, zz, xy, xz, yz."""
     if any(value is None or math.isnan(value) for value in values):
@@ -394,7 +435,7 @@ def _symmetric(values: list[float | None]) -> Matrix | None:
 def _first_number(texts: Mapping[str | None, str], names: Sequence[str]) -> float | None:
     """Return the first of the named numbers that is positive, or None."""
     found = (parse_numbers(texts[name], 1) for name in names if name in texts)
-    values = (float(each[0]) for each in found if each is not None)
+    values = (float(row[0]) for row in found if row is not None)
     return next((value for value in values if 0 < value < math.inf), None)
 
 
@@ -406,8 +447,8 @@ def _complete(*values: float | None) -> tuple[float, ...] | None:
 
 def _owner(element: "etree._Element") -> str:
     """Return the name of the link or joint that contains an element."""
-    owners = (each for each in (element, *element.iterancestors()) if each.tag in _NAMED_TAGS)
-    return next((str(each.get("name")) for each in owners if each.get("name")), "")
+    owners = (owner for owner in (element, *element.iterancestors()) if owner.tag in _NAMED_TAGS)
+    return next((str(owner.get("name")) for owner in owners if owner.get("name")), "")
 
 
 def _same_content(first: "etree._Element", second: "etree._Element") -> bool:

@@ -154,4 +154,5 @@ def _invalid_reductions(doc: XmlDocument) -> Iterator[Problem]:
                 f"{truncate(text, 40)!r}; expected a ratio other than 0",
                 source=doc.source(reduction),
                 subject=subject,
+                severity="warning",
             )

@@ -46,17 +46,18 @@ def invalid_srdf(doc: XmlDocument) -> Iterator[Problem]:
     root = semantics.root
     if root is None or semantics.problems:
         problem = next(iter(semantics.problems))
-        yield Problem(code="TRE010", message=problem.message, source=problem.source)
+        source, message = problem.source, problem.message
+        yield Problem(code="TRE010", message=message, source=source, subject=source.file.name)
         return
     known = {
         "link": link_names(doc.root),
         "joint": {*joint_names(doc.root), _FREE_JOINT, *_names_of(root, "virtual_joint")},
         "group": _names_of(root, "group"),
     }
-    references = [each for each in _references(root) if each.name]
-    missing = [each for each in references if each.name not in known[each.kind]]
-    unknown = list(dict.fromkeys(each.name for each in missing))
-    total = len({each.name for each in references})
+    references = [reference for reference in _references(root) if reference.name]
+    missing = [reference for reference in references if reference.name not in known[reference.kind]]
+    unknown = list(dict.fromkeys(reference.name for reference in missing))
+    total = len({reference.name for reference in references})
     is_own = doc.file.name.startswith(f"{path.stem}.")
     if missing and (is_own or total - len(unknown) >= _MIN_KNOWN_SHARE * total):
         first = missing[0]

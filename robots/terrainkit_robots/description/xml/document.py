@@ -7,7 +7,7 @@ where a tag starts, so it parses well-formed documents a second time.
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.parsers import expat
 
@@ -117,9 +117,16 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
     return XmlDocument(file=file, data=data, root=root, sources=sources, problems=tuple(problems))
 
 
-def _problem(code: str, file: Path, message: str, line: int = 1, **details: str) -> Problem:
+def _problem(code: str, file: Path, message: str, line: int = 1) -> Problem:
     source = Source(file=file, line=line)
-    return Problem(code=code, message=message, source=source, subject=file.name, details=details)
+    return Problem(code=code, message=message, source=source, subject=file.name)
+
+
+def _bytes_fix(file: Path, description: str, start: int, end: int, replacement: bytes) -> Fix:
+    """Return the fix that replaces a range of bytes."""
+    source = Source(file=file, line=1)
+    edit = ReplaceBytes(source=source, start=start, end=end, replacement=replacement)
+    return Fix(safety="safe", description=description, edits=(edit,))
 
 
 def _rejected(
@@ -147,17 +154,9 @@ def _with_version(file: Path, data: bytes, text: bytes, problems: list[Problem])
     message = (
         f"version in <?xml?>: got {version!r}; expected 1.0, or strict readers reject the file"
     )
-    problems.append(_problem("XML001", file, message, start=str(start), end=str(start + 3)))
+    fix = _bytes_fix(file, "Set the version of the XML to 1.0.", start, start + 3, b"1.0")
+    problems.append(replace(_problem("XML001", file, message), severity="warning", fix=fix))
     return text[: match.start(1)] + b"1.0" + text[match.end(1) :]
-
-
-def version_fix(problem: Problem) -> Fix | None:
-    """Return the fix of a wrong version in the XML declaration; None for other problems."""
-    if "end" not in problem.details:
-        return None
-    start, end = int(problem.details["start"]), int(problem.details["end"])
-    edit = ReplaceBytes(source=problem.source, start=start, end=end, replacement=b"1.0")
-    return Fix(safety="safe", description="Set the version of the XML to 1.0.", edits=(edit,))
 
 
 def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> bytes:
@@ -170,7 +169,8 @@ def _skip_leading_bytes(file: Path, data: bytes, problems: list[Problem]) -> byt
         return data
     what = "a byte order mark" if has_bom else "white space before the XML declaration"
     message = f"the file starts with {what}, which some parsers reject"
-    problems.append(_problem("XML009", file, message, bytes=str(len(skipped))))
+    fix = _bytes_fix(file, "Remove the leading bytes.", 0, len(skipped), b"")
+    problems.append(replace(_problem("XML009", file, message), fix=fix))
     return data[leading.end() :]
 
 
@@ -195,18 +195,9 @@ def _wide_encoding(file: Path, data: bytes) -> Problem | None:
             f"the file is encoded as {encoding}, which MuJoCo and urdfdom reject; expected UTF-8"
         )
         utf8 = re.sub(r'(<\?xml[^>]*?encoding=)["\'][^"\']*["\']', r'\1"UTF-8"', text, count=1)
-        return _problem("XML009", file, message, bytes=str(len(data)), text=utf8)
+        fix = _bytes_fix(file, "Write the file as UTF-8.", 0, len(data), utf8.encode())
+        return replace(_problem("XML009", file, message), severity="error", fix=fix)
     return None
-
-
-def leading_bytes_fix(problem: Problem) -> Fix:
-    """Return the fix that removes the reported bytes, or that writes the file as UTF-8."""
-    text = problem.details.get("text", "")
-    edit = ReplaceBytes(
-        source=problem.source, start=0, end=int(problem.details["bytes"]), replacement=text.encode()
-    )
-    description = "Write the file as UTF-8." if text else "Remove the leading bytes."
-    return Fix(safety="safe", description=description, edits=(edit,))
 
 
 def _syntax_errors(file: Path, parser: etree.XMLParser) -> list[Problem]:

@@ -8,7 +8,7 @@ class UnparsedNumbers:
 
     def __init__(self, model: RobotModel) -> None:
         self._unparsed = {
-            (problem.subject, problem.details.get("attribute", ""))
+            (problem.subject, problem.attribute)
             for problem in model.problems
             if problem.code == "XML006"
         }

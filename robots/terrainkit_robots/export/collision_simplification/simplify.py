@@ -133,7 +133,7 @@ class _Simplifier:
             found += (
                 [shape]
                 if replacements is None
-                else [_replace_shape(shape, each) for each in replacements]
+                else [_replace_shape(shape, replacement) for replacement in replacements]
             )
         return replace(link, collisions=tuple(_unique_names(found)))
 

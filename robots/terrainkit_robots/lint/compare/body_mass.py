@@ -33,8 +33,8 @@ def body_difference(
     frames may be rotated relative to each other. The smaller difference is returned.
     """
     base_frames = [
-        trunk_pose_in_link(facts, base) @ each.zero_pose
-        for facts, base, each in zip((robot, other), pairs.base, (body, other_body), strict=True)
+        trunk_pose_in_link(facts, base) @ side.zero_pose
+        for facts, base, side in zip((robot, other), pairs.base, (body, other_body), strict=True)
     ]
     own_frames = [np.eye(4), np.eye(4)]
     if body.parent is None:  # the frames of the trunks may belong to different links
@@ -60,11 +60,11 @@ def has_valid_inertial(body: Body) -> bool:
     """
     inertials = [link.inertial for link in body.links if link.inertial is not None]
     return bool(inertials) and all(
-        each.mass is not None
-        and each.mass >= 0
-        and each.inertia is not None
-        and bool(np.isfinite(each.inertia).all())
-        for each in inertials
+        inertial.mass is not None
+        and inertial.mass >= 0
+        and inertial.inertia is not None
+        and bool(np.isfinite(inertial.inertia).all())
+        for inertial in inertials
     )
 
 

@@ -226,13 +226,13 @@ class _Batch:
         created = {path: data for path, data in new.items() if self._is_new(path, data)}
         edited = {path: self._edited_bytes(path) for path in edits}
         replacements = {path: edited[path].prepare(edits[path]) for path in edits}
-        for path, each in replacements.items():
-            edited[path].apply(each)
+        for path, prepared in replacements.items():
+            edited[path].apply(prepared)
         self._new |= created
 
     def result(self) -> dict[Path, bytes]:
         """Return the current contents of the files."""
-        edited = {path: each.result() for path, each in self._edited.items()}
+        edited = {path: file.result() for path, file in self._edited.items()}
         return self._files.current | edited | self._new
 
     def _edited_bytes(self, path: Path) -> EditedBytes:

@@ -200,7 +200,7 @@ class _Text:
 
     def encode(self, text: str) -> bytes:
         """Return text in the encoding of this file."""
-        return text.encode(self._encoding, "xmlcharrefreplace")
+        return text.encode(self._positions[2], "xmlcharrefreplace")
 
     def _element(self, index: int) -> _Element:
         start, close = self._index[0][index], self._index[1][index]
@@ -225,10 +225,6 @@ class _Text:
     @property
     def _index(self) -> tuple[Sequence[int], Sequence[int]]:
         return self._positions[0], self._positions[1]
-
-    @property
-    def _encoding(self) -> str:
-        return self._positions[2]
 
     @cached_property
     def _positions(self) -> tuple[Sequence[int], Sequence[int], str]:

@@ -17,7 +17,7 @@ FORMATS = ("text", "json", "sarif", "github", "markdown")
 
 def to_text(reports: Sequence[Report], format: str) -> str:  # noqa: A002 (as the option is called)
     """Return `reports` in one of FORMATS. The text ends with a newline unless it is empty."""
-    name = "json_report" if format == "json" else format
+    name = f"{format}_report" if format in ("json", "text") else format
     module = importlib.import_module(f"{__name__}.{name}")
     format_module: Callable[[Sequence[Report]], str] = module.to_text
     return format_module(reports)

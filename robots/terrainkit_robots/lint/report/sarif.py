@@ -8,7 +8,7 @@ from urllib.parse import quote_from_bytes
 
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import to_json
-from terrainkit_robots.lint.rule import FAMILIES, Finding, Rule, rules
+from terrainkit_robots.lint.rule import Finding, Rule, families, rules
 from terrainkit_robots.lint.runner import Report, Skipped
 from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import display_path
@@ -67,7 +67,7 @@ def _rule(rule: Rule) -> dict[str, Any]:
         "fullDescription": {"text": rule.why},
         "help": {"text": "\n\n".join(paragraphs)},
         "defaultConfiguration": {"level": rule.severity},
-        "properties": {"tags": ["robot", FAMILIES[rule.family]], "fixes": rule.fixes},
+        "properties": {"tags": ["robot", families()[rule.family].title], "fixes": rule.fixes},
     }
 
 

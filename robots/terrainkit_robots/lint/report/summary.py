@@ -60,13 +60,13 @@ def group_skipped(skipped: Sequence[Skipped]) -> list[tuple[bool, str, str]]:
     """
     reasons: dict[tuple[SkipKind, str], dict[str, None]] = {}
     suppressed: dict[tuple[object, str], list[Suppressed]] = {}
-    for each in skipped:
-        if isinstance(each, Suppressed) and each.comment:
-            suppressed.setdefault((each.comment, each.comment.reason), []).append(each)
+    for skip in skipped:
+        if isinstance(skip, Suppressed) and skip.comment:
+            suppressed.setdefault((skip.comment, skip.comment.reason), []).append(skip)
         else:
-            reasons.setdefault((each.kind, each.reason), {})[each.code] = None
+            reasons.setdefault((skip.kind, skip.reason), {})[skip.code] = None
     for (_, why), members in suppressed.items():
-        subjects = names(each.finding.subject for each in members)
+        subjects = names(member.finding.subject for member in members)
         reason = f"suppressed for {subjects}: {why}"
         reason = members[0].reason if len(members) == 1 else reason
         reasons.setdefault(("suppressed", reason), {})[members[0].code] = None

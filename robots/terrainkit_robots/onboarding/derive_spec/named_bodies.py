@@ -6,7 +6,7 @@ top link. A foot on a fixed joint remains a separate body.
 
 import re
 
-from terrainkit_robots.analysis.bodies.bodies import Body
+from terrainkit_robots.analysis.bodies.bodies import Body, subtree_of
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.legs.legs import Leg
 
@@ -83,21 +83,9 @@ def _is_upper_body(robot: Facts, body: Body) -> bool:
         return False
     if robot.mirror.image_body(body.index) is not None:
         return False
-    subtree = _subtree(robot, body.index)
-    pairs = robot.mirror.pairs
-    names = [link.name for link in body.links if link.collisions]
-    return any(pair.left in subtree and pair.right in subtree for pair in pairs) or any(
-        _UPPER_BODY_NAMES & _split_name(name) for name in names
-    )
-
-
-def _subtree(robot: Facts, index: int) -> set[int]:
-    found = {index}
-    for body in robot.bodies[index + 1 :]:
-        if body.parent in found:
-            found.add(body.index)
-    return found
-
-
-def _split_name(name: str) -> set[str]:
-    return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)}
+    subtree = subtree_of(robot.bodies, body.index)
+    if any(pair.left in subtree and pair.right in subtree for pair in robot.mirror.pairs):
+        return True
+    names = " ".join(link.name for link in body.links if link.collisions)
+    words = {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", names)}
+    return not _UPPER_BODY_NAMES.isdisjoint(words)

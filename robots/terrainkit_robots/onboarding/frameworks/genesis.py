@@ -17,82 +17,28 @@ _TABLES = {
 
 _REQUIRED = ("default_pose", "stiffness", "damping")
 
-_FUNCTIONS = '''
-def add(scene):
-    """Add the robot to a scene before it is built, and return its entity."""
-    return scene.add_entity(
-        gs.morphs.URDF(
-            file=str(ROBOT_URDF),
-            pos=POSITION,
-            fixed=FIXED,
-            merge_fixed_links=True,
-            links_to_keep=LINKS_TO_KEEP,
-            # Set by ARMATURE below; Genesis' default for all joints is 0.1 kg m2.
-            default_armature=None,
-        )
-    )
-
-
-def dofs(robot, joints=JOINTS):
-    """Return the local DOF index of each joint."""
-    return [robot.get_joint(name).dofs_idx_local[0] for name in joints]
-
-
-def configure(robot):
-    """Set gains, limits and pose of the robot after its scene is built."""
-    if not JOINTS:
-        return
-    robot.set_dofs_kp(list(STIFFNESS.values()), dofs(robot, STIFFNESS))
-    robot.set_dofs_kv(list(DAMPING.values()), dofs(robot, DAMPING))
-    if EFFORT:
-        limits = list(EFFORT.values())
-        robot.set_dofs_force_range([-x for x in limits], limits, dofs(robot, EFFORT))
-    if ARMATURE:
-        robot.set_dofs_armature(list(ARMATURE.values()), dofs(robot, ARMATURE))
-    robot.set_dofs_position(list(DEFAULT_POSE.values()), dofs(robot, DEFAULT_POSE))
-    if ACTION_SCALE:
-        targets = [DEFAULT_POSE[name] for name in ACTION_SCALE]
-        robot.control_dofs_position(targets, dofs(robot, ACTION_SCALE))
-    if SPEED_SCALE:
-        robot.control_dofs_velocity([0.0] * len(SPEED_SCALE), dofs(robot, SPEED_SCALE))
-
-
-def build(scene, n_envs=0):
-    """Add the robot to a scene, build the scene, and return the configured robot."""
-    robot = add(scene)
-    scene.build(n_envs=n_envs)
-    configure(robot)
-    return robot
-'''
-"""The functions of the configuration, the same for every robot."""
-
 
 def config_text(robot: ConfigRobot) -> str:
     """Return the text of `genesis_config.py`."""
     spec = robot.spec
-    height = source.float_literal(spec.spawn_height or 0.0)
-    return source.join_lines(
-        [
-            source.docstring(_about(robot)),
-            ["", "from pathlib import Path", "", "import genesis as gs", ""],
-            [
-                *source.sum_assignment(
-                    "ROBOT_URDF", source.PARENT_FOLDER, "/", source.string_literal(spec.urdf)
-                ),
-                "",
-            ],
-            robot.provenance_comment("spawn_height", prefix="x, y, z"),
-            [f"POSITION = (0.0, 0.0, {height})"],
-            ["# Whether the base is fixed to the world.", f"FIXED = {not spec.floating}", ""],
-            _bodies(robot),
-            ["", "# The order of actions and observations."],
-            source.format_collection("JOINTS = ", source.format_strings(spec.joint_order)),
-            *(["", *_table(robot, name, field)] for name, field in _TABLES.items()),
-            robot.scale_table("ACTION_SCALE", "position"),
-            robot.scale_table("SPEED_SCALE", "velocity"),
-            ["", *_FUNCTIONS.rstrip().split("\n")],
-        ]
+    config = source.fill(
+        "genesis_config",
+        about=source.docstring(_about(robot)),
+        robot_urdf=source.sum_assignment(
+            "ROBOT_URDF", source.PARENT_FOLDER, "/", source.string_literal(spec.urdf)
+        ),
+        spawn_height=robot.provenance_comment("spawn_height", prefix="x, y, z"),
+        height=source.float_literal(spec.spawn_height or 0.0),
+        fixed=str(not spec.floating),
+        bodies=_bodies(robot),
+        joints=source.format_collection("JOINTS = ", source.format_strings(spec.joint_order)),
+        tables=[
+            line for name, field in _TABLES.items() for line in ("", *_table(robot, name, field))
+        ],
+        action_scale=robot.scale_table("ACTION_SCALE", "position"),
+        speed_scale=robot.scale_table("SPEED_SCALE", "velocity"),
     )
+    return source.join_lines([config])
 
 
 def _about(robot: ConfigRobot) -> list[str]:

@@ -33,66 +33,6 @@ _MIN_MOTOR_FEET = 4
 _MAX_PART_LENGTH = 20
 """Longest name of an actuator that is made of the names of its joints."""
 
-
-_CONFIG = """
-$about
-
-from pathlib import Path
-
-import isaaclab.sim as sim_utils
-from isaaclab.actuators import $kinds
-from isaaclab.assets import ArticulationCfg
-$task_imports
-
-$urdf
-
-$name = ArticulationCfg(
-    spawn=sim_utils.UrdfFileCfg(
-        asset_path=str(ROBOT_URDF),
-        fix_base=$fix_base,
-        # Feet on fixed joints with dont_collapse remain separate bodies.
-        merge_fixed_joints=True,
-        activate_contact_sensors=True,
-        # Gains are set by the actuators below.
-        joint_drive=sim_utils.UrdfConverterCfg.JointDriveCfg(
-            gains=sim_utils.UrdfConverterCfg.JointDriveCfg.PDGainsCfg(
-                stiffness=0.0,
-                damping=0.0,
-            ),
-        ),
-        rigid_props=sim_utils.RigidBodyPropertiesCfg(max_depenetration_velocity=1.0),
-        articulation_props=sim_utils.ArticulationRootPropertiesCfg(
-            # URDF cannot exclude contacts between bodies that overlap at the default pose.
-            enabled_self_collisions=False,
-            solver_position_iteration_count=4,
-            solver_velocity_iteration_count=0,
-        ),
-    ),
-    init_state=ArticulationCfg.InitialStateCfg(
-        $init_state
-    ),
-    $soft_limit
-    soft_joint_pos_limit_factor=$factor,
-    actuators={
-        $actuators
-    },
-)
-$scales
-"""
-
-_REGISTER = """
-    gymnasium.register(
-        id="Isaac-Velocity-Rough-$robot-v0",
-        entry_point="isaaclab.envs:ManagerBasedRLEnv",
-        disable_env_checker=True,
-        kwargs={
-            "env_cfg_entry_point": "$package.isaaclab_config:RoughEnvCfg",
-            "rsl_rl_cfg_entry_point": velocity_env_cfg.__package__
-            + ".config.go2.agents.rsl_rl_ppo_cfg:UnitreeGo2RoughPPORunnerCfg",
-        },
-    )
-"""
-
 _TASK_IMPORTS = [
     "from isaaclab.utils import configclass",
     "",
@@ -101,35 +41,6 @@ _TASK_IMPORTS = [
     "except ModuleNotFoundError:  # Isaac Lab 2",
     "    from isaaclab_tasks.manager_based.locomotion.velocity import velocity_env_cfg",
 ]
-
-_TASK = '''
-
-# Bodies after fixed joints are merged.
-$bodies
-
-
-@configclass
-class RoughEnvCfg(velocity_env_cfg.LocomotionVelocityRoughEnvCfg):
-    """Isaac Lab's rough-terrain velocity task for this robot."""
-
-    def __post_init__(self):
-        super().__post_init__()
-        self.scene.robot = $name.replace(
-            prim_path="{ENV_REGEX_NS}/Robot",
-        )
-        self.scene.height_scanner.prim_path = "{ENV_REGEX_NS}/Robot/" + BASE
-        $actions
-        # Range of the factor on the default pose at a reset.
-        reset = self.events.reset_robot_joints.params
-        reset["position_range"] = ($low, $high)
-        # Not all of these events exist in every version of Isaac Lab.
-        for event in ("add_base_mass", "base_com", "base_external_force_torque"):
-            term = getattr(self.events, event, None)
-            if term is not None:
-                term.params["asset_cfg"].body_names = BASE
-        self.rewards.feet_air_time.params["sensor_cfg"].body_names = FEET
-        $contacts
-'''
 
 
 def config_text(robot: ConfigRobot) -> str:
@@ -144,7 +55,7 @@ def config_text(robot: ConfigRobot) -> str:
     name = f"{constant_name(spec.name)}_CFG"
     is_legged = bool(spec.feet) and spec.floating
     config = source.fill(
-        _CONFIG,
+        "isaaclab_config",
         about=source.docstring(_about(robot, name, is_legged)),
         kinds=", ".join(sorted(set(actuators.values()))),
         task_imports=_TASK_IMPORTS if is_legged else [],
@@ -178,7 +89,9 @@ def _about(robot: ConfigRobot, name: str, is_legged: bool) -> list[str]:
         f'    robot = {name}.replace(prim_path="{{ENV_REGEX_NS}}/Robot")',
     ]
     if is_legged:
-        register = source.fill(_REGISTER, robot=class_name(robot.spec.name), package=package)
+        register = source.fill(
+            "isaaclab_register", robot=class_name(robot.spec.name), package=package
+        )
         paragraphs += ["or register the task, with Isaac Lab's PPO of the Go2:"]
         paragraphs += ["\n".join(register)]
     if robot.velocity_joints:
@@ -279,7 +192,7 @@ def _task(robot: ConfigRobot, name: str) -> list[str]:
     """Return the names of bodies, and the class of the velocity task."""
     low, high = source.format_floats(robot.spec.reset_range)
     return source.fill(
-        _TASK,
+        "isaaclab_task",
         bodies=_bodies(robot),
         name=name,
         actions=_actions(robot),

@@ -12,28 +12,6 @@ _DEFAULT_NUM_JOINTS = 12
 
 _IMPORTS = ["import torch", "from legged_gym.envs.base.legged_robot import LeggedRobot"]
 
-_WHEELS = '''
-
-class $name(LeggedRobot):
-    """LeggedRobot with velocity targets for the joints of SPEED_SCALE, such as wheels."""
-
-    def _compute_torques(self, actions):
-        torques = super()._compute_torques(actions)
-        wheels = [self.dof_names.index(name) for name in SPEED_SCALE]
-        scale = torch.tensor(list(SPEED_SCALE.values()), device=self.device)
-        error = scale * actions[:, wheels] - self.dof_vel[:, wheels]
-        limits = self.torque_limits[wheels]
-        torques[:, wheels] = torch.clip(self.d_gains[wheels] * error, -limits, limits)
-        return torques
-
-    def compute_observations(self):
-        # The angle of a wheel grows without bound, and carries no information.
-        wheels = [self.dof_names.index(name) for name in SPEED_SCALE]
-        self.dof_pos[:, wheels] = self.default_dof_pos[:, wheels]
-        super().compute_observations()
-'''
-"""The environment of robots on wheels."""
-
 LEGGED_ONLY = True
 """Whether the framework supports only robots with legs."""
 
@@ -44,40 +22,35 @@ def config_text(robot: ConfigRobot) -> str:
     Raises:
         ConfigError: if legged_gym does not support the names of the bodies.
     """
-    name, has_wheels = class_name(robot.spec.name), bool(robot.velocity_joints)
-    return source.join_lines(
-        [
-            source.docstring(_about(robot, name)),
-            ["", *legged_robot.BEFORE_IMPORTS],
-            _IMPORTS * has_wheels,
-            [
-                "from legged_gym.envs.base.legged_robot_config import (",
-                "    LeggedRobotCfg,",
-                "    LeggedRobotCfgPPO,",
-                ")",
-                "",
-            ],
-            legged_robot.HERE,
-            legged_robot.speed_scale(robot),
-            (["", *source.fill(_WHEELS, name=name)] if has_wheels else []),
-            ["", "", f"class {name}RoughCfg(LeggedRobotCfg):"],
-            legged_robot.class_of("init_state", "LeggedRobotCfg", legged_robot.init_state(robot))[
-                1:
-            ],
-            legged_robot.class_of("env", "LeggedRobotCfg", _env(robot)),
-            legged_robot.class_of("control", "LeggedRobotCfg", _control(robot)),
-            legged_robot.class_of("asset", "LeggedRobotCfg", _asset(robot)),
-            legged_robot.class_of("rewards", "LeggedRobotCfg", legged_robot.rewards(robot)),
-            ["", "", f"class {name}RoughCfgPPO(LeggedRobotCfgPPO):"],
-            legged_robot.class_of("runner", "LeggedRobotCfgPPO", _runner(robot))[1:],
-        ]
+    name = class_name(robot.spec.name)
+    has_wheels = bool(robot.velocity_joints)
+    count = len(robot.spec.joint_order)
+    wheels = source.fill("legged_gym_wheels", name=name)
+    config = source.fill(
+        "legged_gym_config",
+        about=source.docstring(_about(robot, name)),
+        before_imports=legged_robot.BEFORE_IMPORTS,
+        wheel_imports=_IMPORTS if has_wheels else [],
+        here=legged_robot.HERE,
+        speed_scale=legged_robot.speed_scale(robot),
+        wheels=["", "", *wheels] if has_wheels else [],
+        name=name,
+        init_state=legged_robot.init_state(robot),
+        num_heights=str(_NUM_HEIGHTS),
+        num_observations=str(12 + 3 * count + _NUM_HEIGHTS),
+        num_actions=str(count),
+        control=legged_robot.gains(robot, "the last matching key is used, so the order matters."),
+        asset=_asset(robot),
+        rewards=legged_robot.rewards(robot),
+        experiment=source.string_literal(f"rough_{package_name(robot.spec.name)}"),
     )
+    return source.join_lines([config])
 
 
 def _about(robot: ConfigRobot, name: str) -> list[str]:
     package = package_name(robot.spec.name)
     task_class = name if robot.velocity_joints else "LeggedRobot"
-    own = [f"        {name},"] * bool(robot.velocity_joints)
+    own = [f"        {name},"] if robot.velocity_joints else []
     paragraphs = [
         f"{robot.title} for legged_gym: rough terrain.",
         source.GENERATED_NOTE,
@@ -107,20 +80,6 @@ def _about(robot: ConfigRobot, name: str) -> list[str]:
     return paragraphs
 
 
-def _env(robot: ConfigRobot) -> list[str]:
-    count = len(robot.spec.joint_order)
-    return [
-        "# 3 linear velocity, 3 angular velocity, 3 gravity, 3 commands; position, velocity",
-        f"# and last action of each joint; {_NUM_HEIGHTS} terrain heights.",
-        f"num_observations = {12 + 3 * count + _NUM_HEIGHTS}",
-        f"num_actions = {count}",
-    ]
-
-
-def _control(robot: ConfigRobot) -> list[str]:
-    return legged_robot.gains(robot, "the last matching key is used, so the order matters.")
-
-
 def _asset(robot: ConfigRobot) -> list[str]:
     # Too little armature makes light joints unstable; too much slows the others only slightly.
     armatures = robot.joint_values("armature").values()
@@ -133,11 +92,4 @@ def _asset(robot: ConfigRobot) -> list[str]:
         *robot.provenance_comment("armature", depth=2),
         *difference,
         f"armature = {source.float_literal(armature)}",
-    ]
-
-
-def _runner(robot: ConfigRobot) -> list[str]:
-    return [
-        'run_name = ""',
-        f"experiment_name = {source.string_literal(f'rough_{package_name(robot.spec.name)}')}",
     ]

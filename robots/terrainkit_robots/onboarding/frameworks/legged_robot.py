@@ -55,11 +55,6 @@ def check_legs(robot: ConfigRobot, name: str, others: Sequence[str]) -> None:
         raise ConfigError(f"{robot.title} has no spawn_height or base_height_target")
 
 
-def class_of(name: str, base: str, body: list[str]) -> list[str]:
-    """Return the source of a nested class, indented, after a blank line."""
-    return source.indent(["", f"class {name}({base}.{name}):", *source.indent(body)])
-
-
 def init_state(robot: ConfigRobot) -> list[str]:
     """Return the spawn position and the default joint angles."""
     height = source.float_literal(robot.spec.spawn_height or 0.0)

@@ -15,38 +15,6 @@ LEGGED_ONLY = True
 _FOLDERS = frozenset({"base", "bipedal_walker", "g1", "go2", "tron1_pf", "tron1_sf"})
 """The folders in `legged_gym/envs` of LeggedGym-Ex 0.3.0."""
 
-_CONFIG = Path(__file__).with_name("leggedgym_ex_config.txt")
-"""The configuration; what does not depend on the robot is as in LeggedGym-Ex's task go2."""
-
-_TASK = Path(__file__).with_name("leggedgym_ex_task.txt")
-"""The environment and its registration."""
-
-
-_WHEELS = '''\
-def __init__(self, *arguments, **options):
-    super().__init__(*arguments, **options)
-    simulator, joints = self.simulator, self.cfg.asset.dof_names
-    wheels = [joints.index(name) for name in SPEED_SCALE]
-    scale = torch.tensor(list(SPEED_SCALE.values()), device=self.device)
-    position_torques = simulator._compute_torques
-
-    def compute_torques(actions):
-        """Return the torques of position targets, and of velocity targets for the wheels."""
-        torques = position_torques(actions)
-        gains = (simulator._kd_scale * simulator._d_gains)[..., wheels]
-        torques[:, wheels] += gains * scale * actions[:, wheels]
-        return torques
-
-    simulator._compute_torques = compute_torques
-
-@property
-def dof_pos_scale(self):
-    """The scale of each angle; 0 for wheels, whose angle grows without bound."""
-    turns = [float(name not in SPEED_SCALE) for name in self.cfg.asset.dof_names]
-    return self.obs_scales.dof_pos * torch.tensor(turns, device=self.device)
-'''
-"""The methods of robots on wheels, in Genesis and in Isaac Gym."""
-
 
 def config_files(robot: ConfigRobot) -> dict[str, str]:
     """Return the files of the package of the robot in `legged_gym/envs`, by name.
@@ -63,12 +31,12 @@ def config_files(robot: ConfigRobot) -> dict[str, str]:
         )
     about = f"{robot.title} for LeggedGym-Ex"
     task = source.fill(
-        _TASK.read_text(),
+        "leggedgym_ex_task",
         about=source.docstring([f"{about}: the environment and its task, written by terrainkit."]),
         name=class_name(robot.spec.name),
         package=package,
         speed_scale=legged_robot.speed_scale(robot),
-        wheels=[*_WHEELS.splitlines(), ""] if robot.velocity_joints else [],
+        wheels=[*source.fill("leggedgym_ex_wheels"), ""] if robot.velocity_joints else [],
         dof_pos_scale="self.dof_pos_scale" if robot.velocity_joints else "scales.dof_pos",
     )
     return {
@@ -86,7 +54,7 @@ def config_text(robot: ConfigRobot) -> str:
     """
     count, package = len(robot.spec.joint_order), package_name(robot.spec.name)
     config = source.fill(
-        _CONFIG.read_text(),
+        "leggedgym_ex_config",
         about=source.docstring(_about(robot)),
         before_imports=legged_robot.BEFORE_IMPORTS,
         here=legged_robot.HERE,

@@ -27,50 +27,10 @@ _FIELDS = {
 """Fields of BuiltinPositionActuatorCfg, and the corresponding fields of the spec.
 BuiltinVelocityActuatorCfg has the same fields except for the stiffness."""
 
-_ENTITY = '''
-$about
-
-$standard
-from pathlib import Path
-
-import mujoco
-$actuators
-from mjlab.entity import EntityArticulationInfoCfg, EntityCfg
-$task_imports
-
-$robot_xml
-
-
-def get_spec() -> mujoco.MjSpec:
-    """Return the robot without actuators and keyframes, which mjlab adds."""
-    spec = mujoco.MjSpec.from_file(str(ROBOT_XML))
-    actuator = mujoco.mjtObj.mjOBJ_ACTUATOR
-    sensors = [sensor for sensor in spec.sensors if sensor.objtype == actuator]
-    for element in [*sensors, *spec.keys, *spec.actuators]:
-        spec.delete(element)
-    return spec
-
-
-INIT_STATE = EntityCfg.InitialStateCfg(
-    $init_state
-)
-
-$articulation
-$scales
-
-
-def get_robot_cfg() -> EntityCfg:
-    """Return a new configuration of the robot."""
-    return EntityCfg(
-        spec_fn=get_spec,
-        init_state=INIT_STATE,
-        articulation=ARTICULATION,
-        # Actuators in the order of the joints.
-        sort_actuators=True,
-    )
-'''
-
 _POSITION, _VELOCITY = "BuiltinPositionActuatorCfg", "BuiltinVelocityActuatorCfg"
+
+
+_STANDARD_IMPORTS = ["import argparse", "import sys", "from dataclasses import replace"]
 
 
 def train_arguments(spec: RobotSpec) -> str:
@@ -94,11 +54,12 @@ def config_text(robot: ConfigRobot) -> str:
     """
     patterns = mjlab_patterns(robot.all_joints)
     has_task = bool(train_arguments(robot.spec))
-    kinds = [_POSITION] * bool(robot.position_joints) + [_VELOCITY] * bool(robot.velocity_joints)
+    drives = ((_POSITION, robot.position_joints), (_VELOCITY, robot.velocity_joints))
+    kinds = [kind for kind, joints in drives if joints]
     entity = source.fill(
-        _ENTITY,
+        "mjlab_entity",
         about=source.docstring(_about(robot, has_task=has_task)),
-        standard=["import argparse", "import sys", "from dataclasses import replace"] * has_task,
+        standard=_STANDARD_IMPORTS if has_task else [],
         actuators=[f"from mjlab.actuator import {', '.join(kinds)}"] if kinds else [],
         task_imports=mjlab_task.IMPORTS.split("\n") if has_task else [],
         robot_xml=source.sum_assignment(
@@ -113,11 +74,11 @@ def config_text(robot: ConfigRobot) -> str:
 
 def _about(robot: ConfigRobot, *, has_task: bool) -> list[str]:
     package = package_name(robot.spec.name)
-    title = f"{robot.title} for mjlab: entity" + (", actuators and velocity task." * has_task)
+    content = "entity, actuators and velocity task" if has_task else "entity and actuators"
     paragraphs = [
-        title if has_task else f"{title} and actuators.",
+        f"{robot.title} for mjlab: {content}.",
         f"{source.GENERATED_NOTE} A pattern matches the whole name of a joint.",
-        *_training(robot) * has_task,
+        *(_training(robot) if has_task else []),
         f"Copy the folder into your Python package as {package}, and use",
         f"    from {package}.mjlab_config import get_robot_cfg\n\n"
         '    cfg.scene.entities = {"robot": get_robot_cfg()}',

@@ -79,20 +79,12 @@ def _is_start(pattern: str, name: str) -> bool:
 def _usd_pattern(name: str) -> str:
     if not name:
         raise ConfigError("name of a joint or body: got an empty text; expected one letter or more")
-    pattern = re.sub(
-        r"[^\x00-\x7f]+",
-        rf"(?:\g<0>{_NON_ASCII_END}",
-        re.sub(r"[\x00-\x7f]", _replace_char, name),
-    )
+    ascii_pattern = re.sub(r"(?![A-Za-z0-9_])[\x00-\x7f]", ".", name)
+    pattern = re.sub(r"[^\x00-\x7f]+", rf"(?:\g<0>{_NON_ASCII_END}", ascii_pattern)
     if re.match(r"[A-Za-z]", pattern):
         return pattern
     first = "[" + pattern[0] + "_]" if pattern[0].isdigit() else pattern[0]
     return "a?" + first + pattern[1:]
-
-
-def _replace_char(match: re.Match[str]) -> str:
-    letter = match[0]
-    return letter if letter.isalnum() or letter == "_" else "."
 
 
 def _check_unique(
@@ -120,4 +112,4 @@ def _normalize(name: str) -> str:
     """Return the name in USD with repeated underscores merged."""
     flat = re.sub(r"[^A-Za-z0-9]+", "_", name)
     flat = "_" + flat[1:] if flat[0].isdigit() else flat
-    return "a" * flat.startswith("_") + flat
+    return f"a{flat}" if flat.startswith("_") else flat

@@ -7,6 +7,7 @@ of links and joints cannot inject code.
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from string import Template
 
 from terrainkit.errors import ConfigError, one_line
@@ -99,7 +100,7 @@ def sum_assignment(name: str, left: str, operator: str, right: str, *, depth: in
     if len(f"{name} = {line}") <= max_length:
         return [f"{name} = {line}"]
     parts = [line] if len(line) + 4 <= max_length else [left, f"{operator} {right}"]
-    return [f"{name} = (", *(f"    {each}" for each in parts), ")"]
+    return [f"{name} = (", *(f"    {part}" for part in parts), ")"]
 
 
 def comment(text: str, *, depth: int = 0) -> list[str]:
@@ -130,15 +131,20 @@ def fill(template: str, **values: str | Sequence[str]) -> list[str]:
 
     A name with a list of lines stands on a line of its own, whose indentation the lines get. Values
     are not searched for names.
+
+    Args:
+        template: Name of a text file of this package, without its suffix.
+        **values: Values by name; a list that is missing has no lines.
     """
+    text = Path(__file__).with_name(f"{template}.txt").read_text(encoding="utf-8")
     lines: list[str] = []
-    for line in template.removeprefix("\n").removesuffix("\n").split("\n"):
+    for line in text.removesuffix("\n").split("\n"):
         before, _, name = line.partition("$")
         value = values.get(name, "")
         if isinstance(value, str):
             lines.append(Template(line).substitute(values))
         else:
-            lines += [before + each if each else "" for each in value]
+            lines += [before + text if text else "" for text in value]
     return lines
 
 

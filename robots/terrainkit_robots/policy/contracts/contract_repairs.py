@@ -13,7 +13,7 @@ from terrainkit_robots.policy.contracts.contract import (
     Contract,
     own_name,
 )
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 
 _DEGREES = 180 / math.pi
 _UNITS = {_DEGREES: " (degrees)", 1 / _DEGREES: " (radians for degrees)"}

@@ -11,7 +11,7 @@ from terrainkit.errors import ConfigError, listing
 from terrainkit_robots.policy.contracts.contract import Contract, ContractError
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.geoms import lowest_point
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 
 TABLES = {

@@ -3,8 +3,8 @@ import pytest
 
 from terrainkit.errors import MemoryLimitError
 from terrainkit.geometry.grid import Grid
+from terrainkit.geometry.ground_surface import surface_at
 from terrainkit.geometry.mesh import full_mesh, merged_mesh
-from terrainkit.geometry.surface import surface_at
 from tests.terrainkit.geometry.heightfields import any_ground, mesh_of
 
 every_mesh = pytest.mark.parametrize("build", [full_mesh, merged_mesh])

@@ -3,6 +3,8 @@ import re
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.bodies.bodies import center_of_mass, physical_parent
 from terrainkit_robots.analysis.bodies.kinematics import body_poses
@@ -180,3 +182,32 @@ def test_bodies_match_mujoco(name):
         np.testing.assert_allclose(body.center, theirs.ipos, rtol=1e-9, atol=1e-12)
         np.testing.assert_allclose(body.inertia, inertia, atol=near * theirs.inertia.max())
         np.testing.assert_allclose(body.principal, np.sort(theirs.inertia), rtol=near)
+
+
+TRIPLE = st.tuples(*[st.floats(-2, 2)] * 3)
+
+
+@given(st.lists(st.tuples(st.floats(0.1, 9), *[TRIPLE] * 5), min_size=1, max_size=4))
+def test_body_has_the_inertia_of_the_point_masses_of_its_links(parts):
+    """Each link has the inertia of six points on its principal axes, so the body has, too."""
+    text, weights, points = link("root", mass=None), [], []
+    for number, (mass, center, rpy, arms, xyz, turn) in enumerate(parts):
+        arms = np.abs(arms) + 0.1
+        moments = mass / 3 * (np.sum(arms**2) - arms**2)
+        inertia, places = [*moments, 0, 0, 0], (center, rpy, xyz, turn)
+        words = [" ".join(map(repr, map(float, values))) for values in (inertia, *places)]
+        name = f"part{number}"
+        text += link(name, mass=mass, center=words[1], inertia=words[0], rpy=words[2])
+        text += fixed("root", name, words[3], words[4])
+        axes = rpy_to_matrix(np.array(rpy)) * arms
+        local = np.hstack([axes, -axes]).T + center
+        points.append(local @ rpy_to_matrix(np.array(turn)).T + xyz)
+        weights += 6 * [mass / 6]
+    (body,) = bodies(text)
+    masses, points = np.array(weights), np.concatenate(points)
+    assert body.mass == pytest.approx(masses.sum())
+    assert body.center == pytest.approx(masses @ points / masses.sum(), abs=1e-9)
+    arms = points - body.center
+    products = (masses[:, None] * arms).T @ arms
+    wanted = np.trace(products) * np.eye(3) - products
+    np.testing.assert_allclose(body.inertia, wanted, atol=1e-8)

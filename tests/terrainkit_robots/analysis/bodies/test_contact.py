@@ -196,3 +196,11 @@ LINE = [[0, -1], [0, 1]]
 def test_margin(point, polygon, expected):
     found = margin(np.array(point, dtype=float), np.array(polygon, dtype=float))
     assert found == pytest.approx(expected)
+
+
+@given(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), st.floats(-7, 7))
+def test_margin_does_not_change_with_the_frame(point, yaw):
+    turn = rpy_to_matrix(np.array([0, 0, yaw]))[:2, :2]
+    square = np.array(SQUARE, dtype=float)
+    moved = margin(turn @ np.array(point) + 3, square @ turn.T + 3)
+    assert moved == pytest.approx(margin(np.array(point), square), abs=1e-6)

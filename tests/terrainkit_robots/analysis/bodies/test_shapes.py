@@ -3,6 +3,8 @@ import math
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.bodies.bodies import BodyShape
 from terrainkit_robots.analysis.bodies.shapes import bounds, has_bounds, min_height, support, volume
@@ -146,3 +148,36 @@ def test_bounds_without_shapes_are_none():
 )
 def test_min_height(shape, pose, expected):
     assert min_height(shape, pose, Meshes()) == pytest.approx(expected)
+
+
+TRIPLE = st.tuples(*[st.floats(-4, 4)] * 3)
+
+
+def surface(shape):
+    """Return points on a shape of the size in `SIZES`, shape (n, 3), from trimesh."""
+    size = SIZES[shape]
+    made = {
+        "box": lambda: trimesh.creation.box(2 * np.array(size)).subdivide().vertices,
+        "sphere": lambda: trimesh.creation.icosphere(4, *size).vertices,
+        "cylinder": lambda: trimesh.creation.cylinder(size[0], 2 * size[1], sections=64).vertices,
+        "capsule": lambda: trimesh.creation.capsule(2 * size[1], size[0], (64, 64)).vertices,
+        "ellipsoid": lambda: trimesh.creation.icosphere(4).vertices * size,
+    }
+    points = made[shape]()
+    return points - (points.min(axis=0) + points.max(axis=0)) / 2
+
+
+@every_shape
+@given(rpy=TRIPLE, xyz=TRIPLE)
+def test_bounds_and_support_are_those_of_points_on_the_surface(shape, rpy, xyz):
+    turn = rpy_to_matrix(np.array(rpy))
+    points = surface(shape) @ turn.T + xyz
+    lower, upper = bounds([placed(shape, xyz, rpy)], Meshes())
+    assert lower == pytest.approx(points.min(axis=0), abs=0.004)
+    assert upper == pytest.approx(points.max(axis=0), abs=0.004)
+    assert (lower <= points.min(axis=0) + 1e-9).all()
+    assert (upper >= points.max(axis=0) - 1e-9).all()
+    for axis in turn:
+        assert support(geometry(shape), axis, Meshes()) == pytest.approx(
+            (surface(shape) @ axis).max(), abs=0.004
+        )

@@ -18,10 +18,10 @@ from terrainkit_robots.analysis.legs.stance import (
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from tests import small_robots
-from tests.robots import BUNDLED
+from tests.robots import ROBOTS
 from tests.small_robots import ball, box, floating, joint, link
 
-every_robot = pytest.mark.parametrize("name", BUNDLED)
+every_robot = pytest.mark.parametrize("name", ROBOTS)
 
 
 @cache
@@ -239,3 +239,10 @@ def test_ground_forces_are_the_most_even_balance(feet):
     np.testing.assert_allclose(forces @ places / 100, center, atol=1e-6)
     even = 100 / len(places)
     assert np.linalg.norm(forces - even) <= np.linalg.norm(shares - even) + 1e-6
+
+
+@given(st.lists(POINT, min_size=1, max_size=8), POINT, st.floats(0, 1000))
+def test_ground_forces_push_upward_with_the_weight(places, center, weight):
+    forces = ground_forces(np.array(places), np.array(center), weight)
+    assert (forces >= 0).all()
+    assert forces.sum() == pytest.approx(weight, abs=1e-9)

@@ -3,8 +3,9 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.lint.check import check_robot
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
-from terrainkit_robots.spec.robot import Robot
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
+from terrainkit_robots.spec.robot_arrays import Robot
 from tests.small_robots import URDF, ball, box, facts, joint, link, shape
 
 FOUR = [f"{x} {y} 0" for x in (0.2, -0.2) for y in (0.2, -0.2)]

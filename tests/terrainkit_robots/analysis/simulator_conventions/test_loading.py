@@ -14,7 +14,7 @@ from terrainkit_robots.analysis.simulator_conventions.loading import (
 )
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from tests.robots import BUNDLED
+from tests.robots import ROBOTS
 from tests.small_robots import ball, joint, link, shape
 
 BODY = '<body><freejoint/><geom size="0.1"/></body>'
@@ -41,8 +41,8 @@ def read(tmp_path):
     return make
 
 
-@pytest.mark.parametrize("name", BUNDLED)
-def test_bundled_robots_load(robot_file, name):
+@pytest.mark.parametrize("name", ROBOTS)
+def test_robots_load(robot_file, name):
     robot = Facts(load_robot(robot_file(name)))
     assert in_mujoco(robot) is None
     if name.endswith(".urdf"):

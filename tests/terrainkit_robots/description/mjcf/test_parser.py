@@ -86,8 +86,8 @@ def test_suggested_names_are_read_unless_they_are_written():
     assert [each.size for each in link(robot).collisions] == [(1,), (2,), (3,), (4,), (5,)]
     (sise, *_) = [each for each in robot.problems if "sise" in each.message]
     assert " (2 times, next on line 1)" in sise.message
-    found = {"attribute": "sise", "found": "sise", "known": "size", "refused": "mujoco"}
-    assert sise.details == found
+    assert sise.message.endswith("; did you mean size?")
+    assert (sise.attribute, sise.severity) == ("sise", "error")
 
 
 @pytest.mark.parametrize(
@@ -103,14 +103,17 @@ def test_suggested_names_are_read_unless_they_are_written():
 )
 def test_commas_are_repaired(attribute, text, repaired):
     robot = read(body(f'<geom type="capsule" {attribute}="{text}"/>'))
-    assert [each.details["repaired"] for each in robot.problems] == repaired
+    fixes = [f'Set {attribute}="{text}".' if text else None for text in repaired]
+    found = [problem.fix for problem in robot.problems]
+    assert [fix and fix.description for fix in found] == fixes
 
 
 def test_decimal_commas_are_all_reported():
     robot = read(mjcf("".join(f'\n<body name="b{k}" pos="0,1 2 3"/>' for k in range(60))))
     assert codes(robot) == ["XML006"] * 60
     assert joint(robot, "b7_fixed").origin[:3, 3].tolist() == [0.1, 2, 3]
-    assert robot.problems[0].details == {"attribute": "pos", "repaired": "0.1 2 3"}
+    (edit,) = robot.problems[0].fix.edits
+    assert (edit.name, edit.value) == (robot.problems[0].attribute, "0.1 2 3") == ("pos", "0.1 2 3")
     assert robot.problems[0].message.endswith(", with decimal points and separated by spaces")
 
 

@@ -105,7 +105,9 @@ def test_dont_collapse(text, wanted):
 
 def test_origin_with_quaternion():
     found, (problem,) = joint('<origin xyz="1 2 3" quat_xyzw="0 0 2 2"/>')
-    assert (problem.code, problem.details) == ("XML014", {"rpy": "0 0 1.570796327"})
+    added, removed = problem.fix.edits
+    assert (problem.code, removed.name) == ("XML014", "quat_xyzw")
+    assert (added.name, added.value) == ("rpy", "0 0 1.570796327")
     np.testing.assert_allclose(found.origin, TURNED, atol=1e-15)
     assert joint('<origin quat_xyzw="0 0 0 -2"/>')[1] == ()
 
@@ -200,8 +202,9 @@ def inside(problem):
 def test_problem_is_reported_once(problem):
     model = robot(inside(problem))
     (found,) = model.problems
-    told = {"code": found.code, "message": found.message, "details": found.details}
-    assert told == {"details": {}} | {key: problem[key] for key in told if key in problem}
+    told = {"code": found.code, "message": found.message, "attribute": found.attribute}
+    told["fix"] = found.fix.description if found.fix else ""
+    assert told == {"attribute": "", "fix": ""} | {k: problem[k] for k in told if k in problem}
     assert found.subject == next((k for k in "jl" if f'name="{k}"' in inside(problem)), "r")
     assert [shape.size for each in model.links for shape in each.collisions] in ([], [()])
 
@@ -211,7 +214,8 @@ def test_copies_are_compared_with_their_contents():
     geometry = '<geometry><{} radius="{}" length="1"/></geometry>'
     inside = [geometry.format(*each) for each in [("capsule", 1), ("capsule", 2), ("cylinder", 1)]]
     model = robot(f'<link name="l"><collision>{"".join(inside)}{inside[0]}</collision></link>')
-    assert [each.details for each in model.problems] == [{"copy": each} for each in ("", "", "1")]
+    fixes = [problem.fix for problem in model.problems]
+    assert [fix and fix.description for fix in fixes] == [None, None, "Remove the copy."]
 
 
 @pytest.mark.parametrize("name", ["", ' name=""', ' name="  "'])

@@ -7,10 +7,8 @@ from lxml import etree
 from terrainkit_robots.description.xml import document as xml_document
 from terrainkit_robots.description.xml.document import (
     RobotFileError,
-    leading_bytes_fix,
     parse_xml,
     read_bytes,
-    version_fix,
 )
 from tests.terrainkit_robots.description.made_robots import codes
 
@@ -86,8 +84,8 @@ def test_leading_bytes_are_reported_and_removed(ahead, what):
     assert (problem.code, problem.source.line, problem.subject) == ("XML009", 1, "robot.urdf")
     assert problem.message == f"the file starts with {what}, which some parsers reject"
     assert lines(document) == [2 + ahead.count(b"\n"), 3 + ahead.count(b"\n")]
-    assert fixed(ahead + DECLARED, leading_bytes_fix(problem)) == DECLARED
-    assert leading_bytes_fix(problem).description == "Remove the leading bytes."
+    assert fixed(ahead + DECLARED, problem.fix) == DECLARED
+    assert problem.fix.description == "Remove the leading bytes."
 
 
 @pytest.mark.parametrize("encoding", ["utf-16-be", "utf-16-le", "utf-32-be", "utf-32-le", "utf-16"])
@@ -95,11 +93,11 @@ def test_wide_encodings_are_reported_and_written_as_utf8(encoding):
     text = f'<?xml version="1.0" encoding="{encoding}"?><robot name="é"/>'
     data = text.encode(encoding)
     problem = parse(data).problems[0]
-    assert (problem.code, problem.source.line) == ("XML009", 1)
+    assert (problem.code, problem.source.line, problem.severity) == ("XML009", 1, "error")
     assert f"encoded as {encoding[:6].upper()}, " in problem.message
     utf8 = text.replace(encoding, "UTF-8").encode()
-    assert fixed(data, leading_bytes_fix(problem)) == utf8
-    assert leading_bytes_fix(problem).description == "Write the file as UTF-8."
+    assert fixed(data, problem.fix) == utf8
+    assert problem.fix.description == "Write the file as UTF-8."
 
 
 @pytest.mark.parametrize(("version", "is_valid"), [("1.0", True), ("1.1", True), ("2.0", False)])
@@ -110,8 +108,8 @@ def test_version_of_xml(version, is_valid):
     assert [problem.code for problem in found] == ([] if is_valid else ["XML001"])
     for problem in found:
         assert f"version in <?xml?>: got '{version}'; expected 1.0" in problem.message
-        assert fixed(data, version_fix(problem)) == ahead + DECLARED
-    assert version_fix(parse(ahead).problems[0]) is None
+        assert fixed(data, problem.fix) == ahead + DECLARED
+        assert problem.severity == "warning"
 
 
 def test_broken_document_is_recovered():

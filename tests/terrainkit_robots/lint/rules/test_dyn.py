@@ -14,7 +14,7 @@ from terrainkit_robots.lint.rules.dyn import joint_sweep, stability, time_step
 from terrainkit_robots.lint.runner import lint
 from terrainkit_robots.simulation.drop import DropResult
 from terrainkit_robots.simulation.joint_sweep import SweepResult
-from terrainkit_robots.simulation.units import PRISMATIC, REVOLUTE
+from terrainkit_robots.simulation.joint_units import PRISMATIC, REVOLUTE
 from tests.robots import QUADRUPED
 
 BIPED = bundled.urdf_path("biped")

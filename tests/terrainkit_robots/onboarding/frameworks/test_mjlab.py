@@ -16,7 +16,8 @@ from terrainkit import MapConfig, generate
 from terrainkit_robots.description import bundled
 from terrainkit_robots.onboarding.frameworks.config_robot import ConfigRobot
 from terrainkit_robots.onboarding.frameworks.mjlab import config_text
-from terrainkit_robots.onboarding.pipeline import OnboardOptions, onboard
+from terrainkit_robots.onboarding.onboard_options import OnboardOptions
+from terrainkit_robots.onboarding.pipeline import onboard
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
 PROBE = Path(__file__).with_name("mjlab_probe.py")

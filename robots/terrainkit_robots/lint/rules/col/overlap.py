@@ -105,9 +105,9 @@ def _is_arbitrary_pose(robot: Facts, pair: tuple[str, str], overlap: "Overlap") 
 def _group_by_pair(robot: Facts, overlaps: "list[Overlap]") -> "dict[tuple[str, str], Overlap]":
     """Return the deepest overlap of each pair of bodies."""
     by_pair: dict[tuple[str, str], Overlap] = {}
-    for each in overlaps:  # sorted by depth, deepest first
-        pair = robot.body_of[each.first.link].name, robot.body_of[each.second.link].name
-        by_pair.setdefault(pair, each)
+    for overlap in overlaps:  # sorted by depth, deepest first
+        pair = robot.body_of[overlap.first.link].name, robot.body_of[overlap.second.link].name
+        by_pair.setdefault(pair, overlap)
     return by_pair
 
 
@@ -138,7 +138,7 @@ def overlap_in_range(robot: Facts) -> Violations:
     counts: Counter[tuple[str, str]] = Counter()
     for overlaps in robot.overlap_scene.sweep(positions, _NUM_SAMPLES):
         deepest = _group_by_pair(robot, overlaps)
-        counts.update(pair for pair, each in deepest.items() if each.depth > _MAX_OVERLAP)
+        counts.update(pair for pair, overlap in deepest.items() if overlap.depth > _MAX_OVERLAP)
     for pair, number in counts.items():
         share = number / _NUM_SAMPLES
         if share > _MAX_OVERLAP_SHARE:

@@ -58,7 +58,7 @@ def unstable_drop(robot: Facts) -> Violations:
     stable = _is_stable(without)
     with_hulls = stable and _has_mesh_collision(robot)
     level = 2 if drop.diverged or drop.max_speed > _MAX_SPEED_ERROR else 1
-    unit, unit_without = (model.units(each.max_speed_joint).velocity for each in (drop, without))
+    unit, unit_without = (model.units(run.max_speed_joint).velocity for run in (drop, without))
     got = f"{drop.max_speed:.0f} {unit} at {drop.max_speed_joint}"
     if drop.diverged:
         got = f"an unstable state after {drop.seconds:.2f} s"

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.simulation.joint_units import PRISMATIC
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import (
@@ -11,7 +12,6 @@ from terrainkit_robots.simulation.time_step import (
     max_stable_stiffness,
     max_stable_time_step,
 )
-from terrainkit_robots.simulation.units import PRISMATIC
 from terrainkit_robots.text import count
 
 _MIN_STIFFNESS_SHARE = 0.003
@@ -48,7 +48,7 @@ def low_joint_inertia(robot: Facts) -> Violations:
     lightest = min(shares, key=lambda name: shares[name])
     gain, units = gains[lightest], model.units(lightest)
     inertia = inertias[lightest].free
-    without = {name: replace(each, armature=declared[name]) for name, each in gains.items()}
+    without = {name: replace(gain, armature=declared[name]) for name, gain in gains.items()}
     step = max_stable_time_step(model, without).seconds
     legged = {joint.name for leg in robot.legs for joint in leg.joints}
     is_wrong = lightest in legged and shares[lightest] < _MIN_STIFFNESS_SHARE

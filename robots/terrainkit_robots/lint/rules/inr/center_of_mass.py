@@ -16,7 +16,7 @@ _COM_SHARE, _COM_MARGIN, _COM_ERROR = 0.10, 0.005, 3.0
 diagonal plus a margin [m]. The last value is the multiple of that distance that is an error."""
 
 
-@rule("INR008", "com-outside-body", "warning")
+@rule("INR008", "com-outside-body", "warning", needs=("length-unit",))
 def com_outside_body(robot: Facts) -> Violations:
     """A center of mass lies outside of its body.
 

@@ -11,7 +11,7 @@ from terrainkit_robots.analysis.inertia.physical import MAX_INERTIA
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("INR010", "implausible-density", "warning")
+@rule("INR010", "implausible-density", "warning", needs=("mass-unit", "length-unit"))
 def implausible_density(robot: Facts) -> Violations:
     """A mass is implausible for the size of its body.
 

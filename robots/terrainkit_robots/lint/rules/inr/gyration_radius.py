@@ -40,7 +40,7 @@ _MIN_KEPT_MASS = 0.01
 published Go2 has a head of 1 g."""
 
 
-@rule("INR006", "inertia-too-large", "warning")
+@rule("INR006", "inertia-too-large", "warning", needs=("mass-unit", "length-unit", "inertia-unit"))
 def inertia_too_large(robot: Facts) -> Violations:
     """An inertia is larger than the size of the body allows.
 
@@ -100,7 +100,7 @@ def oversized_bodies(robot: Facts) -> Iterator[tuple[Body, float, Matrix]]:
                 yield part, radius, box
 
 
-@rule("INR007", "inertia-too-small", "warning")
+@rule("INR007", "inertia-too-small", "warning", needs=("mass-unit", "length-unit", "inertia-unit"))
 def inertia_too_small(robot: Facts) -> Violations:
     """An inertia is much smaller than the size of the body suggests.
 
@@ -120,7 +120,7 @@ def inertia_too_small(robot: Facts) -> Violations:
         index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
         part = slice(index, index + 1)
         main = replace(whole, links=whole.links[part], poses=whole.poses[part])
-        kept = (each for each, _ in _kept_radii(robot, whole))
+        kept = (body for body, _ in _kept_radii(robot, whole))
         for body in (whole, main, *kept):
             radius = gyration_radius(body.principal, body.mass)
 

@@ -39,7 +39,7 @@ _INERTIA_ATTRIBUTES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz", "diaginertia", 
 """Attributes of URDF and MJCF that hold an inertia."""
 
 
-@rule("INR003", "not-positive-definite", "error", fixes="unsafe")
+@rule("INR003", "not-positive-definite", "error", fixes="unsafe", onboarding="repairs")
 def not_positive_definite(robot: Facts) -> Violations:
     """An inertia is missing, zero, or not positive definite.
 
@@ -115,7 +115,7 @@ def _needs_inertia(robot: Facts, link: Link, main: Container[int]) -> bool:
     return moving and (robot.model.kind != "mjcf" or float(body.principal[0]) <= MIN_INERTIA)
 
 
-@rule("INR004", "triangle-inequality", "error", fixes="unsafe")
+@rule("INR004", "triangle-inequality", "error", fixes="unsafe", onboarding="repairs")
 def triangle_inequality(robot: Facts) -> Violations:
     """The principal moments violate the triangle inequality.
 

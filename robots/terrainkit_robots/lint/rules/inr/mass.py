@@ -23,7 +23,7 @@ _MAX_INFERRED, _MAX_INFERRED_ERROR = 0.01, 0.05
 """Inferred mass divided by the declared mass: limits of the warning and the error."""
 
 
-@rule("INR001", "massless-body", "error")
+@rule("INR001", "massless-body", "error", needs=("all-files",), onboarding="blocks")
 def massless_body(robot: Facts) -> Violations:
     """A moving body has no mass.
 
@@ -107,7 +107,7 @@ def _links_without_mass(robot: Facts) -> Violations:
             )
 
 
-@rule("INR002", "negative-mass", "error")
+@rule("INR002", "negative-mass", "error", onboarding="blocks")
 def negative_mass(robot: Facts) -> Violations:
     """A mass is negative.
 
@@ -131,7 +131,7 @@ def negative_mass(robot: Facts) -> Violations:
             )
 
 
-@rule("INR009", "mass-ratio", "warning")
+@rule("INR009", "mass-ratio", "warning", needs=("mass-unit",))
 def mass_ratio(robot: Facts) -> Violations:
     """The masses of neighboring bodies differ by more than a factor of 1000.
 
@@ -169,7 +169,9 @@ def mass_ratio(robot: Facts) -> Violations:
         )
 
 
-@rule("INR011", "inferred-mass", "warning")
+@rule(
+    "INR011", "inferred-mass", "warning", onboarding="converts", needs=("mass-unit", "length-unit")
+)
 def inferred_mass(robot: Facts) -> Violations:
     """A simulator adds mass for links without an <inertial>.
 

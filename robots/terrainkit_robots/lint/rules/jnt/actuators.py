@@ -1,7 +1,6 @@
 """Rules on actuators and safety controllers."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.lint.problems import problem_violations
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import count, names
 
@@ -64,7 +63,6 @@ def zero_gear(robot: Facts) -> Violations:
         MuJoCo's XML reference, actuator: gear scales the length and the force of the actuator;
         wiki.ros.org/urdf/XML/Transmission.
     """
-    yield from problem_violations(robot, "JNT024", "warning")
     for actuator in robot.model.actuators:
         if actuator.joint and actuator.gear == 0:
             yield Violation(

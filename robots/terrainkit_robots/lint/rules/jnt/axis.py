@@ -19,7 +19,7 @@ _MAX_AXIS_ERROR = 1e-3
 """Allowed deviation of the axis length from 1, for axes with three digits such as 0.707 0.707 0."""
 
 
-@rule("JNT004", "zero-axis", "error")
+@rule("JNT004", "zero-axis", "error", onboarding="blocks")
 def zero_axis(robot: Facts) -> Violations:
     """The axis of a joint is zero or has no numbers.
 

@@ -47,7 +47,7 @@ def negative_loss(robot: Facts) -> Violations:
                 )
 
 
-@rule("JNT021", "excessive-friction", "warning")
+@rule("JNT021", "excessive-friction", "warning", needs=("effort-unit",))
 def excessive_friction(robot: Facts) -> Violations:
     """The friction of a joint consumes most of its effort.
 
@@ -78,7 +78,7 @@ def excessive_friction(robot: Facts) -> Violations:
         )
 
 
-@rule("JNT022", "excessive-damping", "warning")
+@rule("JNT022", "excessive-damping", "warning", needs=("effort-unit",))
 def excessive_damping(robot: Facts) -> Violations:
     """The damping of a joint holds it almost still at full effort.
 
@@ -113,7 +113,7 @@ def excessive_damping(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT023", "excessive-armature", "warning")
+@rule("JNT023", "excessive-armature", "warning", needs=("inertia-unit",))
 def excessive_armature(robot: Facts) -> Violations:
     """The armature of a joint is too large for its effort.
 

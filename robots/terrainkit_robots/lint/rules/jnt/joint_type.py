@@ -23,7 +23,7 @@ _TYPE_SYNONYMS = {
 }
 
 
-@rule("JNT001", "unknown-joint-type", "error")
+@rule("JNT001", "unknown-joint-type", "error", onboarding="blocks")
 def unknown_joint_type(robot: Facts) -> Violations:
     """The type of a joint does not exist.
 

@@ -5,7 +5,7 @@ from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("JNT013", "invalid-mimic", "error")
+@rule("JNT013", "invalid-mimic", "error", onboarding="blocks")
 def invalid_mimic(robot: Facts) -> Violations:
     """A joint mimics a joint that is missing or fixed, or mimics itself.
 

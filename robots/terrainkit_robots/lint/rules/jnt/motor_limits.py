@@ -112,7 +112,13 @@ def missing_velocity(robot: Facts) -> Violations:
         )
 
 
-@rule("JNT011", "placeholder-limit", "warning")
+@rule(
+    "JNT011",
+    "placeholder-limit",
+    "warning",
+    onboarding="repairs",
+    needs=("mass-unit", "length-unit", "effort-unit"),
+)
 def placeholder_limit(robot: Facts) -> Violations:
     """An effort or velocity limit is a placeholder.
 
@@ -155,7 +161,13 @@ def placeholder_limit(robot: Facts) -> Violations:
             )
 
 
-@rule("JNT026", "oversized-effort", "warning", needs=("legs",), certainty="likely")
+@rule(
+    "JNT026",
+    "oversized-effort",
+    "warning",
+    needs=("mass-unit", "length-unit", "effort-unit", "legs"),
+    certainty="likely",
+)
 def oversized_effort(robot: Facts) -> Violations:
     """The effort limit of a leg joint is far too large for the robot.
 

@@ -17,7 +17,13 @@ _MAX_SAG = 1.0
 legged robots have at most 0.4."""
 
 
-@rule("JNT015", "insufficient-torque", "warning", needs=("legs",), certainty="likely")
+@rule(
+    "JNT015",
+    "insufficient-torque",
+    "warning",
+    needs=("mass-unit", "length-unit", "angle-unit", "effort-unit", "legs"),
+    certainty="likely",
+)
 def insufficient_torque(robot: Facts) -> Violations:
     """A joint needs more than half of its effort limit to stand.
 

@@ -39,7 +39,7 @@ def _joint_types(limb: Limb) -> tuple[str, ...]:
     return tuple(joint.kind for joint in limb.joints)
 
 
-@rule("LEG001", "detected-legs", "note", needs=("legs",), certainty="likely")
+@rule("LEG001", "detected-legs", "note")
 def detected_legs(robot: Facts) -> Violations:
     """Lists the legs that were detected and the roles of their joints.
 
@@ -56,7 +56,7 @@ def detected_legs(robot: Facts) -> Violations:
     if len(set(roles.values())) == 1:
         listed = f"feet {', '.join(roles)}; joints of each leg: {roles[robot.legs[0].foot]}"
     else:
-        listed = "; ".join(f"{foot}: {each}" for foot, each in roles.items())
+        listed = "; ".join(f"{foot}: {role}" for foot, role in roles.items())
     yield Violation(
         message=f"{len(robot.legs)} legs with a length of {mean_length(robot.legs):.3f} m; "
         f"{listed}",
@@ -64,7 +64,7 @@ def detected_legs(robot: Facts) -> Violations:
     )
 
 
-@rule("LEG002", "leg-count", "warning", needs=("legs",), certainty="likely")
+@rule("LEG002", "leg-count", "warning", onboarding="warns")
 def leg_count(robot: Facts) -> Violations:
     """The number of legs is not 2, 4, 6 or 8.
 
@@ -112,11 +112,11 @@ def _uncounted_legs(robot: Facts) -> list[str]:
 def _is_equal_limb(robot: Facts, limb: Limb, leg: Limb) -> bool:
     if _joint_types(limb) != _joint_types(leg) or len(limb.chain) != len(leg.chain):
         return False
-    own, other = ([robot.bodies[index].mass for index in each.chain] for each in (limb, leg))
+    own, other = ([robot.bodies[index].mass for index in part.chain] for part in (limb, leg))
     return min(own) > 0 and bool(np.allclose(own, other, rtol=_MAX_MASS_DIFFERENCE))
 
 
-@rule("LEG003", "missing-leg-joint", "warning", needs=("legs",), certainty="likely")
+@rule("LEG003", "missing-leg-joint", "warning")
 def missing_leg_joint(robot: Facts) -> Violations:
     """A leg has fewer joints than the others.
 
@@ -141,7 +141,7 @@ def missing_leg_joint(robot: Facts) -> Violations:
             )
 
 
-@rule("LEG007", "leg-points-up", "error", needs=("legs",), certainty="likely")
+@rule("LEG007", "leg-points-up", "error", needs=("length-unit", "angle-unit"))
 def leg_points_up(robot: Facts) -> Violations:
     """A leg points up, unlike the others.
 

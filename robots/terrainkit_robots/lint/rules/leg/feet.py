@@ -7,7 +7,7 @@ from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import names
 
 
-@rule("LEG004", "foot-collapsed", "note", fixes="safe", needs=("legs",), certainty="likely")
+@rule("LEG004", "foot-collapsed", "note", fixes="safe")
 def foot_collapsed(robot: Facts) -> Violations:
     """Isaac Gym merges the feet into their shanks.
 

@@ -14,7 +14,7 @@ _RIGHT = {"right", "fr", "hr", "br", "rf", "rh", "rb", "rm", "mr"}
 """Words of names that give the position of a leg. RR is omitted: it also occurs in other names."""
 
 
-@rule("LEG005", "forward-axis", "warning", needs=("legs",), certainty="likely")
+@rule("LEG005", "forward-axis", "warning", needs=("length-unit", "angle-unit"))
 def forward_axis(robot: Facts) -> Violations:
     """The robot does not face +x.
 
@@ -34,9 +34,9 @@ def forward_axis(robot: Facts) -> Violations:
         (0, "x", "front", "hind", (_FRONT, _HIND)),
         (1, "y", "left", "right", (_LEFT, _RIGHT)),
     ):
-        positions = [_leg_positions(robot, each, axis) for each in words]
+        positions = [_leg_positions(robot, group, axis) for group in words]
         if all(positions) and max(positions[0]) < min(positions[1]):
-            means = [float(np.mean(each)) for each in positions]
+            means = [float(np.mean(group)) for group in positions]
             message = (
                 f"position of the {ahead} legs along {letter}: got {means[0]:.3f} m; expected more "
                 f"than at the {behind} legs, which are at {means[1]:.3f} m"

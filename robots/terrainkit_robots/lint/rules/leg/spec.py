@@ -57,7 +57,7 @@ def _report_height(
     )
 
 
-@rule("LEG008", "spec-spawn-height", "error", needs=("spec", "legs"), certainty="likely")
+@rule("LEG008", "spec-spawn-height", "error", needs=("spec",))
 def spec_spawn_height(robot: Facts) -> Violations:
     """The spawn height of the spec is inside the ground or far above it.
 
@@ -87,7 +87,7 @@ def spec_spawn_height(robot: Facts) -> Violations:
     yield _report_height(robot, message, measured, None if gap < 0 else "warning")
 
 
-@rule("LEG009", "spec-target-height", "warning", needs=("spec", "legs"), certainty="likely")
+@rule("LEG009", "spec-target-height", "warning", needs=("spec",))
 def spec_target_height(robot: Facts) -> Violations:
     """The target height of the spec differs from the standing height.
 
@@ -115,7 +115,7 @@ def spec_target_height(robot: Facts) -> Violations:
         yield _report_height(robot, message, {"target": target, "standing": stance.height})
 
 
-@rule("LEG010", "spec-reset-range", "warning", needs=("spec", "legs"))
+@rule("LEG010", "spec-reset-range", "warning", needs=("spec",), certainty="proven")
 def spec_reset_range(robot: Facts) -> Violations:
     """The reset range of the spec exceeds the joint limits.
 

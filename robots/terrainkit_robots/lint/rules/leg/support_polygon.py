@@ -17,7 +17,7 @@ _MIN_MARGIN_SHARE = 0.25
 """The same as a share of the largest possible distance, for small feet."""
 
 
-@rule("LEG006", "com-outside-support", "error", needs=("legs",), certainty="likely")
+@rule("LEG006", "com-outside-support", "error", needs=("length-unit", "angle-unit"))
 def com_outside_support(robot: Facts) -> Violations:
     """The center of mass is outside of the support polygon of the standing pose.
 

@@ -18,7 +18,7 @@ from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
 
 
-@rule("MSH008", "too-many-faces", "error", fixes="unsafe")
+@rule("MSH008", "too-many-faces", "error", fixes="unsafe", onboarding="converts")
 def too_many_faces(robot: Facts) -> Violations:
     """A mesh has over 200,000 faces.
 

@@ -12,7 +12,7 @@ from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes, TooLargeError
 from terrainkit_robots.mesh.sniff import MUJOCO_SUFFIXES
 
 
-@rule("MSH005", "unsupported-format", "error", fixes="unsafe")
+@rule("MSH005", "unsupported-format", "error", fixes="unsafe", onboarding="converts")
 def unsupported_format(robot: Facts) -> Violations:
     """A collision mesh is in a format that MuJoCo cannot read.
 
@@ -87,7 +87,7 @@ def _file_problem(meshes: Meshes, used: UsedMesh) -> tuple[str, Severity]:
     return "", "note"
 
 
-@rule("MSH007", "ascii-stl", "error", fixes="safe")
+@rule("MSH007", "ascii-stl", "error", fixes="safe", onboarding="converts")
 def ascii_stl(robot: Facts) -> Violations:
     """A mesh is an ASCII STL file.
 

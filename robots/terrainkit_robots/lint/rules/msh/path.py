@@ -36,7 +36,7 @@ _MAX_PARENT_FOLDERS = 3
 """Maximum number of `..` in a relative path, enough for another package of the same workspace."""
 
 
-@rule("MSH001", "missing-mesh", "error", fixes="unsafe")
+@rule("MSH001", "missing-mesh", "error", fixes="unsafe", onboarding="repairs")
 def missing_mesh(robot: Facts) -> Violations:
     """A mesh file does not exist.
 
@@ -62,6 +62,7 @@ def missing_mesh(robot: Facts) -> Violations:
                 severity=not_loaded(used),
                 measured={"collisions": len(used.collisions)},
                 fix=_relative_fix(robot, used, "unsafe") if is_in_other_folder(used.mesh) else None,
+                is_written=bool(used.collisions),  # a missing visual mesh is omitted
             )
 
 
@@ -82,7 +83,7 @@ def _search_result(robot: Facts, used: UsedMesh) -> str:
     return f"searched at {short_path(mesh.path)}"
 
 
-@rule("MSH002", "absolute-path", "error", fixes="unsafe")
+@rule("MSH002", "absolute-path", "error", fixes="unsafe", onboarding="converts")
 def absolute_path(robot: Facts) -> Violations:
     """A mesh has an absolute path.
 
@@ -162,12 +163,12 @@ def package_uri(robot: Facts) -> Violations:
     for (scheme, _), members in groups.items():
         first, fix = members[0]
         severity = not_loaded(next((used for used, _ in members if used.strict), first))
-        edits = [edit for _, each in members if each is not None for edit in each.edits]
+        edits = [edit for _, fix in members if fix is not None for edit in fix.edits]
         description = fix.description if fix and len(members) == 1 else "Use relative paths."
         yield Violation(
             element=first,
-            message=f"path of {len(members)} mesh{'es' * (len(members) > 1)} "
-            f"({names((each.name for each, _ in members), 2)}): refers to {scheme}; expected a "
+            message=f"path of {len(members)} mesh{'es' if len(members) > 1 else ''} "
+            f"({names((mesh.name for mesh, _ in members), 2)}): refers to {scheme}; expected a "
             "relative path, which MuJoCo can load",
             severity=severity if scheme == "a host" else None,
             measured={"meshes": len(members)},
@@ -187,7 +188,7 @@ def _is_same_path(used: UsedMesh) -> bool:
     return [part.lower() for part in used.mesh.path.parts[-len(parts) :]] == parts
 
 
-@rule("MSH004", "filename-case", "error", fixes="safe")
+@rule("MSH004", "filename-case", "error", fixes="safe", onboarding="converts")
 def filename_case(robot: Facts) -> Violations:
     """A mesh path differs from the file name in case, or contains backslashes.
 

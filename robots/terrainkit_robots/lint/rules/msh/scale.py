@@ -13,7 +13,7 @@ from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import numbers
 
 
-@rule("MSH011", "wrong-scale", "error", certainty="likely")
+@rule("MSH011", "wrong-scale", "error", certainty="likely", needs=("length-unit",))
 def wrong_scale(robot: Facts) -> Violations:
     """A mesh is far too large or too small compared with the joint distances.
 

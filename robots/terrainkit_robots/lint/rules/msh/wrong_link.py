@@ -108,7 +108,7 @@ def odd_leg_mesh(robot: Facts) -> Violations:
         uses = Counter(_stem(g) for link in robot.links for g in getattr(link, kind))
         for bodies in zip(*chains, strict=True):
             shapes = [getattr(robot.bodies[i], kind) for i in bodies]
-            found = [tuple(sorted(_stem(s.geometry) for s in each)) for each in shapes]
+            found = [tuple(sorted(_stem(s.geometry) for s in group)) for group in shapes]
             groups = Counter(found)
             if len(set(bodies)) < 4 or sorted(groups.values()) != [1, 3]:
                 continue

@@ -9,7 +9,7 @@ import numpy as np
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Link
 from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.simulation.as_written import (
+from terrainkit_robots.simulation.written_model import (
     WrittenStand,
     make_written_model,
     stand_as_written,
@@ -82,8 +82,8 @@ def _consequence(
         return
     found = found[: _MAX_SYMPTOMS if math.isfinite(stand.speed) else 1]
     got, other = (
-        ", ".join(_describe(name, each, written.weight) for name in found)
-        for each in (stand, without)
+        ", ".join(_describe(name, result, written.weight) for name in found)
+        for result in (stand, without)
     )
     yield Violation(
         element=link,
@@ -121,7 +121,7 @@ def gravity_compensation(robot: Facts) -> Violations:
         lost = lost if math.isfinite(lost) else share
         yield Violation(
             element=_link(robot, bodies[0]),
-            message=f"gravcomp of {names(model.body(int(each)).name for each in bodies)}: got "
+            message=f"gravcomp of {names(model.body(int(body)).name for body in bodies)}: got "
             f"{model.body_gravcomp.max():g}, so that the ground carries "
             f"{written.weight * (1 - lost):.0f} of {written.weight:.0f} N; expected 0",
             measured={"lost_weight": round(lost, 4)},

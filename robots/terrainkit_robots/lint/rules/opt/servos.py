@@ -7,9 +7,9 @@ from typing import Any
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Violation, Violations, rule
-from terrainkit_robots.simulation.as_written import make_written_model, position_servos
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.time_step import joint_inertia
+from terrainkit_robots.simulation.written_model import make_written_model, position_servos
 from terrainkit_robots.text import count
 
 # The models of MuJoCo Menagerie and Playground have 0.11 to 1.2, and robots of others 0.03.
@@ -48,7 +48,7 @@ def _servos(model: Any) -> Iterator[_Servo]:
         joint = int(model.actuator_trnid[index, 0])
         if gear == 0 or int(model.jnt_type[joint]) != int(mujoco.mjtJoint.mjJNT_HINGE):
             continue
-        low, high = (float(each) for each in model.actuator_ctrlrange[index])
+        low, high = (float(limit) for limit in model.actuator_ctrlrange[index])
         ends = sorted((low / gear, high / gear))
         is_limited = model.actuator_ctrllimited[index] and model.jnt_limited[joint]
         lower, upper = model.jnt_range[joint]
@@ -63,7 +63,9 @@ def _servos(model: Any) -> Iterator[_Servo]:
 
 
 def _source(robot: Facts, joint: str) -> dict[str, Any]:
-    source = next((each.source for each in robot.model.actuators if each.joint == joint), None)
+    source = next(
+        (actuator.source for actuator in robot.model.actuators if actuator.joint == joint), None
+    )
     return {"subject": joint, "source": source}
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from terrainkit_robots.analysis.bodies.joint_order import permutation
+from terrainkit_robots.analysis.bodies.permutation import permutation
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.analysis.simulator_conventions.armature import (
@@ -19,7 +19,7 @@ from terrainkit_robots.analysis.simulator_conventions.loaded_robot import (
     is_welded,
     loaded_robots,
 )
-from terrainkit_robots.lint.rule import Violation, Violations, rule
+from terrainkit_robots.lint.rule import UNITS, Violation, Violations, rule
 from terrainkit_robots.text import conjunction
 
 _MAX_JOINTS = 40
@@ -94,14 +94,15 @@ def merged_feet(robot: Facts) -> Violations:
     if not merges:
         return
     foot, bodies = next(iter(merges.items()))
-    by = [name for name in SIMULATORS if any(name in each for each in merges.values())]
-    example = f"{foot} into {next(iter(bodies.values()))}" + ", ..." * (len(merges) > 1)
+    by = [name for name in SIMULATORS if any(name in simulators for simulators in merges.values())]
+    more = ", ..." if len(merges) > 1 else ""
+    verb = "merges" if len(by) == 1 else "merge"
     yield Violation(
         subject=foot,
         source=robot.tree.parent_joint[foot].source,
         message=(
-            f"{conjunction(by)} merge{'s' * (len(by) == 1)} {len(merges)} feet into their parent "
-            f"links by default ({example})"
+            f"{conjunction(by)} {verb} {len(merges)} feet into their parent links by default "
+            f"({foot} into {next(iter(bodies.values()))}{more})"
         ),
         hint="; ".join(f"{simulator}: {KEEP_LINK_OPTIONS[simulator]}" for simulator in by),
         measured={"feet": len(merges)},
@@ -142,7 +143,7 @@ def welded_trunk(robot: Facts) -> Violations:
     )
 
 
-@rule("SIM003", "genesis-armature", "note")
+@rule("SIM003", "genesis-armature", "note", needs=UNITS)
 def genesis_armature(robot: Facts) -> Violations:
     """The default armature of Genesis exceeds the inertia that a joint moves.
 

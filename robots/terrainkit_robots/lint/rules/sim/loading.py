@@ -80,7 +80,7 @@ def mujoco_load_failure(robot: Facts) -> Violations:
         refusals.append(mujoco_load_error(robot.model))
     except NotAttemptedError as error:
         reason = str(error)
-    is_mesh_error = any(each and re.search(_MESH_ERROR, each.message) for each in refusals)
+    is_mesh_error = any(refusal and re.search(_MESH_ERROR, refusal.message) for refusal in refusals)
     if (reason or is_mesh_error) and robot.model.kind == "urdf":
         try:
             refusals.append(mujoco_load_error(robot.model, with_meshes=False))
@@ -155,16 +155,16 @@ def _explaining_rule(robot: Facts, message: str) -> tuple[str, Severity]:
             return problem.code, "error"
     order: tuple[Severity, ...] = ("note", "warning", "error")
     best: tuple[str, Severity] = "", "note"
-    codes = next((each for pattern, each in _EXPLAINED_BY if re.search(pattern, message)), "")
-    for each in codes.split():
+    codes = next((known for pattern, known in _EXPLAINED_BY if re.search(pattern, message)), "")
+    for code in codes.split():
         try:
-            found = [finding.severity for finding in findings_of(robot, each)]
+            found = [finding.severity for finding in findings_of(robot, code)]
         except CannotCheckError:
             continue
         if found:
             severity = max(found, key=order.index)
             if not best[0] or order.index(severity) > order.index(best[1]):
-                best = each, severity
+                best = code, severity
     return best
 
 

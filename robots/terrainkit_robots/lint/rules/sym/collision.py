@@ -23,7 +23,7 @@ _MAX_SHAPE_ERROR, _SHAPE_MARGIN = 0.3, 0.01
 [m]."""
 
 
-@rule("SYM013", "collision-asymmetry", "warning", certainty="likely")
+@rule("SYM013", "collision-asymmetry", "warning")
 def collision_asymmetry(robot: Facts) -> Violations:
     """The collision shapes of a body differ from its mirror image, or are missing.
 
@@ -115,7 +115,7 @@ def _collides(link: Link) -> bool:
 def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
     """Return the violation of a pair whose primitives have different sizes, or None."""
     shapes = _primitives(pair.left.body), _primitives(pair.right.body)
-    if [each.shape for each in shapes[0]] != [each.shape for each in shapes[1]]:
+    if [primitive.shape for primitive in shapes[0]] != [primitive.shape for primitive in shapes[1]]:
         return None
     for left, right in zip(*shapes, strict=True):
         sizes = np.array(left.size), np.array(right.size)
@@ -144,7 +144,7 @@ def _resized(robot: Facts, pair: MirrorPair) -> Violation | None:
 def _primitives(body: Body) -> list[Geometry]:
     """Return the collision primitives of a body, by shape and size."""
     found = [s.geometry for s in body.collisions if s.geometry.size and min(s.geometry.size) > 0]
-    return sorted(found, key=lambda each: (each.shape, each.size))
+    return sorted(found, key=lambda primitive: (primitive.shape, primitive.size))
 
 
 def _box(robot: Facts, side: MirrorSide) -> Matrix | None:
@@ -155,6 +155,6 @@ def _box(robot: Facts, side: MirrorSide) -> Matrix | None:
 
 def _visual_offset(robot: Facts, body: Body) -> float | None:
     """Return the distance between the middles of the collision and the visual shapes [m]."""
-    boxes = [box_at_zero(body, each, robot.meshes) for each in (body.collisions, body.visuals)]
+    boxes = [box_at_zero(body, shapes, robot.meshes) for shapes in (body.collisions, body.visuals)]
     a, b = boxes
     return None if a is None or b is None else float(np.linalg.norm((a - b).mean(axis=0)))

@@ -10,7 +10,7 @@ from terrainkit_robots.analysis.symmetry.mass_asymmetry import (
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("SYM008", "copied-assembly", "note", certainty="likely")
+@rule("SYM008", "copied-assembly", "note")
 def copied_assembly(robot: Facts) -> Violations:
     """The left and the right side are the same assembly, mounted twice.
 

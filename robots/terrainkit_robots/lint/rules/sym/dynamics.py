@@ -19,7 +19,7 @@ _MIN_EFFORT_SHARE = 0.1
 """Difference of that effort, as a share of the effort limit, below which a loss does not matter."""
 
 
-@rule("SYM009", "loss-asymmetry", "warning", certainty="likely")
+@rule("SYM009", "loss-asymmetry", "warning")
 def loss_asymmetry(robot: Facts) -> Violations:
     """The damping, friction or armature of a joint differs widely from its mirror image.
 
@@ -59,7 +59,7 @@ def loss_asymmetry(robot: Facts) -> Violations:
             )
 
 
-@rule("SYM010", "gear-asymmetry", "warning", certainty="likely")
+@rule("SYM010", "gear-asymmetry", "warning")
 def gear_asymmetry(robot: Facts) -> Violations:
     """The gear of an actuator has the opposite sign of its mirror image.
 

@@ -37,7 +37,7 @@ _MAX_MOMENT_ERROR = 0.05
 """Difference of principal moments above which SYM003 reports the pair, as the same share."""
 
 
-@rule("SYM003", "inertia-asymmetry", "warning", certainty="likely")
+@rule("SYM003", "inertia-asymmetry", "warning")
 def inertia_asymmetry(robot: Facts) -> Violations:
     """The principal moments of a body differ from its mirror image.
 
@@ -103,7 +103,7 @@ def _precision(body: Body) -> float:
     return float(10.0 ** min(exponents, default=0))
 
 
-@rule("SYM011", "product-asymmetry", "warning", certainty="likely")
+@rule("SYM011", "product-asymmetry", "warning")
 def product_asymmetry(robot: Facts) -> Violations:
     """The principal axes of a body's inertia differ from its mirror image.
 
@@ -132,7 +132,8 @@ def product_asymmetry(robot: Facts) -> Violations:
         if np.abs(left.body.inertia - right.body.inertia).max() < 1e-3 * np.abs(a).max():
             if not _has_products(left.body.inertia):
                 continue
-            if _is_copy(left.body, right.body):
+            # With the same center of mass, they are the same part.
+            if float(np.abs(left.body.center - right.body.center).max()) < 0.002:
                 continue
         largest = max(float(left.body.principal[2]), float(right.body.principal[2]))
         moments = np.abs(left.body.principal - right.body.principal).max() / largest
@@ -184,8 +185,3 @@ def _inertia(body: Body) -> Matrix | None:
 def _has_products(inertia: Matrix) -> bool:
     products = inertia - np.diag(np.diag(inertia))
     return float(np.abs(products).max()) > _MAX_PRODUCT_ERROR / 2 * float(np.abs(inertia).max())
-
-
-def _is_copy(a: Body, b: Body) -> bool:
-    """Return whether two bodies have the same center of mass, so that they are the same part."""
-    return float(np.abs(a.center - b.center).max()) < 0.002

@@ -24,7 +24,7 @@ from terrainkit_robots.text import numbers
 from terrainkit_robots.transforms import Matrix
 
 
-@rule("SYM006", "joint-origin-asymmetry", "warning", certainty="likely")
+@rule("SYM006", "joint-origin-asymmetry", "warning")
 def joint_origin_asymmetry(robot: Facts) -> Violations:
     """The origin of a joint is not the mirror image of its counterpart's origin.
 
@@ -44,7 +44,7 @@ def joint_origin_asymmetry(robot: Facts) -> Violations:
             yield _report_pair(robot, error)
 
 
-@rule("SYM007", "joint-axis-asymmetry", "warning", certainty="likely")
+@rule("SYM007", "joint-axis-asymmetry", "warning")
 def joint_axis_asymmetry(robot: Facts) -> Violations:
     """The axis of a joint is not the mirror image of its counterpart's axis.
 

@@ -32,7 +32,7 @@ distance [m] and this share of the legs' distance. Of 143 published legged robot
 share of 0.11."""
 
 
-@rule("SYM001", "mass-asymmetry", "warning", certainty="likely")
+@rule("SYM001", "mass-asymmetry", "warning")
 def mass_asymmetry(robot: Facts) -> Violations:
     """The mass of a body differs from its mirror image.
 
@@ -70,7 +70,7 @@ def mass_asymmetry(robot: Facts) -> Violations:
         )
 
 
-@rule("SYM002", "com-asymmetry", "warning", certainty="likely")
+@rule("SYM002", "com-asymmetry", "warning")
 def com_asymmetry(robot: Facts) -> Violations:
     """A center of mass is not at the mirrored position of its mirror image.
 

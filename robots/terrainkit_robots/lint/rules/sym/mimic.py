@@ -8,7 +8,7 @@ from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("SYM012", "mimic-asymmetry", "warning", certainty="likely")
+@rule("SYM012", "mimic-asymmetry", "warning")
 def mimic_asymmetry(robot: Facts) -> Violations:
     """A joint and its mirror image do not follow mirrored joints in the same way.
 
@@ -72,7 +72,7 @@ def _crosses(robot: Facts, joint: Joint) -> bool:
         for leg in robot.legs
     ]
     own = [chain for chain in chains if joint.name in chain]
-    return any(target in chain for chain in chains) and not any(target in each for each in own)
+    return any(target in chain for chain in chains) and not any(target in chain for chain in own)
 
 
 def _is_gripper(left: Joint, right: Joint) -> bool:

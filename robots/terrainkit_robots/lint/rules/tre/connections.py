@@ -192,7 +192,7 @@ def _components(tree: Tree) -> dict[str, str]:
     return component
 
 
-@rule("TRE006", "no-links", "error")
+@rule("TRE006", "no-links", "error", needs=("all-files",))
 def no_links(robot: Facts) -> Violations:
     """The robot has no links.
 

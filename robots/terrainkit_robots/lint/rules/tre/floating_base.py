@@ -7,7 +7,14 @@ from terrainkit_robots.description.model import WORLD, Link
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 
 
-@rule("TRE007", "no-free-joint", "error", fixes="safe", needs=("legs",), certainty="likely")
+@rule(
+    "TRE007",
+    "no-free-joint",
+    "error",
+    fixes="safe",
+    needs=("all-files", "legs"),
+    certainty="likely",
+)
 def no_free_joint(robot: Facts) -> Violations:
     """A legged MJCF robot has no free joint.
 

@@ -51,7 +51,7 @@ def detached_link(robot: Facts) -> Violations:
         # Visual meshes are opened only if the result depends on them.
         if max(_gaps(body, _collision_box(robot, parent), _collision_box(robot, body))) <= limit:
             continue
-        boxes = [box_at_zero(each, shapes_of(each), robot.meshes) for each in (parent, body)]
+        boxes = [box_at_zero(side, shapes_of(side), robot.meshes) for side in (parent, body)]
         parent_box, box = boxes
         if parent_box is None or box is None:
             continue

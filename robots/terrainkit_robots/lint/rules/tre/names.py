@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from terrainkit.settings.text import truncate
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint, Link
-from terrainkit_robots.lint.problems import problem_violations, problems
 from terrainkit_robots.lint.rule import Violation, Violations, rule
 from terrainkit_robots.text import names
 
@@ -33,7 +32,6 @@ def duplicate_name(robot: Facts) -> Violations:
         urdfdom: `joint '...' is not unique`; MuJoCo: `repeated URDF name`, for links only.
     """
     model = robot.model
-    yield from problem_violations(robot, "TRE001")
     for what, items in (
         ("links", [link for link in model.links if not link.virtual]),
         ("joints", model.joints),
@@ -50,7 +48,7 @@ def duplicate_name(robot: Facts) -> Violations:
 
 
 @rule("TRE010", "invalid-reference", "warning")
-def invalid_reference(robot: Facts) -> Violations:
+def invalid_reference(robot: Facts) -> None:
     """A tag for another tool, or the SRDF, names a link or joint that does not exist.
 
     The names in <gazebo>, <transmission>, <sensor>, <ros2_control> and the SRDF were not changed
@@ -65,9 +63,3 @@ def invalid_reference(robot: Facts) -> Violations:
         wiki.ros.org/urdf/XML: gazebo, transmission and sensor; wiki.ros.org/srdf. An SRDF belongs
         to the URDF of the same file name, beside it or in srdf/ or config/ of the package.
     """
-    for problem in problems(robot, "TRE010"):
-        yield Violation(
-            subject=problem.subject or problem.source.file.name,
-            source=problem.source,
-            message=problem.message,
-        )

@@ -3,7 +3,7 @@
 import numpy as np
 
 from terrainkit_robots.analysis.facts import Facts, cached_fact
-from terrainkit_robots.analysis.units import (
+from terrainkit_robots.analysis.unit_errors import (
     UnitError,
     body_unit_errors,
     effort_error,
@@ -33,7 +33,7 @@ def _violation(name: str, what: str, error: UnitError, si: str) -> Violation:
     )
 
 
-@rule("UNI001", "mass-unit", "error", certainty="likely")
+@rule("UNI001", "mass-unit", "error")
 def mass_unit(robot: Facts) -> Violations:
     """All masses are off by the same factor.
 
@@ -51,7 +51,7 @@ def mass_unit(robot: Facts) -> Violations:
         yield _violation("masses", "density [kg/m3]", errors["masses"], "kg")
 
 
-@rule("UNI002", "length-unit", "error", certainty="likely")
+@rule("UNI002", "length-unit", "error")
 def length_unit(robot: Facts) -> Violations:
     """All lengths, all shapes or all joint origins are off by the same factor.
 
@@ -72,7 +72,7 @@ def length_unit(robot: Facts) -> Violations:
             yield _violation(name, what, errors[name], "meters")
 
 
-@rule("UNI003", "inertia-unit", "error", certainty="likely")
+@rule("UNI003", "inertia-unit", "error")
 def inertia_unit(robot: Facts) -> Violations:
     """All inertias are off by the same factor.
 
@@ -91,7 +91,7 @@ def inertia_unit(robot: Facts) -> Violations:
         yield _violation("inertias", what, errors["inertias"], "kg m2")
 
 
-@rule("UNI004", "angle-unit", "error", certainty="likely")
+@rule("UNI004", "angle-unit", "error")
 def angle_unit(robot: Facts) -> Violations:
     """The ranges of all hinges are off by the same factor.
 
@@ -108,7 +108,7 @@ def angle_unit(robot: Facts) -> Violations:
         yield _violation("angles of joint limits", "range [rad]", error, "radians")
 
 
-@rule("UNI005", "effort-unit", "error", needs=("legs",), certainty="likely")
+@rule("UNI005", "effort-unit", "error", needs=("legs",))
 def effort_unit(robot: Facts) -> Violations:
     """The effort limits of all leg joints are off by the same factor.
 

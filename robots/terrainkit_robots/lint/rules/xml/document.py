@@ -1,14 +1,11 @@
 """Rules on the XML document: syntax, root element, xacro and included files."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.fix import SetAttribute, make_fix
-from terrainkit_robots.description.xml.document import leading_bytes_fix, version_fix
-from terrainkit_robots.lint.problems import problem_violation, problem_violations, problems
-from terrainkit_robots.lint.rule import Severity, Violations, rule
+from terrainkit_robots.lint.rule import rule
 
 
-@rule("XML001", "malformed-xml", "error", fixes="safe")
-def malformed_xml(robot: Facts) -> Violations:
+@rule("XML001", "malformed-xml", "error", fixes="safe", is_fatal=True)
+def malformed_xml(robot: Facts) -> None:
     """The file is not well-formed XML.
 
     Readers handle malformed XML differently: some stop, others silently drop every element after
@@ -23,13 +20,10 @@ def malformed_xml(robot: Facts) -> Violations:
     Source:
         XML 1.0, section 2.1. The message is from libxml2.
     """
-    for problem in problems(robot, "XML001"):
-        fix = version_fix(problem)
-        yield problem_violation(robot, problem, fix, "warning" if fix is not None else None)
 
 
 @rule("XML009", "byte-order-mark", "warning", fixes="safe")
-def byte_order_mark(robot: Facts) -> Violations:
+def byte_order_mark(robot: Facts) -> None:
     """There are invisible characters before the XML, or the file is UTF-16.
 
     Some editors write a byte order mark or a blank line before <?xml ...?>. Strict readers reject
@@ -43,13 +37,10 @@ def byte_order_mark(robot: Facts) -> Violations:
         XML 1.0, section 2.8: the declaration must come first. lxml and other readers reject strings
         that start with a byte order mark. MuJoCo 4.0: `XML_ERROR_PARSING`.
     """
-    for problem in problems(robot, "XML009"):
-        severity: Severity | None = "error" if "text" in problem.details else None
-        yield problem_violation(robot, problem, leading_bytes_fix(problem), severity)
 
 
 @rule("XML010", "entity-declarations", "error")
-def entity_declarations(robot: Facts) -> Violations:
+def entity_declarations(robot: Facts) -> None:
     """The file declares its own XML entities.
 
     An entity can include another file or expand to gigabytes. Most robot readers do not resolve
@@ -62,11 +53,10 @@ def entity_declarations(robot: Facts) -> Violations:
         OWASP on XML external entities; tinyxml2, which urdfdom and MuJoCo use, does not support
         entities.
     """
-    return problem_violations(robot, "XML010")
 
 
-@rule("XML011", "mjcf-parse-error", "error")
-def mjcf_parse_error(robot: Facts) -> Violations:
+@rule("XML011", "mjcf-parse-error", "error", is_fatal=True)
+def mjcf_parse_error(robot: Facts) -> None:
     """MuJoCo cannot parse the MJCF file.
 
     The message is from MuJoCo. check-robot skips the element and checks the rest.
@@ -77,11 +67,10 @@ def mjcf_parse_error(robot: Facts) -> Violations:
     Source:
         mujoco.MjSpec.from_string, the parser behind every MuJoCo loader.
     """
-    return problem_violations(robot, "XML011")
 
 
-@rule("XML002", "unknown-root", "error")
-def unknown_root(robot: Facts) -> Violations:
+@rule("XML002", "unknown-root", "error", is_fatal=True)
+def unknown_root(robot: Facts) -> None:
     """The file is neither URDF, xacro nor MJCF.
 
     The file is in another format, such as SDF, USD or a launch file, or its root element is
@@ -93,11 +82,10 @@ def unknown_root(robot: Facts) -> Violations:
     Source:
         The URDF specification (wiki.ros.org/urdf/XML) and MuJoCo's XML reference.
     """
-    return problem_violations(robot, "XML002")
 
 
 @rule("XML003", "unnamed-robot", "warning", fixes="safe")
-def unnamed_robot(robot: Facts) -> Violations:
+def unnamed_robot(robot: Facts) -> None:
     """The robot has no name.
 
     URDF requires a name. urdfdom and the tools built on it reject a <robot> without a name. Other
@@ -109,16 +97,10 @@ def unnamed_robot(robot: Facts) -> Violations:
     Source:
         wiki.ros.org/urdf/XML/robot: the attribute `name` is required.
     """
-    for problem in problems(robot, "XML003"):
-        name = "".join(c if c.isalnum() and c.isascii() else "_" for c in robot.model.file.stem)
-        name = name if name[:1].isalpha() else f"robot_{name}"
-        edit = SetAttribute(source=problem.source, name="name", value=name)
-        fix = make_fix("safe", f'Add name="{name}", from the file name.', [edit])
-        yield problem_violation(robot, problem, fix)
 
 
 @rule("XML004", "unexpanded-xacro", "error")
-def unexpanded_xacro(robot: Facts) -> Violations:
+def unexpanded_xacro(robot: Facts) -> None:
     """A plain URDF file contains xacro.
 
     A URDF reader skips macros as unknown elements and cannot parse `${length}` as a number. Whole
@@ -130,11 +112,10 @@ def unexpanded_xacro(robot: Facts) -> Violations:
     Source:
         wiki.ros.org/xacro: xacro is expanded before the file is read as URDF.
     """
-    return problem_violations(robot, "XML004")
 
 
-@rule("XML005", "xacro-failed", "error")
-def xacro_failed(robot: Facts) -> Violations:
+@rule("XML005", "xacro-failed", "error", is_fatal=True)
+def xacro_failed(robot: Facts) -> None:
     """The xacro file cannot be expanded.
 
     An argument has no value, a package is not found, or an expression is invalid. Without the
@@ -146,11 +127,10 @@ def xacro_failed(robot: Facts) -> Violations:
     Source:
         wiki.ros.org/xacro. The message is from the xacro package.
     """
-    return problem_violations(robot, "XML005")
 
 
 @rule("XML012", "invalid-include", "error")
-def invalid_include(robot: Facts) -> Violations:
+def invalid_include(robot: Facts) -> None:
     """An included file is missing, includes itself, or cannot be read.
 
     MuJoCo rejects the whole model. check-robot checks the other files.
@@ -161,4 +141,3 @@ def invalid_include(robot: Facts) -> Violations:
     Source:
         MuJoCo's XML reference, `include`.
     """
-    return problem_violations(robot, "XML012")

@@ -1,13 +1,11 @@
 """Rules on elements and their attributes."""
 
 from terrainkit_robots.analysis.facts import Facts
-from terrainkit_robots.description.fix import RemoveAttribute, RemoveElement, SetAttribute, make_fix
-from terrainkit_robots.lint.problems import problem_violation, problem_violations, problems
-from terrainkit_robots.lint.rule import Violations, rule
+from terrainkit_robots.lint.rule import rule
 
 
 @rule("XML006", "invalid-number", "error", fixes="safe")
-def invalid_number(robot: Facts) -> Violations:
+def invalid_number(robot: Facts) -> None:
     """An attribute is not a number, or has too few or too many numbers.
 
     Readers disagree about invalid numbers: "0,5" is 0 or an error, and a missing third coordinate
@@ -20,15 +18,10 @@ def invalid_number(robot: Facts) -> Violations:
         urdfdom parses numbers in the C locale; MuJoCo: `bad format in attribute`, `does not have
         enough data`.
     """
-    for problem in problems(robot, "XML006"):
-        value, name = problem.details.get("repaired", ""), problem.details.get("attribute", "")
-        edits = [SetAttribute(source=problem.source, name=name, value=value)] if value else []
-        fix = make_fix("safe", f'Set {name}="{value}".', edits)
-        yield problem_violation(robot, problem, fix)
 
 
 @rule("XML007", "unknown-tag", "warning")
-def unknown_tag(robot: Facts) -> Violations:
+def unknown_tag(robot: Facts) -> None:
     """A tag or attribute is unknown and similar to a standard one.
 
     URDF readers silently skip unknown names. A <colision> adds no collision shape, and a limit with
@@ -41,13 +34,10 @@ def unknown_tag(robot: Facts) -> Violations:
     Source:
         wiki.ros.org/urdf/XML, from link to safety_controller; MuJoCo's XML reference.
     """
-    for problem in problems(robot, "XML007"):
-        is_rejected = problem.details.get("refused") == "mujoco"
-        yield problem_violation(robot, problem, severity="error" if is_rejected else None)
 
 
 @rule("XML013", "missing-attribute", "error", fixes="safe")
-def missing_attribute(robot: Facts) -> Violations:
+def missing_attribute(robot: Facts) -> None:
     """A required attribute or element is missing.
 
     Examples are a link without a name, a mesh without a file, a box without a size and an inertia
@@ -61,16 +51,10 @@ def missing_attribute(robot: Facts) -> Violations:
         wiki.ros.org/urdf/XML: the attributes marked as required; MuJoCo 4.0: `required attribute
         missing: 'ixy'`.
     """
-    for problem in problems(robot, "XML013"):
-        products = problem.details.get("attributes", "").split()
-        edits = [SetAttribute(source=problem.source, name=name, value="0") for name in products]
-        description = f"Set {', '.join(products)} to 0, which lenient readers assume."
-        fix = make_fix("safe", description, edits)
-        yield problem_violation(robot, problem, fix)
 
 
 @rule("XML015", "repeated-element", "error", fixes="safe")
-def repeated_element(robot: Facts) -> Violations:
+def repeated_element(robot: Facts) -> None:
     """An element that may occur once occurs twice.
 
     Examples are two <inertial> in a link and two <axis> in a joint, often left behind when a file
@@ -82,14 +66,10 @@ def repeated_element(robot: Facts) -> Violations:
     Source:
         wiki.ros.org/urdf/XML; MuJoCo 4.0: "repeated element".
     """
-    for problem in problems(robot, "XML015"):
-        edits = [RemoveElement(source=problem.source)] if problem.details.get("copy") else []
-        fix = make_fix("safe", "Remove the copy.", edits)
-        yield problem_violation(robot, problem, fix)
 
 
 @rule("XML008", "duplicate-material", "error", fixes="safe")
-def duplicate_material(robot: Facts) -> Violations:
+def duplicate_material(robot: Facts) -> None:
     """A visual or collision has two materials.
 
     MuJoCo rejects the whole file: `repeated element: 'material'`. Other readers use the first one.
@@ -100,14 +80,10 @@ def duplicate_material(robot: Facts) -> Violations:
     Source:
         Observed in MuJoCo 4.0; wiki.ros.org/urdf/XML/link allows one material.
     """
-    for problem in problems(robot, "XML008"):
-        edit = RemoveElement(source=problem.source)
-        fix = make_fix("safe", "Remove the second material.", [edit])
-        yield problem_violation(robot, problem, fix)
 
 
 @rule("XML016", "undefined-material", "warning")
-def undefined_material(robot: Facts) -> Violations:
+def undefined_material(robot: Facts) -> None:
     """A visual names a material that is not defined.
 
     A <material> with a name only refers to one with a <color> or a <texture>. urdfdom rejects the
@@ -121,11 +97,10 @@ def undefined_material(robot: Facts) -> Violations:
     Source:
         urdfdom: `link '...' material '...' undefined`; wiki.ros.org/urdf/XML/link.
     """
-    return problem_violations(robot, "XML016")
 
 
-@rule("XML014", "unsupported-quaternion", "error", fixes="unsafe")
-def unsupported_quaternion(robot: Facts) -> Violations:
+@rule("XML014", "unsupported-quaternion", "error", fixes="unsafe", onboarding="converts")
+def unsupported_quaternion(robot: Facts) -> None:
     """A rotation is given as a quaternion, which simulators ignore.
 
     URDF 1.1 introduced `quat_xyzw`. MuJoCo and yourdfpy silently ignore it, so links and joints
@@ -139,18 +114,10 @@ def unsupported_quaternion(robot: Facts) -> Violations:
     Source:
         Pull requests 194 and 235 of urdfdom; MuJoCo 4.0 and yourdfpy 0.0.60 ignore it.
     """
-    for problem in problems(robot, "XML014"):
-        rpy = problem.details["rpy"]
-        edits = (
-            SetAttribute(source=problem.source, name="rpy", value=rpy),
-            RemoveAttribute(source=problem.source, name="quat_xyzw"),
-        )
-        fix = make_fix("unsafe", f'Set rpy="{rpy}".', edits)
-        yield problem_violation(robot, problem, fix)
 
 
 @rule("XML018", "rotation-in-degrees", "warning")
-def rotation_in_degrees(robot: Facts) -> Violations:
+def rotation_in_degrees(robot: Facts) -> None:
     """A rotation is in degrees, but is read as radians.
 
     An angle of 90 is read as 14 turns and 117 degrees. The part points in a direction that looks
@@ -164,4 +131,3 @@ def rotation_in_degrees(robot: Facts) -> Violations:
         http://wiki.ros.org/urdf/XML/link: rpy in radians. Angles of more than a turn are reported,
         unless they are whole quarter turns.
     """
-    return problem_violations(robot, "XML018")

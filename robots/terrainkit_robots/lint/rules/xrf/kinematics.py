@@ -7,7 +7,7 @@ from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 
 if TYPE_CHECKING:
-    from terrainkit_robots.lint.compare.link_poses import LinkPoseDifference
+    from terrainkit_robots.lint.compare.pose_differences import LinkPoseDifference
 from terrainkit_robots.lint.rules.xrf.joints import joint_difference
 from terrainkit_robots.lint.rules.xrf.other_robot import joint_pairs, other_name, other_robot
 
@@ -26,7 +26,7 @@ def compare_kinematics(robot: Facts) -> Violations:
         Both robots are compared in 20 random poses. yourdfpy computes the link poses of a URDF, and
         MuJoCo compiles the frames of an MJCF.
     """
-    from terrainkit_robots.lint.compare.link_poses import compare_link_poses
+    from terrainkit_robots.lint.compare.pose_differences import compare_link_poses
 
     held = [a.name for a, b in joint_pairs(robot) if joint_difference(robot, a, b)[2] == "error"]
     gap = compare_link_poses(robot, other_robot(robot), locked=held)
@@ -53,7 +53,7 @@ def compare_kinematics(robot: Facts) -> Violations:
 
 
 def _kinematics_message(gap: "LinkPoseDifference", other: str) -> str:
-    from terrainkit_robots.lint.compare.link_poses import MAX_ANGLE, MAX_DISTANCE
+    from terrainkit_robots.lint.compare.pose_differences import MAX_ANGLE, MAX_DISTANCE
 
     ours, theirs = gap.base
     base = ours if ours == theirs else f"{ours} ({theirs} there)"

@@ -50,9 +50,9 @@ def compare_total_mass(robot: Facts) -> Violations:
     """
     pairs, other, there = robot_pairs(robot), other_robot(robot), other_name(robot)
     a, b = robot.total_mass, other.total_mass
-    for each, mass in ((robot, a), (other, b)):
+    for facts, mass in ((robot, a), (other, b)):
         if math.isnan(mass):
-            file = truncate(each.model.file.name)
+            file = truncate(facts.model.file.name)
             raise CannotCheckError(f"masses of {file} are computed from mesh files")
     difference = relative_difference(a, b)
     if difference > _MAX_MASS_DIFFERENCE:

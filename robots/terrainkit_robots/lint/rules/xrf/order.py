@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
+from terrainkit_robots.analysis.bodies.permutation import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.lint.rule import Severity, Violation, Violations, rule
 from terrainkit_robots.lint.rules.xrf.other_robot import (

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from terrainkit.settings.text import closest, truncate
-from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 from terrainkit_robots.analysis.bodies.kinematics import ancestors
+from terrainkit_robots.analysis.bodies.permutation import is_reordered, permutation
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.model import Joint
 from terrainkit_robots.lint.rule import Violation, Violations, rule
@@ -302,7 +302,7 @@ def spec_mirror(robot: Facts) -> Violations:
     mirror, expected = robot.required_spec.mirror, robot.mirror_map
     known = [joint.name for joint in robot.actuated]
     for name, image in mirror.items():
-        unknown = next((each for each in (name, image.joint) if each not in known), None)
+        unknown = next((joint for joint in (name, image.joint) if joint not in known), None)
         back = mirror.get(image.joint)
         own = expected.get(name)
         got = f"{truncate(image.joint)} with sign {image.sign:+d}"

@@ -1,0 +1,400 @@
+"""What onboarding says about a robot: statements, for the terminal and for report.md.
+
+Each step makes one statement, which has a line for the terminal, lines of Markdown, or both. The
+terminal prints them in the order of the steps; report.md has them by section.
+"""
+
+import math
+import shlex
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Literal
+
+from terrainkit_robots.analysis.bodies.permutation import permutation
+from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
+from terrainkit_robots.lint.report.escape import escape_control, escape_surrogates
+from terrainkit_robots.lint.report.grouping import group_findings
+from terrainkit_robots.lint.report.markdown import cell, findings_table, titled_list
+from terrainkit_robots.lint.report.summary import group_skipped, summarize_findings
+from terrainkit_robots.lint.rule import SEVERITIES, Finding
+from terrainkit_robots.onboarding.equivalence import NUM_POSES
+from terrainkit_robots.onboarding.frameworks.mjlab import train_arguments
+from terrainkit_robots.onboarding.joint_table import format_number, joint_table
+from terrainkit_robots.simulation.assessment import assess
+from terrainkit_robots.text import count, display_path, names
+
+if TYPE_CHECKING:
+    from terrainkit_robots.onboarding.convert import RobotFiles
+    from terrainkit_robots.onboarding.result import OnboardResult
+    from terrainkit_robots.onboarding.verify import Verification
+    from terrainkit_robots.simulation.standing import StandResult
+
+Section = Literal[
+    "pictures", "robot", "changes", "standing", "comparison", "joints", "orders", "findings", "next"
+]
+
+_HEADINGS: dict[Section, str] = {
+    "pictures": "",
+    "robot": "",
+    "changes": "Changes",
+    "standing": "Standing test",
+    "comparison": "Comparison with the source",
+    "joints": "Joints",
+    "orders": "Joint order by simulator",
+    "findings": "Findings",
+    "next": "Next steps",
+}
+"""The sections of report.md and their headings."""
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What is said about one step."""
+
+    section: Section
+    """Section of report.md."""
+
+    lines: Iterable[str] = ()
+    """Lines of Markdown. An iterator is read at most once."""
+
+    label: str = ""
+    """Label of the line in the terminal; without one there is no line."""
+
+    text: str = ""
+    """The line in the terminal."""
+
+
+def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
+    """Yield the label and the text of each line for the terminal."""
+    return ((said.label, said.text) for said in statements(result) if said.label)
+
+
+def report_markdown(result: "OnboardResult") -> str:
+    """Return the text of report.md for a robot that was written."""
+    assert result.robot is not None
+    said = list(statements(result))
+    lines = [f"# {cell(result.robot.spec.name)}\n"]
+    for section, heading in _HEADINGS.items():
+        own = [
+            line for statement in said if statement.section == section for line in statement.lines
+        ]
+        lines += [f"## {heading}\n", *own] if heading and own else own
+    return escape_surrogates("\n".join(lines))
+
+
+def statements(result: "OnboardResult") -> Iterator[Statement]:
+    """Yield what is said about a robot, in the order of the steps."""
+    report = result.report
+    yield Statement("findings", _findings(result), "checked", summarize_findings([report]))
+    yield from _fixes(result)
+    robot, checks = result.robot, result.verification
+    if robot is None or checks is None:
+        return
+    yield Statement("robot", _properties(robot), "wrote", _list_files(robot))
+    if checks.equivalences:
+        yield Statement("comparison", _comparison(checks), "compared", _compare_files(checks))
+    yield from _standing(checks, robot)
+    yield Statement("joints", _joints(robot))
+    yield Statement("orders", _simulators(robot))
+    yield Statement("next", _commands(result, robot))
+    if result.configs:
+        rows = [(files[0], "see its docstring") for files in result.configs.values()]
+        listed = names(file for files in result.configs.values() for file in files)
+        yield Statement("next", titled_list("Framework configurations", rows), "configs", listed)
+    for framework, reason in result.skipped_configs.items():
+        yield Statement("next", (), "skipped", f"{framework}: {reason}")
+    pictures = f"{count(len(result.images), 'picture')} in report.md"
+    if not result.images:
+        pictures = f"none: {result.images_error}"
+    yield Statement("pictures", _pictures(result), "pictures", pictures)
+    if result.edits:
+        edits = names(result.edits)
+        text = f"your edits are in {edits}; use --spec to apply the values of a spec"
+        yield Statement("changes", (), "backups", text)
+    if num_missing := len(_repairable(report.findings, "MSH")):
+        text = "mesh is" if num_missing == 1 else "meshes are"
+        text += " missing; set the folder of a package with --package NAME=DIR"
+        yield Statement("findings", (), "missing", f"{num_missing} {text}")
+    if robot.changes:
+        lines = ("Omitted, changed or added:\n", *(f"- {cell(c)}" for c in robot.changes), "")
+        changes = f"{count(len(robot.changes), 'change')} listed in report.md"
+        yield Statement("changes", lines, "notes", changes)
+    elif not result.fixed:
+        yield Statement("changes", ["Nothing was fixed, omitted or changed.\n"])
+
+
+# Check and repair
+
+
+def _findings(result: "OnboardResult") -> Iterator[str]:
+    report = result.report
+    yield f"**{summarize_findings([report])}** in the source file, after the fixes.\n"
+    findings = sorted(report.findings, key=lambda f: (SEVERITIES.index(f.severity), f.code))
+    yield from findings_table(group_findings(report.facts.model, findings))
+    skipped = [(codes, reason) for _, codes, reason in group_skipped(report.skipped)]
+    yield from titled_list("Not checked or ignored", skipped)
+
+
+def _fixes(result: "OnboardResult") -> Iterator[Statement]:
+    """Yield what was fixed, and the repairs of inertias and mesh paths, which change the robot."""
+    yield Statement("changes", _source(result))
+    if not result.fixed:
+        return
+    codes = dict.fromkeys(finding.code for finding in result.fixed)
+    text = f"{count(len(result.fixed), 'finding')}: {names(codes)}"
+    yield Statement("changes", _fixed(result.fixed), "fixed", text)
+    for noun, family in (("inertia", "INR"), ("path", "MSH")):
+        subjects = _repairable(result.fixed, family)
+        if subjects:
+            nouns = f"{noun}s" if len(subjects) > 1 else noun
+            text = f"the {nouns} of {names(subjects, max_count=3)}; see report.md"
+            yield Statement("changes", (), "repaired", text)
+
+
+def _source(result: "OnboardResult") -> Iterator[str]:
+    file = cell(display_path(result.report.facts.model.file))
+    yield f"The source is {file}; it was not changed.\n"
+
+
+def _fixed(fixed: Sequence[Finding]) -> Iterator[str]:
+    rows = []
+    for finding in fixed:
+        text = finding.message if finding.fix is None else finding.fix.description
+        rows.append((finding.code, f"{finding.subject}: {text}" if finding.subject else text))
+    return titled_list("Fixed in the written files", rows)
+
+
+def _repairable(findings: Sequence[Finding], family: str) -> list[str]:
+    """Return the subjects of the findings that onboarding can repair."""
+    return [f.subject for f in findings if f.onboarding == "repairs" and f.family == family]
+
+
+# Convert
+
+
+def _list_files(robot: "RobotFiles") -> str:
+    meshes = [data for name, data in robot.files.items() if "/" in name]
+    texts = [name for name in robot.files if "/" not in name]
+    size = sum(map(len, meshes)) / 1e6
+    more = f", {count(len(meshes), 'mesh file')} ({size:.1f} MB)" if meshes else ""
+    return f"{names(texts)}{more}"
+
+
+def _properties(robot: "RobotFiles") -> Iterator[str]:
+    yield " ".join(_sentences(robot)) + "\n"
+
+
+def _sentences(robot: "RobotFiles") -> Iterator[str]:
+    """Yield sentences on the size, the base and the legs of a robot."""
+    facts, spec = robot.facts, robot.spec
+    joints = count(len(spec.joint_order), "actuated joint")
+    num_bodies = sum(not body.virtual for body in facts.bodies)
+    bodies = f"{num_bodies:,} rigid {'body' if num_bodies == 1 else 'bodies'}"
+    mass = (
+        f"weighs {format_number(facts.total_mass, 4)} kg and "
+        if _is_finite(facts.total_mass)
+        else ""
+    )
+    yield f"{cell(spec.name)} {mass}has {bodies} and {joints}."
+    base = "floating" if spec.floating else "fixed to the world"
+    yield f"Its base, {cell(spec.base)}, is {base}."
+    if not facts.legs:
+        yield (
+            "No legs were found, so there are no feet, no standing pose and no spawn height, and "
+            "the rules for legs were skipped."
+        )
+        return
+    feet = ", ".join(map(cell, spec.feet))
+    length = f", {format_number(spec.leg_length)} m long" if _is_finite(spec.leg_length) else ""
+    yield f"It stands on {count(len(facts.legs), 'leg')}{length}: {feet}."
+    height = facts.stance.height if facts.stance is not None else None
+    measures = (
+        ("its base is {} m above the ground", height),
+        ("its spawn height is {} m", spec.spawn_height),
+        ("its feet are {} m apart", spec.stance_width),
+    )
+    known = [text.format(format_number(value)) for text, value in measures if _is_finite(value)]
+    if known:
+        yield f"At the default pose, {', '.join(known)}."
+
+
+def _is_finite(value: float | None) -> bool:
+    return value is not None and math.isfinite(value)
+
+
+def _joints(robot: "RobotFiles") -> Iterator[str]:
+    spec = robot.spec
+    if not spec.joint_order:
+        return
+    yield (
+        "In the order of actions, observations and actuators. The source of each number is in "
+        "robot.toml."
+    )
+    if robot.facts.legs:
+        yield "The holding torque is the torque at the default pose, and its share of the effort."
+    yield ""
+    yield from _table(joint_table(robot.facts, spec))
+    others = [joint.name for joint in robot.facts.joints if joint.name not in spec.joint_order]
+    if others:
+        yield f"Not actuated: {cell(', '.join(others))}.\n"
+
+
+def _simulators(robot: "RobotFiles") -> Iterator[str]:
+    orders = robot.facts.simulator_orders
+    if not robot.spec.joint_order or not any(order.joints for order in orders):
+        return
+    yield from _table(order_table(robot.facts.file_order, orders))
+    for order in orders:
+        certainty = "certain" if order.certain else "to be verified"
+        yield f"- {order.simulator} ({certainty}): {cell(order.reason)}"
+    yield ""
+    actuated = robot.spec.joint_order
+    lines = []
+    for order in orders:
+        simulated = [name for name in order.joints if name in set(actuated)]
+        to, back = permutation(actuated, simulated), permutation(simulated, actuated)
+        if to is None or back is None:
+            continue  # an overriding spec may have other joints
+        if to != back or to != list(range(len(to))):
+            lines += [f"to_{order.key} = {to}", f"from_{order.key} = {back}"]
+    if lines:
+        yield (
+            "Permutations between the order of robot.toml and the order of a simulator: "
+            "`simulator_values = [values[i] for i in to_...]`.\n"
+        )
+        yield from ("```python", *lines, "```\n")
+    else:
+        yield "All simulators use the order of robot.toml.\n"
+
+
+def _table(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield the lines of a table; the first row is its header."""
+    for index, row in enumerate(rows):
+        yield f"| {' | '.join(map(cell, row))} |"
+        if index == 0:
+            yield "|---" * len(row) + "|"
+    yield ""
+
+
+# Verify
+
+
+def _compare_files(checks: "Verification") -> str:
+    equivalences = checks.equivalences
+    distance = max(equivalence.distance for equivalence in equivalences)
+    mass = max(abs(equivalence.mass) for equivalence in equivalences)
+    files = " and ".join(equivalence.file for equivalence in equivalences)
+    return (
+        f"{files} match the source: link positions within {1000 * distance:.2g} mm at {NUM_POSES} "
+        f"poses, mass within {mass:.2g}"
+    )
+
+
+def _comparison(checks: "Verification") -> Iterator[str]:
+    yield "Largest errors at random poses.\n"
+    rows = [("file", "mass", "joint inertia", "link position", "link rotation")]
+    for found in checks.equivalences:
+        mass = f"{round(found.mass, 5) + 0.0:+.3%}"
+        inertia = f"{found.inertia:.3%} at {found.joint}" if found.joint else ""
+        position = f"{1000 * found.distance:.2g} mm at {found.link}"
+        rotation = f"{math.degrees(found.angle):.2g} deg at {found.angle_link}"
+        rows.append((found.file, mass, inertia, position, rotation))
+    yield from _table(rows)
+
+
+def _standing(checks: "Verification", robot: "RobotFiles") -> Iterator[Statement]:
+    lines = _standing_lines(checks, robot) if robot.facts.legs else ()
+    yield Statement("standing", lines, "standing", _standing_text(checks, robot))
+    if checks.free_standing is None:
+        return
+    failures = assess(checks.free_standing).failures
+    how = f"{checks.free_standing.seconds:g} s with the gains of robot.toml and without a policy"
+    text = f"no, a policy has to balance it: {how}; {failures[0]}" if failures else f"yes: {how}"
+    outcome = f"it does not stand: {'; '.join(failures)}" if failures else "it stands as well"
+    line = f"With the gains below and without a policy, {cell(outcome)}.\n"
+    yield Statement("standing", [line], "free", text)
+
+
+def _standing_text(checks: "Verification", robot: "RobotFiles") -> str:
+    standing = checks.standing
+    if checks.error or checks.skipped:
+        return f"not simulated: {checks.error or checks.skipped}"
+    if standing is None:
+        return f"not simulated: the robot has {'a fixed base' if robot.facts.legs else 'no legs'}"
+    how = "with the gains of robot.toml"
+    if checks.joints_locked:
+        how = "with locked joints, since bipeds need a controller to balance"
+    if checks.stand_gains:
+        how = "with suggested gains, which hold the pose without a policy"
+    if checks.failures:
+        return f"NO: {standing.seconds:g} s {how}; {'; '.join(checks.failures)}"
+    tilt = f"tilt {math.degrees(standing.tilt):.1f} degrees"
+    return f"yes: {standing.seconds:g} s {how}, {tilt}, only the feet touch the ground"
+
+
+def _standing_lines(checks: "Verification", robot: "RobotFiles") -> Iterator[str]:
+    if checks.standing is None:
+        reason = cell(checks.error or checks.skipped)
+        yield f"It was not simulated{reason and f': {reason}'}.\n"
+        return
+    how = "at its default pose, with the gains below"
+    if checks.joints_locked:
+        how = "with locked joints"
+    if checks.stand_gains:
+        how = "at its default pose, with suggested gains"
+    outcome = "It stands" if checks.is_stable else "It does not stand"
+    yield f"**{outcome}**, {how}, in MuJoCo:\n"
+    has_slides = any(joint.kind == "prismatic" for joint in robot.facts.joints)
+    unit = "rad or m" if has_slides else "rad"
+    rows = _standing_rows(checks.standing, unit, locked=checks.joints_locked)
+    yield from _table([("quantity", "value"), *rows])
+
+
+def _standing_rows(
+    standing: "StandResult", unit: str, *, locked: bool
+) -> Iterator[tuple[str, str]]:
+    unstable = "; then the simulation became unstable" if standing.diverged else ""
+    yield "duration", f"{format_number(standing.seconds)} s{unstable}"
+    tilts = [format_number(math.degrees(t), 2) for t in (standing.tilt, standing.max_tilt)]
+    yield "tilt", "{} deg at the end, {} deg at most".format(*tilts)
+    sink = f"{1000 * standing.height_loss:.1f} mm below the start"
+    yield "base height", f"{format_number(standing.height)} m at the end, {sink}"
+    yield "drift", f"{1000 * standing.drift:.1f} mm"
+    yield "ground contacts", ", ".join(standing.other_contacts) or "only the feet"
+    if locked:
+        return
+    if standing.saturated_joint:
+        effort = f"{standing.saturation:.0%} of the effort limit of {standing.saturated_joint}"
+        yield "largest torque", effort
+    yield "largest joint position error", f"{format_number(standing.joint_error, 2)} {unit}"
+
+
+# Report
+
+
+def _pictures(result: "OnboardResult") -> Iterator[str]:
+    if result.images:
+        titles = [PurePath(name).stem for name in result.images]
+        images = [f"![{cell(t)}]({n})" for t, n in zip(titles, result.images, strict=True)]
+        yield f"| {' | '.join(map(cell, titles))} |"
+        yield "|---" * len(titles) + "|"
+        yield f"| {' | '.join(images)} |\n"
+    elif result.images_error:
+        yield f"No pictures: {cell(result.images_error)}.\n"
+
+
+def _commands(result: "OnboardResult", robot: "RobotFiles") -> Iterator[str]:
+    yield (
+        "Edit robot.toml to change body names, the default pose, gains and limits. Run these "
+        "commands in this folder.\n"
+    )
+    urdf, mjcf = (shlex.quote(escape_control(name)) for name in (robot.spec.urdf, robot.spec.mjcf))
+    yield "```sh"
+    yield "python -m mujoco.viewer --mjcf=scene.xml  # view the robot"
+    yield f"terrainkit check-robot {urdf} --spec robot.toml  # check an edited robot.toml"
+    yield f"terrainkit check-robot {urdf} --against {mjcf}  # compare the two files"
+    arguments = train_arguments(robot.spec)
+    if arguments and "mjlab" in result.configs:
+        yield f"python {arguments}  # train the robot in mjlab"
+    yield "```\n"
