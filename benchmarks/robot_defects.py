@@ -34,8 +34,8 @@ from mutants.robot_files import ROBOT_FILES, robot_folder
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.rule import Finding
-from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 

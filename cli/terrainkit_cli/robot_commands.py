@@ -137,7 +137,7 @@ class CheckRobot(Command):
         return int(any(result.failed for result in results))
 
     def _settings(self) -> "Settings":
-        from terrainkit_robots.lint.selection import select_rules
+        from terrainkit_robots.lint.check import select_rules
 
         settings = replace(
             parse_settings(self.ignore, self.package, self.xacro_arg),

@@ -187,8 +187,8 @@ def push_interval(env: "LeggedEnv") -> int:
 
 def reset_joint_offset(env: "LeggedEnv", env_ids: Ids) -> None:
     """Sample the zero offset of each joint."""
-    limit, shape = env.cfg.domain_rand.joint_offset, env.joint_offset[env_ids].shape
-    env.joint_offset[env_ids] = env.rng.uniform(-limit, limit, shape)
+    limit = env.cfg.domain_rand.joint_offset
+    env.joint_offset[env_ids] = env.rng.uniform(-limit, limit, env.joint_offset[env_ids].shape)
 
 
 def reset_lin_vel_bias(env: "LeggedEnv", env_ids: Ids) -> None:

@@ -31,7 +31,8 @@ def bad_orientation(env: "LeggedEnv") -> BoolArray:
 
 def terrain_out_of_bounds(env: "LeggedEnv") -> BoolArray:
     """Return which robots have left the map."""
-    xy, terrain = env.state.base_pos[:, :2], env.terrain
+    xy = env.state.base_pos[:, :2]
+    terrain = env.terrain
     return np.asarray(((xy < terrain.lower) | (xy > terrain.upper)).any(axis=1))
 
 

@@ -19,10 +19,10 @@ import trimesh
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.fixes.apply import fix_robot, write_fixes
 from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.lint.runner import lint
-from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.spec.robot_spec import RobotSpec

@@ -3,12 +3,12 @@ import math
 
 import numpy as np
 import pytest
-from terrainkit_robots.lint.compare.link_poses import compare_link_poses, sample_positions
 
 from terrainkit_robots.analysis.bodies.link_poses import link_poses
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.compare.pose_differences import compare_link_poses, sample_positions
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
 from tests.small_robots import facts, joint, link
