@@ -188,7 +188,7 @@ def action_l2(env: "LeggedEnv") -> FloatArray:
 
 
 def collision(env: "LeggedEnv") -> FloatArray:
-    """Count penalized bodies that touch something."""
+    """Penalize bodies that should not touch anything, by the number that do."""
     return (env.state.penalized_force > np.float32(0.1)).sum(axis=1, dtype=np.float32)
 
 
