@@ -288,9 +288,9 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
     write_fixes(result)
     safeties = ("safe", "unsafe") if unsafe else ("safe",)
     unfixed = tuple(
-        (unfixed.finding, unfixed.reason)
-        for unfixed in result.unfixed
-        if unfixed.finding.fix is not None and unfixed.finding.fix.safety in safeties
+        (left.finding, left.reason)
+        for left in result.unfixed
+        if left.finding.fix is not None and left.finding.fix.safety in safeties
     )
     return replace(result.report, fixed=result.fixed, unfixed=unfixed)
 
