@@ -233,10 +233,11 @@ def commands(block, replaced=REPLACED):
 def check_pip_install(words):
     """Check that what is installed exists; .ci/readme and the jobs of CI install it."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    (target,) = (word for word in words if not word.startswith("-"))
-    path, _, extras = target.rstrip("]").partition("[")
-    assert path == ".", target
-    assert set(filter(None, extras.split(","))) <= set(project["optional-dependencies"]), target
+    dependencies = {re.match(r"[\w-]+", text)[0] for text in project["dependencies"]}
+    for target in (word for word in words if not word.startswith("-")):
+        path, _, extras = target.rstrip("]").partition("[")
+        assert path == "." or path in dependencies, target
+        assert set(filter(None, extras.split(","))) <= set(project["optional-dependencies"]), target
 
 
 def serve(words):

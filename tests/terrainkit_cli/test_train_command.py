@@ -173,7 +173,7 @@ def test_only_the_first_process_prints_the_result(capsys):
     ("limit", "words", "message"),
     [
         (10**9, (), "needs an address space of 1.30 GB; the limit is 1.00 GB (ulimit -v)"),
-        (2 * 10**9, ("--num-envs", "4096"), "error: "),
+        (2 * 10**9, ("--num-envs", "16384"), "error: "),
     ],
 )
 def test_train_in_a_small_address_space_is_one_line(tmp_path, limit, words, message):
