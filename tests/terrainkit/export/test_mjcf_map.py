@@ -183,7 +183,7 @@ def test_mjcf_auto_uses_twice_as_many_boxes_as_heightfields():
 
 @pytest.mark.parametrize("row", range(11))
 def test_mjcf_auto_finds_a_slope_between_any_two_rows(monkeypatch, row):
-    monkeypatch.setattr(mjcf_map, "_ROWS_PER_BAND", 4)
+    monkeypatch.setattr(mjcf_map, "ROWS_PER_BAND", 4)
     heights = np.zeros((12, 4))
     heights[row + 1 :] = 0.05
     assert mjcf_map.collision_boxes(plot(heights), "auto") is None

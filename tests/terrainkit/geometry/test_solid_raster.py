@@ -36,7 +36,7 @@ def test_solid_raster_without_solids_has_no_tops():
 
 @pytest.mark.parametrize("band", [1000, 500_000])
 def test_solid_raster_agrees_with_the_index_within_a_pixel(monkeypatch, band):
-    monkeypatch.setattr(solid_raster, "_BAND", band)
+    monkeypatch.setattr(solid_raster, "PIXELS_PER_BAND", band)
     rng = np.random.default_rng(0)
     center = rng.uniform(-3, 3, (20, 3))
     boxes = make_boxes(center[:10], rng.uniform(0.2, 1, (10, 3)), rpy=[0, 0, 0.5])
