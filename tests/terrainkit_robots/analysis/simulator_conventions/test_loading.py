@@ -128,11 +128,11 @@ def test_cheap_elements_are_passed_to_mujoco_and_comments_not_counted(read, monk
 @pytest.mark.parametrize(
     ("limit", "load", "message"),
     [
-        ("_MAX_BODIES", in_mujoco, "number of bodies: got 3; expected at most 2 for MuJoCo"),
+        ("MAX_BODIES", in_mujoco, "number of bodies: got 3; expected at most 2 for MuJoCo"),
         ("MAX_ELEMENTS", in_mujoco, "number of elements: expected at most 2"),
         ("MAX_ELEMENTS", in_yourdfpy, "number of elements: got 5; expected at most 2"),
         # 1 name, 1 folder of the file, and 3 folders: its own, and 2 of the compiler.
-        ("_MAX_PATHS", in_mujoco, "number of files and folders: got 3 paths; expected at most 2"),
+        ("MAX_PATHS", in_mujoco, "number of files and folders: got 3 paths; expected at most 2"),
     ],
 )
 def test_large_files_are_not_passed(read, monkeypatch, limit, load, message):

@@ -153,13 +153,13 @@ def test_renamed_top_level_default():
 
 
 def test_file_with_too_many_kinds_of_errors_is_not_checked(monkeypatch):
-    monkeypatch.setattr(parser, "_MAX_ATTEMPTS", 3)
+    monkeypatch.setattr(parser, "MAX_ATTEMPTS", 3)
     words = [f'w{k}="1"' for k in range(3)]
     two, three = (read(body(f"<geom size='1' {' '.join(words[:k])}/>")) for k in (2, 3))
     assert (codes(two), len(two.links)) == (["XML007"] * 2, 1)
     assert (codes(three), three.links) == (["XML007"] * 3 + ["XML011"], ())
     assert three.problems[-1].message.startswith("MuJoCo still rejects the file")
-    monkeypatch.setattr(parser, "_MAX_SECONDS", -1)
+    monkeypatch.setattr(parser, "MAX_SECONDS", -1)
     assert codes(read(body("<geom size='1' w='1'/>"))) == ["XML007", "XML011"]
 
 

@@ -205,7 +205,7 @@ def test_too_many_elements_are_reported(monkeypatch):
 
 
 def test_number_of_files_is_bounded(tmp_path, monkeypatch):
-    monkeypatch.setattr(tree, "_MAX_FILES", 3)
+    monkeypatch.setattr(tree, "MAX_FILES", 3)
     includes = "".join(f'<include file="p{k}.xml"/>' for k in range(3))
     files = {f"p{k}.xml": PART.replace('"b"', f'"b{k}"') for k in range(3)}
     robot = load(tmp_path, {"robot.xml": f"<mujoco>{includes}</mujoco>", **files})

@@ -49,9 +49,9 @@ def test_similar_name_is_suggested_unless_its_number_differs(name, suggestion):
 
 def test_number_of_suggestions_is_bounded(monkeypatch):
     wrong = '<gazebo reference="fooot"/><gazebo reference="bbase"/>'
-    monkeypatch.setattr(references, "_MAX_SUGGESTIONS", 1)
+    monkeypatch.setattr(references, "MAX_SUGGESTIONS", 1)
     assert ["did you mean" in message for message, _ in told(wrong)] == [True, False]
-    monkeypatch.setattr(references, "_MAX_COMPARED", 3)
+    monkeypatch.setattr(references, "MAX_COMPARED", 3)
     assert ["did you mean" in message for message, _ in told(wrong)] == [False, False]
 
 

@@ -153,7 +153,7 @@ def test_not_xml(data):
     [
         ("MAX_BYTES", 2**20, "<a>" + " " * (2**20 - 7) + "</a>", "more than 1 MiB;"),
         ("MAX_ELEMENTS", 9, "<a>" + "<b/>" * 8 + "</a>", "more than 9 elements;"),
-        ("_MAX_ATTRIBUTES", 3, "<a><b x='' y='' z=''/></a>", "more than 3 attributes;"),
+        ("MAX_ATTRIBUTES", 3, "<a><b x='' y='' z=''/></a>", "more than 3 attributes;"),
     ],
 )
 def test_limits(name, most, text, says, monkeypatch):

@@ -87,7 +87,7 @@ def test_unstable_drop_of_sliding_joint_is_in_meters(monkeypatch, sliding_shanks
 )
 def test_does_not_stand_severity(monkeypatch, stood, path, tilt, lifted, most_legs, severity):
     fallen = replace(stood, tilt=math.radians(tilt), lifted_feet=lifted)
-    monkeypatch.setattr(stability, "_MAX_SINGLE_LEGS", most_legs)
+    monkeypatch.setattr(stability, "MAX_SINGLE_LEGS", most_legs)
     monkeypatch.setattr(stability, "stand_test", lambda *_, **__: fallen)
     violations = check("DYN002", path)
     assert [violation.severity for violation in violations] == ([severity] if severity else [])
@@ -117,7 +117,7 @@ def test_biped_needs_its_center_of_mass_above_its_feet(monkeypatch):
         (margin, ["the center of mass of the biped is not above its feet"]),
         (0.99 * margin, []),
     ):
-        monkeypatch.setattr("terrainkit_robots.simulation.standing._MIN_MARGIN", limit)
+        monkeypatch.setattr("terrainkit_robots.simulation.standing.MIN_MARGIN", limit)
         assert [each.reason for each in lint(robot, [rule]).skipped] == reasons
 
 
