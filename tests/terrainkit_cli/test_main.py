@@ -97,7 +97,7 @@ def test_jobs_that_do_not_fit_in_memory_are_rejected(rejected, monkeypatch):
 
 @pytest.mark.parametrize("command", ["train", "evaluate", "export", "play", "smoke-test"])
 def test_training_commands_name_the_missing_extra(rejected, monkeypatch, command):
-    monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
+    monkeypatch.setattr(training_extra, "PACKAGES", ("torch", "no_such_package"))
     told = "missing packages: no_such_package; run: pip install '.[train]' (in a clone of terra"
     assert rejected(f"{command} quadruped").startswith(told)
 
