@@ -8,7 +8,6 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import field_types, flatten
 from terrainkit_cli.train_command import Train
-from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Commands, Env, Rewards, Task
 from terrainkit_robots.rl.tasks import get_task, register_task
 
@@ -33,8 +32,7 @@ class RoverTask(Task):
 
 
 @pytest.fixture
-def rover(monkeypatch, tmp_path):
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+def rover(own_tasks, tmp_path):  # noqa: ARG001
     return register_task("rover", tmp_path, RoverTask(env=Env(num_envs=17)))
 
 

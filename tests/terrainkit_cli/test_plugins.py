@@ -1,9 +1,8 @@
-import sys
 from pathlib import Path
 
 import pytest
 
-from terrainkit.terrain import plugin_file, registry
+from terrainkit.terrain import registry
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -102,17 +101,6 @@ BLOCKS = [
     part.partition("```")[0] for part in (DOCS / "python_api.md").read_text().split("```python\n")
 ]
 (SCRIPT,) = (block for block in BLOCKS if "class SideStep(" in block)
-
-
-@pytest.fixture
-def own_registry(monkeypatch):
-    """Forget what a test registers and imports."""
-    monkeypatch.setattr(registry, "_registered", {})
-    monkeypatch.setattr(plugin_file, "_loaded", {})
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    registry._get.cache_clear()
-    yield
-    registry._get.cache_clear()
 
 
 @pytest.mark.usefixtures("own_registry")

@@ -155,8 +155,8 @@ def test_run_folder_replaces_the_task(run, task):
     assert open_run(run).task == other
 
 
-def test_open_run_finds_bundled_policy_by_name(task, mine, monkeypatch):
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+@pytest.mark.usefixtures("own_tasks")
+def test_open_run_finds_bundled_policy_by_name(task, mine):
     shipped = tasks.register_task("rover_of_this_test", mine).trained_run
     with pytest.raises(ConfigError, match="no policy is shipped with rover_of_this_test"):
         open_run("rover_of_this_test")
@@ -166,7 +166,8 @@ def test_open_run_finds_bundled_policy_by_name(task, mine, monkeypatch):
     assert opened.info.robot == "rover_of_this_test"
 
 
-def test_missing_keys_of_a_run_have_the_defaults_of_the_schema(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("own_tasks")
+def test_missing_keys_of_a_run_have_the_defaults_of_the_schema(tmp_path):
     """A new option is off in an old run, whatever the registered task says today."""
 
     @dataclass(frozen=True, kw_only=True)
@@ -174,7 +175,6 @@ def test_missing_keys_of_a_run_have_the_defaults_of_the_schema(tmp_path, monkeyp
         height: float
         effort: float = 1.0
 
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
     today = Task(
         observations=Observations(foot_contact=True),
         rewards=Rewards(torques=-7.0),

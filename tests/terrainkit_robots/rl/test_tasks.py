@@ -18,11 +18,7 @@ from terrainkit_robots.rl.tasks import get_task, register_task, task_names
 MINE = replace(Task(), env=Env(num_envs=7))
 QUADRUPED = get_task("quadruped").folder
 
-
-@pytest.fixture(autouse=True)
-def restored_tasks(monkeypatch):
-    """Restore the registered tasks after each test."""
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+pytestmark = pytest.mark.usefixtures("own_tasks")
 
 
 @pytest.fixture
