@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 
 from terrainkit.terrain import registry
+from tests.tables import read_table
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -55,27 +56,7 @@ BUILD = "patch (0, 0): terrain dunes (dune_pack:Dunes): SystemExit: 0"
 
 
 @pytest.mark.usefixtures("dune_pack")
-@pytest.mark.parametrize(
-    ("fails", "words", "told"),
-    [
-        ("import", ("generate", *SMALL), IMPORT),
-        ("import", ("list", "dunes"), IMPORT),
-        (
-            "import",
-            ("check-robot", "quadruped"),
-            "rules DUN (dune_pack) cannot be loaded: SystemExit: 0",
-        ),
-        ("import", ("train", "rover"), "task rover (dune_pack) cannot be loaded: SystemExit: 0"),
-        (
-            "",
-            ("generate", "--overlay", "ripples", "-o", "map.npz"),
-            "overlay ripples (dune_pack:Dunes) cannot be loaded: overlay: got <class "
-            "'dune_pack.Dunes'>; expected a subclass of Overlay",
-        ),
-        ("heights", ("generate", *SMALL), BUILD),
-        ("heights", ("generate", *SMALL, "--jobs", 2), BUILD),
-    ],
-)
+@pytest.mark.parametrize(("fails", "words", "told"), read_table(__file__, "failing_plugin"))
 def test_failing_plugin_is_one_line(terrainkit_process, monkeypatch, tmp_path, fails, words, told):
     monkeypatch.setenv("FAIL", fails)
     run = terrainkit_process(*words)
