@@ -26,6 +26,7 @@ from terrainkit_robots.rl.run import (
 )
 from terrainkit_robots.rl.terrain import load_terrain
 from terrainkit_robots.spec.robot_arrays import Robot
+from tests.tables import read_table
 
 
 @pytest.fixture
@@ -213,17 +214,7 @@ def test_open_run_rejects_other_folders(tmp_path, monkeypatch, name, told):
         open_run(name)
 
 
-@pytest.mark.parametrize(
-    ("file", "old", "new", "told"),
-    [
-        (RUN_FILE, "version = 1", "version = 2", "format_version: got 2; expected one of: 1"),
-        (RUN_FILE, 'robot = "quadruped"', "robot = 3", "robot: got 3; expected a string"),
-        (RUN_FILE, 'robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
-        (RUN_FILE, 'terrain = "plane"', "", "terrain: missing; expected a string"),
-        (RUN_FILE, "seed", "seed =", "not a TOML file"),
-        (TASK_FILE, "tracking_lin_vel", "tracking_lin_vle", "tracking_lin_vle"),
-    ],
-)
+@pytest.mark.parametrize(("file", "old", "new", "told"), read_table(__file__, "malformed_files"))
 def test_open_run_rejects_malformed_files(run, file, old, new, told):
     path = run / file
     path.write_text(path.read_text().replace(old, new, 1))
