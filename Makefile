@@ -1,4 +1,4 @@
-.PHONY: test lowest pythons check format bench fuzz mutate docs demo-page wheel site browser integrations workflows
+.PHONY: test lowest pythons check format bench fuzz mutate records docs demo-page wheel site browser integrations workflows
 
 test:          ## all tests
 	python -m pytest
@@ -24,6 +24,12 @@ fuzz:          ## read damaged and hostile files for 10 minutes
 
 mutate:        ## plant changes in a file and list those that no test notices; ARGS="FILE TEST ..."
 	.ci/mutate $(ARGS)
+
+records:       ## write what the tests of all terrains, presets and rules compare with
+	python -m tests.terrainkit.test_every_terrain
+	python -m tests.terrainkit.terrain.test_presets
+	python -m tests.terrainkit_robots.lint.test_every_rule
+	python -m tests.terrainkit_robots.lint.test_all_rules
 
 docs:          ## write the generated docs, and draw the pictures that are missing
 	python docs/build.py

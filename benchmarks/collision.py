@@ -33,9 +33,11 @@ def run() -> Iterator[tuple[str, float]]:
         for name, cost in _step_times(terrain_map).items():
             yield f"{preset}_{name}_over_plane", cost
 
+    flat = tuple(terrain for terrain in get_preset("all") if terrain.name in _FLAT_TERRAINS)
     counts, costs = [], []
     for rows in _NUM_ROWS:
-        terrain_map = _flat_map(rows)
+        config = terrainkit.MapConfig(rows=rows, cols=6, terrains=flat, slope_threshold=0.25)
+        terrain_map = terrainkit.generate(config)
         times = _step_times(terrain_map)
         counts.append(len(terrain_map.boxes().centers))
         costs.append(times["boxes"] / times["hfield"])
@@ -44,12 +46,6 @@ def run() -> Iterator[tuple[str, float]]:
     # The cost grows with the number of boxes and with its logarithm.
     slope, offset = np.polyfit(np.log(counts), costs, 1)
     yield "break_even_boxes", float(np.exp((1 - offset) / slope))
-
-
-def _flat_map(rows: int) -> terrainkit.TerrainMap:
-    terrains = tuple(terrain for terrain in get_preset("all") if terrain.name in _FLAT_TERRAINS)
-    config = terrainkit.MapConfig(rows=rows, cols=6, terrains=terrains, slope_threshold=0.25)
-    return terrainkit.generate(config)
 
 
 def _step_times(terrain_map: terrainkit.TerrainMap) -> dict[str, float]:

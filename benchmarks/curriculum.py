@@ -9,6 +9,7 @@ seeds.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import get_args
 
 import numpy as np
@@ -124,11 +125,8 @@ def run() -> Iterator[tuple[str, float]]:
     names = ("skill_after_5M_samples", "share_in_impossible_columns", "million_samples_to_solve")
     for learner_name, learner in LEARNERS.items():
         for sampler_name in get_args(SamplerName):
-            results = []
-            for seed in _SEEDS:
-                kind = SAMPLERS[sampler_name]
-                sampler = kind(_ROWS, _COLS, _NUM_ENVS, max_init_level=5, seed=seed)
-                results.append(Training(learner, sampler, seed).run())
+            kind = partial(SAMPLERS[sampler_name], _ROWS, _COLS, _NUM_ENVS, max_init_level=5)
+            results = [Training(learner, kind(seed=seed), seed).run() for seed in _SEEDS]
             means = np.mean(results, axis=0) / (1, 1, 1e6)
             for name, value in zip(names, means.tolist(), strict=True):
                 yield f"{learner_name}.{sampler_name}.{name}", value

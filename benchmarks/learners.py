@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from clock import seconds
 
 from terrainkit_robots.integrations.gymnasium import TaskVectorEnv
 from terrainkit_robots.rl.config import Task
@@ -36,7 +37,7 @@ def run() -> Iterator[tuple[str, float]]:
     for function in measured.values():
         function()
     rounds = [
-        {name: _cpu_seconds(function) for name, function in measured.items()}
+        {name: seconds(function, time.process_time) for name, function in measured.items()}
         for _ in range(_NUM_ROUNDS)
     ]
     plain = statistics.median(times["plain"] for times in rounds)
@@ -45,12 +46,6 @@ def run() -> Iterator[tuple[str, float]]:
     for name in measured:
         ratio = statistics.median(times["plain"] / times[name] for times in rounds)
         yield f"{name}{limits.get(name, '')}", ratio
-
-
-def _cpu_seconds(function: Callable[[], Any]) -> float:
-    start = time.process_time()
-    function()
-    return time.process_time() - start
 
 
 def _task() -> Task:

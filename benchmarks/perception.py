@@ -58,7 +58,9 @@ def run() -> Iterator[tuple[str, float]]:
             ),
         )
 
-    x, y, z = (values.ravel()[:MILLION] for values in _points(scan, position, yaw, rng))
+    # The points of two scans of the robots.
+    scans = [scan.points(position, heading) for heading in (yaw, rng.permutation(yaw))]
+    x, y, z = (values.ravel()[:MILLION] for values in np.concatenate(scans, axis=1))
     geom, up = np.zeros(1, np.int32), 9.0
     start, down = np.array([0.0, 0.0, up]), np.array([0.0, 0.0, -1.0])
     found, on_heightfield = np.empty(len(x)), np.empty(len(x), bool)
@@ -79,9 +81,3 @@ def run() -> Iterator[tuple[str, float]]:
         for dy in (-1e-5, 1e-5)
     ]
     yield "heights_off_by_1_mm (0)", float((np.ptp(beside, axis=0) <= 1e-3).sum())
-
-
-def _points(scan, position, yaw, rng):  # type: ignore[no-untyped-def]
-    """Return x, y and z of the points of two scans of the robots."""
-    parts = [scan.points(position, heading) for heading in (yaw, rng.permutation(yaw))]
-    return np.concatenate(parts, axis=1)

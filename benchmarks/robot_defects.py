@@ -34,8 +34,8 @@ from mutants.robot_files import ROBOT_FILES, robot_folder
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.rule import Finding
-from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 
@@ -161,19 +161,18 @@ def _test_mutant(path: Path, index: int, site: int, seed: int) -> MutantResult |
         prefix=f"mutant_{index}_{site}",
         functions=source.functions(),
     )
-    files = []
     try:
         names = defect.apply(mutant)
         for name, content in mutant.files.items():
-            files.append(mutant.folder / name)
-            files[-1].parent.mkdir(parents=True, exist_ok=True)
-            files[-1].write_bytes(content)
+            file = mutant.folder / name
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(content)
         return _check(mutant, defect, result.robot, names, findings, meshes)
     except NotApplicableError:
         return None
     finally:
-        for file in files:
-            file.unlink(missing_ok=True)
+        for name in mutant.files:
+            (mutant.folder / name).unlink(missing_ok=True)
 
 
 def _raise_timeout(*_: object) -> None:
@@ -246,10 +245,6 @@ def _test_robot(
     return source, results
 
 
-def _num_bytes(path: Path) -> int:
-    return sum(file.stat().st_size for file in robot_folder(path).rglob("*"))
-
-
 def _is_selected(defect: Defect, only: str) -> bool:
     return any(code.startswith(only) for code in defect.codes)
 
@@ -272,7 +267,7 @@ def measure(sites: int = 2, seed: int = 0, only: str = "", robot: str = "") -> R
             for index, defect in enumerate(defects())
             if defect.format == format_ and _is_selected(defect, only)
         ]
-        size = _num_bytes(path)
+        size = sum(file.stat().st_size for file in robot_folder(path).rglob("*"))
         tasks.append((size, path, indices, (sites + 1) // 2 if size > _MAX_MESH_BYTES else sites))
     if not any(indices for _, _, indices, _ in tasks):
         sys.exit(f"no defect for --only {only!r} and --robots {robot!r}; see {DEFECTS}")

@@ -64,9 +64,7 @@ def _time_shares(env: LeggedEnv) -> Iterator[tuple[str, float]]:
     runner = LeggedRunner(env)
     env.sim.step = _timed(env.sim.step, times, "physics")  # type: ignore[method-assign]
     env.step = _timed(env.step, times, "step")  # type: ignore[method-assign]
-    start = time.perf_counter()
-    runner.learn(_NUM_ITERATIONS)
-    total = time.perf_counter() - start
+    total = seconds(partial(runner.learn, _NUM_ITERATIONS))
     yield "physics", times["physics"] / total
     yield "environment", (times["step"] - times["physics"]) / total
     yield "networks", 1 - times["step"] / total

@@ -116,9 +116,13 @@ def run_forked(folder: Path, prepare: Callable[[], Command]) -> Failure | None:
         os.killpg(child, signal.SIGKILL)
     status, usage = ended
     kibibytes = usage.ru_maxrss - int((folder / "memory").read_text())
+    cpu = usage.ru_utime + usage.ru_stime
+    # Whether the command ended only by the limits of its child processes.
+    is_slow = cpu > SECONDS or wall_clock > _MAX_WAIT * SECONDS
+    hang = f"ends after {wall_clock:.0f} s, of which it computes {cpu:.0f} s" if is_slow else ""
     found = chain(
         _failures(folder, os.waitstatus_to_exitcode(status), kibibytes / 2**20),
-        _slow(wall_clock, usage.ru_utime + usage.ru_stime),
+        [("hang", hang)],
         (("processes", line) for line in orphans),
     )
     return next((Failure(kind, line) for kind, line in found if line), None)
@@ -147,12 +151,6 @@ def _failures(folder: Path, code: int, gigabytes: float) -> Iterator[tuple[str, 
     for line in set(_listing(folder)).difference(before):
         is_output = code != 2 and line.startswith("'work/out")
         yield "files", f"exit code {code}: changed {line}" * (not is_output)
-
-
-def _slow(wall_clock: float, cpu: float) -> Iterator[tuple[str, str]]:
-    """Yield whether a command ended only by the limits of its child processes."""
-    is_slow = cpu > SECONDS or wall_clock > _MAX_WAIT * SECONDS
-    yield "hang", f"ends after {wall_clock:.0f} s, of which it computes {cpu:.0f} s" * is_slow
 
 
 def _read(path: Path) -> str:

@@ -230,7 +230,8 @@ class Evaluate(PolicyCommand):
         if self.suite and not is_map(self.suite):
             get_suite(self.suite)  # an unknown name is reported before the run is loaded
         spec, config = self.load_spec(), self.eval_config(self.seconds)
-        repetitions, margins = self.repetitions or DEFAULT_REPETITIONS, None
+        repetitions = self.repetitions or DEFAULT_REPETITIONS
+        margins = None
         if self.margins:
             margins = report_card.report_margins(spec, config, self.repetitions)
         if self.suite:

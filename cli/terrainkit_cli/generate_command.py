@@ -34,8 +34,7 @@ class Generate(PluginCommand, ConfigCommand):
 
     output: OutputPath
     """File to write. The suffix selects the format: .npz for a complete map, which the other
-    commands read; .xml (MuJoCo), .usd, .sdf (Gazebo), .stl, .ply, .obj, .glb or .png for other
-    programs."""
+    commands read, or one of `terrainkit export`, such as .xml (MuJoCo), for other programs."""
 
     config: Annotated[str, option("FILE")] = ""
     """Map config (.toml), or a map (.npz) whose config is used; options override it."""

@@ -66,8 +66,7 @@ def report_suite(
     render.result(
         f"\nThe table counts the robots, of {repetitions} on each patch, that crossed. {CRITERION}"
     )
-    if margins is not None:
-        card = replace(card, remarks={"margins": margins})
+    card = replace(card, remarks={"margins": margins})
     return [card.to_json().encode(), card_markdown(card).encode(), draw_card(card)]
 
 

@@ -137,7 +137,7 @@ class CheckRobot(Command):
         return int(any(result.failed for result in results))
 
     def _settings(self) -> "Settings":
-        from terrainkit_robots.lint.selection import select_rules
+        from terrainkit_robots.lint.check import select_rules
 
         settings = replace(
             parse_settings(self.ignore, self.package, self.xacro_arg),
@@ -288,9 +288,9 @@ def _write_fixes(result: "FixResult", *, unsafe: bool) -> "Report":
     write_fixes(result)
     safeties = ("safe", "unsafe") if unsafe else ("safe",)
     unfixed = tuple(
-        (unfixed.finding, unfixed.reason)
-        for unfixed in result.unfixed
-        if unfixed.finding.fix is not None and unfixed.finding.fix.safety in safeties
+        (left.finding, left.reason)
+        for left in result.unfixed
+        if left.finding.fix is not None and left.finding.fix.safety in safeties
     )
     return replace(result.report, fixed=result.fixed, unfixed=unfixed)
 

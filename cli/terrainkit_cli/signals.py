@@ -30,8 +30,8 @@ def raise_on_signals() -> None:
     numbers = _termination_signals()
 
     def terminate(number: int, _: object) -> None:
-        for ignored in numbers:  # a second signal would interrupt the cleanup
-            signal.signal(ignored, lambda *_: None)
+        for other in numbers:  # a second signal would interrupt the cleanup
+            signal.signal(other, lambda *_: None)
         raise Terminated(number)
 
     for number in numbers:

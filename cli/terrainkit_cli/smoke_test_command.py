@@ -133,7 +133,8 @@ def failed_checks(result: "SmokeTestResult") -> int:
 
 def summary(result: "SmokeTestResult") -> str:
     """Return a result as one line."""
-    robot, failed = result.about["robot"], failed_checks(result)
+    robot = result.about["robot"]
+    failed = failed_checks(result)
     if not failed:
         return f"{robot} can be trained"
     return f"{robot}: {failed} of {len(result['checks'])} checks failed"

@@ -178,7 +178,8 @@ def _print_result(runner: "LeggedRunner", task: "Task", task_file: Path | None) 
         return
     from terrainkit_robots.text import count
 
-    folder, completed = quote(str(runner.folder)), runner.current_learning_iteration
+    folder = quote(str(runner.folder))
+    completed = runner.current_learning_iteration
     run = f"{folder} --task {quote(str(task_file))}" if task_file else folder
     whole = task.runner.max_iterations
     if completed < whole:

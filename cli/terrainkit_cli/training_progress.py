@@ -45,7 +45,8 @@ class ProgressMeter:
 
     def start(self, runner: "LeggedRunner") -> None:
         """Measure a training from its first iteration on."""
-        self._start_time, self._first = time.perf_counter(), runner.current_learning_iteration
+        self._start_time = time.perf_counter()
+        self._first = runner.current_learning_iteration
         runner.logger.episode_callback = self._add_episodes
 
     def _add_episodes(self, count: int, log: Mapping[str, float]) -> None:
@@ -76,7 +77,9 @@ class ProgressMeter:
 
     def _metrics(self, runner: "LeggedRunner") -> dict[str, str]:
         """Return speed, time to go, and means over the last episodes, once one has ended."""
-        env, logger, completed = runner.env, runner.logger, runner.current_learning_iteration
+        env = runner.env
+        logger = runner.logger
+        completed = runner.current_learning_iteration
         steps = env.cfg.runner.num_steps_per_env * env.num_envs * runner.gpu_world_size
         pace = (time.perf_counter() - self._start_time) / (completed - self._first)
         metrics = {

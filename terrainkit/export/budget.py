@@ -93,7 +93,7 @@ def compute_budget(terrain_map: "TerrainMap", foot_radius: float = 0.03) -> Budg
             except ExportError as error:
                 sizes[name] = str(error)
                 continue
-            sizes[name] = sum(file.stat().st_size for file in Path(folder).iterdir())
+            sizes[name] = sum(part.stat().st_size for part in Path(folder).iterdir())
             if "collision" in options:
                 collisions[options["collision"]] = _collision_budget(path)
     return Budget(

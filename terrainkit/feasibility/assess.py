@@ -191,6 +191,8 @@ class _Path:
             usable = path_edges(graph, step_demand, (start, targets))
             ratios = graph.demand(usable)
             ends = position(usable.end) - position(usable.start)
+            # Of the least demanding paths, a short one over easy ground: a step at the limit counts
+            # as twice its length.
             length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)
             way = shortest_path(usable, length, start, targets, size)
             if way is None:

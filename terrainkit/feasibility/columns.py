@@ -128,7 +128,7 @@ def sample_columns(patch: Patch, threshold: float) -> Columns:
     in_cells = (index + 0.5) / n - 0.5
     xy: FloatArray = index * spacing + np.array(lower)
     ground = surface_at(patch.heights, in_cells, threshold=threshold).height
-    # No solid fits between two columns.
+    # Each solid is at least as wide as the distance of two columns, so none fits between them.
     widened = np.maximum(spacing - solid_widths(solids), 0.0) / 2
     solid_index = SolidIndex(solids, radius=widened)
     intervals = free_intervals(ground, solid_index.intervals(xy)).reshape(nx, ny, -1, 2)

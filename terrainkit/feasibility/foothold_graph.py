@@ -138,6 +138,7 @@ def ratio(name: str, value: FloatArray, limits: RobotLimits) -> FloatArray:
         # 1 at the limit, and 0 from twice the limit on.
         result = np.maximum(2.0 - value / limit, 0.0)
     elif name == "crouched_height":
+        # 0 from the standing height on, 1 at the crouched height, and more below.
         clearance = np.minimum(value, limits.standing_height)
         result = (limits.standing_height - clearance) / (limits.standing_height - limit)
     else:

@@ -65,6 +65,7 @@ def _with_tops(
     solid = tops.solid.reshape(-1)
     max_size = 2 * limits.foothold
     on_solid = np.flatnonzero(solid >= 0)
+    # The columns show solids that were widened to both sides.
     sizes[on_solid] = np.maximum(sizes[on_solid] - 2 * tops.widened[solid[on_solid]], 0.0)
     exact = np.full(len(sizes), np.nan)
     narrow = on_solid[sizes[on_solid] < max_size]
@@ -104,7 +105,8 @@ def _flat_steps(columns: Columns, steps: Edges, limits: RobotLimits) -> NDArray[
         following = np.full(columns.floor.size, -1)
         following[steps.start[chains[0]]] = chains[0]
         rise = step[chains[0]]
-        # The steps one after the other across the smallest foothold.
+        # Small steps may add up to an edge. `rise` is the sum of 2, 3, ... steps one after the
+        # other, as many as fit on the smallest foothold; all steps of a sum above the edge are one.
         for _ in range(1, math.floor(limits.foothold / columns.spacing + 1e-9)):
             after = following[steps.end[chains[-1]]]
             chains = [chain[after >= 0] for chain in (*chains, after)]
@@ -172,6 +174,8 @@ def _surface_sizes(
     # The wall of a node with a step beside it is one pixel away.
     distance = cv2.distanceTransform(is_free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     inner = pixel[0] + 1, pixel[1] + 1
+    # A disk with a radius of r pixels is 2 r pixels wide, which is r columns. It fits where the
+    # nearest wall is at least r away, and covers all nodes within r of such a place.
     for radius in range(2, max_size + 1):
         centers = (distance < radius - 1e-3).astype(np.uint8)
         if centers.all():

@@ -49,6 +49,8 @@ class FreeWidth:
         """Return the free width around the columns of a patch."""
         import cv2
 
+        # A line shorter than twice the body width has one of its ends within the body width. Rays
+        # end at the side of a cell, half a column before its center.
         reach = math.ceil(limits.body_width / columns.spacing) + 1
         kernel = np.ones((2 * reach + 1, 2 * reach + 1), dtype=np.uint8)
         ceilings = []
@@ -202,6 +204,8 @@ class _Cell(NamedTuple):
 def _trace_ray(angle: float, length: float, spacing: float) -> list[_Cell]:
     """Return the cells that a ray of some length enters [m], in their order."""
     x, y = math.cos(angle), math.sin(angle)
+    # From the center of a cell, the sides across an axis are half a column away, then one column
+    # more each; along the ray, that is divided by the component of its direction.
     crossings = [
         ((n + 0.5) * spacing / abs(along), axis)
         for axis, along in enumerate((x, y))
@@ -209,6 +213,7 @@ def _trace_ray(angle: float, length: float, spacing: float) -> list[_Cell]:
         for n in range(math.ceil(length * abs(along) / spacing + 0.5))
     ]
     cells, at, distances = [], [0, 0], [0.0]
+    # Rounded, so that sides that meet in a corner come in the order of the axes.
     for distance, axis in sorted((round(d, 9), axis) for d, axis in crossings):
         if distance >= length:
             break

@@ -133,12 +133,15 @@ def _pairs(
 
 def _offsets(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
     """Return the moves over gaps below `max_gap` [m] in columns, shape (n, 2), and their gaps."""
-    # The gap is narrower than the distance of the nodes by at most a column along each axis.
+    # Along the longer axis, the gap is a column narrower than the distance of the nodes: far - 1 <
+    # max_gap / spacing.
     n = min(math.ceil(max_gap / columns.spacing), max(columns.shape))
     moves = np.argwhere(np.ones((2 * n + 1, 2 * n + 1))) - n
     near, far = np.abs(moves).min(axis=1), np.abs(moves).max(axis=1)
-    # The line leaves the cell of each node after half a column along the longer axis. Cells that
-    # touch at a corner are as far apart as the circles in them.
+    # The line leaves the cell of each node after half a column along the longer axis, which is the
+    # share 1/2 / far of its length: 1 - 1 / far of it is outside of both cells. Cells that touch at
+    # a corner are as far apart as the circles in them: sqrt(2) - 1 columns, which is 1 - sqrt(1/2)
+    # of the distance of their centers. Steps join the cells that share a side.
     outside = np.where(far > 1, 1.0 - 1.0 / np.maximum(far, 1), 1.0 - 0.5**0.5)
     gaps = np.hypot(near, far) * columns.spacing * outside
     useful = ((far > 1) | (near > 0)) & (gaps < max_gap)

@@ -31,7 +31,8 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
     steps = graph.steps
     num_nodes = graph.columns.floor.size
     gaps = steps.select(slice(0))
-    # A lower bound of the demand of all gaps: the demand of cells that touch at a corner.
+    # Cells that touch at a corner are sqrt(2) - 1 columns apart, and all others at least one (see
+    # `gap_edges`): no gap between cells demands less.
     searched = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap
     without_gaps = least = bottleneck(steps, step_demand, segment, num_nodes)
     while min(least, MAX_DEMAND) > searched:
@@ -51,6 +52,7 @@ def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) 
     if least == without_gaps:
         return usable
     # One gap into each component is enough to find the demand; a path may need to go far to it.
+    # Gaps are searched below a demand: to keep those that demand `least`, it is the next number.
     above = np.nextafter(least, np.inf)
     gaps, components = _below(graph, gaps, above), Components.build(steps, is_usable, num_nodes)
     is_reached = components.reached(segment[0], gaps)

@@ -18,7 +18,8 @@ WALL = 0.1
 """Thickness of the walls beside stairs [m]."""
 
 _ARC_POINTS = 4
-"""Points on the outer edge of a curved tread."""
+"""Points on the edges of a curved tread. The three chords of a tread that turns by 30 degrees leave
+the arc by 1 - cos(5 degrees), 0.4 % of its radius."""
 
 Points = NDArray[np.float64]
 
@@ -156,6 +157,8 @@ def lay_out(
         gap: Gap between two flights side by side [m].
         risers: Height of the riser of each tread and landing in their order [m]; 0 for none.
     """
+    # Points of the plane are complex numbers, x + iy, and headings those of length 1: a product
+    # with a heading turns the points of a section, which are as if it began at 0 along x.
     position, heading, z = 0j, 1 + 0j, 0.0
     plates: list[Points] = []
     nosings: list[Points] = []
@@ -173,10 +176,13 @@ def lay_out(
                 parts.append(_real(position + heading * _plate(section, k, width, gap, extra)))
         tops += heights.tolist()
         # The line of the nosings begins at the first riser of a flight up, and ends at the last of
-        # a flight down.
+        # a flight down. It rises by one riser per tread, so it ends a riser above the last tread of
+        # a flight up, and begins at the height before a flight down.
         low, high = heights[0], heights[-1]
         if not section.is_landing:
             low, high = (low, high + steps[-1]) if section.rise > 0 else (z, high)
+            # The tips of the nosings are in front of the risers, where the line is lower by its
+            # slope times the nosing.
             ahead = nosing * abs(steps[-1]) / section.length if section.length else 0.0
             low, high = low + ahead, high + ahead
         for side, points in zip(sides, _sides(section, width, gap), strict=True):
@@ -211,16 +217,21 @@ def _plate(
     """
     half = width / 2
     if section.turn == 1 and not section.is_landing:
+        # Winders share the quarter turn around the left corner, from the right (-90 degrees) to
+        # ahead (0). The walking line is half a width from the corner: an arc of the length of the
+        # nosing has the angle nosing / half there.
         first, last = np.pi / 2 * (np.array([k, k + 1]) / section.number - 1)
         angle = np.array([first - extra[0] / half, last + extra[1] / half])
         if first < -np.pi / 4 < last:
             angle = np.insert(angle, 1, -np.pi / 4)  # the corner
         rays = np.exp(1j * angle)
+        # The outer edge is a square: a ray ends where its longer component is the width.
         reach = width / np.maximum(np.abs(rays.real), np.abs(rays.imag))
         return np.append(reach * rays, 0.0) + 1j * half
     along = np.linspace(k * section.length - extra[0], (k + 1) * section.length + extra[1], 2)
     left, right = half, -half
     if section.turn == 2:
+        # Both flights are on the same side of it, so either nosing is behind its start.
         along, left = np.array([-max(extra), section.length]), 1.5 * width + gap
     elif section.turn:
         along, left = np.array([-extra[0], width]), half + extra[1]
@@ -249,6 +260,8 @@ def _sides(
 def _end(section: StairSection, width: float, gap: float) -> tuple[complex, complex]:
     """Return the position and the heading at the end of a section; see `_plate`."""
     if section.turn:
+        # The next flight leaves through the middle of the left side of the square, or goes back
+        # beside the last one.
         return [(1 + 1j) * width / 2, 1j * (width + gap)][section.turn - 1], 1j**section.turn
     length, half = section.number * section.length, width / 2
     turn = complex(np.exp(1j * length / (section.inner_radius + half)))
@@ -268,6 +281,8 @@ def _at(
     """
     if section.inner_radius == math.inf:
         return np.asarray(along + 1j * left, complex)
+    # The center of the arc is to the left of the start by the radius of the walking line; lengths
+    # are measured on that line, so the angle is length / radius.
     walking = section.inner_radius + half
     turned = np.exp(1j * along / walking)
     return np.asarray(1j * walking - 1j * (walking - left) * turned, complex)
@@ -280,6 +295,8 @@ def _real(points: NDArray[np.complex128]) -> Points:
 def _prisms(bases: tuple[Points, ...], low: Points, high: Points) -> Solids:
     """Return upright prisms: boxes where the base is a rectangle along the axes, else hulls."""
     corners = [(base.min(axis=0), base.max(axis=0)) for base in bases]
+    # Each of the 4 corners of such a rectangle has both coordinates at the bounds of the base;
+    # those of other treads are partly inside of the bounds.
     is_box = np.array(
         [
             np.isclose(base, pair[0], atol=1e-9).sum() + np.isclose(base, pair[1], atol=1e-9).sum()

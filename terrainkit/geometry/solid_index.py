@@ -257,7 +257,7 @@ def half_spaces(solids: Solids) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     planes, counts = [np.concatenate(sides, axis=1).reshape(-1, 4)], [np.full(len(shapes), 6)]
     equations = [convex_hull(vertices).equations.round(9) for vertices in solids.hulls()]
     if equations:
-        hull = np.repeat(np.arange(len(equations)), [len(planes) for planes in equations])
+        hull = np.repeat(np.arange(len(equations)), [len(facets) for facets in equations])
         # Coplanar facets of a hull repeat their plane.
         unique = np.unique(np.column_stack([hull, np.concatenate(equations)]), axis=0)
         planes.append(unique[:, 1:] * [1, 1, 1, -1])

@@ -183,6 +183,7 @@ def _above(body: Any, cut: NDArray[np.float64], grid: Grid, threshold: float) ->
 
 def _make_solid(points: NDArray[np.float64]) -> Solids:
     """Return the box that has these corners, or else their convex hull."""
+    # Of a box, the two shortest edges from a corner are along two of its axes.
     edges = points[1:] - points[0]
     lengths = np.linalg.norm(edges, axis=1)
     first, second = edges[np.argsort(lengths)[:2]]

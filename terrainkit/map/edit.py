@@ -43,9 +43,9 @@ def edit_map(terrain_map: _Map, heights: ArrayLike | None, solids: Solids | None
     for row, col in np.ndindex(spawns.shape):
         old = terrain_map.patch(row, col).spawns
         patch_goals = goals[row, col][~np.isnan(goals[row, col, :, 0])]
-        ground = SpawnGround.of_map(config, new, solids, (row, col))
+        spawn_ground = SpawnGround.of_map(config, new, solids, (row, col))
         rng = partial(np.random.default_rng, [config.seed, row, col])
-        positions = _spawn_positions(ground, f"patch ({row}, {col})", old, rng)
+        positions = _spawn_positions(spawn_ground, f"patch ({row}, {col})", old, rng)
         spawns[row, col] = with_heading(positions, patch_goals)
     return replace(
         terrain_map,
@@ -67,7 +67,7 @@ def assign_solids(config: MapConfig, solids: Solids) -> Solids:
 
 
 def _spawn_positions(
-    ground: SpawnGround,
+    spawn_ground: SpawnGround,
     name: str,
     spawns: NDArray[np.float32],
     rng: Callable[[], np.random.Generator],
@@ -75,7 +75,7 @@ def _spawn_positions(
     """Return the spawn positions of a patch [m], shape (n, 3).
 
     Args:
-        ground: The ground of the patch.
+        spawn_ground: The ground of the patch.
         name: Name of the patch, for errors.
         spawns: Earlier spawn positions, which are kept if all of them are flat and free, shape
             (k, 4); x and y of the first are the preferred position otherwise.
@@ -85,10 +85,10 @@ def _spawn_positions(
         ConfigError: if the patch has no place to spawn.
     """
     kept = [
-        (x, y, z) if ground.is_on_floor((x, y, z)) else ground.find((x, y))
+        (x, y, z) if spawn_ground.is_on_floor((x, y, z)) else spawn_ground.nearest_flat((x, y))
         for x, y, z in spawns[:, :3].tolist()
     ]
     if None not in kept and np.allclose(np.array(kept)[:, :2], spawns[:, :2], atol=1e-4):
         return np.array(kept)
     x, y = spawns[0, :2].tolist()
-    return ground.sample(ground.find_origin(name, (x, y)), rng)
+    return spawn_ground.sample(spawn_ground.find_origin(name, (x, y)), rng)

@@ -58,7 +58,7 @@ class SpawnGround:
             solids=solids.select(np.asarray(reaches)),
         )
 
-    def find(self, position: tuple[float, float]) -> tuple[float, float, float] | None:
+    def nearest_flat(self, position: tuple[float, float]) -> tuple[float, float, float] | None:
         """Return the spawn origin nearest to `position`.
 
         It is exactly at `position` if the ground there is flat and free, and else at the center of
@@ -88,7 +88,7 @@ class SpawnGround:
         return x, y, z
 
     def find_origin(self, name: str, position: tuple[float, float]) -> tuple[float, float, float]:
-        """Return the spawn origin of a patch [m]; see `find`.
+        """Return the spawn origin of a patch [m]; see `nearest_flat`.
 
         Args:
             name: Name of the patch, for the error.
@@ -102,7 +102,7 @@ class SpawnGround:
         """
         config = self.config
         grid = self.grid
-        origin = self.find(position)
+        origin = self.nearest_flat(position)
         if origin is None:
             tolerance = self.flattest_tolerance(position)
             largest = 0.45 * (min(grid.shape) - 1) * grid.cell
@@ -123,7 +123,7 @@ class SpawnGround:
         return origin
 
     def flattest_tolerance(self, position: tuple[float, float]) -> float | None:
-        """Return a `spawn_tolerance` with which `find` finds an origin.
+        """Return a `spawn_tolerance` with which `nearest_flat` finds an origin.
 
         It is what the flattest free disk around the center of a cell needs. In a patch that is too
         small for such disks, it is what the disk around the preferred position needs.

@@ -80,7 +80,7 @@ def place_on_flattest(
     ground = SpawnGround.of_map(config, heights, solids, patch)
     # In single precision as in a map, so that an edit keeps the position.
     x, y = spawn_xy.astype(np.float32).tolist()
-    origin = ground.find((x, y))
+    origin = ground.nearest_flat((x, y))
     if origin is None:
         tolerance = ground.flattest_tolerance((x, y))
         if tolerance is not None:

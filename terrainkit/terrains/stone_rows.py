@@ -59,7 +59,7 @@ class StoneRows(Lane):
         upper = np.dstack([corner[..., :2] + self.stone, top])
         block = np.array([x[-1] + self.stone + self.gap, low[1], -self.depth - SINK])
         lower, upper = (np.reshape(corners, (-1, 3)) for corners in (corner, upper))
-        if block[0] < high[0] - 1e-3:
+        if block[0] < high[0] - 1e-3:  # a thinner block would only be a rounding error
             lower, upper = np.vstack([lower, block]), np.vstack([upper, [*high, 0.0]])
         return make_blocks(lower, upper)
 

@@ -1,8 +1,8 @@
 """Tests of all terrains.
 
 Their parameters and numbers of their patches, with default parameters and with others, are in
-terrain_values.json. Write them anew with `python -m tests.terrainkit.test_every_terrain`: maps of
-equal configs differ between versions then.
+terrain_values.json. `make records` writes them anew: maps of equal configs differ between versions
+then.
 """
 
 import contextlib
@@ -195,7 +195,8 @@ RECORDED = {f"{name} {json.dumps(given)}": (name, given, (81, 60)) for name, giv
 @coarse
 @pytest.mark.parametrize("key", RECORDED)
 def test_every_terrain_keeps_its_values(key):
-    recorded = json.loads(VALUES.read_text())[key]
+    recorded = json.loads(VALUES.read_text()).get(key)
+    assert recorded, "`make records` writes the values of a new terrain"
     for found, expected in zip(values_of(*RECORDED[key]), recorded, strict=True):
         assert found.keys() == expected.keys()
         for name, value in expected.items():

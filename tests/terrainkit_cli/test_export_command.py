@@ -1,4 +1,5 @@
 import json
+import re
 import shutil
 from dataclasses import replace
 
@@ -10,6 +11,8 @@ pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 import torch
 
+from terrainkit.export import exporters_by_suffix
+from terrainkit_cli.export_command import Export
 from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Env, Policy, Runner, Task
 from terrainkit_robots.rl.env import LeggedEnv
@@ -98,6 +101,12 @@ def test_export_bundled_policy_by_name(terrainkit, trained, tmp_path, monkeypatc
     assert run.returncode == 0, run.stderr
     assert names(tmp_path / "quadruped_policy") == FILES
     assert names(shipped) == names(trained)
+
+
+def test_export_help_names_every_format():
+    formats, _, _ = Export.__doc__.partition("Some formats also write files")
+    named = re.findall(r"(?<!\w)\.[a-z]+", formats)
+    assert {*named, ".usda", ".usdc"} == {*exporters_by_suffix()}
 
 
 def test_export_map(terrainkit, tmp_path):

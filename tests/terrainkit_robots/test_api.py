@@ -9,7 +9,7 @@ from tests.robots import QUADRUPED
 
 @pytest.mark.parametrize("name", terrainkit_robots.__all__)
 def test_public_name_can_be_imported(name):
-    assert getattr(terrainkit_robots, name).__name__ == name
+    assert getattr(terrainkit_robots, name).__name__.rpartition(".")[2] == name
     assert name in dir(terrainkit_robots)
 
 

@@ -17,10 +17,6 @@ from pathlib import Path
 
 import torch
 
-EFFECTS = ("writes", "hangs", "prints", "memory", "crashes")
-"""What an escape does: it writes PATH, runs without end and ignores signals, prints MARK to stdout,
-stderr or in an error, needs more than 1 GB, or ends the process."""
-
 MARK = "::error::"
 """What is printed; a runner of CI takes it for a command."""
 
@@ -36,7 +32,8 @@ class Escape:
     """
 
     effect: str
-    """One of EFFECTS."""
+    """What it does: `writes` PATH, `hangs` (runs without end and ignores signals), `prints` MARK to
+    stdout, stderr or in an error, needs more than 1 GB of `memory`, or `crashes` the process."""
 
     body: str = ""
     """Lines at the start of `forward`, in the language of the archive."""

@@ -213,7 +213,8 @@ def resolve_in(folders: Iterable[Path], filename: str) -> tuple[Path, FoundBy]:
         The path and how it was found: `path` if a folder has the file, `search` if a folder has it
         with different letter case, `nothing` with the path in the first folder otherwise.
     """
-    paths, filename = list(folders), filename[:_MAX_LENGTH]
+    paths = list(folders)
+    filename = filename[:_MAX_LENGTH]
     for folder in paths:
         if "\0" not in filename and exists(_join(folder, filename)):
             return _join(folder, filename), "path"

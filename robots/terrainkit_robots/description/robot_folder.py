@@ -45,7 +45,8 @@ def robot_files(folder: Path) -> list[Path]:
     files.sort(key=lambda path: (not path.is_symlink(), path))
     robots, fragments, scenes = dict[str, Path](), set[str](), dict[str, set[str]]()
     for path in files:
-        root, file = _read_root(path), os.path.realpath(path)
+        root = _read_root(path)
+        file = os.path.realpath(path)
         included = _included_files(path, root)
         fragments |= included
         if _is_robot(path, root):

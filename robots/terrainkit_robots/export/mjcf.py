@@ -192,7 +192,9 @@ def _assets(root: Any, model: RobotModel) -> dict[_MeshKey, str]:
     visual = {_mesh_key(g) for link in model.links for g in link.visuals if g.shape == "mesh"}
     if not (collision or visual):
         return {}
-    asset, names, used_names = etree.SubElement(root, "asset"), dict[_MeshKey, str](), set[str]()
+    asset = etree.SubElement(root, "asset")
+    names = dict[_MeshKey, str]()
+    used_names = set[str]()
     for key in sorted(collision | visual):
         file, scale = key
         name = free_name(file.rsplit("/", 1)[-1].rsplit(".", 1)[0], used_names)

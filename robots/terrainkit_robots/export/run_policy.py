@@ -26,7 +26,8 @@ own: dict[str, Any] = runpy.run_path(args.observations) if args.observations els
 folder = Path(__file__).parent
 config = json.loads((folder / "policy.json").read_text())
 policy = onnxruntime.InferenceSession(folder / config["files"]["onnx"])
-timing, joints = config["timing"], {k: np.array(v) for k, v in config["joints"].items()}
+timing = config["timing"]
+joints = {k: np.array(v) for k, v in config["joints"].items()}
 
 # The robot on a plane, with the joints and the friction of the training.
 spec = mujoco.MjSpec.from_file(str(folder / config["files"]["mjcf"]))

@@ -196,7 +196,8 @@ class _Writer:
             )
 
     def _limit(self, element: Any, joint: Joint) -> None:
-        attributes, limits = {}, joint.range
+        attributes = {}
+        limits = joint.range
         if limits is not None:
             attributes = {"lower": number_text(limits[0]), "upper": number_text(limits[1])}
         elif joint.kind == "prismatic":

@@ -26,9 +26,9 @@ from terrainkit.errors import ConfigError
 from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.description.package_resolver import exists
 from terrainkit_robots.description.xml.document import read_bytes
+from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report, Skipped
-from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import count, display_path, names
 
 Entries = Mapping[str, Sequence[str]]
@@ -98,7 +98,8 @@ class Baseline:
         """
         entries = self.robots.get(self._key(report), {})
         recorded = Counter((code, subject) for code in entries for subject in entries[code])
-        found, file = _counts(report), display_path(self.path)
+        found = _counts(report)
+        file = display_path(self.path)
         known = {key for key in found if found[key] <= recorded[key]}
         reason = f"{count(sum(found[key] for key in known), 'finding')} accepted in {file}"
         kept, skipped = list[Finding](), list(report.skipped)

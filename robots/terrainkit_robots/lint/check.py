@@ -1,15 +1,129 @@
-"""Check a robot file: load it, compute its facts, and run the lint rules."""
+"""Check a robot file: load it, run the selected rules, and leave out suppressed findings."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.runner import Report
-from terrainkit_robots.lint.selection import lint_selected
-from terrainkit_robots.lint.settings import Settings, read_settings
+from terrainkit_robots.lint.rule import Finding, Rule, rules
+from terrainkit_robots.lint.runner import Report, Skipped, has_inputs, lint
+from terrainkit_robots.lint.settings import Settings, matching, read_settings
+from terrainkit_robots.lint.suppressions import SuppressionComment, read_comments
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from terrainkit_robots.text import display_path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Suppressed(Skipped):
+    """A finding that is suppressed by a comment in the file, or recorded in the baseline file."""
+
+    finding: Finding
+    comment: SuppressionComment | None = None
+    """None for a finding in the baseline file."""
+
+
+def select_rules(settings: Settings) -> tuple[tuple[Rule, ...], tuple[Skipped, ...]]:
+    """Return the rules that the settings select.
+
+    Returns:
+        Selected rules, and ignored rules with the reasons.
+
+    Raises:
+        ConfigError: if the settings name an unknown rule.
+    """
+    named = {rule for word in settings.select for rule in matching(word)}
+    reasons = {
+        rule.code: reason for word, reason in settings.ignore.items() for rule in matching(word)
+    }
+    candidates = [rule for rule in rules() if rule in named or not settings.select]
+    selected = tuple(rule for rule in candidates if rule.code not in reasons)
+    ignored = tuple(
+        Skipped(code=rule.code, kind="ignored", reason=f"ignored: {reasons[rule.code]}")
+        for rule in candidates
+        if rule.code in reasons
+    )
+    return selected, ignored
+
+
+def lint_selected(
+    facts: Facts, settings: Settings, contents: Mapping[Path, bytes] | None = None
+) -> Report:
+    """Return the report of the selected rules on a robot, without suppressed findings.
+
+    Args:
+        facts: The robot.
+        settings: Which rules to run. If they select none by name, all whose inputs are available.
+        contents: Bytes that replace the content of files, by path.
+
+    Raises:
+        ConfigError: if the settings name an unknown rule.
+    """
+    selected, ignored = select_rules(settings)
+    simulate = settings.simulate is not False
+    if not settings.select:
+        selected = tuple(r for r in selected if has_inputs(r, facts, simulate=simulate))
+    report = lint(facts, selected, simulate=simulate)
+    comments = [
+        comment
+        for file in facts.model.sources
+        for comment in read_comments(file, (contents or {}).get(file))
+    ]
+    kept, suppressed = _apply_suppressions(report, comments)
+    completed = frozenset(r.code for r in selected) - {s.code for s in report.skipped}
+    unused = _unused_suppressions(comments, completed, suppressed)
+    return replace(
+        report,
+        findings=tuple(kept),
+        skipped=(*report.skipped, *ignored, *suppressed, *unused),
+        completed=completed,
+    )
+
+
+def _apply_suppressions(
+    report: Report, comments: Sequence[SuppressionComment]
+) -> tuple[list[Finding], list[Suppressed]]:
+    """Split the findings of a report into remaining and suppressed findings."""
+    by_rule: dict[tuple[Path, str], list[SuppressionComment]] = {}
+    for suppression in comments:
+        if suppression.error is None:
+            by_rule.setdefault((suppression.file, suppression.code), []).append(suppression)
+    kept: list[Finding] = []
+    suppressed: list[Suppressed] = []
+    for finding in report.findings:
+        candidates = by_rule.get((finding.file, finding.code), ())
+        comment = next((c for c in candidates if c.applies_to(finding.line)), None)
+        if comment is None:
+            kept.append(finding)
+            continue
+        location = f"{finding.file.name}:{finding.line}"
+        target = f"{finding.subject} ({location})" if finding.subject else location
+        reason = f"suppressed for {target}: {comment.reason}"
+        suppressed.append(
+            Suppressed(
+                code=finding.code,
+                kind="suppressed",
+                reason=reason,
+                finding=finding,
+                comment=comment,
+            )
+        )
+    return kept, suppressed
+
+
+def _unused_suppressions(
+    comments: Sequence[SuppressionComment], completed: Set[str], suppressed: Sequence[Suppressed]
+) -> Iterator[Skipped]:
+    """Yield the comments that suppress nothing although their rule ran."""
+    used = {id(finding.comment) for finding in suppressed}
+    for comment in comments:
+        error = comment.error
+        if error is None and comment.code in completed and id(comment) not in used:
+            error = f"unused suppression: {comment.code} has no finding here"
+        if error is not None:
+            reason = f"comment at {display_path(comment.file)}:{comment.line}: {error}"
+            yield Skipped(code=comment.code, kind="unused", reason=reason)
 
 
 def check_robot(

@@ -103,6 +103,7 @@ def lint(facts: Facts, selected: Sequence[Rule], *, simulate: bool = True) -> Re
             if skip is not None:
                 skipped.append(skip)
                 continue
+            # One more than reported, to tell whether there are more. A rule may have no end.
             found = list(islice(rule.findings(facts), MAX_FINDINGS + 1))
             findings += found[:MAX_FINDINGS]
             if len(found) > MAX_FINDINGS:

@@ -96,6 +96,7 @@ def convert(
     spec_changes: tuple[str, ...] = ()
     if user_spec is not None:
         spec_changes = _check_user_spec(Facts(model, meshes, spec=user_spec), str(options.spec))
+    # Gains and limits are derived from the robot that is written, with its meshes.
     spec = _derived_spec(Facts(model, meshes), options.gains)
     if user_spec is not None:
         own = replace(user_spec, floating=spec.floating, urdf=URDF, mjcf=MJCF)
@@ -210,6 +211,7 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
         joint: ActuatorConfig(**{name: values[joint] for name, values in columns.items()})
         for joint in spec.joint_order
     }
+    # Links that were merged into others remain as sites, so that their frames can be found.
     bodies = {link.name for link in merged.model.links}
     frames = [
         Site(name=link, body=body, pose=pose)
@@ -224,6 +226,8 @@ def _mjcf_text(facts: Facts, spec: "RobotSpec", excluded: frozenset[frozenset[st
     )
     if imu.name in spec.feet or is_other:
         imu = replace(imu, name=f"{imu.name}_site")
+    # At position 0 the legs are often straight. The base is then higher, or the feet would be in
+    # the ground.
     height = rounded_length(_base_height(facts))
     extras = Extras(
         actuators=actuators,
@@ -251,6 +255,7 @@ def _keyframe_changes(facts: Facts) -> tuple[str, ...]:
 
 def _excluded_contacts(facts: Facts) -> tuple[frozenset[frozenset[str]], tuple[str, ...]]:
     """Return the pairs of links that must not collide, and a line for each derived pair."""
+    # Coarse shapes overlap in the pose in which the robot stands. MuJoCo would push them apart.
     from_file = facts.model.excluded
     try:
         overlaps = facts.overlap_scene.detect(facts.default_pose)

@@ -115,6 +115,7 @@ def new_folder(target: Path, *, overwrite: bool = False) -> Iterator[Path]:
     check_folder(target, overwrite=overwrite)
     with atomic_folder(target) as folder:
         yield folder
+        # Minutes may have passed, in which the user has put other files there.
         check_folder(target, overwrite=overwrite)
 
 

@@ -61,6 +61,7 @@ def onboard(
         raise TerrainkitError(f"{path}: {rule.code}: {rule.reason}")
     if not options.force and any(finding.is_blocking for finding in result.report.findings):
         return result
+    # Again, since the default folder has the name of the robot, which is known now.
     target = Path(output or options.name or plain_name(result.report.facts.model))
     check_folder(target, overwrite=options.overwrite)
     options.on_step("deriving the default pose and the gains")
@@ -106,6 +107,8 @@ def _write_folder(
         write_files(folder, files)
         # Another process renders the pictures at the same time.
         rendering = render_robot(folder / MJCF) if options.render_images else None
+        # Gains of the file and gains for training may be too soft to hold the pose; suggested ones
+        # for standing hold it, and the user vouches for those of a spec.
         stiffness = result.robot.spec.provenance.items()
         is_soft = options.spec is None and (
             options.gains == "train"

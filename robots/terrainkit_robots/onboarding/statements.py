@@ -9,7 +9,7 @@ import shlex
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from terrainkit_robots.analysis.bodies.permutation import permutation
 from terrainkit_robots.analysis.simulator_conventions.order_table import order_table
@@ -30,11 +30,7 @@ if TYPE_CHECKING:
     from terrainkit_robots.onboarding.verify import Verification
     from terrainkit_robots.simulation.standing import StandResult
 
-Section = Literal[
-    "pictures", "robot", "changes", "standing", "comparison", "joints", "orders", "findings", "next"
-]
-
-_HEADINGS: dict[Section, str] = {
+_HEADINGS = {
     "pictures": "",
     "robot": "",
     "changes": "Changes",
@@ -52,8 +48,8 @@ _HEADINGS: dict[Section, str] = {
 class Statement:
     """What is said about one step."""
 
-    section: Section
-    """Section of report.md."""
+    section: str
+    """Section of report.md, a key of `_HEADINGS`."""
 
     lines: Iterable[str] = ()
     """Lines of Markdown. An iterator is read at most once."""
@@ -73,13 +69,12 @@ def summarize(result: "OnboardResult") -> Iterator[tuple[str, str]]:
 def report_markdown(result: "OnboardResult") -> str:
     """Return the text of report.md for a robot that was written."""
     assert result.robot is not None
-    said = list(statements(result))
+    sections: dict[str, list[str]] = {name: [] for name in _HEADINGS}
+    for statement in statements(result):
+        sections[statement.section] += statement.lines
     lines = [f"# {cell(result.robot.spec.name)}\n"]
-    for section, heading in _HEADINGS.items():
-        own = [
-            line for statement in said if statement.section == section for line in statement.lines
-        ]
-        lines += [f"## {heading}\n", *own] if heading and own else own
+    for name, own in sections.items():
+        lines += [f"## {_HEADINGS[name]}\n", *own] if _HEADINGS[name] and own else own
     return escape_surrogates("\n".join(lines))
 
 

@@ -106,9 +106,12 @@ def verify(
             )
     if not robot.facts.legs or not floating:
         return Verification(equivalences=equivalences)
+    # A biped falls with any gains unless a policy balances it. With locked joints, the test still
+    # shows that its feet carry it.
     joints_locked = not is_statically_stable(robot.facts.legs)
     if reason := why_it_balances(robot.facts):
         return Verification(equivalences=equivalences, skipped=reason)
+    # Gains for training need not hold the pose, so a fall with them says nothing about the files.
     stand_gains = soft_gains and not joints_locked
     test = partial(
         stand_test,

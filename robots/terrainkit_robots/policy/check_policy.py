@@ -32,9 +32,17 @@ from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
-SECONDS, SETTLING_SECONDS, SHORT_SECONDS, COMMAND_SHARE = 4.0, 2.0, 2.0, 0.75
-"""Duration of the test, and its part without measurement [s]; duration of the first test of a
-change [s]; commands relative to their limits."""
+SECONDS = 4.0
+"""Duration of the test [s]."""
+
+SETTLING_SECONDS = 2.0
+"""Part of the test without measurement [s]."""
+
+SHORT_SECONDS = 2.0
+"""Duration of the first test of a change [s]."""
+
+COMMAND_SHARE = 0.75
+"""Commands relative to their limits."""
 
 NUM_REPAIRS = 12
 """Number of changes that are tested fully."""
@@ -80,7 +88,8 @@ def check_policy(
         ConfigError: If a file cannot be read.
     """
     registered = get_task(robot)
-    found, model = find_contract(path, contract), Robot.load(registered.folder)
+    found = find_contract(path, contract)
+    model = Robot.load(registered.folder)
     with prefixed_errors(f"{found.source}: "):
         parsed = read_contract(found, model)
     return check_contract(parsed, found.policy, model, task or registered.task)
@@ -234,7 +243,9 @@ def score_contracts(
     commands = motion_commands(spec.task.commands)[: None if seconds == SECONDS else 2]
     count, width = len(contracts), len(commands)
     env = build_eval_env(spec, Plane(), count * width, EvaluationConfig(seconds=seconds))
-    actor, fallen, velocity = load_policy(spec, env), np.zeros(env.num_envs, bool), []
+    actor = load_policy(spec, env)
+    fallen = np.zeros(env.num_envs, bool)
+    velocity = []
     actor.reset(torch.ones(env.num_envs, dtype=torch.bool))  # type: ignore[attr-defined]
     start = min(SETTLING_SECONDS, seconds / 2)
 

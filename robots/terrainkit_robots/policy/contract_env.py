@@ -57,8 +57,8 @@ class ContractInterface(PolicyInterface):
     def to_ctrl(self, env: LeggedEnv, actions: FloatArray) -> FloatArray:
         """Return the targets of all joints for the actions of the contracts."""
         target = np.tile(env.actions.offset, (len(actions), 1))
-        joints, rows = list(env.robot.spec.joint_order), np.arange(len(actions))
-        parts = np.split(rows, len(self._contracts))
+        joints = list(env.robot.spec.joint_order)
+        parts = np.split(np.arange(len(actions)), len(self._contracts))
         for contract, part in zip(self._contracts, parts, strict=True):
             offset, scale = np.array([contract.action_offset, contract.action_scale], np.float32)
             values = offset + scale * actions[part]
@@ -75,8 +75,7 @@ def _other_terms(robot: Robot) -> dict[str, ObservationTerm]:
     lever = imu_position(robot)
 
     def running_phase(env: LeggedEnv) -> FloatArray:
-        time = env.steps_since_reset * env.cfg.dt
-        return env.gait.phases(time, np.ones(env.num_envs, bool))[0]
+        return env.gait.phases(env.steps_since_reset * env.cfg.dt, np.ones(env.num_envs, bool))[0]
 
     return {
         "running_gait_phase": ObservationTerm(running_phase),
@@ -128,7 +127,8 @@ def _contract_tables(contracts: Sequence[Contract], env: LeggedEnv) -> list[Floa
     """Return the table of each contract, for an environment of these contracts."""
     terms = {name: term for name, term in env.obs_terms["policy"].items() if name != "history"}
     widths = {name: term.function(env).shape[1] for name, term in terms.items()}
-    terrain, joints = env.cfg.terrain, list(env.robot.spec.joint_order)
+    terrain = env.cfg.terrain
+    joints = list(env.robot.spec.joint_order)
     grid = len(terrain.measured_points_x), len(terrain.measured_points_y)
     return [_table(contract, widths, joints, grid) for contract in contracts]
 
@@ -144,7 +144,8 @@ def _table(
         joints: Joints of the environment in order.
         grid: Numbers of points of the height scan along x and y.
     """
-    starts, blocks = dict(zip(widths, np.cumsum([0, *widths.values()]), strict=False)), []
+    starts = dict(zip(widths, np.cumsum([0, *widths.values()]), strict=False))
+    blocks = []
     ids = [joints.index(joint) for joint in contract.joints]
     for term in contract.terms:
         own, source = (

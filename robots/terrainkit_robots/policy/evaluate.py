@@ -112,7 +112,8 @@ def make_eval_env(
         directions = direction_commands(task.commands).values()
         commands = command_grid(task.commands) if terrain.is_plane else np.array([*directions])
     rows, cols = terrain.env_origins.shape[:2]
-    n, patches = config.num_envs, rows * cols
+    n = config.num_envs
+    patches = rows * cols
     if n is None and terrain.is_plane and commands is not None and len(commands) > 1:
         n = len(commands)
     elif n is None:

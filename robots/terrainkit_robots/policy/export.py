@@ -21,11 +21,11 @@ from terrainkit_robots.checkpoint import read_checkpoint
 from terrainkit_robots.export.model_copy import EXAMPLE, ROBOT_FILE, copy_model
 from terrainkit_robots.policy.contracts.contract import (
     FORMATS,
+    KNOWN_TERMS,
     MJLAB,
     TERM_NAMES,
     UNITREE,
     Contract,
-    unknown_terms,
 )
 from terrainkit_robots.policy.contracts.deploy_yaml import YAML_FILE, write_deploy_yaml
 from terrainkit_robots.policy.contracts.mjlab_metadata import write_metadata
@@ -124,7 +124,8 @@ def export_policy(
     network = OnnxNetwork(actor, run.task.normalization, order)
     description = describe_policy(env) | {"recurrent": network.describe_state()} | training
     text = json.dumps(description, indent=2) + "\n"
-    metadata, notes = {METADATA_KEY: text}, []
+    metadata = {METADATA_KEY: text}
+    notes = []
     if deploy_yaml:
         contract = to_contract(description, UNITREE)
         other_files[YAML_FILE] = write_deploy_yaml(contract).encode()
@@ -151,7 +152,9 @@ def export_policy(
 
 def _unknown_terms(contract: Contract) -> list[str]:
     """Return a note about the terms that the readers of a format lack."""
-    if not (names := unknown_terms(contract)):
+    known_terms = KNOWN_TERMS[contract.style].split()
+    unknown = [term.name for term in contract.terms if term.name not in known_terms]
+    if not unknown:
         return []
     formulas = {
         name: _FORMULAS[own]
@@ -159,8 +162,8 @@ def _unknown_terms(contract: Contract) -> list[str]:
         for name in names
         if own in _FORMULAS
     }
-    known = "; ".join(dict.fromkeys(formulas[name] for name in names if name in formulas))
-    what = f"readers of {FORMATS[contract.style]} lack {listing(names)}, and stop"
+    known = "; ".join(dict.fromkeys(formulas[name] for name in unknown if name in formulas))
+    what = f"readers of {FORMATS[contract.style]} lack {listing(unknown)}, and stop"
     return [f"{what}; add what policy.json describes{': ' if known else ''}{known}"]
 
 
@@ -231,7 +234,8 @@ class ScriptNetwork(torch.nn.Module):
 
 def run_onnx(data: bytes, steps: Sequence[FloatArray]) -> list[FloatArray]:
     """Return the actions of an ONNX file for the observations (n, k) of each step."""
-    session, results = make_session(data), []
+    session = make_session(data)
+    results = []
     shapes = [node.shape for node in session.get_inputs()[1:]]
     state = make_state([(layers, width) for layers, _, width in shapes], len(steps[0]))
     for obs in steps:
@@ -248,7 +252,8 @@ def export_onnx(network: OnnxNetwork, obs: torch.Tensor, metadata: Mapping[str, 
         obs: Observations to trace it with, shape (n, k).
         metadata: Its metadata by key.
     """
-    file, model = io.BytesIO(), network.model
+    file = io.BytesIO()
+    model = network.model
     names: dict[str, Any] = {"input_names": model.input_names, "output_names": model.output_names}
     _, *states = model.get_dummy_inputs()
     inputs = obs, *(state.repeat(1, len(obs), 1) for state in states)
@@ -406,7 +411,8 @@ def observation_order(env: LeggedEnv) -> NDArray[np.int64]:
 
 def _terms(env: LeggedEnv) -> Iterator[tuple[str, ObservationTerm, int, int, int]]:
     """Yield name, term, first number in an observation of `env`, size and steps of each term."""
-    start, steps = 0, env.history_length
+    start = 0
+    steps = env.history_length
     has_history = "history" in env.obs_terms["policy"]
     for name, term in env.obs_terms["policy"].items():
         size = term.function(env).shape[1]
@@ -419,7 +425,8 @@ def _terms(env: LeggedEnv) -> Iterator[tuple[str, ObservationTerm, int, int, int
 
 def _observation_parts(env: LeggedEnv) -> list[dict[str, Any]]:
     """Return slice, steps of the history, unit, offset, scale and clip of each term."""
-    parts, first = [], 0
+    parts = []
+    first = 0
     for name, term, _, size, history in _terms(env):
         part: dict[str, Any] = {"name": name, "start": first, "stop": first + size * history}
         part["history"] = history

@@ -69,8 +69,7 @@ def make_actor(task: Task, env: LeggedEnv) -> MLPModel:
         runner = runner_config(task)
         name = "student" if "student" in runner else "actor"
         kind, config = resolve_class(runner[name])
-        groups = runner["obs_groups"]
-        return kind(env.get_observations(), groups, name, env.num_actions, **config)
+        return kind(env.get_observations(), runner["obs_groups"], name, env.num_actions, **config)
 
 
 @contextmanager

@@ -84,7 +84,8 @@ def first_falls(margins: Sequence[RolloutMetrics]) -> list[RolloutMetrics]:
 def margin_rows(margins: Sequence[RolloutMetrics]) -> list[tuple[str, ...]]:
     """Return the margins as rows of text with a header."""
     head = f"fell of {margins[0].robots}", "m/s", "followed", "swing [cm]", "steps/s"
-    loads, first = ("torque", "joint speed", "foot force"), first_falls(margins)
+    loads = ("torque", "joint speed", "foot force")
+    first = first_falls(margins)
     rows: list[tuple[str, ...]] = [("condition", *head, *loads, "")]
     for margin in margins:
         value = "" if margin.value is None else f"{margin.value:g}"
@@ -181,7 +182,8 @@ def margin_commands(commands: Commands) -> FloatArray:
 def _conditions(env: LeggedEnv) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Return the fields of `RolloutMetrics` of each condition, and which are left out and why."""
     conditions: list[dict[str, Any]] = [{"condition": "nominal"}]
-    base, step = float(env.scene.model.body_mass[env.scene.base]), 1000 * env.cfg.sim.dt
+    base = float(env.scene.model.body_mass[env.scene.base])
+    step = 1000 * env.cfg.sim.dt
     left_out = []
     for name, disturbance in DISTURBANCES.items():
         values = disturbance.values
@@ -211,7 +213,8 @@ def _disturb(
         rng: Generator of the directions.
     """
     at = {name: array[:, None].astype(np.float32) for name, array in values.items()}
-    params, friction = env.params, at["friction"]
+    params = env.params
+    friction = at["friction"]
     env.params = replace(
         params,
         geom_friction=np.where(np.isnan(friction), params.geom_friction, friction),

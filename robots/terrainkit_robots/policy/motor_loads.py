@@ -20,7 +20,8 @@ class Loads:
 
     def __init__(self, env: LeggedEnv) -> None:
         """Measure an environment from now on."""
-        self._env, n = env, env.num_envs
+        self._env = env
+        n = env.num_envs
         limits = np.stack([env.robot.effort, env.robot.velocity])[:, None]
         self._limits = np.where(limits > 0, limits, np.inf)
         self._steps: list[tuple[FloatArray, FloatArray]] = []  # since the last step of the policy

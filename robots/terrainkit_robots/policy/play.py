@@ -31,8 +31,17 @@ from terrainkit_robots.rl.run import PolicySpec
 from terrainkit_robots.rl.scene import drawn_model
 from terrainkit_robots.transforms import FloatArray
 
-DEFAULT_SECONDS, DEFAULT_ROBOTS, FORMATION_ENVS, MAX_FPS = 12.0, 4, 9, 25.0
-"""Defaults: duration [s], robots that the video of a map follows, robots on a plane, frame rate."""
+DEFAULT_SECONDS = 12.0
+"""Duration [s]."""
+
+DEFAULT_ROBOTS = 4
+"""Robots that the video of a map follows."""
+
+FORMATION_ENVS = 9
+"""Robots on a plane."""
+
+MAX_FPS = 25.0
+"""Largest frame rate of a video [Hz]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,8 +93,8 @@ def play(
         if video:
             recorder.record()
 
-    evaluation, policy = EvaluationRollout(env), load_policy(spec, env)
-    evaluation.run(policy, config.seconds, commands, update, stop_early=not video)
+    evaluation = EvaluationRollout(env)
+    evaluation.run(load_policy(spec, env), config.seconds, commands, update, stop_early=not video)
     recorded = recorder.make_video(robots, size, scan=height_points) if video else None
     return PlayResult(evaluation=summarize(spec, config, evaluation), video=recorded)
 
@@ -185,7 +194,10 @@ class PoseRecorder:
 
         A robot on a map is shown until it falls. `scan` shows the points of the height scan.
         """
-        env, terrain, poses, shots = self.env, self.env.terrain, np.stack(self.poses), []
+        env = self.env
+        terrain = self.env.terrain
+        poses = np.stack(self.poses)
+        shots = []
         frames, n = poses.shape[:2]
 
         def points(robot: int) -> FloatArray | None:
@@ -199,7 +211,8 @@ class PoseRecorder:
             poses[:, :, :2] += spacing * np.stack([-row, col - (side - 1) / 2], axis=1)
             captions = tuple(_caption(commands[n // 2]) for commands in self.commands)
             shots.append(Shot(robot=n // 2, captions=captions, points=points(n // 2)))
-        tracked, rows = select_tracked_robots(env, robots), len(terrain.env_origins)
+        tracked = select_tracked_robots(env, robots)
+        rows = len(terrain.env_origins)
         for robot in tracked if not terrain.is_plane else ():
             level, column = env.curriculum.levels[robot], env.curriculum.columns[robot]
             caption = str(terrain.terrain_names[level, column])

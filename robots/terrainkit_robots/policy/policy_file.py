@@ -39,13 +39,13 @@ class PolicyFile:
         Raises:
             ConfigError: If the file is not a policy.
         """
-        self.__name__, data = path.name, read_file(path)
+        self.__name__ = path.name
+        data = read_file(path)
         self._dones: BoolArray | None = None
         if path.suffix == ".pt" or data.startswith(b"PK"):
             self._process = ChildProcess(run_script, data, limits=LIMITS)
         else:
-            folder = path.parent.absolute()
-            self._process = ChildProcess(run_model, data, folder, limits=LIMITS)
+            self._process = ChildProcess(run_model, data, path.parent.absolute(), limits=LIMITS)
         try:
             loaded = self._process.receive()
             self.num_obs, self.num_actions = loaded["sizes"].astype(np.int64).tolist()

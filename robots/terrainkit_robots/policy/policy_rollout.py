@@ -78,7 +78,8 @@ class EvaluationRollout:
 
     def __init__(self, env: LeggedEnv) -> None:
         n, dt = env.num_envs, env.cfg.dt
-        self.env, self.start_pos = env, env.curriculum.progress.start.copy()
+        self.env = env
+        self.start_pos = env.curriculum.progress.start.copy()
         self.half_patch = np.inf if env.terrain.is_plane else env.terrain.patch_length / 2
         self.falls, self.crossed = np.zeros(n, bool), np.zeros(n, bool)
         self.commanded_distance = np.zeros(n)
@@ -137,7 +138,8 @@ class EvaluationRollout:
         self.crossed |= active & (distance > self.half_patch)
 
     def _update_gait(self, commands: FloatArray, velocity: FloatArray, settled: BoolArray) -> None:
-        state, moving = self.env.state, settled & (commands != 0).any(axis=1)
+        state = self.env.state
+        moving = settled & (commands != 0).any(axis=1)
         along, squares = velocity * commands, np.square(commands)
         lin_command = squares[:, :2].sum(axis=1)
         is_linear = lin_command > 0

@@ -102,7 +102,8 @@ def checked_archive(data: bytes) -> bytes:
     Raises:
         ConfigError: If it is damaged, or another kind of file.
     """
-    expected, result = "expected TorchScript (torch.jit.save) or ONNX", io.BytesIO()
+    expected = "expected TorchScript (torch.jit.save) or ONNX"
+    result = io.BytesIO()
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             size = sum(file.file_size for file in archive.infolist())

@@ -68,7 +68,9 @@ def update_scene(
     """
     import mujoco
 
-    camera, options, scene = mujoco.MjvCamera(), mujoco.MjvOption(), renderer.scene
+    camera = mujoco.MjvCamera()
+    options = mujoco.MjvOption()
+    scene = renderer.scene
     camera.lookat, camera.distance = target, distance
     camera.azimuth, camera.elevation = azimuth, elevation
     options.sitegroup[:] = 0

@@ -63,7 +63,9 @@ def pose_frames(
     """Yield a frame for each pose, shape (nq,), seen by a camera that follows the robot."""
     import mujoco
 
-    distance, renderer, area = RELATIVE_DISTANCE * prepare_model(model), None, np.zeros((2, 2))
+    distance = RELATIVE_DISTANCE * prepare_model(model)
+    renderer = None
+    area = np.zeros((2, 2))
     for qpos in poses:
         lower, upper = visible_area(qpos[None, :3], distance, size)
         if renderer is None or (lower < area[0]).any() or (upper > area[1]).any():

@@ -90,9 +90,11 @@ class TestResult:
         """The hardest level that is passed, and its parameters."""
         if self.passed is None:
             return "none"
-        values = self.levels[self.passed].parameters.items()
-        text = ", ".join(f"{name} {_value_text(value)}" for name, value in values)
-        return f"{self.passed}: {text}" if text else str(self.passed)
+        parts = [
+            f"{name} {value:.3g}" if isinstance(value, float) else f"{name} {format_value(value)}"
+            for name, value in self.levels[self.passed].parameters.items()
+        ]
+        return f"{self.passed}: {', '.join(parts)}" if parts else str(self.passed)
 
 
 Card = ResultTable[TestResult]
@@ -111,9 +113,10 @@ def card_rows(card: Card) -> list[tuple[str, ...]]:
 
 def card_markdown(card: Card) -> str:
     """Return a card as a Markdown document."""
-    about, margins = card.about, ""
-    if "margins" in card.remarks:
-        rows = margin_rows(card.remarks["margins"]["margins"])
+    about = card.about
+    margins = ""
+    if measured := card.remarks["margins"]:
+        rows = margin_rows(measured["margins"])
         margins = f"\n## Margins\n\n{_markdown_table(rows)}\n{NOTE}\n"
     return (
         f"# {about['robot']} on {about['map']}\n\n"
@@ -149,7 +152,8 @@ def measure(
     """
     rows, cols = terrain_map.difficulty.shape
     crossing = Crossing(spec, terrain_map, rows * repetitions, config)
-    levels, columns = np.repeat(np.arange(rows), repetitions), []
+    levels = np.repeat(np.arange(rows), repetitions)
+    columns = []
     for col in range(cols):
         columns.append(crossing.attempt(levels, np.full_like(levels, col)))
         progress((col + 1) / cols)
@@ -173,7 +177,7 @@ def measure(
         "success": success,
         "interval": interval,
     }
-    return ResultTable(about=about, tables={"tests": tests})
+    return ResultTable(about=about, tables={"tests": tests}, remarks={"margins": None})
 
 
 def _test_result(terrain_map: TerrainMap, col: int, name: str, attempts: Attempts) -> TestResult:
@@ -228,10 +232,6 @@ def _success(outcomes: NDArray[np.int8]) -> tuple[float, tuple[float, float]]:
 def _markdown_table(rows: list[tuple[str, ...]]) -> str:
     lines = rows[0], ("---",) * len(rows[0]), *rows[1:]
     return "".join(f"| {' | '.join(row)} |\n" for row in lines)
-
-
-def _value_text(value: Any) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else format_value(value)
 
 
 def _percent(result: Mapping[str, Any]) -> str:

@@ -102,7 +102,9 @@ class _Progress:
     def __init__(self, env: LeggedEnv, patches: list[Patch], speed: float) -> None:
         n = len(patches)
         self.outcomes, self.seconds = np.full(n, TIMED_OUT, np.int8), np.full(n, np.nan)
-        self._env, self._active, self._steps = env, np.ones(n, bool), 0
+        self._env = env
+        self._active = np.ones(n, bool)
+        self._steps = 0
         # Robots on the same patch take its routes in turn.
         earlier = Counter[tuple[float, float]]()
         routes = []

@@ -21,7 +21,7 @@ def draw_card(card: Card) -> bytes:
         )
         for test in card["tests"]
     ]
-    if "margins" not in card.remarks:
+    if not card.remarks["margins"]:
         return draw_heatmap(summary(card), rows, note="passed level")
     rows += _margin_rows(card.remarks["margins"]["margins"])
     return draw_heatmap(summary(card), rows, note="passed level, or first value with falls")
@@ -29,7 +29,8 @@ def draw_card(card: Card) -> bytes:
 
 def _margin_rows(margins: Sequence[RolloutMetrics]) -> list[HeatmapRow]:
     """Return a row per disturbance, and a cell per value: the share of robots that do not fall."""
-    rows, first = [], first_falls(margins)
+    rows = []
+    first = first_falls(margins)
     for name, group in groupby(margins[1:], lambda margin: margin.condition):
         found = list(group)
         values = {f"{margin.value:g}": margin for margin in found}

@@ -23,8 +23,11 @@ from terrainkit_robots.rl.run import PolicySpec
 LEVELS = 20
 """Values of each quantity."""
 
-PATCH_SIZE, CELL = (8.0, 4.0), 0.05
-"""Size of the patches and distance between two height samples [m]."""
+PATCH_SIZE = (8.0, 4.0)
+"""Size of the patches along x and y [m]."""
+
+CELL = 0.05
+"""Distance between two height samples [m]."""
 
 # Twice the default limit is a grade of 1.154, tan(49 degrees).
 SLOPE_THRESHOLD = 1.25
@@ -200,7 +203,8 @@ def measure_limits(
             for new, old in ((levels, failed), (counts, crossed))
         )
         progress((number + 1) / rounds)
-    grid, results = terrain_map.config.patch_grid(0, 0), []
+    grid = terrain_map.config.patch_grid(0, 0)
+    results = []
     for test, low, high, count in zip(
         tests, passed.tolist(), failed.tolist(), crossed.tolist(), strict=True
     ):

@@ -30,7 +30,8 @@ def patch_routes(patch: Patch) -> list[NDArray[np.float64]]:
     """
     if len(patch.goals):
         return [patch.goals[:, :2].astype(np.float64)]
-    corners, routes = (patch.grid.lower, patch.grid.upper), []
+    corners = (patch.grid.lower, patch.grid.upper)
+    routes = []
     for side, axis in ((1, 0), (1, 1), (0, 0), (0, 1)):
         if patch.far_edges[side, axis]:
             goal = patch.origin[:2].astype(np.float64)

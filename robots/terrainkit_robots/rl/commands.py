@@ -147,7 +147,8 @@ class VelocityCommand(CommandTerm):
         self.tracked += tracking.sum(), len(tracking)
         if self._cfg.curriculum and self.tracked[1] >= len(self.values):
             if self.tracked[0] > CURRICULUM_TRACKING * self.tracked[1]:
-                limit, (low, high) = self._cfg.max_curriculum, self.lin_vel_x
+                limit = self._cfg.max_curriculum
+                (low, high) = self.lin_vel_x
                 self.lin_vel_x[0] = min(low, max(low - CURRICULUM_STEP, -limit))
                 self.lin_vel_x[1] = max(high, min(high + CURRICULUM_STEP, limit))
             self.tracked[:] = 0

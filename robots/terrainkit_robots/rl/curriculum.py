@@ -110,8 +110,7 @@ def end_episodes(env: "LeggedEnv", env_ids: Ids, unstable: BoolArray) -> dict[st
             log["Episode/goals_reached"] = float(np.nanmean(reached))
     if "tracking_lin_vel" in env.active_rewards:
         most = env.cfg.env.episode_length_s * env.active_rewards["tracking_lin_vel"][1]
-        tracking = env.episode_sums["tracking_lin_vel"][env_ids] / most
-        env.velocity_command.end_episodes(tracking)
+        env.velocity_command.end_episodes(env.episode_sums["tracking_lin_vel"][env_ids] / most)
     returns = np.sum([total[env_ids] for total in env.episode_sums.values()], axis=0)
     env.curriculum.sampler.update(env_ids[complete], progress[complete], returns[complete])
     return log if env.terrain.is_plane else log | env.curriculum.log()

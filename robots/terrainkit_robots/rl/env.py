@@ -47,6 +47,8 @@ def make_env(
     kind = task.env_class or LeggedEnv
     plugin = None if is_built_in(kind) else f"{kind.__module__}:{kind.__qualname__}"
     with plugin_errors(plugin, TerrainkitError):
+        if interface is None:  # which a class of the user need not take
+            return kind(task, robot, terrain, device)
         return kind(task, robot, terrain, device, interface)
 
 
@@ -183,7 +185,8 @@ class LeggedEnv(VecEnv):
 
     def command_terms(self) -> dict[str, CommandTerm]:
         """Return the commands by name: `velocity`, and your own ones."""
-        cfg, is_map = self.cfg.commands, not self.terrain.is_plane
+        cfg = self.cfg.commands
+        is_map = not self.terrain.is_plane
         heading = is_map if cfg.heading_command is None else cfg.heading_command
         return {
             "velocity": VelocityCommand(cfg, self.num_envs, self.cfg.dt, heading_command=heading)
@@ -275,8 +278,7 @@ class LeggedEnv(VecEnv):
         """Reset every environment."""
         self._reset_idx(np.arange(self.num_envs))
         self.state = self._compute_state(slice(None))
-        width = observations.history_width(self)
-        self.obs_history = np.zeros((self.num_envs, width), np.float32)
+        self.obs_history = np.zeros((self.num_envs, observations.history_width(self)), np.float32)
         self._update_commands()
         self.update_observations()
 
@@ -318,22 +320,21 @@ class LeggedEnv(VecEnv):
 
     def _compute_state(self, rows: Any, last: State | None = None) -> State:
         """Return the state of some environments; without the `last` one, after a reset."""
-        history = self.action_history[:, rows].copy()
         names = "actions", "last_actions", "last_last_actions"
-        actions: dict[str, Any] = dict(zip(names, history, strict=True))
+        actions: dict[str, Any] = dict(zip(names, self.action_history[:, rows].copy(), strict=True))
         measured = self.sensors.read(rows, last, self.commands[rows])
         return State(**measured, **actions, **self._command_state(rows))
 
     def _command_state(self, rows: Any) -> dict[str, Any]:
         """Return the fields of `State` that depend on the commands."""
-        commands, time = self.commands[rows].copy(), self.steps_since_reset[rows] * self.cfg.dt
+        commands = self.commands[rows].copy()
+        time = self.steps_since_reset[rows] * self.cfg.dt
         gait_phase, swing_phase = self.gait.phases(time, is_moving(commands))
         return {"commands": commands, "gait_phase": gait_phase, "swing_phase": swing_phase}
 
     def _update_commands(self) -> None:
         """Let commands follow headings and waypoints, and write them into the state."""
-        position = self.sim.qpos[:, :2].astype(np.float32)
-        self.velocity_command.update(self.yaw, position)
+        self.velocity_command.update(self.yaw, self.sim.qpos[:, :2].astype(np.float32))
         for name, values in self._command_state(slice(None)).items():
             np.copyto(getattr(self.state, name), values)
 
@@ -361,14 +362,9 @@ class LeggedEnv(VecEnv):
         groups = {}
         for name, terms in self.obs_terms.items():
             rng = self.rng if name == "policy" else None  # noise for the policy only
-            values = observations.compute_observations(self, terms, rng)
-            groups[name] = torch.from_numpy(values)
-        if past := self.history_length - 1:
-            # The history of a new episode repeats its first observation.
-            new, policy = self.steps_since_reset == 0, groups["policy"]
-            width = self.obs_history.shape[1] // past
-            policy[new, width : width * (1 + past)] = policy[new, :width].repeat(1, past)
-        self.set_observations(groups)
+            groups[name] = observations.compute_observations(self, terms, rng)
+        observations.fill_history(self, groups["policy"])
+        self.set_observations({name: torch.from_numpy(group) for name, group in groups.items()})
 
     def set_observations(self, groups: Mapping[str, torch.Tensor]) -> None:
         """Replace the current observations of each group, shape (n, width)."""

@@ -70,6 +70,9 @@ def load_env_state(env: "LeggedEnv", state: Mapping[str, Any]) -> None:
     except ConfigError as error:
         hint = "with another env.num_envs, the networks and the curriculum can be used"
         raise ConfigError(f"{error}; {hint}") from error
+    for name, array in saved.items():  # a term may make its buffer when it is first called
+        if name.startswith("buffers.") and name not in own["arrays"]:
+            env.buffers[name.removeprefix("buffers.")] = torch.clone(array).numpy()
     _copy_arrays(env, saved, own["arrays"])
     if env.waypoints and (env.waypoints.index > env.waypoints.numbers).any():
         largest = env.waypoints.index.max()

@@ -187,20 +187,14 @@ def push_interval(env: "LeggedEnv") -> int:
 
 def reset_joint_offset(env: "LeggedEnv", env_ids: Ids) -> None:
     """Sample the zero offset of each joint."""
-    limit, shape = env.cfg.domain_rand.joint_offset, env.joint_offset[env_ids].shape
-    env.joint_offset[env_ids] = env.rng.uniform(-limit, limit, shape)
+    limit = env.cfg.domain_rand.joint_offset
+    env.joint_offset[env_ids] = env.rng.uniform(-limit, limit, env.joint_offset[env_ids].shape)
 
 
 def reset_lin_vel_bias(env: "LeggedEnv", env_ids: Ids) -> None:
     """Sample the constant error of the observed base linear velocity."""
     limit = env.cfg.noise.noise_level * env.cfg.noise.lin_vel_bias
     env.lin_vel_bias[env_ids] = env.rng.uniform(-limit, limit, (len(env_ids), 3))
-
-
-def reset_progress(env: "LeggedEnv", env_ids: Ids) -> None:
-    """Let a robot that starts an episode not be stuck; see `terminations.stuck`."""
-    if env.cfg.termination.stuck_time is not None:
-        env.buffers.setdefault("progress", np.ones(env.num_envs, np.float32))[env_ids] = 1
 
 
 def reset_action_delay(env: "LeggedEnv", env_ids: Ids) -> None:
@@ -217,6 +211,5 @@ EVENTS = {
     "joint_offset": EventTerm(reset=reset_joint_offset),
     "lin_vel_bias": EventTerm(reset=reset_lin_vel_bias),
     "action_delay": EventTerm(reset=reset_action_delay),
-    "progress": EventTerm(reset=reset_progress),
 }
 """Every event of a task by name, in the order in which they happen."""

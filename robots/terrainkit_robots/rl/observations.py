@@ -176,13 +176,15 @@ def history_width(env: "LeggedEnv") -> int:
 
 def _deepest(env: "LeggedEnv") -> float:
     """Return the upper limit of the height scan [m]: legged_gym's, or at the task's depth."""
-    depth, feet = env.cfg.terrain.scan_depth, env.robot.base_height_target - HEIGHT_SCAN_OFFSET
+    depth = env.cfg.terrain.scan_depth
+    feet = env.robot.base_height_target - HEIGHT_SCAN_OFFSET
     return 1.0 if depth is None else min(1.0, feet + depth)
 
 
 def privileged_terms(env: "LeggedEnv") -> dict[str, ObservationTerm]:
     """Return the critic's terms; contact forces are in units of the robot's weight."""
-    term, scale = ObservationTerm, env.cfg.normalization.obs_scales.lin_vel
+    term = ObservationTerm
+    scale = env.cfg.normalization.obs_scales.lin_vel
     # Of the policy's terms, the linear velocity comes last.
     known = {k: v for k, v in policy_terms(env).items() if k not in ("base_lin_vel", "history")}
     return known | {
@@ -220,7 +222,8 @@ def compute_observations(
     Returns:
         Observations, shape (n, width).
     """
-    group, clip = terms.values(), env.cfg.normalization.clip_observations
+    group = terms.values()
+    clip = env.cfg.normalization.clip_observations
     values = [term.value(env) for term in group]
     widths = [value.shape[1] for value in values]
     observations = np.concatenate(values, axis=1, dtype=np.float32)
@@ -234,3 +237,16 @@ def compute_observations(
     scales = [np.broadcast_to(term.scale, width) for term, width in zip(group, widths, strict=True)]
     observations *= np.concatenate(scales, dtype=np.float32)
     return np.clip(observations, -clip, clip, out=observations)
+
+
+def fill_history(env: "LeggedEnv", observations: FloatArray) -> None:
+    """Let the history of a new episode repeat its first observation.
+
+    Args:
+        env: The environment.
+        observations: Observations of the policy, shape (n, width), which are changed.
+    """
+    if past := env.history_length - 1:
+        new = env.steps_since_reset == 0
+        width = env.obs_history.shape[1] // past
+        observations[new, width : width * (1 + past)] = np.tile(observations[new, :width], past)

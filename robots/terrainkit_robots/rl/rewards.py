@@ -122,8 +122,7 @@ def _tracking(env: "LeggedEnv") -> tuple[FloatArray, FloatArray]:
     widths[1][turns_little] = width_at_rest
     ratios = (error / width for error, width in zip(errors, widths, strict=True))
     lin, yaw = ((np.exp(-ratio) + np.exp(-NARROW * ratio)) / 2 for ratio in ratios)
-    moving = is_moving(commands)
-    only_yaw = moving & (squares[0] == 0)
+    only_yaw = is_moving(commands) & (squares[0] == 0)
     return lin * np.where(only_yaw, yaw, 1), yaw * np.where(turns_little, lin, 1)
 
 
@@ -189,7 +188,7 @@ def action_l2(env: "LeggedEnv") -> FloatArray:
 
 
 def collision(env: "LeggedEnv") -> FloatArray:
-    """Count penalized bodies that touch something."""
+    """Penalize bodies that should not touch anything, by the number that do."""
     return (env.state.penalized_force > np.float32(0.1)).sum(axis=1, dtype=np.float32)
 
 
@@ -218,7 +217,8 @@ def feet_gait(env: "LeggedEnv") -> FloatArray:
 
 def _swing_height(env: "LeggedEnv") -> np.float32:
     """Return the height of a swinging foot above the ground [m]."""
-    setting, feet = env.cfg.rewards.swing_height, env.state.foot_height.shape[1]
+    setting = env.cfg.rewards.swing_height
+    feet = env.state.foot_height.shape[1]
     target = (setting or SWING_HEIGHT) * env.robot.leg_length
     return np.float32(min(target, MAX_SWING_HEIGHT) if setting is None and feet == 4 else target)
 

@@ -118,7 +118,8 @@ def create_run(folder: Path, task: Task, robot_name: str | Path, terrain: str | 
         ExportError: If the folder is not empty, or cannot be written.
     """
     robot, source = _sources(robot_name, terrain)
-    robot_folder, map_config = tasks.get_task(robot_name).folder, _map_config(source)
+    robot_folder = tasks.get_task(robot_name).folder
+    map_config = _map_config(source)
     info = RunInfo(
         robot=robot,
         terrain=source,
@@ -203,7 +204,8 @@ def open_run(
         raise ConfigError(f"{folder} has no {RUN_FILE}; terrainkit train writes such a folder")
     info = RunInfo.load(folder / RUN_FILE)
     try:
-        terrain, found = info.terrain, tasks.get_task(info.robot)
+        terrain = info.terrain
+        found = tasks.get_task(info.robot)
     except ConfigError as error:
         hint = "if it is a task of your own, give its Python file with --task"
         raise ConfigError(f"the task of {folder} is missing: {error}; {hint}") from error

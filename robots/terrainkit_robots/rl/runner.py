@@ -44,7 +44,8 @@ class MetricsLogger(Logger):
     writer: Any
 
     def __init__(self, runner: "LeggedRunner") -> None:
-        self._runner, env = runner, runner.env
+        self._runner = runner
+        env = runner.env
         self.episode_callback: Callable[[int, Mapping[str, float]], object] = lambda *_: None
         """Called with the number of episodes that a step ended, and the means of their log."""
         world = (runner.is_distributed, runner.gpu_world_size, runner.gpu_global_rank)
@@ -209,7 +210,8 @@ class LeggedRunner(OnPolicyRunner):
         """
         if not self.is_main_process:
             raise SystemExit(1) from error
-        self.is_distributed, self.current_learning_iteration = False, self._completed
+        self.is_distributed = False
+        self.current_learning_iteration = self._completed
         self.save()
         raise ConfigError(
             f"another process of torchrun ended after iteration {self._completed}; continue with "
@@ -281,8 +283,7 @@ class LeggedRunner(OnPolicyRunner):
             load_env_state(self.env, process["env"])
             self.logger.continue_from(state["logger"])
             if len(processes) != self.gpu_world_size:  # no two processes may sample alike
-                seed = [self.env.cfg.runner.seed, state["iteration"]]
-                self.env.rng = np.random.default_rng(seed)
+                self.env.rng = np.random.default_rng([self.env.cfg.runner.seed, state["iteration"]])
             else:
                 torch.set_rng_state(process["random"]["cpu"])
                 if self.device != "cpu" and "cuda" in process["random"]:
@@ -291,7 +292,8 @@ class LeggedRunner(OnPolicyRunner):
 
     def _load_teacher(self, path: Path) -> None:
         """Load the actor of a checkpoint as the teacher of a distillation."""
-        groups, algorithm = self.cfg["obs_groups"]["teacher"], cast("Any", self.alg)
+        groups = self.cfg["obs_groups"]["teacher"]
+        algorithm = cast("Any", self.alg)
         sizes = {"policy": sum(self.env.obs_sizes[name] for name in groups)}
         with open_checkpoint(path, self.env.robot.spec.joint_order, sizes) as state:
             weights = state["actor_state_dict"]
@@ -330,7 +332,8 @@ class LeggedRunner(OnPolicyRunner):
 
         The other settings come from the task.
         """
-        saved, optimizer = state["optimizer_state_dict"], self.alg.optimizer
+        saved = state["optimizer_state_dict"]
+        optimizer = self.alg.optimizer
         groups = optimizer.state_dict()["param_groups"]
         weights = enumerate(
             weight for group in optimizer.param_groups for weight in group["params"]

@@ -61,7 +61,8 @@ class Scene:
                 self.model: Any = mjspec.compile()
             except ValueError as error:
                 raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
-            base, surface = self.model.body(robot.spec.base).id, terrain.surface
+            base = self.model.body(robot.spec.base).id
+            surface = terrain.surface
             self.near_terrain = None  # of which the model has the geoms, if it lacks some
             if surface is not None and not all_geoms:
                 self.near_terrain = find_near_terrain(self.model, base, surface, task.dt)
@@ -185,7 +186,8 @@ def _add_sensors(robot: Robot, mjspec: Any) -> dict[str, slice]:
         "penalized_force": (sensor.mjSENS_CONTACT, body, spec.penalized_contacts),
         "termination_force": (sensor.mjSENS_CONTACT, body, spec.termination_contacts),
     }
-    ranges, start = {}, 0
+    ranges = {}
+    start = 0
     for kind, (type_, objtype, names) in kinds.items():
         for name in names:
             made = mjspec.add_sensor(type=type_, objtype=objtype, objname=name)
@@ -200,7 +202,8 @@ def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArr
     data = mujoco.MjData(model)
     data.qpos[:] = default_qpos
     mujoco.mj_kinematics(model, data)
-    foot_pos, depths = np.array([data.site(SOLE + foot).xpos for foot in robot.spec.feet]), []
+    foot_pos = np.array([data.site(SOLE + foot).xpos for foot in robot.spec.feet])
+    depths = []
     for foot, height in zip(robot.spec.feet, foot_pos[:, 2], strict=True):
         geoms = np.flatnonzero(collides(model) & (model.geom_bodyid == model.body(foot).id))
         depths.append(max((height - lowest_point(model, data, int(g)) for g in geoms), default=0.0))

@@ -104,7 +104,9 @@ class Simulation:
 
 def check_env_memory(task: Task, robot: Robot, *, scan: bool, history: int, ngeom: int) -> None:
     """Raise MemoryLimitError if training needs more memory than is free, within a factor of two."""
-    joints, steps, policy = len(robot.default_pose), task.runner.num_steps_per_env, task.policy
+    joints = len(robot.default_pose)
+    steps = task.runner.num_steps_per_env
+    policy = task.policy
     points = len(task.terrain.measured_points_x) * len(task.terrain.measured_points_y)
     num_envs = task.env.num_envs
     observations = 45 + 7 * joints + 2 * scan * points + history * (20 + 3 * joints)

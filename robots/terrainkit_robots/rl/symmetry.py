@@ -161,7 +161,8 @@ def mirror_feet(position: FloatArray) -> NDArray[np.int64]:
 
 def _foot_maps(robot: Robot, scene: Scene) -> dict[str, SignedPermutation]:
     """Return the maps of a vector and of a number per foot: feet are paired by default position."""
-    feet, index = robot.spec.feet, mirror_feet(scene.foot_pos)
+    feet = robot.spec.feet
+    index = mirror_feet(scene.foot_pos)
     for k in np.flatnonzero(index[index] != np.arange(len(feet))):
         got = f"the foot {feet[k]} is nearest to the mirror image of {feet[index[k]]}"
         raise ConfigError(f"symmetry: {got}, which is nearest to another; expected pairs of feet")

@@ -78,7 +78,8 @@ def load_task_file(path: str | Path) -> RegisteredTask:
         ConfigError: if there is no such file, or it registers no task or several.
         PluginError: if it fails.
     """
-    path, before = Path(path), dict(_registered)
+    path = Path(path)
+    before = dict(_registered)
     if path.suffix != ".py" or not isfile(path):  # noqa: PTH113 - see `get_task`
         raise ConfigError(f"task: got {path}; expected a Python file that calls register_task")
     module = sys.modules[path.stem] = ModuleType(path.stem)  # dataclasses look there

@@ -31,25 +31,27 @@ def bad_orientation(env: "LeggedEnv") -> BoolArray:
 
 def terrain_out_of_bounds(env: "LeggedEnv") -> BoolArray:
     """Return which robots have left the map."""
-    xy, terrain = env.state.base_pos[:, :2], env.terrain
+    xy = env.state.base_pos[:, :2]
+    terrain = env.terrain
     return np.asarray(((xy < terrain.lower) | (xy > terrain.upper)).any(axis=1))
 
 
 def stuck(env: "LeggedEnv") -> BoolArray:
     """Return which robots make no progress along their linear velocity command.
 
-    The progress is a moving average over `stuck_time`, which the event `progress` sets to 1.
+    The progress is a moving average over `stuck_time`, which is 1 after a reset.
     """
     limit = env.cfg.termination.stuck_time
     if limit is None:
         return np.zeros(env.num_envs, bool)
-    progress = env.buffers["progress"]
+    progress = env.buffers.setdefault("progress", np.ones(env.num_envs, np.float32))
     commands, velocity = env.state.commands[:, :2], env.state.base_lin_vel[:, :2]
     squares = np.square(commands).sum(axis=1)
     # A robot that is commanded to stand makes all the progress.
     fraction = np.where(
         squares > 0, (commands * velocity).sum(axis=1) / np.maximum(squares, 1e-9), 1
     )
+    progress[env.steps_since_reset <= 1] = 1
     progress += np.float32(env.cfg.dt / limit) * (np.clip(fraction, -1, 1) - progress)
     return progress < STUCK
 

@@ -1,6 +1,5 @@
 """Geoms of a MuJoCo model: which collide, and where they are."""
 
-from collections.abc import Iterable
 from itertools import product
 from typing import Any
 
@@ -53,16 +52,3 @@ def lowest_point(model: Any, data: Any, geom: int) -> float:
         case _:
             extent = size @ up
     return float(data.geom_xpos[geom][2] - extent)
-
-
-def height_above(model: Any, data: Any, geoms: Iterable[int], floor: Any) -> float:
-    """Return the height of the lowest point of geoms above a floor [m].
-
-    Args:
-        model: The MuJoCo model.
-        data: Its state, with computed kinematics.
-        geoms: Ids of the geoms; without any, the point is the origin of the base.
-        floor: Id of a horizontal plane.
-    """
-    lowest = min((lowest_point(model, data, geom) for geom in geoms), default=data.qpos[2])
-    return float(lowest - data.geom_xpos[floor, 2])

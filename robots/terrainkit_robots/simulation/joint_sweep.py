@@ -106,7 +106,8 @@ class _Sweep:
         """Return the last unblocked position, the bodies that block the next one, and the loads."""
         model, data = self._rollout.model, self._rollout.data
         dof = int(model.joint(name).dofadr[0])
-        reached, loads = start, []
+        reached = start
+        loads = []
         for position in np.linspace(start, end, 1 + int(np.ceil(abs(end - start) / step))):
             self._set_position(name, float(position))
             loads.append(float(data.qfrc_bias[dof]))

@@ -8,7 +8,7 @@ import numpy as np
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from terrainkit_robots.simulation.gain import Gain
-from terrainkit_robots.simulation.geoms import collides, height_above
+from terrainkit_robots.simulation.geoms import collides
 from terrainkit_robots.simulation.sim_model import SimModel
 
 _MAX_CONTACTS = 300
@@ -16,6 +16,9 @@ _MAX_CONTACTS = 300
 
 _MAX_DOFS = 100
 """With more degrees of freedom two seconds take longer than that."""
+
+_MAX_DISTANCE = 100.0
+"""Distance within which the floor is searched [m]."""
 
 
 class Rollout:
@@ -75,12 +78,25 @@ class Rollout:
         model, data = self.model, self.data
         data.qpos[:] = qpos
         if self.sim.floating and clearance is not None:
+            # Measured from far above the floor, so that all distances are positive.
+            data.qpos[2] = qpos[2] + _MAX_DISTANCE / 2
             mujoco.mj_kinematics(model, data)
-            is_floor = model.geom_bodyid == 0
-            shapes = np.flatnonzero(collides(model) & ~is_floor)
-            data.qpos[2] += clearance - height_above(model, data, shapes, np.argmax(is_floor))
+            data.qpos[2] += clearance - self._clearance()
         mujoco.mj_forward(model, data)
         check_contacts(data)
+
+    def _clearance(self) -> float:
+        """Return the height of the lowest shape above the floor [m]."""
+        import mujoco
+
+        model, data = self.model, self.data
+        (floors,) = np.nonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)
+        distances = [
+            mujoco.mj_geomDistance(model, data, int(floors[0]), int(geom), _MAX_DISTANCE, None)
+            for geom in np.flatnonzero(collides(model))
+            if geom not in floors
+        ]
+        return min(distances, default=float(data.qpos[2]))
 
     def steps(self, seconds: float) -> Iterator[int]:
         """Step, and yield the index of each step. Stop if the simulation diverges."""

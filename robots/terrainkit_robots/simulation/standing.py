@@ -189,7 +189,9 @@ def stand_test(
     with quiet_mujoco():
         qpos = sim.qpos_at(positions)
         if joints_locked:
-            sim, gains, positions = weld_joints(sim, positions), {}, {}
+            sim = weld_joints(sim, positions)
+            gains = {}
+            positions = {}
             qpos = np.concatenate([qpos[:3], _level(ground_normal)])
         rollout = Rollout(sim, gains, self_collision=self_collision)
         # Without a drop, a failure is a failure to stand and not to land.
@@ -243,7 +245,8 @@ class _Recorder:
         self.steps = step + 1
         if step % _DECIMATION:
             return
-        data, time = self.rollout.data, step * float(self.rollout.model.opt.timestep)
+        data = self.rollout.data
+        time = step * float(self.rollout.model.opt.timestep)
         self.max_tilt = max(self.max_tilt, self._tilt())
         if 2 * time >= self.seconds:
             saturation = np.abs(data.actuator_force) / self.efforts

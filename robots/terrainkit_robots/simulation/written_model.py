@@ -20,7 +20,7 @@ from terrainkit_robots.analysis.simulator_conventions.loading import (
 )
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.simulation.gain import Gain
-from terrainkit_robots.simulation.geoms import collides, height_above
+from terrainkit_robots.simulation.geoms import collides, lowest_point
 from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.rollout import check_contacts, check_dofs, has_diverged
 
@@ -236,10 +236,11 @@ def stand_as_written(
             offset, slope = model.actuator_biasprm[index, :2]
             data.ctrl[index] = -(offset + slope * length) / model.actuator_gainprm[index, 0]
         mujoco.mj_kinematics(model, data)
-        data.qpos[2] -= height_above(model, data, written.shapes, written.floor)
+        data.qpos[2] -= _clearance(written, model, data)
         mujoco.mj_forward(model, data)
         check_contacts(data)
-        start, steps = data.qpos[:3].copy(), round(_SECONDS / model.opt.timestep)
+        start = data.qpos[:3].copy()
+        steps = round(_SECONDS / model.opt.timestep)
         speeds = np.zeros((steps, model.nv - 6))
         forces, heights = np.zeros(steps), np.zeros(steps)
         for step in range(steps):
@@ -252,7 +253,7 @@ def stand_as_written(
             forces[step], heights[step] = data.qfrc_constraint[2], data.qpos[2]
             speeds[step] = data.qvel[6:]
         mujoco.mj_kinematics(model, data)
-        clearance = height_above(model, data, written.shapes, written.floor)
+        clearance = _clearance(written, model, data)
     settled = round(_SETTLING_SECONDS / model.opt.timestep)
     return WrittenStand(
         lost_weight=1 - float(forces[settled:].mean()) / written.weight,
@@ -274,3 +275,9 @@ def position_servos(model: Any) -> list[int]:
     kinds = model.jnt_type[model.actuator_trnid[:, 0]]
     moves = (kinds == mujoco.mjtJoint.mjJNT_SLIDE) | (kinds == mujoco.mjtJoint.mjJNT_HINGE)
     return [int(index) for index in np.flatnonzero(is_servo & on_joint & moves)]
+
+
+def _clearance(written: WrittenModel, model: Any, data: Any) -> float:
+    """Return the height of the lowest colliding shape above the floor [m]."""
+    lowest = min(lowest_point(model, data, geom) for geom in written.shapes)
+    return float(lowest - data.geom_xpos[written.floor, 2])

@@ -34,7 +34,11 @@ from terrainkit_robots.text import count
 MAX_FOOT_HEIGHT, MAX_FOOT_DEPTH, MIN_BASE_HEIGHT = 0.02, 0.001, 0.5
 """Limits of a foot above and below the ground [m], and of the base, relative to its target."""
 
-NUM_ENVS, RANDOM_STEPS = 16, 100
+NUM_ENVS = 16
+"""Number of robots."""
+
+RANDOM_STEPS = 100
+"""Steps with random actions, after which every reward should have been other than 0."""
 
 DEFAULT_SAMPLES, MIN_TREND_SAMPLES = 100_000, 50_000
 """Samples of the short training, and the fewest that show whether a robot learns."""
@@ -106,7 +110,8 @@ def run_checks(
     robot: Robot, task: Task, samples: int, progress: Progress = lambda _: None
 ) -> ResultTable[Check]:
     """Check whether a robot can be trained for a task on a plane; see `smoke_test`."""
-    name, expected = "environment initializes", "no error"
+    name = "environment initializes"
+    expected = "no error"
     task = replace(task, commands=replace(task.commands, waypoints=False))  # a plane has no goals
     algorithm = replace(task.algorithm, num_mini_batches=1)  # a few robots allow no more
     env_cfg = replace(task.env, num_envs=NUM_ENVS, num_threads=1)
@@ -139,7 +144,8 @@ def check_spawn_height(env: LeggedEnv) -> Check:
     data.qpos[2] = spec.spawn_height or 0.0
     with quiet_mujoco():
         mujoco.mj_kinematics(model, data)
-    passed, measured = True, []
+    passed = True
+    measured = []
     for foot in spec.feet:
         geoms = scene.geoms[model.geom_bodyid[scene.geoms] == model.body(foot).id]
         height = min((lowest_point(model, data, int(geom)) for geom in geoms), default=np.nan)
@@ -220,7 +226,8 @@ def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Chec
     env.state = random_state(env.state, env.cfg.runner.seed)
     for name, (reward, _) in env.active_rewards.items():
         low, high = np.min(values[name]), np.max(values[name])
-        passed, measured = bool(np.isfinite([low, high]).all()), f"{low:.3g} to {high:.3g}"
+        passed = bool(np.isfinite([low, high]).all())
+        measured = f"{low:.3g} to {high:.3g}"
         if not passed:
             measured = "not finite"
         elif low == 0 == high:
@@ -237,7 +244,8 @@ def check_rewards(env: LeggedEnv, trained: Mapping[str, float]) -> Iterator[Chec
 
 def random_state(state: State, seed: int) -> State:
     """Return random states, of magnitudes from 0.1 for the first robot to 1000 for the last."""
-    rng, random = np.random.default_rng(seed), {}
+    rng = np.random.default_rng(seed)
+    random = {}
     for name, array in vars(state).items():
         scale = np.logspace(-1, 3, len(array)).reshape(-1, *[1] * (array.ndim - 1))
         values = scale * rng.normal(size=array.shape)
@@ -252,9 +260,8 @@ def check_training(record: TrainingRecord) -> Check:
     values = [list(loss.values()) for loss in record.losses]
     passed = not record.error and bool(np.isfinite([*np.ravel(values), record.noise_std]).all())
     measured = ", ".join(f"{name.replace('_', ' ')} {value:.3g}" for name, value in last.items())
-    expected = "finite losses and noise"
     name = f"trains for {count(len(record.losses), 'iteration')}"
-    return Check(name, passed, record.error or measured, expected)
+    return Check(name, passed, record.error or measured, "finite losses and noise")
 
 
 def check_trends(record: TrainingRecord) -> Iterator[Check]:

@@ -15,8 +15,11 @@ from terrainkit_robots.rl.terrain import Plane
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import BoolArray, FloatArray
 
-NUM_ENVS, START_TIME = 128, 1.0
-"""Number of robots, and time that belongs to no quarter [s]: at first, all robots stand."""
+NUM_ENVS = 128
+"""Number of robots."""
+
+START_TIME = 1.0
+"""Time that belongs to no quarter [s]: at first, all robots stand."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +46,8 @@ def record_rewards(env: LeggedEnv) -> list[list[float]]:
 
     def record(unstable: BoolArray) -> FloatArray:
         before = [total.copy() for total in env.episode_sums.values()]
-        rewards, after = compute(unstable), env.episode_sums.values()
+        rewards = compute(unstable)
+        after = env.episode_sums.values()
         terms = [total - last for total, last in zip(after, before, strict=True)]
         recorded.append(
             [float(values.mean()) / env.cfg.dt for values in (env.state.fallen, *terms)]

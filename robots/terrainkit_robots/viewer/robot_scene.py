@@ -65,7 +65,9 @@ class RobotScene:
         self.base.position, self.base.wxyz = position, wxyz
 
     def _add_shapes(self, body: int, kind: str, shapes: Sequence[BodyShape]) -> list[Any]:
-        is_visual, meshes, handles = kind == "visual", self.facts.meshes, []
+        is_visual = kind == "visual"
+        meshes = self.facts.meshes
+        handles = []
         for k, shape in enumerate(shapes):
             geometry = shape.geometry
             if not has_bounds(geometry, meshes):

@@ -149,7 +149,8 @@ class PolicyView:
 
     def _reset(self) -> None:
         """Reset the robot to the selected patch."""
-        env, self._reset_requested = self.env, False
+        env = self.env
+        self._reset_requested = False
         env.curriculum.levels[:] = min(self.level.value, len(env.terrain.terrain_names) - 1)
         env.curriculum.columns[:] = int(self.column.value.partition(":")[0])
         env.reset()

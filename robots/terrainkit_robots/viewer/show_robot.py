@@ -67,7 +67,8 @@ class JointSliders:
         """Add the sliders, in the order of the joints, to the GUI of a server."""
         self._default, self._mirror = facts.default_pose, facts.mirror_map
         self._set_positions = set_positions
-        self._lock, self._is_updating = threading.RLock(), False
+        self._lock = threading.RLock()
+        self._is_updating = False
         self.mirrored = server.gui.add_checkbox("move mirrored joints", initial_value=False)
         self.reset = server.gui.add_button("default pose")
         self.reset.on_click(lambda _: self._assign(self._default))
@@ -84,8 +85,7 @@ class JointSliders:
         position = float(self._default.get(joint.name, 0.0))
         lower, upper = slider_range(joint, position)
         step = 10.0 ** math.floor(math.log10((upper - lower) / _SLIDER_STEPS))
-        label = f"{joint.name} [{joint.unit}]"
-        slider = server.gui.add_slider(label, lower, upper, step, position)
+        slider = server.gui.add_slider(f"{joint.name} [{joint.unit}]", lower, upper, step, position)
         slider.on_update(lambda _: self._on_update(joint.name))
         return slider
 
@@ -133,7 +133,8 @@ def add_markers(server: "viser.ViserServer", report: Report) -> "list[viser.Scen
     handles: list[viser.SceneNodeHandle] = []
     for k, ((body, point), findings) in enumerate(places.items()):
         # Findings are sorted by severity.
-        color, node = _SEVERITY_COLORS[findings[0].severity], f"{body_node(body)}/finding_{k}"
+        color = _SEVERITY_COLORS[findings[0].severity]
+        node = f"{body_node(body)}/finding_{k}"
         radius = max(0.01, 0.05 * float(size))
         codes = ", ".join(dict.fromkeys(finding.code for finding in findings))
         handles += [
@@ -154,10 +155,9 @@ class FindingPlaces:
             if joint is not None:
                 self._add(joint.name, [joint.source], (body.index, _point(joint.anchor)))
             for link, pose in zip(body.links, body.poses, strict=True):
-                place = (body.index, _point(pose[:3, 3]))
                 sources = [element.source for element in (*link.collisions, *link.visuals)]
                 sources += [link.inertial.source] if link.inertial is not None else []
-                self._add(link.name, [link.source, *sources], place)
+                self._add(link.name, [link.source, *sources], (body.index, _point(pose[:3, 3])))
 
     def _add(self, name: str, sources: Sequence[Source], place: Place) -> None:
         self._by_name.setdefault(name, place)

@@ -1,11 +1,12 @@
 import dataclasses
+import tracemalloc
 
 import numpy as np
 import pytest
 
-from terrainkit import export
+from terrainkit import MapConfig, SubTerrain, export, generate
 from terrainkit.errors import ExportError
-from terrainkit.export import check_export, exporters_by_suffix
+from terrainkit.export import check_export, exporters_by_suffix, get_exporter
 
 every_suffix = pytest.mark.parametrize("suffix", sorted(exporters_by_suffix()))
 
@@ -14,9 +15,16 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_export_has_these_formats():
-    formats = ".glb .npz .obj .ply .png .py .sdf .stl .usd .usda .usdc .xml .yaml"
-    assert sorted(exporters_by_suffix()) == formats.split()
+@every_suffix
+def test_export_takes_no_more_memory_than_stated(tmp_path, suffix):
+    stairs = SubTerrain(terrain="pyramid_stairs")
+    terrain_map = generate(MapConfig(rows=3, cols=3, terrains=(stairs,)))
+    path = terrain_map.save(tmp_path / f"map{suffix}")  # after all imports
+    tracemalloc.start()
+    terrain_map.save(path, overwrite=True)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < get_exporter(path).BYTES_PER_SAMPLE * terrain_map.heights.size + 3e6
 
 
 @every_suffix

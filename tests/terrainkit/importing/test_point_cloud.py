@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from terrainkit.errors import HeightFileError
-from terrainkit.importing import source as source_module
+from terrainkit.importing import height_source as source_module
 from terrainkit.importing.height_source import open_source
 from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.point_cloud import PointSource, read

@@ -31,7 +31,7 @@ def ground_of(config, heights, solids=None, grid=PLOT):
 def spawn(heights, wanted=(2.0, 2.0), *, radius=0.5, tolerance=0.01, walls=True, solids=None):
     threshold = 0.75 if walls else None
     config = MapConfig(spawn_radius=radius, spawn_tolerance=tolerance, slope_threshold=threshold)
-    return ground_of(config, heights, solids).find(wanted)
+    return ground_of(config, heights, solids).nearest_flat(wanted)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_find_spawn_is_at_or_nearest_to_the_preferred_point(heights, wanted, fou
 
 def test_find_spawn_is_in_the_map_frame():
     grid = Grid(shape=(40, 40), cell=0.1, lower=(-10.0, 5.0))
-    assert ground_of(MapConfig(), ground(), grid=grid).find((-8.0, 7.0)) == (-8.0, 7.0, 0.0)
+    assert ground_of(MapConfig(), ground(), grid=grid).nearest_flat((-8.0, 7.0)) == (-8.0, 7.0, 0.0)
 
 
 def test_find_spawn_accepts_slope_within_tolerance():
@@ -114,11 +114,11 @@ def test_flattest_tolerance_of_a_slope(grade, cell, tolerance):
     needed = ground_of(config, heights, grid=grid).flattest_tolerance(center)
     assert needed == pytest.approx(tolerance, rel=1e-6)
     works = dataclasses.replace(config, spawn_tolerance=tolerance * (1 + 1e-5))
-    found = ground_of(works, heights, grid=grid).find(center)
+    found = ground_of(works, heights, grid=grid).nearest_flat(center)
     assert found == pytest.approx((*center, grade * center[1]), rel=1e-4)
     if grade:
         fails = dataclasses.replace(config, spawn_tolerance=tolerance * 0.9)
-        assert ground_of(fails, heights, grid=grid).find(center) is None
+        assert ground_of(fails, heights, grid=grid).nearest_flat(center) is None
 
 
 def test_flattest_tolerance_is_of_the_flattest_free_disk():

@@ -1,6 +1,6 @@
 """Tests of the presets; sub-terrains are in presets.json, of published work in test_paper.py.
 
-Write it anew with `python -m tests.terrainkit.terrain.test_presets`.
+`make records` writes it anew.
 """
 
 import json

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from tests.robots import QUADRUPED
 from tests.small_robots import box, joint, link, shape

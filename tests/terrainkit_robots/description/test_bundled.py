@@ -7,7 +7,7 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.spec.robot_spec import RobotSpec
 from terrainkit_robots.transforms import quat_to_matrix

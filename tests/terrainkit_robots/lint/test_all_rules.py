@@ -1,9 +1,9 @@
 """Run all rules on the robot of every case, and on a quadruped with changed numbers.
 
 A tenth of the robots is tested; all of them with TERRAINKIT_ALL_RULES=1, as every night. The
-findings are in all_findings.json, without their texts. Write them anew with `python -m
-tests.terrainkit_robots.lint.test_all_rules`, and read the difference. Rules that load the file in
-MuJoCo are left out, since its versions reject different files.
+findings are in all_findings.json, without their texts. `make records` writes them anew; read the
+difference. Rules that load the file in MuJoCo are left out, since its versions reject different
+files.
 """
 
 import json
@@ -57,8 +57,8 @@ def brief(finding, folder):
     return " ".join([finding.code, f"{place}:", *numbers])
 
 
-def of_cases(family, folder):
-    """Return the findings on the robots of the cases of a family, by the case.
+def cases_with_robots(family):
+    """Return the cases of a family, one of each robot.
 
     A robot that is compared with another file or a spec is left out, since XRF tests it.
     """
@@ -67,9 +67,13 @@ def of_cases(family, folder):
         for case in ALL_CASES
         if case.other_text is case.spec is None
     }
-    cases = [case for case in robots.values() if case.code.startswith(family)]
+    return [case for case in robots.values() if case.code.startswith(family)]
+
+
+def of_cases(family, folder):
+    """Return the findings on the robots of the cases of a family, by the case."""
     found = {}
-    for number, case in enumerate(cases[::STEP]):
+    for number, case in enumerate(cases_with_robots(family)[::STEP]):
         (folder / str(number)).mkdir()
         found[str(case)] = findings(str(case), case, folder / str(number))
     return found
@@ -88,6 +92,12 @@ def of_changes(name, folder):
 @cache
 def expected():
     return json.loads(FINDINGS.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_all_findings_have_the_robots_of_all_cases(family):
+    titles = [str(case) for case in cases_with_robots(family)]
+    assert titles == [*expected()[family]], "`make records` writes the findings of a new case"
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -1,7 +1,7 @@
 """Run every rule on its cases: robots in cases/<CODE>.toml that violate it or not.
 
-The texts of all findings are in findings.json. Write them anew with `python -m
-tests.terrainkit_robots.lint.test_every_rule`, and read the difference.
+The texts of all findings are in findings.json. `make records` writes them anew; read the
+difference.
 """
 
 import json
@@ -19,10 +19,10 @@ import trimesh
 import terrainkit_robots
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.fixes.apply import fix_robot, write_fixes
 from terrainkit_robots.lint.rule import get_rule, rules
 from terrainkit_robots.lint.runner import lint
-from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.spec.robot_spec import RobotSpec
@@ -211,7 +211,9 @@ def test_failing_case_is_found(case, tmp_path):
     found = [f for f in report.findings if f.code == case.code]
     assert found, f"no finding; skipped: {report.skipped}"
     if not case.code.startswith(SIMULATED):
-        assert [text_of(finding, tmp_path) for finding in found] == expected_texts()[str(case)]
+        texts = expected_texts().get(str(case))
+        assert texts, "`make records` writes the texts of a new case"
+        assert [text_of(finding, tmp_path) for finding in found] == texts
     for finding in found:
         check_text(case, finding)
         assert finding.file.is_relative_to(tmp_path)

@@ -11,9 +11,9 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.model import Source
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.rule import FAMILIES, Rule, Violation, rules
 from terrainkit_robots.lint.runner import INTERNAL_ERROR, MAX_FINDINGS, Skipped, has_inputs, lint
-from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from tests.small_robots import URDF, facts, joint, link
 

@@ -3,8 +3,8 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.load import load_robot
+from terrainkit_robots.lint.check import Suppressed, lint_selected, select_rules
 from terrainkit_robots.lint.rule import rules
-from terrainkit_robots.lint.selection import Suppressed, lint_selected, select_rules
 from terrainkit_robots.lint.settings import Settings, matching
 from tests.small_robots import link
 from tests.tables import read_table

@@ -422,6 +422,15 @@ class TestStateDict:
             assert torch.equal(other.get_observations()[name], group), name
         assert record(other, actions[21:]) == expected
 
+    def test_load_restores_buffers_that_a_term_makes_later(self, random_env):
+        env, other = random_env(3), random_env(3)
+        env.buffers["clock"] = np.arange(3, dtype=np.float32)
+        saved = env_state(env)
+        load_env_state(other, saved)
+        assert other.buffers["clock"].tolist() == [0, 1, 2]
+        other.buffers["clock"] += 1
+        assert saved["arrays"]["buffers.clock"].tolist() == [0, 1, 2]
+
     @pytest.mark.parametrize("name", ["buffers.steps_until_push", "state.foot_force"])
     def test_load_rejects_other_version(self, random_env, name):
         saved = env_state(random_env(3))

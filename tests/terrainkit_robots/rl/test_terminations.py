@@ -108,7 +108,7 @@ class TestStuck:
         env = SimpleNamespace(
             cfg=Task(termination=Termination(**limits)),
             num_envs=len(commands),
-            buffers={"progress": np.ones(len(commands), np.float32)},
+            buffers={},
             steps_since_reset=np.zeros(len(commands), np.int64),
             state=SimpleNamespace(commands=np.asarray(commands, np.float32), base_lin_vel=vel),
         )

@@ -14,7 +14,7 @@ from websockets.sync.server import serve
 
 import terrainkit as tk
 from terrainkit.viewer.map_scene import show_map
-from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.rl.run import open_run
 from terrainkit_robots.viewer.show_policy import PolicyView

@@ -6,8 +6,8 @@ import pytest
 import trimesh
 
 from terrainkit_robots.description.model import Joint, Limit, Source
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.runner import lint
-from terrainkit_robots.lint.selection import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.viewer.robot_scene import shape_surface
 from terrainkit_robots.viewer.show_robot import (

@@ -67,7 +67,8 @@ def joint_motion(body: BodyFrame, position: Matrix | np.float64) -> Matrix:
         Transforms that are applied in the frame of the body, shape (..., 4, 4) [m].
     """
     assert body.joint is not None
-    joint, q = body.joint, np.asarray(position) - body.joint.reference
+    joint = body.joint
+    q = np.asarray(position) - body.joint.reference
     motion = np.broadcast_to(np.eye(4), (*q.shape, 4, 4)).copy()
     if joint.kind == "prismatic":
         motion[..., :3, 3] = q[..., None] * joint.direction

@@ -19,6 +19,7 @@ def composite_inertias(bodies: Sequence[Body]) -> list[float]:
         For each body the inertia of it and all bodies below it about the axis of its joint
         [kg m2], or their mass [kg] for a prismatic joint. NaN for a body without a moving joint.
     """
+    # Mass, first and second moments about one point, the origin of the trunk, add up over bodies.
     masses = [body.mass for body in bodies]
     firsts = []
     seconds = []

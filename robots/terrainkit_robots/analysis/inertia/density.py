@@ -47,6 +47,8 @@ def check_min_density(
     def needs_volume(length: float) -> bool:
         return body.mass < _PLAUSIBLE_DENSITY * length**3 / _SLENDERNESS
 
+    # The volume of a mesh is expensive, and a body that is dense enough for its box is dense enough
+    # for its shapes.
     box = body_bounds.shape_box(body, needs_volume)
     if box is None or body.mass >= _PLAUSIBLE_DENSITY * _box_volume(box):
         return None

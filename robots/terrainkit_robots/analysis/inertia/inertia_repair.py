@@ -73,12 +73,15 @@ class InertiaRepair:
         smallest = float(self._location[link.name][0].principal[0])
         if inertia is None or not smallest > MIN_INERTIA:
             return np.inf
+        # The spectral norm of a symmetric matrix is the largest change of a moment about any axis.
         return float(np.linalg.norm(inertia - inertial.inertia, 2)) / smallest
 
     def _repaired(
         self, link: Link, inertial: Inertial, declared: Matrix
     ) -> tuple[Matrix | None, str]:
         """Return a physical inertia in the inertial frame of a link, and what it is."""
+        # The mirror image is the same part with valid numbers. The nearest inertia keeps the axes
+        # and most of what is declared. The box knows no more than the size and the mass.
         candidates = (
             (self._mirror_inertia(link), "the inertia of its mirror image"),
             (self._nearest(link, declared), "the nearest physical inertia"),
@@ -101,6 +104,7 @@ class InertiaRepair:
             return None
         body, index = self._location[link.name]
         other_index = self.mirror.image_index.get(body.index)
+        # Links have no mirror images of their own: they correspond by their place in the body.
         if other_index is None or len(self.bodies[other_index].links) != len(body.links):
             return None
         other = self.bodies[other_index].links[index]
@@ -130,11 +134,14 @@ class InertiaRepair:
         """
         if is_zero(inertia):
             return None
-        nearest, box, mass = nearest_physical(inertia), self._box(link), _mass(link)
+        nearest = nearest_physical(inertia)
+        box = self._box(link)
+        mass = _mass(link)
         if nearest is None or box is None or not mass > 0:
             return nearest
         radius = gyration_radius(principal_moments(nearest), mass)
-        # No mass inside the box is farther from its center than half of the diagonal.
+        # No mass inside the box is farther from its center than half of the diagonal, and the
+        # radius of gyration is an average of distances.
         return nearest if radius <= np.linalg.norm(box[1] - box[0]) / 2 else None
 
     def _solid_box(self, link: Link, inertial: Inertial) -> Matrix | None:
@@ -162,6 +169,7 @@ def _edits(inertial: Inertial, inertia: Matrix) -> Iterator[Edit]:
     source = inertial.inertia_source or inertial.source
     numbers = _format(inertia)
     off_diagonal = inertia - np.diag(np.diag(inertia))
+    # Rotations between frames leave rounding errors of 1e-16 of the largest element.
     is_diagonal = np.abs(off_diagonal).max() <= 1e-12 * np.abs(inertia).max()
     if not inertial.attribute:
         for name, number in zip(_ATTRIBUTES, numbers, strict=True):

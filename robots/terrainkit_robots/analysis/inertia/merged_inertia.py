@@ -40,6 +40,8 @@ def merged_inertia(parts: Iterable[tuple[Inertial, Matrix]]) -> Inertial | None:
     if not weighted or total == 0:
         return None
     center = sum((mass * pose[:3, 3] for _, mass, pose in weighted), np.zeros(3)) / total
+    # Turn each inertia to the common axes, and shift it from its own center of mass to the common
+    # one.
     inertia = np.zeros((3, 3))
     for part, mass, pose in weighted:
         rotation = pose[:3, :3]

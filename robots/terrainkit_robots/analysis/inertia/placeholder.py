@@ -31,6 +31,7 @@ def placeholder_inertias(bodies: Sequence[Body]) -> list[tuple[Matrix, list[Link
     for elements, indices in groups.items():
         inertia = np.reshape(elements, (3, 3))
         members = {i: links[i] for i in indices}
+        # Left and right parts have the same numbers, so two bodies are no placeholder.
         is_majority = len(indices) >= max(3, math.ceil(len(links) / 2))
         if is_identity(inertia) or (is_majority and _are_different(members, inertia, bodies)):
             found.append((inertia, list(members.values())))
@@ -51,6 +52,7 @@ def _are_different(links: Mapping[int, Link], inertia: Matrix, bodies: Sequence[
 
 def _is_round(inertia: Matrix) -> bool:
     """Return whether an inertia is spherical, or diagonal with at most two digits."""
+    # CAD programs write many digits, and products that are not exactly zero.
     moments = np.diag(inertia)
     if (inertia != np.diag(moments)).any():
         return False

@@ -78,7 +78,8 @@ def _com_offset(robot: LegModel, poses: Sequence[Matrix]) -> float:
 
 def _lower_leg(leg: Leg, robot: LegModel) -> Iterator[int]:
     """Yield the last body of a leg, and all bodies that its knee moves."""
-    knee, is_below = leg.joint("knee"), False
+    knee = leg.joint("knee")
+    is_below = False
     for index in leg.limb.chain:
         is_below |= knee is not None and robot.bodies[index].joint is knee
         if is_below or index == leg.limb.chain[-1]:

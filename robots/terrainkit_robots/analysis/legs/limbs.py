@@ -124,7 +124,8 @@ def detect_limbs(
     def height_score(leaf: Chain) -> float:
         foot = float(leaf.tip[2])
         min_rise = max(_MIN_ARM_HEIGHT * height, _MIN_ARM_RISE * _length(leaf, 0))
-        ratio, is_arm = (foot - ground) / height, foot - rest > min_rise
+        ratio = (foot - ground) / height
+        is_arm = foot - rest > min_rise
         return (ratio <= _LOW) / 2 + (ratio <= _NEAR_GROUND) / 2 - is_arm - is_fixed_base / 2
 
     return tuple(_make_limb(leaf, leaves, bodies, size, height_score(leaf)) for leaf in leaves)

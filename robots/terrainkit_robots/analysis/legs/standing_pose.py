@@ -148,6 +148,7 @@ def _leg_pairs(robot: LegModel) -> list[tuple[Leg, Leg | None, Sequence[int]]]:
     for index, leg in enumerate(legs):
         if index in done:
             continue
+        # With a sign of 0, neither equal nor opposite positions are mirrored.
         images = [(i, 1) if uses[i] > 1 else robot.mirror.image_body(i) for i in leg.limb.chain]
         chain = tuple(image[0] for image in images if image is not None)
         other = next((k for k, o in enumerate(legs) if o.limb.chain == chain), None)
@@ -177,6 +178,7 @@ def _foot_shift(robot: LegModel, positions: Mapping[str, float]) -> Matrix:
     center = center_of_mass(robot.bodies, poses)
     hips = [_hip_point(leg, robot, poses) for leg in robot.legs]
     offset = (center - np.mean(hips, axis=0)) * [1, 1, 0]
+    # Only the horizontal part counts, and a longer offset keeps its direction.
     limit = _MAX_FOOT_OFFSET * float(np.mean([leg.length for leg in robot.legs]))
     return np.asarray(offset * min(1.0, limit / max(float(np.linalg.norm(offset)), 1e-9)))
 
@@ -244,10 +246,12 @@ class _LegObjective:
             position = positions[joint.name]
             total = total + 10 * _limit_cost(position, joint) + 1e-3 * np.abs(position)
         if self.ankle is not None:
-            # Not zero only where the limits of the ankle prevent a level sole.
+            # Not zero only where the limits of the ankle prevent a level sole. A sole that is 0.3
+            # rad off level costs about 1, as a foot that is 2 % of the leg length off.
             total = total + 10 * (positions[self.ankle.name] - self._level_ankle(hip, knee)) ** 2
         outward = np.clip((knee_point - self.hip_point) @ self.penalty_axis, 0, None)
         total = total + _OUTWARD_COST * outward
+        # A knee that is too low by 1 % of the leg length costs 1.
         low = _MIN_KNEE_HEIGHT * self.length - (knee_point[..., 2] - contact[..., 2])
         return np.asarray(total + 100 * np.clip(low / self.length, 0, None))
 
@@ -314,7 +318,9 @@ def _local_minima(cost: Matrix) -> list[tuple[int, int]]:
 
 def _minimize(objective: _LegObjective, starts: Matrix, limits: Matrix) -> Matrix:
     """Return the best position of hip and knee near any of the starts, shape (2,)."""
-    best, width, rows = starts, np.ptp(limits, axis=1), np.arange(len(starts))
+    best = starts
+    width = np.ptp(limits, axis=1)
+    rows = np.arange(len(starts))
     for _ in range(_ROUNDS):
         # Two grid steps to either side of the best point.
         width = width / 5
@@ -364,12 +370,14 @@ def _make_objective(
         foot = leaf.zero_pose.copy()
         foot[:3, :3] = axis_angle_to_matrix(leg.pitch, np.float64(angle)) @ foot[:3, :3]
     else:
-        angle, foot = 0.0, poses[leaf.index]  # the contact of a ball depends on the pose
+        angle = 0.0
+        foot = poses[leaf.index]  # the contact of a ball depends on the pose
     contact = contact_points(leaf, foot, robot.meshes).mean(axis=0)
     if ankles and len(robot.legs) == 2:
         contact = contact + _ankle_offset(leg, robot, foot)
     ratio = _HEIGHT_RATIO.get(len(robot.legs), _DEFAULT_HEIGHT_RATIO)
-    hip_point, length = _hip_point(leg, robot, poses), max(leg.length, 1e-6)
+    hip_point = _hip_point(leg, robot, poses)
+    length = max(leg.length, 1e-6)
     return _LegObjective(
         chain=tuple(chain),
         base_pose=poses[chain[0].parent or 0],
@@ -403,6 +411,7 @@ def _ankle_offset(leg: Leg, robot: LegModel, foot: Matrix) -> Matrix:
     ankle = [p for p, role in zip(leg.limb.points, leg.roles, strict=True) if role == "ankle"]
     if not ankle:
         return np.zeros(3)
+    # The points of the limb are those of the zero pose; the foot has turned since then.
     above = foot @ invert_poses(leaf.zero_pose) @ [*ankle[-1], 1.0]
     sole = contact_points(leaf, foot, robot.meshes) @ forward
     reach = _MAX_ANKLE_OFFSET * float(np.ptp(sole)) / 2
@@ -430,6 +439,9 @@ def _level_coefficients(
 
     The rotations of all joints that bend the leg then add up to `angle`.
     """
+    # The axes are parallel to the normal of the leg's plane or opposite to it, so the foot turns by
+    # the sum of the positions times these cosines. Solved for the ankle, that is a plane over hip
+    # and knee.
     cosines = {
         joint.name: float(joint_axis(body, body.zero_pose)[1] @ leg.pitch)
         for body in (robot.bodies[i] for i in leg.limb.chain)

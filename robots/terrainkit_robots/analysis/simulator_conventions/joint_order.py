@@ -143,10 +143,14 @@ class _Robot:
                     "older versions are breadth first"
                 )
             case "Isaac Lab":
-                traverse, first, keys = _breadth_first, "breadth first", [_joint_name]
+                traverse = _breadth_first
+                first = "breadth first"
+                keys = [_joint_name]
                 known, names = "in importers up to Isaac Sim 5.1", "robot.joint_names"
             case "Isaac Gym":
-                traverse, first, keys = _depth_first, "depth first", [_joint_name, _link_name]
+                traverse = _depth_first
+                first = "depth first"
+                keys = [_joint_name, _link_name]
                 known = "in the lists published for A1 and Go1"
                 names = "gym.get_asset_dof_names(asset)"
         if self._is_unique(traverse, (None, self._file_index, *keys)):

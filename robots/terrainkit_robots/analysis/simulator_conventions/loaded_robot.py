@@ -73,7 +73,9 @@ def _loaded(robot: Facts, order: SimulatorOrder) -> LoadedRobot:
     joints = merged_joints(robot.fixed_joints, simulator, keeps_fixed_links=keeps)
     body_of = merge_joints(robot.tree, robot.bodies, joints).body_of
     merged = {link: body for link, body in body_of.items() if link != body}
-    bodies, mass, losses = order.bodies, robot.total_mass, list[str]()
+    bodies = order.bodies
+    mass = robot.total_mass
+    losses = list[str]()
     bare = [link for link in robot.links if link.inertial is None and model.kind != "mjcf"]
     if simulator == "PyBullet":
         bare = [link for link in bare if link.name != WORLD]

@@ -237,7 +237,9 @@ def _check_cost(files: tuple[Path, ...], *, with_files: bool) -> None:
     Raises:
         NotAttemptedError: if they could be too large.
     """
-    elements, directories, names = 0, {Path()}, set[str]()
+    elements = 0
+    directories = {Path()}
+    names = set[str]()
     for source in files:
         for element in _relevant_elements(parse_xml(source, _read(source)).root):
             elements += 1

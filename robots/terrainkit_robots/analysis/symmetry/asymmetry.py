@@ -122,7 +122,8 @@ def _gap(mirror: Mirror, pair: MirrorPair, slide: _Slide | None) -> Matrix:
 
 def _slide_along(mirror: Mirror, pair: MirrorPair, slide: _Slide | None) -> _Slide:
     """Return the offset along the axis of an aligned pair."""
-    gap, axis = _gap(mirror, pair, slide), pair.right.axis
+    gap = _gap(mirror, pair, slide)
+    axis = pair.right.axis
     # The hinge that the offset is from: this one, unless it only follows its parent.
     own = mirror.image(pair.left.offset) - pair.right.offset
     if slide is not None and float(np.linalg.norm(own)) <= MAX_POSITION_ERROR:

@@ -119,7 +119,9 @@ class Mirror:
         """
         image = self.image(axis) if joint.kind == "prismatic" else -self.image(axis)
         cosine = float(image @ other)
-        return 0 if abs(cosine) < _MIN_ALIGNED_COSINE else 1 if cosine > 0 else -1
+        if abs(cosine) < _MIN_ALIGNED_COSINE:
+            return 0
+        return 1 if cosine > 0 else -1
 
 
 def detect_mirror(legs: Sequence[Leg], bodies: Sequence[Body]) -> Mirror:

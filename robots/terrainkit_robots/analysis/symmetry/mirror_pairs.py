@@ -140,7 +140,8 @@ def outlier_first(
     right_bodies = {pair.right for pair in mirror.pairs}
 
     def distance(joint: MirrorSide) -> float:
-        own, side = value(joint.body), left_bodies if joint is left else right_bodies
+        own = value(joint.body)
+        side = left_bodies if joint is left else right_bodies
         if own is None:
             return np.inf
         others = [value(bodies[i]) for i in siblings if i in side]

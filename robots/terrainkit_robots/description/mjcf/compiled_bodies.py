@@ -183,7 +183,8 @@ class CompiledBodies:
         """Add a geom or site to the copy, without mass."""
         import mujoco
 
-        kind, ends = shape_kind(shape), shape.fromto
+        kind = shape_kind(shape)
+        ends = shape.fromto
         spans = kind in _SPANNING and not math.isnan(ends[0])
         if spans and np.linalg.norm(ends[:3] - ends[3:]) < _MIN_LENGTH:
             self._report_rejected(shape, "the two points of fromto are equal")
@@ -209,8 +210,11 @@ class CompiledBodies:
         """Give the copy of a geom the mass of the geom, as far as MuJoCo can compile it."""
         import mujoco
 
-        copy, mass, density = self._copies[geom], float(geom.mass), float(geom.density)
-        is_placeholder, kinds = geom in self._placeholders, mujoco.mjtGeom
+        copy = self._copies[geom]
+        mass = float(geom.mass)
+        density = float(geom.density)
+        is_placeholder = geom in self._placeholders
+        kinds = mujoco.mjtGeom
         needs_mesh = bool(geom.meshname) or geom.type in (kinds.mjGEOM_MESH, kinds.mjGEOM_SDF)
         is_massless = mass == 0 or (math.isnan(mass) and density == 0)
         if is_massless or (is_placeholder and not needs_mesh):

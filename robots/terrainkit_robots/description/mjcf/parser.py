@@ -89,7 +89,8 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
 
     for node in list(tree.nodes()):
         _check_numbers(tree, node)
-    start, message = time.monotonic(), ""
+    start = time.monotonic()
+    message = ""
     for _ in range(MAX_ATTEMPTS):
         limit_size(tree)
         text, attached, lines = tree.write()
@@ -97,7 +98,8 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
             with quiet_mujoco():
                 return mujoco.MjSpec.from_string(text, include=attached or None), lines
         except (ValueError, RuntimeError, mujoco.FatalError, mujoco.UnexpectedError) as error:
-            tree.complete, message = False, _clean_message(str(error))
+            tree.complete = False
+            message = _clean_message(str(error))
             if not _repair(tree, lines, str(error)):
                 return None, lines
         if time.monotonic() - start > MAX_SECONDS:
@@ -266,7 +268,8 @@ def _invalid_number(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
     name = match["name"]
     if name not in node.attributes:
         return False
-    text, counts = node.attributes.pop(name), _COUNTS.get(name)
+    text = node.attributes.pop(name)
+    counts = _COUNTS.get(name)
     if "large" in match[0]:
         expected = "a smaller number"
     elif counts is None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from terrainkit_robots.description.mjcf.actuators import (
     ActuatorData,
+    coupled_joints,
     force_limit,
     position_gains,
     read_actuators,
@@ -28,7 +29,6 @@ from terrainkit_robots.description.mjcf.inertia import (
     geom_inertial,
     scale_to_total_mass,
 )
-from terrainkit_robots.description.mjcf.loops import coupled_joints
 from terrainkit_robots.description.mjcf.parser import parse_mjcf
 from terrainkit_robots.description.mjcf.references import dangling_references
 from terrainkit_robots.description.mjcf.shapes import (

@@ -185,6 +185,8 @@ def _is_base_offset(a: Matrix, b: Matrix, pairs: RobotPairs) -> bool:
     others = [k for k, pair in enumerate(pairs.links) if pair != pairs.base]
     if len(others) < 2:
         return False
+    # All poses are relative to the base. If T a = b holds for one link in one pose, T is the only
+    # candidate, and it has to hold for the others.
     offset = b[others[0], 0] @ invert_poses(a[others[0], 0])
     distance, angle = pose_error(offset @ a[others], b[others])
     return bool(distance.max() <= MAX_DISTANCE and angle.max() <= MAX_ANGLE)
@@ -192,6 +194,7 @@ def _is_base_offset(a: Matrix, b: Matrix, pairs: RobotPairs) -> bool:
 
 def _is_constant_rotation(a: Matrix, b: Matrix) -> bool:
     """Return whether the relative rotation of each pair of links is the same in every pose."""
+    # Another orientation of the link frames, as between exporters, does not change with the pose.
     relative = invert_poses(a) @ b
     _, angle = pose_error(np.broadcast_to(relative[:, :1], relative.shape), relative)
     return bool(angle.max() <= MAX_ANGLE)

@@ -180,6 +180,7 @@ def _apply_round(
         try:
             if finding.fix.safety != "safe" and not unsafe:
                 raise EditError("the fix is unsafe, because it changes the robot")
+            # A fix that is found again after it was applied would be applied in every round.
             if not inserted.isdisjoint(_insertions(finding)):
                 raise EditError("the fix was applied without effect")
             batch.add(finding.fix)

@@ -360,7 +360,8 @@ def _insert(text: _Text, parent: _Element, edits: Sequence[InsertChild]) -> Iter
     if not text.data[parent.tag_end : parent.close].strip():
         yield _fill(text, parent, [*first, *last])
         return
-    parent_indent, child = text.indent_before(parent.start), text.child(parent)
+    parent_indent = text.indent_before(parent.start)
+    child = text.child(parent)
     indent = None if parent_indent is None else parent_indent + text.indent
     if child is not None:
         indent = text.indent_before(child.start)

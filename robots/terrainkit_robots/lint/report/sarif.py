@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote_from_bytes
 
+from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.report.facts_json import facts_json
 from terrainkit_robots.lint.report.json_report import to_json
 from terrainkit_robots.lint.rule import Finding, Rule, families, rules
 from terrainkit_robots.lint.runner import Report, Skipped
-from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import display_path
 
 SCHEMA = (

@@ -3,10 +3,10 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.report.grouping import group_findings
 from terrainkit_robots.lint.rule import SEVERITIES, Finding
 from terrainkit_robots.lint.runner import Report, SkipKind, Skipped
-from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.text import count, display_path, names
 
 _MAX_CODES = 6

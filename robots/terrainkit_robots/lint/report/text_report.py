@@ -114,7 +114,8 @@ def _robot(report: Report, width: int, *, verbose: bool) -> Iterator[Line]:
 def _note(group: FindingGroup, width: int) -> Line:
     """Return a note on one line, cut at `width` characters."""
     first = group.first
-    label, code = Span("note", _STYLES["note"]), f" {first.code}"
+    label = Span("note", _STYLES["note"])
+    code = f" {first.code}"
     more = f" (+{len(group.others)})" if group.others else ""
     text = " ".join(escape_control(group.text[:_MAX_LENGTH]).split())
     room = max(width - len(f"{label.text}{code} {more}"), 20)

@@ -121,6 +121,7 @@ def _pose_and_gain_columns(facts: Facts, gains: "Mapping[str, Gain]") -> dict[st
             origin="declared" if gain.declared else "suggested", reason=gain.reason
         )
         pose[name] = rounded(facts.default_pose[name]), origin
+        # A declared gain is kept as it is; a suggested one is not known to more than two digits.
         digits = 6 if gain.declared else 2
         stiffness[name] = rounded(gain.stiffness, digits), origin_of_gain
         damping[name] = rounded(gain.damping, digits), replace(see, origin=origin_of_gain.origin)
@@ -165,6 +166,7 @@ def _reset_range(facts: Facts, pose: Mapping[str, float]) -> tuple[tuple[float, 
     factors = [_reset_scale(joint, pose[joint.name], offset) for joint in facts.actuated]
     lowest = max((low for low, _ in factors), default=_DEFAULT_RESET_RANGE[0])
     highest = min((high for _, high in factors), default=_DEFAULT_RESET_RANGE[1])
+    # Rounded inward, to two digits, so that no joint leaves its limits.
     inner = min(1.0, math.ceil(100 * lowest) / 100), max(1.0, math.floor(100 * highest) / 100)
     if inner == _DEFAULT_RESET_RANGE:
         return inner, "as in legged_gym"
@@ -182,6 +184,8 @@ def _reset_scale(joint: Joint, position: float, offset: float) -> tuple[float, f
     """Return the factors on a position that move the joint to its limits or by an offset."""
     if position == 0:
         return _DEFAULT_RESET_RANGE
+    # A factor f moves the joint to f * position. The limits over the position are therefore the
+    # factors, in reverse order if it is negative.
     lower, upper = joint.range or (-math.inf, math.inf)
     ends = np.array([max(lower, position - offset), min(upper, position + offset)])
     with np.errstate(all="ignore"):

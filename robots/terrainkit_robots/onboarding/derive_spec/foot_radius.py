@@ -40,16 +40,18 @@ def _leg_radius(robot: Facts, leg: Leg, poses: Sequence[Matrix]) -> float:
     if not shapes:
         return 0.0
     contacts = contact_points(body, pose, robot.meshes)
-    if leg.limb.has_wheel:
+    if leg.limb.has_wheel:  # the distance from its axle to the ground
         return float(joint_axis(body, pose)[0][2] - contacts[:, 2].min())
     width = float(np.ptp(contacts @ leg.pitch))
     touching = min(shapes, key=lambda shape: min_height(shape, pose, robot.meshes))
+    # A round foot touches in a point, and a sole along its width; a wide roller does both.
     return max(width / 2, _shape_radius(robot, touching, pose, leg.pitch))
 
 
 def _shape_radius(robot: Facts, shape: BodyShape, pose: Matrix, axis: Matrix) -> float:
     """Return the radius on which a shape rolls about an axis; 0 for a flat sole."""
-    geometry, rotation = shape.geometry, (pose @ shape.pose)[:3, :3]
+    geometry = shape.geometry
+    rotation = (pose @ shape.pose)[:3, :3]
     match geometry.shape:
         case "sphere" | "capsule":
             return geometry.size[0]

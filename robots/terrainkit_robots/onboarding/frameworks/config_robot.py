@@ -125,7 +125,8 @@ class ConfigRobot:
             prefix: Text before the unit.
             unit: Unit, by default the unit of the field.
         """
-        unit, source = unit or unit_of(field), self.spec.provenance.get(field)
+        unit = unit or unit_of(field)
+        source = self.spec.provenance.get(field)
         text = " ".join(part for part in (prefix, unit and f"[{unit}]") if part)
         if source is not None:
             text += f"; {source.origin}" + (f": {source.reason}" if source.reason else "")

@@ -51,7 +51,8 @@ def config_text(robot: ConfigRobot) -> str:
     """
     if not robot.spec.joint_order:
         raise ConfigError(f"{robot.title} has no joints, which Isaac Lab requires")
-    spec, actuators = robot.spec, _actuators(robot)
+    spec = robot.spec
+    actuators = _actuators(robot)
     name = f"{constant_name(spec.name)}_CFG"
     is_legged = bool(spec.feet) and spec.floating
     config = source.fill(

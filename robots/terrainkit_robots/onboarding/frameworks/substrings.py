@@ -53,6 +53,7 @@ def keys_for(targets: Sequence[str], names: Iterable[str]) -> Keys:
     remaining = list(dict.fromkeys(targets))
     keys: list[str] = []
     while remaining:
+        # A name with a key of its own should not match another one: the frameworks take the last.
         matched = [name for name in dict.fromkeys(targets) if name not in remaining]
         key = _best_key(remaining, [*others, *matched])
         keys.append(key)
@@ -86,7 +87,7 @@ def gain_keys(joints: Sequence[str], gains: Mapping[str, object]) -> Keys:
     )
     ambiguous = {joint for joint in joints if sum(key in joint for key in keys) > 1}
     if ambiguous:
-        keys.sort(key=len)
+        keys.sort(key=len)  # the longest match is the most specific one, and comes last
     return Keys(keys=tuple(keys), clashes=tuple(pair for pair in clashes if pair[1] in ambiguous))
 
 

@@ -199,9 +199,3 @@ def own_name(style: int, name: str, others: Sequence[str]) -> str:
         f"observation term {truncate(repr(name))}: unknown",
         f"one of {known}, or a term of this name in the {own}",
     )
-
-
-def unknown_terms(contract: Contract) -> list[str]:
-    """Return the terms that the readers of a format lack: they stop until one adds them."""
-    known = KNOWN_TERMS[contract.style].split()
-    return [term.name for term in contract.terms if term.name not in known]

@@ -163,7 +163,8 @@ def _orders(contract: Contract, robot: Robot) -> Iterator[list[int]]:
         yield by_kind
         yield [by_kind.index(k) for k in range(count)]
     mirror = {joint: image.joint for joint, image in robot.spec.mirror.items()}
-    joints, pairs = contract.joints, list(combinations(range(count), 2))
+    joints = contract.joints
+    pairs = list(combinations(range(count), 2))
     for i, j in pairs:
         is_likely = j == i + 1 or mirror.get(joints[i]) == joints[j]
         if len(pairs) <= MAX_PAIRS or is_likely:

@@ -207,7 +207,8 @@ def _joint_names(file: _Deploy, robot_joints: Sequence[str]) -> tuple[str, ...]:
 
 def _from_gym(gym: dict[str, Any], joints: Sequence[str]) -> dict[str, Any]:
     """Return a configuration of unitree_rl_gym in the form of `deploy.yaml`."""
-    pose, count = gym["default_angles"], len(joints)
+    pose = gym["default_angles"]
+    count = len(joints)
     observations = {
         "base_ang_vel": gym["ang_vel_scale"],
         "projected_gravity": 1.0,

@@ -42,7 +42,8 @@ def read_metadata(metadata: Mapping[str, str]) -> Contract:
         return values
 
     flat = per_term("flatten_history_dim", "1")
-    history, terms = per_term("history_length", "0"), []
+    history = per_term("history_length", "0")
+    terms = []
     rows = zip(names, per_term("scale", "1"), per_term("clip", ""), history, flat, strict=True)
     for name, scale, clip, steps, is_flat in rows:
         length = _number(f"history_length of {name}", steps)

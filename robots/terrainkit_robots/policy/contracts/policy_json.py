@@ -93,7 +93,8 @@ def to_contract(document: Mapping[str, Any], style: int) -> Contract:
     """
     joints, action, scan = document["joints"], document["action"], document["height_scan"]
     control = document["control_type"]
-    default, points = Terrain(), (scan or {}).get("points")
+    default = Terrain()
+    points = (scan or {}).get("points")
     grid = [[x, y] for x in default.measured_points_x for y in default.measured_points_y]
     for name, got, is_expressible, expected in (
         ("control.control_type", control, control == "P", "P: positions"),

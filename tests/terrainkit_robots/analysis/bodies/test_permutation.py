@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from terrainkit_robots.analysis.bodies.joint_order import is_reordered, permutation
 
+from terrainkit_robots.analysis.bodies.permutation import is_reordered, permutation
 from tests.small_robots import facts
 
 NAMES = st.permutations([f"j{k}" for k in range(12)])

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from terrainkit_robots.description.load import load_robot
-from terrainkit_robots.description.xacro.expansion import XacroError, expand_xacro
 from terrainkit_robots.description.xacro.process import _check_expression, _RejectedError
+from terrainkit_robots.description.xacro.reader import XacroError, expand_xacro
 from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import codes, write_all
 

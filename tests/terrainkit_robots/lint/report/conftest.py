@@ -7,9 +7,9 @@ import pytest
 from terrainkit_robots.analysis.facts import Facts
 from terrainkit_robots.description.fix import Fix
 from terrainkit_robots.description.model import RobotModel, Source
+from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report, Skipped
-from terrainkit_robots.lint.selection import Suppressed
 from terrainkit_robots.lint.suppressions import read_comments
 
 NASTY = 'a,b:c%d|e{0}<b>@me`*_\x1b[31m\r\n::error::x\u202e\udc80"'

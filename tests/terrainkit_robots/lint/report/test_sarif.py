@@ -7,9 +7,9 @@ from urllib.parse import unquote_to_bytes
 import jsonschema
 import pytest
 
+from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.report.sarif import to_text, uri
 from terrainkit_robots.lint.rule import rules
-from terrainkit_robots.lint.selection import Suppressed
 
 SCHEMA = json.loads((Path(__file__).parent / "sarif-2.1.0.schema.json").read_text())
 

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.report.text_report import format_lines, to_text
-from terrainkit_robots.lint.selection import Suppressed
 from tests.tables import read_table
 
 TEXT = read_table(__file__, "text")

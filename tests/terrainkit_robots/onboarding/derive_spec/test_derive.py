@@ -3,7 +3,7 @@ import math
 import pytest
 
 from terrainkit.errors import ConfigError
-from terrainkit_robots.lint.selection import lint_selected
+from terrainkit_robots.lint.check import lint_selected
 from terrainkit_robots.lint.settings import Settings
 from terrainkit_robots.onboarding.derive_spec.derive import derive_spec
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES, RobotSpec, unit_of

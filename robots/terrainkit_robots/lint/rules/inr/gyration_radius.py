@@ -115,7 +115,8 @@ def inertia_too_small(robot: Facts) -> Violations:
     Source:
         The ratio is 0.58 for a rod, 0.47 for a cube, and 0.36 for a sphere.
     """
-    body_bounds, candidates = robot.body_bounds, []
+    body_bounds = robot.body_bounds
+    candidates = []
     for whole, _ in _body_radii(robot):
         index = next(k for k, link in enumerate(whole.links) if link.name == whole.name)
         part = slice(index, index + 1)
@@ -150,7 +151,8 @@ def is_far_too_large(robot: Facts, body: Body) -> bool:
 def _report_radius(
     body: Body, radius: float, box: Matrix, limit: str, severity: Severity
 ) -> Violation:
-    half, cause = half_diagonal(box), main_cause(body)
+    half = half_diagonal(box)
+    cause = main_cause(body)
     return Violation(
         subject=cause.name,
         source=inertia_source(cause),

@@ -65,6 +65,7 @@ def exchanged_axes(robot: Facts) -> Violations:
         others = float(max(moments[order[0]], moments[order[1]]))
         if moments[long] <= _MIN_EXCESS * float(min(moments[order[0]], moments[order[1]])):
             continue
+        # The two larger moments of a rod are nearly equal, and now one is about the long axis.
         if moments[long] < 0.95 * others:
             continue
         link = _exchanged_link(body, long)

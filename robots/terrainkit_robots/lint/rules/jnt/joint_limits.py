@@ -248,21 +248,18 @@ def narrow_range(robot: Facts) -> Violations:
     warned = {joint.name for joint in robot.leg_joints}
     if robot.legs and 2 * len(narrow) >= len(hinges):
         warned |= {joint.name for joint in narrow}
+    unit = ""
+    if options is not None and options.degrees:
+        unit = "; MJCF angles are in degrees unless <compiler angle> says otherwise"
     for joint, limits in narrow.items():
         size = limits[1] - limits[0]
-        factor = 180 / math.pi
-        unit = (
-            "; MJCF angles are in degrees unless <compiler angle> says otherwise"
-            if options is not None and options.degrees
-            else ""
-        )
         yield Violation(
             subject=joint.name,
             source=(joint.limit or joint).source,
             severity=None if joint.name in warned else "note",
             message=f"range of joint {joint.name}: got {size:.3g} rad ({limits[0]:.3g} to "
-            f"{limits[1]:.3g}), which is {factor * size:.3g} after a second conversion; expected "
-            f"at least {_MIN_RANGE:g} rad{unit}",
+            f"{limits[1]:.3g}), which is {math.degrees(size):.3g} after a second conversion; "
+            f"expected at least {_MIN_RANGE:g} rad{unit}",
             measured={"range": size},
         )
 

@@ -186,9 +186,13 @@ class _ModelNames:
         ):
             return
         left_counts, right_counts = self._counts(pair.left.name), self._counts(pair.right.name)
-        item, mirror, expected = pair.right, pair.left, right
+        item = pair.right
+        mirror = pair.left
+        expected = right
         if left_counts < right_counts:
-            item, mirror, expected = pair.left, pair.right, left
+            item = pair.left
+            mirror = pair.right
+            expected = left
         is_clear = expected and left_counts != right_counts
         yield Violation(
             element=item,

@@ -52,7 +52,8 @@ def _describe(name: str, stand: WrittenStand, weight: float) -> str:
     value = getattr(stand, name)
     if not math.isfinite(value):
         return "the simulation diverges"
-    carried, kn = weight * (1 - stand.lost_weight), weight * value / 1000
+    carried = weight * (1 - stand.lost_weight)
+    kn = weight * value / 1000
     return _SYMPTOMS[name][2].format(
         value=value, mm=1000 * value, carried=carried, weight=weight, kn=kn
     )

@@ -104,7 +104,8 @@ def effort_asymmetry(robot: Facts) -> Violations:
             return None if limit is None else np.array([limit])
 
         odd, other, reason = robot.outlier_first(pair, value)
-        joint, parts = odd.joint, list[str]()
+        joint = odd.joint
+        parts = list[str]()
         measured: dict[str, float | int | str] = {}
         for name, (a, b, difference) in differences.items():
             own, mirror = (b, a) if odd is right else (a, b)

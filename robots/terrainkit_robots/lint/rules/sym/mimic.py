@@ -34,7 +34,8 @@ def mimic_asymmetry(robot: Facts) -> Violations:
         in_legs = pair.indices <= robot.leg_bodies
         if (a is None and b is None) or (_is_gripper(left, right) and not in_legs):
             continue
-        odd, problem = right, ""
+        odd = right
+        problem = ""
         crossed = next(
             (joint for joint in (left, right) if in_legs and _crosses(robot, joint)), None
         )

@@ -141,7 +141,8 @@ def compare_effort(robot: Facts) -> Violations:
     for limited, group in _grouped(pairs, missing):
         bare = other if limited else robot
         has_actuators = bool(bare.model.actuators) or bare.model.kind != "mjcf"
-        without, note = there if limited else "this file", ", which has no actuators"
+        without = there if limited else "this file"
+        note = ", which has no actuators"
         yield _report_group(
             group,
             "effort limit",

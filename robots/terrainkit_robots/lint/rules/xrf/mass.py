@@ -78,7 +78,8 @@ def _missing_mass(robot: Facts, other: Facts) -> Violations:
         floating = any(joint.kind == "floating" for joint in mjcf.model.joints)
         dropped = dropped_mass(urdf) if mjcf.model.kind == "mjcf" and floating else 0.0
         if dropped > _MAX_MASS_DIFFERENCE * urdf.total_mass:
-            root, file = urdf.bodies[0].top.name, truncate(urdf.model.file.name)
+            root = urdf.bodies[0].top.name
+            file = truncate(urdf.model.file.name)
             yield Violation(
                 subject=root,
                 source=robot.model.source,
@@ -114,7 +115,9 @@ def compare_inertia(robot: Facts) -> Violations:
             continue
         if not (has_valid_inertial(one) and has_valid_inertial(two)):
             continue
-        gap, body, message = body_difference(robot, other, pairs, one, two), truncate(one.name), ""
+        gap = body_difference(robot, other, pairs, one, two)
+        body = truncate(one.name)
+        message = ""
         if gap.mass > _MAX_MASS_DIFFERENCE:
             if not total_differs:  # else reported by XRF007
                 message = (

@@ -236,7 +236,8 @@ def spec_pose(robot: Facts) -> Violations:
     Source:
         Limits of the description; MuJoCo enforces them as constraints.
     """
-    joints, pose = _joints_by_name(robot), robot.required_spec.default_pose
+    joints = _joints_by_name(robot)
+    pose = robot.required_spec.default_pose
     for name, position in match_joints(pose, _table_joints(robot)).values.items():
         limits, unit = joints[name].range, joints[name].unit
         if limits is None:
