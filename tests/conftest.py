@@ -12,6 +12,7 @@ from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.files import child_process
 from terrainkit.files.child_process import ProcessLimits
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders, make_hulls
+from terrainkit.terrain import plugin_file, registry
 
 # Before torch is imported: its threads would otherwise spin while they wait for one another, which
 # takes half of the time of training where other tests keep the cores busy.
@@ -35,6 +36,46 @@ def make_viewer_server():
             return servers.enter_context(viewer_server(host, port))
 
         yield make
+
+
+@pytest.fixture
+def own_registry(monkeypatch):
+    """Yield a function that forgets what a test registers, installs or loads from a plugin file.
+
+    The test starts without any, and afterward they are forgotten as well.
+    """
+    registered = {}
+    monkeypatch.setattr(registry, "_registered", registered)
+    monkeypatch.setattr(plugin_file, "_loaded", {})
+    monkeypatch.setattr(sys, "path", [*sys.path])
+
+    def forget():
+        registered.clear()
+        registry._get.cache_clear()
+
+    forget()
+    yield forget
+    forget()
+
+
+@pytest.fixture
+def own_tasks(monkeypatch):
+    """Yield a function that forgets the tasks that a test registers or loads from a file.
+
+    Afterward they are forgotten as well.
+    """
+    from terrainkit_robots.rl import tasks
+
+    before, registered = dict(tasks._registered), dict(tasks._registered)
+    monkeypatch.setattr(tasks, "_registered", registered)
+
+    def forget():
+        registered.clear()
+        registered.update(before)
+        tasks.load_task_file.cache_clear()
+
+    yield forget
+    forget()
 
 
 @pytest.fixture(scope="session")

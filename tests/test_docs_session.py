@@ -23,13 +23,12 @@ import numpy as np
 import pytest
 
 from terrainkit import TerrainkitWarning
-from terrainkit.terrain import registry
 from terrainkit_cli.main import main
 from tests.frameworks.pages import DOCS, ROOT, page_blocks
+from tests.tables import read_table
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from terrainkit_robots.rl import tasks
 
 SHELL = ("sh", "bash")
 PAGES = [
@@ -69,35 +68,7 @@ FRAMEWORK_BLOCKS = [
 
 FRAMEWORK_PAGES = ("integrations.md", "isaaclab.md", "onboarding.md")
 
-QUICK = "--max-iterations 2 --runner.save-interval 1 --num-envs 4 --env.num-threads 1"
-REPLACED = (
-    # Trainings and evaluations take minutes or hours. The last value of an option counts.
-    (r"^(terrainkit|torchrun .*) train .*", rf"\g<0> {QUICK}"),
-    (r"^terrainkit average .*", r"\g<0> --checkpoints 2"),
-    (r"^terrainkit evaluate (?!.*--suite).*", r"\g<0> --seconds 2.1 --num-envs 2"),
-    (r"^terrainkit evaluate .*--suite.*", r"\g<0> --repetitions 1"),
-    (r"^terrainkit play .*", r"\g<0> --seconds 0.1 --num-envs 2 --size 64 64"),
-    (r"^terrainkit smoke-test .*", r"\g<0> --samples 500"),
-    (r"^python policy/run_policy.py.*", r"\g<0> --seconds 0.1"),
-    (r"EvaluationConfig\(seconds=20\)", "EvaluationConfig(seconds=2.1, num_envs=2)"),
-    # Large maps and suites take tens of seconds.
-    (r"--suite basics-1\b", "--suite map.npz"),
-    (r"^terrainkit suite generate \S+", "terrainkit generate --preset stairs --rows 1 --cols 4"),
-    (r"--preset all --rows 3 --cols 62", "--preset stairs --rows 1 --cols 4"),
-    (r"--preset parkour -o", "--preset parkour --rows 1 --cols 7 -o"),
-    (r"--robot quadruped --demand \S+ -o courses.npz", "--rows 1 --cols 1 -o courses.npz"),
-    # CI has two processors.
-    (r"ProcessPoolExecutor\(8\)", "ProcessPoolExecutor(2)"),
-    (r"Client\(n_workers=2\)", "Client(processes=False, dashboard_address=None)"),
-    # Another program may use the default port.
-    (r"^torchrun --nproc", "torchrun --standalone --nproc"),
-    # There is no display.
-    (r" --viewer\b", ""),
-    # These would clone the repository of the robot.
-    (r"\bgo2(_mj)?_description\b", "quadruped"),
-    # This is the run of pytest.
-    (r"^python -m pytest$", "python -m pytest --version"),
-)
+REPLACED = read_table(__file__, "replaced")
 """What is typed in place of parts of the pages: patterns and their replacements."""
 
 FINDS = ("check-robot", "check-policy", "feasibility")
@@ -106,44 +77,7 @@ FINDS = ("check-robot", "check-policy", "feasibility")
 SERVES = ("demo", "view")
 """Commands that run until they are ended."""
 
-AFTERWARD = {
-    "README.md": (
-        "m.config.rows == 6 and len(start.levels) == len(levels) == 4096",
-        "Path('my_biped/robot.toml').exists()",
-        "Path('policy/policy.onnx').exists()",
-    ),
-    "check_robot.md": ("Path('robots.sarif').exists()",),
-    "ci.md": ("Path('robots.baseline.json').read_text() == block('json')",),
-    "importing.md": (
-        "len(imported.terrain_map.solids) > 0",
-        "m.heights.shape == heights.shape",
-        "np.allclose(np.unique(np.load('classes.npz')['ground_friction']), [0.1, 0.5, 0.9])",
-    ),
-    "integrations.md": (
-        "name == 'stepping_stones' and x[0] == m.first_sample[0]",
-        "abs(m.height(spawn[:2]) - spawn[2]) < 1e-3",
-        # The ball of 0.1 m lies on the ground.
-        "abs(data.qpos[2] - 0.1 - m.height(data.qpos[:2])) < 0.01",
-        "model.nbody > 13 and model.nhfield == 1",  # the map and a robot
-        "env.env.terrain.terrain_map.grid == m.grid",
-        "observations.shape[0] == 16 and np.isfinite(observations).all()",
-    ),
-    "onboarding.md": (
-        "kp['FL_hip_joint'] == 60.0",
-        "len([*Path('quadruped').glob('*_config.py')]) == 2",  # mjlab and legged_gym
-    ),
-    "perception.md": (
-        "heights.shape == ceilings.shape == (40, 187)",
-        "depth.shape == (40, 36, 64)",
-        "occupied.shape == (40, 17, 11, 11)",
-        "0.04 < np.isnan(measured).mean() < 0.3",
-    ),
-    "python_api.md": (
-        "result.verification.is_stable",
-        "terrain_map.terrain_names == ('side_step',)",
-        "(share == 1).all()",  # robots followed their commands over half of a patch
-    ),
-}
+AFTERWARD = read_table(__file__, "afterward")
 """Expressions that are true after a page, with the names of its Python session."""
 
 
@@ -204,14 +138,10 @@ PACKAGES = ("", "robots", "cli")
 
 
 @pytest.fixture
-def forget(monkeypatch):
+def forget(own_registry, own_tasks):  # noqa: ARG001
     """Forget the tasks, terrains and modules of a page."""
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
-    monkeypatch.setattr(registry, "_registered", dict(registry._registered))
     modules = set(sys.modules)
     yield
-    registry._get.cache_clear()
-    tasks.load_task_file.cache_clear()
     for name in set(sys.modules) - modules:
         if "/page/" in (getattr(sys.modules[name], "__file__", None) or ""):
             del sys.modules[name]

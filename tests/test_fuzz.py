@@ -131,7 +131,7 @@ def test_hang_says_whether_the_command_or_its_child_hangs(
     tmp_path, monkeypatch, forked, function, expected
 ):
     monkeypatch.setattr("terrainkit_cli.main.main", lambda _: function())
-    monkeypatch.setattr(forked, "_EXECUTES", ())
+    monkeypatch.setattr(forked, "EXECUTES", ())
     failure = forked.run_forked(tmp_path, lambda: forked.Command(words=[]))
     assert failure
     assert failure.kind == "hang"

@@ -41,7 +41,7 @@ MEMORY = 2 << 30
 _ADDRESS_SPACE = 8 << 30
 
 _CALLS = ("os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect")
-_EXECUTES = {*_CALLS, "pickle.find_class"}
+EXECUTES = {*_CALLS, "pickle.find_class"}
 _OWN = re.compile(
     r"'-P', '-[cm]', '.*terrainkit|^\('(numpy|concurrent|multiproc|terrainkit|plugin)"
 )
@@ -220,7 +220,7 @@ def _audit_hook(folder: Path, target: int) -> Callable[[str, Any], None]:
     def hook(event: str, arguments: Any) -> None:
         if event in _CHANGES or (event == "open" and arguments[2] & _WRITES):
             kind, is_allowed = "files", not any(map(is_outside, arguments[:2]))
-        elif event in _EXECUTES:
+        elif event in EXECUTES:
             kind, is_allowed = "executed", bool(_OWN.search(repr(arguments)))
         elif event == "exec":
             name = arguments[0].co_filename

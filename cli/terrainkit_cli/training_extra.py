@@ -6,7 +6,7 @@ import os
 from terrainkit.errors import ConfigError, install_command
 from terrainkit.files.memory import check_address_space
 
-_PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "mujoco.batch")
+PACKAGES = ("torch", "rsl_rl", "tensordict", "tensorboard", "mujoco.batch")
 """Packages that training imports; MuJoCo has `batch` since version 3.17."""
 
 _ADDRESS_SPACE = 1_300_000_000
@@ -24,7 +24,7 @@ def require_training(*packages: str, extra: str = "train") -> None:
         ConfigError: if a package is missing.
         MemoryLimitError: if torch cannot be imported in the address space (`ulimit -v`).
     """
-    missing = [name for name in (*_PACKAGES, *packages) if importlib.util.find_spec(name) is None]
+    missing = [name for name in (*PACKAGES, *packages) if importlib.util.find_spec(name) is None]
     if missing:
         raise ConfigError(f"missing packages: {', '.join(missing)}; run: {install_command(extra)}")
     check_address_space(_ADDRESS_SPACE, "importing torch and MuJoCo")

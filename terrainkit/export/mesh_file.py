@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 SUFFIXES = (".stl", ".ply", ".obj", ".glb")
 BYTES_PER_SAMPLE = 20
 
-_FACES_PER_BLOCK = 1 << 15
+FACES_PER_BLOCK = 1 << 15
 """Faces or vertices that are written at a time."""
 
-_MAX_GLB_BYTES = (1 << 32) - 1
+MAX_GLB_BYTES = (1 << 32) - 1
 """Largest file that the header of a .glb can describe."""
 
 _STL_FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -74,8 +74,8 @@ def write_stl(mesh: TriMesh, path: Path) -> None:
     with path.open("wb") as file:
         file.write(b"terrain, in meters".ljust(80))
         file.write(np.array(len(mesh.triangles), dtype="<u4").tobytes())
-        for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
-            corners = mesh.vertices[mesh.triangles[start : start + _FACES_PER_BLOCK]]
+        for start in range(0, len(mesh.triangles), FACES_PER_BLOCK):
+            corners = mesh.vertices[mesh.triangles[start : start + FACES_PER_BLOCK]]
             normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
             lengths = np.linalg.norm(normals, axis=1, keepdims=True)
             faces = np.zeros(len(corners), dtype=_STL_FACE)
@@ -98,8 +98,8 @@ end_header
 """
     file.write(header.encode())
     file.write(np.ascontiguousarray(mesh.vertices, dtype="<f4").data)
-    for start in range(0, len(mesh.triangles), _FACES_PER_BLOCK):
-        triangles = mesh.triangles[start : start + _FACES_PER_BLOCK]
+    for start in range(0, len(mesh.triangles), FACES_PER_BLOCK):
+        triangles = mesh.triangles[start : start + FACES_PER_BLOCK]
         faces = np.empty(len(triangles), dtype=_PLY_FACE)
         faces["count"], faces["vertices"] = 3, triangles
         file.write(faces.tobytes())
@@ -111,8 +111,8 @@ def _write_obj(mesh: TriMesh, file: BinaryIO) -> None:
         ("v %.6f %.6f %.6f\n", mesh.vertices, 0),
         ("f %d %d %d\n", mesh.triangles, 1),
     ):
-        for start in range(0, len(values), _FACES_PER_BLOCK):
-            block = values[start : start + _FACES_PER_BLOCK] + first
+        for start in range(0, len(values), FACES_PER_BLOCK):
+            block = values[start : start + FACES_PER_BLOCK] + first
             file.write((line * len(block) % tuple(block.ravel().tolist())).encode())
 
 
@@ -167,9 +167,9 @@ def _write_glb(mesh: TriMesh, file: BinaryIO, extras: dict[str, float]) -> None:
     text = json.dumps(scene, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)  # chunks begin at multiples of 4 bytes
     total = 12 + 8 + len(text) + 8 + num_bytes
-    if total > _MAX_GLB_BYTES:
+    if total > MAX_GLB_BYTES:
         raise ExportError(
-            f"a .glb file: got {total} bytes; expected at most {_MAX_GLB_BYTES}; use .ply"
+            f"a .glb file: got {total} bytes; expected at most {MAX_GLB_BYTES}; use .ply"
         )
     file.write(struct.pack("<4sII", b"glTF", 2, total))
     file.write(struct.pack("<I4s", len(text), b"JSON") + text)

@@ -45,7 +45,7 @@ rescales the data to [0, 1], and the third value of `size` is the range in meter
 BYTES_PER_SAMPLE = 0
 """Heightfields are written row by row; `decompose_boxes` checks the memory of boxes."""
 
-_ROWS_PER_BAND = 256
+ROWS_PER_BAND = 256
 """Samples along x that are searched for slopes at a time."""
 
 _MARGIN = 2
@@ -278,8 +278,8 @@ def collision_boxes(terrain_map: "TerrainMap", collision: Collision) -> BoxDecom
 def _is_flat(terrain_map: "TerrainMap") -> bool:
     """Return whether all cells are flat, band by band: most maps have a slope in an early one."""
     heights, grid = terrain_map.heights, terrain_map.grid
-    for start in range(0, len(heights), _ROWS_PER_BAND):
-        band = heights[start : start + _ROWS_PER_BAND + 1]  # the next one repeats the last row
+    for start in range(0, len(heights), ROWS_PER_BAND):
+        band = heights[start : start + ROWS_PER_BAND + 1]  # the next one repeats the last row
         nodes = NodeGrid.from_heights(
             band, replace(grid, shape=band.shape), terrain_map.config.wall_threshold
         )

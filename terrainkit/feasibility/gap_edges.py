@@ -12,7 +12,7 @@ from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph, ratio
 from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 
-_MAX_PAIRS = 100_000
+MAX_PAIRS = 100_000
 """Pairs of nodes that are compared at once, to bound the memory."""
 
 _MAX_ENDS = 4
@@ -68,13 +68,13 @@ def gap_edges(
 
 
 def _batches(parts: Iterable[Edges]) -> Iterator[Edges]:
-    """Yield the edges of all parts in batches of at least `_MAX_PAIRS`, except for the last."""
+    """Yield the edges of all parts in batches of at least `MAX_PAIRS`, except for the last."""
     batch = []
     number = 0
     for part in parts:
         batch.append(part)
         number += len(part.start)
-        if number >= _MAX_PAIRS:
+        if number >= MAX_PAIRS:
             yield Edges.concatenate(batch)
             batch = []
             number = 0
@@ -112,7 +112,7 @@ def _pairs(
     gap = np.repeat(widths, m)
     i, j = columns.column(start)
     place = ((i + n) * ny + j + n) * m
-    size = max(_MAX_PAIRS // max(len(offset), 1), 1)
+    size = max(MAX_PAIRS // max(len(offset), 1), 1)
     for first in range(0, len(start), size):
         end = node.reshape(-1)[place[first : first + size, None] + offset]
         which, move = np.nonzero(end >= 0)

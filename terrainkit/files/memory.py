@@ -7,7 +7,7 @@ from pathlib import Path
 
 from terrainkit.errors import MemoryLimitError
 
-_PROCESS = Path("/proc/self")
+PROCESS = Path("/proc/self")
 """Where Linux lists the control groups of this process, and the mounted file systems."""
 
 _FILES = {
@@ -103,7 +103,7 @@ def limit_allocations(num_workers: int) -> None:
     if free is not None:
         import resource
 
-        used = int((_PROCESS / "statm").read_text().split()[5]) * resource.getpagesize()
+        used = int((PROCESS / "statm").read_text().split()[5]) * resource.getpagesize()
         limit = used + max(0, free - num_workers * _WORKER_BYTES)
         _, hard = resource.getrlimit(resource.RLIMIT_DATA)
         with suppress(ValueError, OSError):  # a lower limit of the system
@@ -113,8 +113,8 @@ def limit_allocations(num_workers: int) -> None:
 def _control_group_limits() -> Iterator[int]:
     """Yield the free memory of each control group above this process [bytes]."""
     try:
-        groups = [line.split(":", 2) for line in (_PROCESS / "cgroup").read_text().splitlines()]
-        mounts = [line.split() for line in (_PROCESS / "mountinfo").read_text().splitlines()]
+        groups = [line.split(":", 2) for line in (PROCESS / "cgroup").read_text().splitlines()]
+        mounts = [line.split() for line in (PROCESS / "mountinfo").read_text().splitlines()]
     except OSError:  # not Linux
         return
     paths = {name: Path(path) for _, names, path in groups for name in names.split(",")}

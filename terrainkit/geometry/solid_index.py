@@ -7,11 +7,14 @@ from terrainkit.geometry.ray_grid import NUDGE, Floats, RayGrid
 from terrainkit.geometry.segments import segment_indices
 from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
 
-_MAX_PAIRS = 2_000_000
+MAX_PAIRS = 2_000_000
 """Candidate pairs of points and solids that are evaluated at once, to bound the memory."""
 
-_MIN_BIN, _MAX_BINS = 0.5, 1_000_000
-"""Minimum side of the bins of the index [m], and their largest number."""
+MIN_BIN = 0.5
+"""Minimum side of the bins of the index [m]."""
+
+MAX_BINS = 1_000_000
+"""Largest number of bins of the index."""
 
 _PARALLEL = 1e-6
 """Largest cosine of the angle between a line and the normal of a face that it is parallel to."""
@@ -57,7 +60,7 @@ class SolidIndex:
     def _make_bins(self) -> None:
         self._corner = self._lower.min(axis=0)
         extent = self._upper.max(axis=0) - self._corner
-        self._bin = max(_MIN_BIN, float(np.sqrt(extent.prod() / _MAX_BINS)))
+        self._bin = max(MIN_BIN, float(np.sqrt(extent.prod() / MAX_BINS)))
         self._shape = (extent / self._bin).astype(np.int64) + 1
         first = ((self._lower - self._corner) / self._bin).astype(np.int64)
         last = ((self._upper - self._corner) / self._bin).astype(np.int64)
@@ -104,9 +107,7 @@ class SolidIndex:
             return none, none, np.empty(0), np.empty(0)
         counts, starts = self._candidates(xy)
         # Lines are evaluated in blocks with a bounded number of candidates each.
-        cuts = np.searchsorted(
-            np.cumsum(counts), np.arange(_MAX_PAIRS, counts.sum() + 1, _MAX_PAIRS)
-        )
+        cuts = np.searchsorted(np.cumsum(counts), np.arange(MAX_PAIRS, counts.sum() + 1, MAX_PAIRS))
         blocks = np.split(np.arange(len(xy)), np.unique(cuts))
         parts = [self._line_intervals(xy, counts, starts, block) for block in blocks]
         line, solid, bottom, top = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))

@@ -11,7 +11,7 @@ from terrainkit.geometry.solids import Solids, rotation_matrices
 
 PIXEL = 0.025
 """Distance between two samples [m]; an edge is off by at most half of it."""
-_BAND = 500_000
+PIXELS_PER_BAND = 500_000
 """Number of pixels that are sampled at once, to bound the memory."""
 _TILT = 1e-12
 """Largest difference between 1 and the z component of the axis of a level solid."""
@@ -48,8 +48,8 @@ class SolidRaster:
         pixels = pixels[~is_mixed]
         tables = [np.empty((1, 0, 2), np.float32)]  # Row 0 of the table has no solids.
         num_rows = 1
-        for start in range(0, len(pixels), _BAND):
-            band = pixels[start : start + _BAND]
+        for start in range(0, len(pixels), PIXELS_PER_BAND):
+            band = pixels[start : start + PIXELS_PER_BAND]
             bounds = self._index.intervals(self._centers(band)).astype(np.float32)
             rows, row = _distinct(bounds)
             self._row.put(band, num_rows + row)
@@ -73,8 +73,8 @@ class SolidRaster:
         touch = SolidIndex(solids, radius=radius)
         fill = SolidIndex(solids.select(level), radius=-radius)
         rest = np.flatnonzero(~is_mixed)
-        for start in range(0, len(rest), _BAND):
-            band = rest[start : start + _BAND]
+        for start in range(0, len(rest), PIXELS_PER_BAND):
+            band = rest[start : start + PIXELS_PER_BAND]
             centers = self._centers(pixels[band])
             is_mixed[band] = touch.count(centers) != fill.count(centers)
         return is_mixed

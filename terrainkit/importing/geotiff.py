@@ -17,7 +17,7 @@ _GEOGRAPHIC, _PIXEL_IS_POINT, _WEB_MERCATOR = 2, 2, 3857
 _UNITS = {9001: 1.0, 9002: 0.3048, 9003: 1200 / 3937}
 """Meters per unit: meter, foot and US survey foot."""
 
-_MAX_VALUES = 1 << 16
+MAX_VALUES = 1 << 16
 """Largest number of values of a tag that is read."""
 
 
@@ -83,7 +83,7 @@ def _read_tags(file: BinaryIO) -> dict[int, Any]:
     for tag, kind, count, inline in entries:
         if tag not in (_BANDS, _PIXEL_SCALE, _TIE_POINT, _MATRIX, _GEO_KEYS, _NODATA):
             continue
-        if kind not in _FORMATS or count > _MAX_VALUES:
+        if kind not in _FORMATS or count > MAX_VALUES:
             raise ValueError(f"tag {tag} has {count} values of type {kind}")
         layout = f"{order}{count}{_FORMATS[kind]}"
         size = struct.calcsize(layout)

@@ -18,10 +18,13 @@ Array = NDArray[np.float64]
 MIN_GAP = 1e-3
 """Height of free space below which bodies touch [m]."""
 
-_CELLS_PER_STRIP = 1 << 18
-_PAIRS_PER_BLOCK = 1 << 20
+CELLS_PER_STRIP = 1 << 18
+"""Points of the grid that are sampled at once, to bound the memory."""
 
-_MAX_PAIRS = 2_000_000_000
+PAIRS_PER_BLOCK = 1 << 20
+"""Pairs of a triangle and a point that are intersected at once, to bound the memory."""
+
+MAX_PAIRS = 2_000_000_000
 """Largest number of pairs of a triangle and a point in its bounding box, about 5 minutes."""
 
 
@@ -121,17 +124,17 @@ def _intersections(
     i0, i1 = np.searchsorted(x, lower[:, 0]), np.searchsorted(x, upper[:, 0], "right")
     j0, j1 = np.searchsorted(y, lower[:, 1]), np.searchsorted(y, upper[:, 1], "right")
     pairs = ((i1 - i0) * (j1 - j0)).sum()
-    if pairs > _MAX_PAIRS:
+    if pairs > MAX_PAIRS:
         raise HeightFileError(
             f"got {len(corners)} triangles over {len(x)} x {len(y)} samples; expected a smaller "
             "mesh, or larger cells"
         )
-    length = max(1, _CELLS_PER_STRIP // len(y))
+    length = max(1, CELLS_PER_STRIP // len(y))
     for start in range(0, len(x), length):
         first, end = np.maximum(i0, start), np.minimum(i1, start + length)
         count = np.maximum(end - first, 0) * (j1 - j0)
         within = np.flatnonzero(count)
-        block = np.cumsum(count[within]) // _PAIRS_PER_BLOCK
+        block = np.cumsum(count[within]) // PAIRS_PER_BLOCK
         for triangles in np.split(within, np.flatnonzero(np.diff(block)) + 1):
             k, local = segment_indices(count[triangles])
             triangle = triangles[k]

@@ -27,6 +27,7 @@ from terrainkit.overlays.noise import Noise
 from terrainkit.terrain import Terrain, registry
 from terrainkit.terrain.parameter import MAX_VALUE, parameters_of
 from tests.limits import LIMITS as ROBOT
+from tests.tables import read_table
 
 VALUES = Path(__file__).with_name("terrain_values.json")
 VARIANTS = [(name, {}) for name in registry.terrain_names()] + [
@@ -96,99 +97,7 @@ def assert_spawns_are_level(terrain_map, radius):
     assert np.ptp(ground, axis=(1, 2)).max() <= config.spawn_tolerance + 1e-5
 
 
-LIMITS = [
-    ("beams", {"gap": (1.29, 1.3)}, "got gaps 1.3 m long with a spacing of 1.3 m"),
-    ("boxes", {"min_side": (1.8, 1.81)}, "got min_side 1.81 m and max_side 1.8 m"),
-    ("boxes", {"min_side": (1.0, 3.0), "max_side": 4.0}, "a box that fits beside a platform of 2"),
-    ("boxes", {"height": (1.0, 9.0), "tilt": 0.1}, "a box that fits beside a platform of 2"),
-    ("building", {"storeys": (4, 5)}, "got 5 storeys 2.4 m high"),
-    ("building", {"door_height": (2.19, 2.2)}, "expected .* sill < door_height < 2.2 m"),
-    ("building", {"door": (1.3, 1.32)}, "expected .* door < 0.85 room_size - 0.22 m"),
-    ("building", {"corridor": (5.3, 5.6)}, "stairs and a corridor that fit in a patch of 8 m"),
-    ("continuous_ramps", {"length": (5.0, 5.01)}, "got elements of 5.01 m x 1.2 m between strips"),
-    ("continuous_ramps", {"width": (8.0, 8.01)}, "got elements of 0.6 m x 8.01 m between strips"),
-    ("crawl", {"min_depth": (0.6, 0.61)}, "expected min_depth <= max_depth, and a bar"),
-    ("crawl", {"start": (6.4, 6.5)}, "expected min_depth <= max_depth, and a bar that fits"),
-    ("crawl", {"spacing": (0.02, 0.019), "min_depth": 0.01, "max_depth": 0.01}, "least 0.03 m"),
-    ("floating_islands", {"walkway": (0.9, 0.91)}, "expected walkway <= radius"),
-    ("floating_islands", {"radius": (1.0, 1.5)}, "an island that fits"),
-    ("gap_track", {"length": (1.5, 1.6)}, "got gaps 1.6 m long"),
-    ("gutter", {"roll": (1.5707, 1.5708)}, "expected a roll below 1.5708 rad"),
-    ("gutter", {"bottom": (2.39, 2.4)}, "got roll"),
-    ("gutter", {"width": (8.0, 8.1)}, "got roll"),
-    ("gutter", {"start": 4.0, "end": (3.9, 4.0)}, "got roll"),
-    ("hurdles", {"max_thickness": (1.1, 1.2)}, "got hurdles 1.2 m long"),
-    ("hurdles", {"top": "round", "height": (0.21, 0.2), "min_thickness": 0.4}, "got a height of"),
-    ("k_rails", {"height": (0.848, 0.849)}, "got height 0.849 m; expected less than 0.7 of"),
-    ("k_rails", {"panel": (2.5, 2.51)}, "got panel .* expected 2 to 10000 panels"),
-    ("k_rails", {"panel": (0.07, 0.06), "height": 0.01}, "got panel .* 2 to 10000 panels"),
-    ("ladder", {"angle": (0.5, 0.499)}, "expected an angle of 0.5 rad to 1.57 rad"),
-    ("ladder", {"angle": (1.5707, 1.5708)}, "expected an angle of 0.5 rad to 1.57 rad"),
-    ("ladder", {"rung_spacing": (1.5, 1.51)}, "got angle .*, rung_spacing 1.51 m"),
-    ("ladder", {"rung_spacing": (0.000151, 0.000149)}, "got angle"),
-    ("ladder", {"distance": (2.45, 2.46)}, "got angle .* distance 2.46 m"),
-    ("ladder", {"landing": (3.9, 4.0)}, "two landings of 4 m leave no deck in a patch 8 m long"),
-    ("maze", {"corridor": (3.7, 3.71)}, "expected at least 2 x 2 cells that fit in a patch of 8"),
-    ("obstacles", {"min_width": (2.0, 2.1)}, "got min_width 2.1 m and max_width 2 m"),
-    ("obstacles", {"max_width": (8.0, 8.1)}, "max_width 8.1 m; expected .* the patch, 8 m x 8 m"),
-    ("open_stairs", {"tread": (4.0, 4.01)}, "two strips of 2 m leave no tread of 4.01 m"),
-    ("pallets", {"platform": (4.0, 6.0)}, "got a platform of 6 m"),
-    ("poles", {"min_width": (0.75, 0.76)}, "got widths .* expected min <= max, and a pole"),
-    ("poles", {"min_height": (2.0, 2.1)}, "got widths .* expected min <= max, and a pole"),
-    ("poles", {"gap": (1.0, 9.0)}, "got widths .* expected min <= max, and a pole"),
-    (
-        "pyramid_stairs",
-        {"step_width": 0.3, "platform": (7.4, 7.6)},
-        "no step of 0.3 m fits between",
-    ),
-    ("rails", {"width": (0.99, 1.0)}, "got width 1 m; expected less than .* 1 m with 2"),
-    ("random_grid", {"block": (7.8, 7.9)}, "no block of 7.9 m fits in a rim"),
-    ("random_stairs", {"min_step_height": (0.08, 0.09)}, "got min_step_height 0.09 m and step_h"),
-    ("road", {"bump_length": (1.89, 1.9)}, "got speed bumps 2 m long with a spacing of 2 m"),
-    ("road", {"min_radius": (0.375, 0.376)}, "expected min_radius <= max_radius"),
-    ("rocks", {"min_radius": (0.6, 0.7)}, "expected min <= max, and a rock that fits"),
-    ("rocks", {"min_radius": (1.0, 2.0), "max_radius": 2.0}, "a rock that fits"),
-    ("rooms", {"door": (2.29, 2.3)}, "expected door < side, and a room that fits"),
-    ("rooms", {"side": (7.6, 7.7)}, "expected door < side, and a room that fits"),
-    ("side_ramps", {"gap": (1.5, 1.6)}, "got gaps 1.6 m long"),
-    ("side_ramps", {"roll": (0.876, 0.8761)}, "got roll .* above the floor of the pit"),
-    ("side_ramps", {"roll": (0.876, 1.6)}, "got roll 1.6 rad and width 1 m"),
-    ("side_ramps", {"depth": (0.089, 0.088)}, "above the floor of the pit, 0.088 m deep"),
-    ("sidewalk", {"end": (2.6, 2.8)}, "which need 2.8 m; expected at most 2.* m between start"),
-    (
-        "sidewalk",
-        {"tree_grate": (1.8, 1.81), "end": 0.5},
-        "got spacing 2 m; expected at least 2.01 m",
-    ),
-    ("sidewalk", {"slot": (0.14, 0.145)}, "got slots of 0.145 m in a grating 0.3 m long"),
-    ("sidewalk", {"spacing": (8.0, 8.01)}, "and at most the width of the patch, 8 m"),
-    ("slit", {"offset": (3.77, 3.78)}, "got an opening of 0.455 m with an offset of 3.78 m"),
-    ("slope", {"landing": (3.9, 4.0)}, "two landings of 4 m leave no slope in a patch 8 m long"),
-    ("spiral_stairs", {"radius": (0.31, 0.3)}, "expected column < radius, a tread of at most a"),
-    ("spiral_stairs", {"radius": (3.0, 3.01)}, "a spiral that fits behind a start of 2 m"),
-    ("spiral_stairs", {"tread": (1.41, 1.42)}, "a tread of at most a quarter turn"),
-    ("spiral_stairs", {"number": (200, 201)}, "at most 200 treads"),
-    ("staircase", {"width": (7.86, 7.87)}, "expected a straight staircase .* that fits in a patch"),
-    ("staircase", {"riser_difference": (0.119, 0.12)}, "with riser_difference < riser"),
-    ("stairs", {"landing": (3.8, 3.9)}, "two landings of 3.9 m leave no step of 0.31 m"),
-    ("stairs_turning", {"landing": (2.8, 2.9)}, "expected flights that fit in a patch of 8 m x 8"),
-    ("stakes", {"diameter": (0.3, 0.001), "gap": 0.001}, "got .* from one to the next; expected"),
-    ("star", {"width": (0.707, 0.708)}, "got width 0.708 m; expected at most 0.707 m"),
-    ("star", {"rim": (2.9, 3.0)}, "got a rim of 3 m and a platform of 2 m; expected a pit"),
-    ("stepfield", {"post": (0.5, 0.6)}, "expected a field of 10 x 10 posts that fits"),
-    ("stepping_beams", {"min_length": (1.6, 1.7)}, "min_length: got 1.7 m; expected at most max_"),
-    ("stepping_beams", {"start": (6.0, 6.5)}, "got beams 0.5 m long"),
-    ("stone_rows", {"stone": (3.8, 3.81)}, "expected two rows that fit in a pit of 4 m x 7.8 m"),
-    ("stone_rows", {"stone": (3.0, 3.01), "gap": 0.5}, "expected two rows that fit"),
-    ("stone_rows", {"row_gap": (6.2, 6.21)}, "expected two rows that fit"),
-    ("stones_everywhere", {"stone": (0.96, 0.001), "gap": 0.001}, "got 0.002 m from one to the ne"),
-    ("street", {"passage": (2.0, 3.0)}, "got passage 3 m, .* and at most 2.* m between curb and"),
-    ("street", {"door": (1.19, 1.2)}, "expected door < step_width < spacing"),
-    ("tilted_grid", {"block": (7.8, 7.9)}, "no block of 7.9 m fits in a rim"),
-    ("tunnel", {"width": (7.9, 8.0)}, "got width 8 m; expected less than the width of the patch"),
-    ("tunnel", {"depth": (2.9, 3.0)}, "got tunnels 3 m long"),
-    ("wave", {"number": (20, 21)}, "21 waves need .* 84 along both axes; the patch has 80 x 80"),
-]
+LIMITS = read_table(__file__, "limits")
 """Terrains with a parameter of 8 m x 8 m that just fits and one that does not, and its error."""
 
 
@@ -200,7 +109,7 @@ LIMITS = [
 def test_every_terrain_rejects_what_does_not_fit(terrain, limits, problem):
     for end in (0, 1):
         values = {
-            name: pair[end] if isinstance(pair, tuple) else pair for name, pair in limits.items()
+            name: pair[end] if isinstance(pair, list) else pair for name, pair in limits.items()
         }
         built, rng = registry.get_terrain(terrain).at(0.0, values), np.random.default_rng(0)
         rejected = pytest.raises(ConfigError, match=f"^{terrain}.*{problem}")
@@ -326,26 +235,7 @@ def weighted(values):
     return round(float((values * weights).sum()), 4)
 
 
-GOALS = {
-    "continuous_ramps": [7.4],
-    "course": [4.0, 7.0],
-    "crossing_ramps": [7.4],
-    "gap_track": [3.9, 5.8, 7.7],
-    "gutter": [7.5],
-    "hurdles": [3.7, 5.4, 7.1],
-    "k_rails": [7.4],
-    "ladder": [4.0, 6.5],
-    "open_stairs": [4.0, 7.0],
-    "road": [4.0, 6.0, 7.95],
-    "side_ramps": [3.0, 4.6, 6.2, 7.6],
-    "sidewalk": [4.5, 7.5],
-    "staircase": [4.309, 7.309],
-    "slit": [3.5, 5.0, 6.5, 7.95],
-    "stepfield": [2.95, 3.95, 4.95, 5.95, 7.5],
-    "stepping_beams": [7.7],
-    "stone_rows": [7.0],
-    "tunnel": [5.0, 7.95],
-}
+GOALS = read_table(__file__, "goals")
 """x of the goals on a lane of 8 m x 8 m at difficulty 1 [m]."""
 
 

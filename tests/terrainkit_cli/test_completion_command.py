@@ -5,14 +5,9 @@ import sys
 
 import pytest
 
-COMPLETE = """
-complete_line() {
-  COMP_LINE=$1 COMP_POINT=${#1} COMP_TYPE=9 COMPREPLY=()
-  _python_argcomplete terrainkit
-  echo "${COMPREPLY[@]}"
-}
-eval "$(terrainkit completion bash)"
-"""
+from tests.tables import read_table
+
+COMPLETE = read_table(__file__, "complete")
 
 
 @pytest.fixture
@@ -39,24 +34,7 @@ def completed(tmp_path, monkeypatch):
     return complete
 
 
-@pytest.mark.parametrize(
-    ("line", "expected"),
-    [
-        ("terrainkit ch", ["check-map", "check-robot", "check-policy"]),
-        ("terrainkit check-robot --fo", ["--format"]),
-        ("terrainkit check-robot a.urdf --format s", ["sarif"]),
-        ("terrainkit check-robot ", ["biped", "quadruped"]),
-        ("terrainkit train quadruped --runner.logger ", ["tensorboard", "wandb"]),
-        ("terrainkit generate --terrain stairs", ["stairs", "stairs_turning"]),
-        ("terrainkit generate --overlay s", ["side_walls"]),
-        ("terrainkit generate --preset legged_", ["legged_gym", "legged_gym_rough"]),
-        ("terrainkit evaluate quadruped --suite p", ["parkour-1"]),
-        ("terrainkit suite show p", ["parkour-1"]),
-        ("terrainkit rule DYN001", ["DYN001"]),
-        ("terrainkit suite ", ["list", "show", "generate"]),
-        ("terrainkit --v", ["--version"]),
-    ],
-)
+@pytest.mark.parametrize(("line", "expected"), read_table(__file__, "completion_in_bash"))
 def test_completion_in_bash(completed, line, expected):
     assert completed(line) == expected
 

@@ -8,9 +8,9 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit.settings.schema import field_types, flatten
 from terrainkit_cli.train_command import Train
-from terrainkit_robots.rl import tasks
 from terrainkit_robots.rl.config import Commands, Env, Rewards, Task
 from terrainkit_robots.rl.tasks import get_task, register_task
+from tests.tables import read_table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +33,7 @@ class RoverTask(Task):
 
 
 @pytest.fixture
-def rover(monkeypatch, tmp_path):
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+def rover(own_tasks, tmp_path):  # noqa: ARG001
     return register_task("rover", tmp_path, RoverTask(env=Env(num_envs=17)))
 
 
@@ -117,22 +116,7 @@ def test_train_options_of_custom_task(rover, words):
     assert made.changed_config() == replace(rover.task, laps=5, rewards=rewards)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (
-            "--rewards.traking-lin-vel 1",
-            r"^no option .*; did you mean --rewards\.tracking-lin-vel\?$",
-        ),
-        ("--rewards.wheel-slip 1", r"^no option --rewards\.wheel-slip"),
-        ("--reward.torques 1", r"did you mean --rewards\.torques\?"),
-        ("--terain x", r"^no option --terain; did you mean --terrain\?$"),
-        ("--rewards.tracking-sigma 0", r"^--rewards\.tracking-sigma: got 0; expected a number > 0"),
-        ("--commands.lin-vel-x 2 1", r"^--commands\.lin-vel-x: got \[2, 1\].*the lower one first"),
-        ("--terrain.measure-heights yes", r"-heights: got 'yes'; expected true or false, or"),
-        ("--env.episode-length-s 0.001", r"^env\.episode_length_s: got 0\.001; expected at"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "train_rejects_invalid"))
 def test_train_rejects_invalid_options(words, message):
     with pytest.raises(ConfigError, match=message) as error:
         parse_words("quadruped", *words.split()).changed_config()

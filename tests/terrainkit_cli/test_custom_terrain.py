@@ -9,11 +9,11 @@ from terrainkit import TerrainMap
 from terrainkit.overlays.mirror import Mirror
 from terrainkit.overlays.noise import Noise
 from terrainkit.overlays.side_walls import SideWalls
-from terrainkit.terrain import Terrain, parameter, registry
+from terrainkit.terrain import Terrain, parameter
 
 
 @pytest.fixture
-def banked():
+def banked(own_registry):  # noqa: ARG001
     """Register a terrain with a parameter of each type."""
 
     @terrainkit.register_terrain
@@ -38,9 +38,7 @@ def banked():
             shoulder[:, slice(0, 5) if self.side == "right" else slice(-5, None)] = self.height
             return shoulder
 
-    yield BankedTrack
-    registry._registered.pop(("terrain", "banked_track"))
-    registry._get.cache_clear()
+    return BankedTrack
 
 
 @pytest.mark.usefixtures("banked")

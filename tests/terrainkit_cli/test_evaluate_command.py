@@ -4,6 +4,8 @@ from functools import partial
 
 import pytest
 
+from tests.tables import read_table
+
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate, suites
@@ -71,27 +73,7 @@ def test_evaluate_loads_the_given_checkpoint(here, monkeypatch):
         assert (document["all"]["robots"], len(document["by_command"])) == (1, 1)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("", "RUN: missing; expected"),
-        ("walk --checkpoint 5", "expected one of: 3, 7"),
-        ("walk --seconds -1", "seconds: got -1.0; expected a number > 0"),
-        ("walk --terrain moon", "moon"),
-        ("walk --command nan 0 0", "command: got [nan, 0, 0]; expected 3 values"),
-        ("walk --command 1 0 0 --random-commands", "expected one of them"),
-        ("walk --suite basics-2", "no suite 'basics-2'; did you mean 'basics-1'?"),
-        ("walk --suite basics-1 --limits", "--suite, --limits: got both"),
-        ("walk --limits --margins", "--margins, --limits: got both"),
-        ("walk --limits --seconds 3", "--seconds: got a value; expected none with --suite"),
-        ("walk --margins --num-envs 3", "--num-envs: got a value; expected none with"),
-        ("walk --limits --terrain plane", "--terrain: got a value; expected none with"),
-        ("walk --limits --random-commands", "--random-commands: got a value; expected none with"),
-        ("walk --limits --repetitions 0", "--repetitions: got 0; expected an integer from 1"),
-        ("gone --limits", "gone"),
-        ("walk --repetitions 3", "--repetitions: got a value; expected none without"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "evaluate_rejects_invalid"))
 @pytest.mark.usefixtures("walking")
 def test_evaluate_rejects_invalid_input(rejected, words, message):
     assert message in rejected(f"evaluate {words}")

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from tests.tables import read_table
+
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 import torch
@@ -125,20 +127,7 @@ def test_export_map(terrainkit, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("", "MAP.npz or RUN: missing"),
-        ("unicorn", "no map, run or robot unicorn; robots are: biped"),
-        ("none.npz -o a.stl", "no file none.npz"),
-        ("none.pt", "run: got none.pt"),
-        ("empty", "empty has no run.toml"),
-        ("text.txt -o a.stl", "text.txt"),
-        ("map.npz", "--output: missing; expected a file"),
-        ("map.npz -o a.xml --checkpoint 3", "--checkpoint: got the map map.npz"),
-        ("map.npz -o a.xml --example", "--example: got the map map.npz"),
-        ("map.npz -o a.stl --collision boxes", "option of .stl: got 'collision'; expected full"),
-        ("run --y-up", "--y-up: got the run run; expected a map"),
-        ("run --checkpoint 7", "run: got checkpoint 7; expected one of: 1, 2"),
-        ("run -o text.txt/policy", "text.txt is not a folder"),
-        ("run -o text.txt", "text.txt exists"),
+        *read_table(__file__, "export_rejects_invalid_input"),
         ("x" * 5000, "cannot read"),
     ],
     ids=lambda text: text[:30],

@@ -5,6 +5,7 @@ import pytest
 
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit_robots.description import bundled
+from tests.tables import read_table
 
 
 @pytest.fixture
@@ -51,30 +52,12 @@ def test_limits_without_a_robot_describe_one(terrainkit, stairs):
     assert "demand        ranges for the robot of --limit" in run.stdout
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("", "--robot: missing; expected a bundled robot"),
-        ("--limit step=0.2", "no limit 'step'; did you mean 'step_up'?"),
-        ("--robot nosuch", "no task or robot folder 'nosuch'"),
-        ("--robot .", "has no robot.toml"),
-        ("--robot quadruped --limit gap", "--limit: got 'gap'; expected NAME=VALUE"),
-        ("--robot quadruped --jobs 0", "jobs"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "invalid_input_is_one_line"))
 def test_invalid_input_is_one_line(rejected, stairs, words, message):
     assert message in rejected(f"feasibility {stairs} {words}")
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ('feet = ["FL_foot", "FR_foot", "RL_foot", "RR_foot"]', "feet = []", "feet of quadruped"),
-        ("leg_length = 0.448", "leg_length = 0.0", "leg_length of quadruped: got 0 m"),
-        ('mjcf = "quadruped.xml"', 'mjcf = "x.xml"', "which does not exist"),
-        ('mjcf = "quadruped.xml"', 'mjcf = "robot.toml"', "cannot be loaded"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "message"), read_table(__file__, "robot_without_limits"))
 def test_robot_without_limits_is_one_line(rejected, tmp_path, stairs, old, new, message):
     source, folder = bundled.urdf_path("quadruped").parent, tmp_path / "robot"
     shutil.copytree(source, folder, ignore=shutil.ignore_patterns("trained", "tasks"))
@@ -114,17 +97,7 @@ def test_generate_with_a_demand_solves_the_terrains_that_have_a_column(terrainki
     assert names == ("stairs", "pyramid_stairs")
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--demand 0.2:0.9", "expected --demand together with --robot or --limit"),
-        ("--robot quadruped", "expected --demand together with --robot or --limit"),
-        ("--limit gap=1", "expected --demand together with --robot or --limit"),
-        ("--robot quadruped --demand 0.2", "got '0.2'; expected LOW:HIGH, such as"),
-        ("--robot quadruped --demand 0.9:0.2", "demand: got 0.9:0.2; expected LOW"),
-        ("--robot quadruped --demand true:2", "got 'true:2'; expected LOW:HIGH"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "invalid_demand_is_one_line"))
 def test_invalid_demand_is_one_line(rejected, tmp_path, words, message):
     assert message in rejected(f"generate --terrain flat -o m.npz {words}")
     assert not (tmp_path / "m.npz").exists()

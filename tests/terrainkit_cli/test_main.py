@@ -7,6 +7,7 @@ import pytest
 
 from terrainkit_cli import training_extra
 from terrainkit_cli.main import COMMANDS, command
+from tests.tables import read_table
 
 
 def test_no_command_lists_all_commands(terrainkit_process):
@@ -34,43 +35,7 @@ def test_help_describes_command_in_80_columns(terrainkit, name):
     assert max(map(len, run.stdout.splitlines())) <= 80
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("generat", "no command 'generat'; did you mean 'generate'? There are: demo, gen"),
-        ("generate", "--output: missing; see terrainkit generate --help"),
-        ("generate -o a.npz --row 3", "no option --row; did you mean --rows?"),
-        ("generate -o a.npz --rows 0", "rows: got 0; expected an integer from 1"),
-        ("generate -o a.npz --patch-size 8", "too few values; expected 2"),
-        ("generate -o a.npz --rows 9999 --cols 9999", "GB of memory;"),
-        ("generate -o a.npz --mode selected", "expected one (--terrain)"),
-        ("generate -o a.npz --preset moon", "no preset 'moon'; there are: legged_gym"),
-        ("generate -o a.npz --terrain pit --set depth", "expected name=value"),
-        ("generate -o a.npz --set depth=1", "--set: got parameters without a terrain"),
-        ("generate -o a.npz --terrain pit --preset all", "expected one of them"),
-        ("generate -o a.npz --terrain pit --set side=2,side=3", "side twice"),
-        ("generate -o a.npz --config none.toml", "cannot read none.toml"),
-        ("generate -o a.stl --no-mesh", "--no-mesh: got a.stl; expected a .npz file"),
-        ("generate -o a.abc", "no format for '.abc' (a.abc); there are: "),
-        ("generate -o a", "no format for a name without suffix (a); there are: "),
-        ("generate -o /proc/a.npz", "cannot write /proc/a.npz"),
-        ("list moon", "no terrain 'moon' is built in, installed, or registered"),
-        ("info none.npz", "no file none.npz"),
-        ("info none.npz --patch 3", "--patch: too few values; expected 2"),
-        ("info none.npz more", "got more; expected no more arguments"),
-        ("check-map", "MAP.npz: missing; see terrainkit check-map --help"),
-        ("check-map .", "expected an .npz file"),
-        ("rule --all=yes", "--all: got a value; expected none"),
-        ("rule INR0011", "did you mean 'INR011'?"),
-        ("preview none.npz -o a.png", "no file none.npz"),
-        ("check-robot quadrupd", "did you mean 'quadruped'? Bundled robots are: biped"),
-        ("check-robot quadruped --format jsn", "markdown; did you mean 'json'?"),
-        ("onboard quadruped --config isaclab", "did you mean 'isaaclab'?"),
-        ("train quadrupd", "did you mean 'quadruped'?"),
-        ("evaluate quadruped_mp", "did you mean 'quadruped_map'?"),
-        ("export quadrupd", "did you mean 'quadruped'?"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "invalid_input_is_one_line"))
 def test_invalid_input_is_one_line_on_stderr(rejected, tmp_path, words, message):
     assert message in rejected(words)
     assert list(tmp_path.iterdir()) == []
@@ -97,7 +62,7 @@ def test_jobs_that_do_not_fit_in_memory_are_rejected(rejected, monkeypatch):
 
 @pytest.mark.parametrize("command", ["train", "evaluate", "export", "play", "smoke-test"])
 def test_training_commands_name_the_missing_extra(rejected, monkeypatch, command):
-    monkeypatch.setattr(training_extra, "_PACKAGES", ("torch", "no_such_package"))
+    monkeypatch.setattr(training_extra, "PACKAGES", ("torch", "no_such_package"))
     told = "missing packages: no_such_package; run: pip install '.[train]' (in a clone of terra"
     assert rejected(f"{command} quadruped").startswith(told)
 
@@ -163,18 +128,7 @@ def test_full_stdout_is_one_line():
 
 
 @pytest.mark.usefixtures("small_map")
-@pytest.mark.parametrize(
-    ("words", "heavy"),
-    [
-        ("generate -o a.npz --rows 1", "trimesh mujoco torch scipy cv2 rich asyncio"),
-        (
-            "check-robot quadruped --select XML,COL",
-            "rich jsonschema scipy unittest.mock asyncio glfw",
-        ),
-        ("export small.npz -o map.png", "torch rsl_rl onnx tensordict"),
-        ("--help", "torch rsl_rl onnx tensordict mujoco"),
-    ],
-)
+@pytest.mark.parametrize(("words", "heavy"), read_table(__file__, "commands_avoid_slow_imports"))
 def test_commands_avoid_slow_imports(tmp_path, words, heavy):
     code = "import sys; from terrainkit_cli.main import main; main(sys.argv[1:]);"
     code += f"print(*({{*{heavy.split()}}} & {{*sys.modules}}), file=sys.stderr)"
@@ -186,13 +140,7 @@ def test_commands_avoid_slow_imports(tmp_path, words, heavy):
 @pytest.mark.usefixtures("small_map")
 @pytest.mark.parametrize(
     ("words", "name"),
-    [
-        (("generate", "-o", "a.npz", "--rows", "1"), "SIGTERM"),
-        (("generate", "-o", "a.npz", "--rows", "1"), "SIGHUP"),
-        (("export", "small.npz", "-o", "a.stl"), "SIGTERM"),
-        (("check-robot", "unnamed.urdf", "--fix"), "SIGHUP"),
-        (("onboard", "quadruped", "--no-pictures"), "SIGTERM"),
-    ],
+    read_table(__file__, "signal_removes_temporary_files"),
     ids=lambda value: value if isinstance(value, str) else value[0],
 )
 def test_signal_removes_temporary_files(tmp_path, words, name):

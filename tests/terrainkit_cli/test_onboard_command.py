@@ -6,6 +6,7 @@ import pytest
 
 from terrainkit_robots.analysis.cannot_check import CannotCheckError
 from tests.robots import ARM
+from tests.tables import read_table
 
 NO_PICTURES = "--no-pictures"
 
@@ -89,19 +90,7 @@ def test_onboard_warns_of_failed_standing_test(here, tmp_path, monkeypatch):
     assert here("quadruped", NO_PICTURES, "--overwrite", "--strict")[0] == 1
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("", "FILE: missing"),
-        ("nothing.urdf", "robot file: got nothing.urdf"),
-        ("arm.urdf -o arm.urdf/where", "arm.urdf is not a folder"),
-        ("arm.urdf --config gym", "framework: got 'gym'; expected: "),
-        ("arm.urdf --spec arm.urdf", "arm.urdf: not a TOML file"),
-        ("arm.urdf --base flying", "--base"),
-        ("quadruped --name genesis --config leggedgym_ex,genesis", "got 'genesis', a framework"),
-        ("quadruped --name 'My Robot'", "name: got 'My Robot'; expected a name such as my_robot"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "onboard_rejects_input"))
 def test_onboard_rejects_input(rejected, tmp_path, words, message):
     (tmp_path / "arm.urdf").write_text(ARM)
     before = sorted(tmp_path.iterdir())

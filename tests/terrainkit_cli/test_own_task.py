@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from terrainkit_robots.rl import tasks
+pytestmark = pytest.mark.usefixtures("own_tasks")
 
 DOCS = Path(__file__).parents[2] / "docs"
 QUICK = ("--num-envs", "4", "--env.num-threads", "1")
@@ -20,21 +20,6 @@ def height_command(data, rotation):
 def front_feet(data, rotation):
     return [0.4, 0.4]
 """
-
-
-@pytest.fixture(autouse=True)
-def forget(monkeypatch):
-    """Return a function that forgets the tasks of files."""
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
-    own = dict(tasks._registered)
-
-    def forget():
-        tasks._registered.clear()
-        tasks._registered.update(own)
-        tasks.load_task_file.cache_clear()
-
-    yield forget
-    tasks.load_task_file.cache_clear()
 
 
 @pytest.fixture
@@ -49,14 +34,14 @@ def ran(terrainkit):
     return run
 
 
-def test_task_of_the_guide_from_training_to_its_export(ran, rejected, forget):
+def test_task_of_the_guide_from_training_to_its_export(ran, rejected, own_tasks):
     [code] = re.findall(r"```python\n(.*?)```", (DOCS / "adding_a_robot.md").read_text(), re.DOTALL)
     Path("crouch.py").write_text(code)
     own = ("--task", "crouch.py")
     printed = ran("train", *own, "--max-iterations", 2, "--log-dir", "run", *QUICK)
     assert "terrainkit evaluate run --task crouch.py" in printed
     assert ran("train", *own, "--resume", "run", "--max-iterations", 3, *QUICK)
-    forget()
+    own_tasks()
     assert rejected("evaluate run").endswith("give its Python file with --task\n")
     rollout = ("--seconds", 2.5, "--num-envs", 3, "--format", "json")
     live = json.loads(ran("evaluate", "run", *own, *rollout))

@@ -3,6 +3,8 @@ from functools import partial
 
 import pytest
 
+from tests.tables import read_table
+
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit import MapConfig, SubTerrain, generate
@@ -83,16 +85,7 @@ def test_play_checks_the_target_first(rejected, tmp_path, monkeypatch):
     assert (tmp_path / "walk.mp4").read_bytes() == b"mine"
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("", "RUN: missing; expected"),
-        ("walk -o walk.avi", "ends in .mp4"),
-        ("walk --size 99 64", "expected two even numbers"),
-        ("walk --viewer --no-video", "--viewer: got --output or --no-video"),
-        ("walk --viewer -o a.mp4", "--viewer: got --output or --no-video"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "play_rejects_invalid_input"))
 @pytest.mark.usefixtures("walking")
 def test_play_rejects_invalid_input(rejected, words, message):
     assert message in rejected(f"play {words}")

@@ -1,9 +1,9 @@
-import sys
 from pathlib import Path
 
 import pytest
 
-from terrainkit.terrain import plugin_file, registry
+from terrainkit.terrain import registry
+from tests.tables import read_table
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -56,27 +56,7 @@ BUILD = "patch (0, 0): terrain dunes (dune_pack:Dunes): SystemExit: 0"
 
 
 @pytest.mark.usefixtures("dune_pack")
-@pytest.mark.parametrize(
-    ("fails", "words", "told"),
-    [
-        ("import", ("generate", *SMALL), IMPORT),
-        ("import", ("list", "dunes"), IMPORT),
-        (
-            "import",
-            ("check-robot", "quadruped"),
-            "rules DUN (dune_pack) cannot be loaded: SystemExit: 0",
-        ),
-        ("import", ("train", "rover"), "task rover (dune_pack) cannot be loaded: SystemExit: 0"),
-        (
-            "",
-            ("generate", "--overlay", "ripples", "-o", "map.npz"),
-            "overlay ripples (dune_pack:Dunes) cannot be loaded: overlay: got <class "
-            "'dune_pack.Dunes'>; expected a subclass of Overlay",
-        ),
-        ("heights", ("generate", *SMALL), BUILD),
-        ("heights", ("generate", *SMALL, "--jobs", 2), BUILD),
-    ],
-)
+@pytest.mark.parametrize(("fails", "words", "told"), read_table(__file__, "failing_plugin"))
 def test_failing_plugin_is_one_line(terrainkit_process, monkeypatch, tmp_path, fails, words, told):
     monkeypatch.setenv("FAIL", fails)
     run = terrainkit_process(*words)
@@ -102,17 +82,6 @@ BLOCKS = [
     part.partition("```")[0] for part in (DOCS / "python_api.md").read_text().split("```python\n")
 ]
 (SCRIPT,) = (block for block in BLOCKS if "class SideStep(" in block)
-
-
-@pytest.fixture
-def own_registry(monkeypatch):
-    """Forget what a test registers and imports."""
-    monkeypatch.setattr(registry, "_registered", {})
-    monkeypatch.setattr(plugin_file, "_loaded", {})
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    registry._get.cache_clear()
-    yield
-    registry._get.cache_clear()
 
 
 @pytest.mark.usefixtures("own_registry")

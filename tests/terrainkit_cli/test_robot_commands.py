@@ -10,6 +10,7 @@ import pytest
 from terrainkit_robots.description import bundled
 from terrainkit_robots.lint.rule import rules
 from tests.robots import BOX
+from tests.tables import read_table
 
 GOOD = f'<?xml version="1.0"?>\n{BOX.format(name="box", mass=1)}'
 BAD = GOOD.replace('mass value="1"', 'mass value="-1"')
@@ -29,19 +30,7 @@ def check(terrainkit, folder):  # noqa: ARG001
     return lambda words: terrainkit("check-robot", *shlex.split(words))
 
 
-@pytest.mark.parametrize(
-    ("words", "code"),
-    [
-        ("good.urdf", 0),
-        ("bad.urdf", 1),
-        ("unnamed.urdf", 0),
-        ("unnamed.urdf --strict", 1),
-        ("good.urdf bad.urdf", 1),
-        ("bad.urdf --ignore 'INR002=a balloon' --select INR002,XML", 0),
-        ("none.urdf", 2),
-        ("bad.urdf none.urdf", 2),
-    ],
-)
+@pytest.mark.parametrize(("words", "code"), read_table(__file__, "check_robot_exit_code"))
 def test_check_robot_exit_code(check, words, code):
     assert check(words).returncode == code
 
@@ -87,34 +76,7 @@ def test_check_robot_checks_folder(check):
     assert [json.loads(line)["verdict"] for line in lines] == ["fail", "pass", "pass"]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("", "FILE: missing"),
-        ("none.urdf", "robot file: got none.urdf, which does not exist; bundled robots are: "),
-        ("empty", "empty: got no robot file in it; expected URDF, xacro or MJCF"),
-        (". --spec robot.toml", "--against and --spec: got 4 files; expected one"),
-        ("fifo", "cannot read fifo: it is a pipe"),
-        ("good.urdf --select XYZ1", "no rule 'XYZ1'; expected a code"),
-        ("good.urdf --ignore INR002", "--ignore: got 'INR002'; expected CODES=REASON"),
-        ("good.urdf --ignore INR002=", "--ignore: got 'INR002='; expected CODES=REASON"),
-        ("good.urdf --ignore INR=a --ignore INR=b", "--ignore: got INR twice"),
-        ("good.urdf --package mine", "--package: got 'mine'; expected NAME=DIR"),
-        ("good.urdf --package mine=none", "package mine: got none; expected an existing folder"),
-        ("good.urdf --xacro-arg a=1", "--xacro-arg: got 'a=1'; expected NAME:=VALUE"),
-        ("good.urdf --diff --format json", "--diff prints a diff"),
-        # An empty name does not check all robots of the working directory.
-        ("''", "got a folder; expected a file; it contains bad.urdf"),
-        ("good.urdf --baseline none.json", "no file none.json; --write-baseline"),
-        ("bad.urdf --baseline bad.urdf --write-baseline", "baseline bad.urdf: Expecting value"),
-        ("bad.urdf --baseline good.urdf/a --write-baseline", "good.urdf is not a folder"),
-        ("good.urdf --write-baseline", "--write-baseline: got no file"),
-        ("good.urdf -o .", "it is a folder"),
-        ("good.urdf -o /proc/report.txt", "cannot write /proc/report.txt"),
-        ("good.urdf -o link", "--output link would replace the checked file good.urdf"),
-        ("whole.xml good.urdf -o part.xml", "would replace the checked file part.xml"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "check_robot_rejects_input"))
 def test_check_robot_rejects_input(rejected, folder, words, message):
     os.mkfifo(folder / "fifo")
     (folder / "empty").mkdir()

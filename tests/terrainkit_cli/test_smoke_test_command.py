@@ -5,6 +5,8 @@ from functools import partial
 
 import pytest
 
+from tests.tables import read_table
+
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit.errors import ConfigError
@@ -120,20 +122,7 @@ def test_smoke_test_passes_file_options(here, calls, tmp_path):
     assert calls[1][2] == 0
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("a --format sarif", "sarif"),
-        ("a --samples -1", "--samples: got -1; expected an integer >= 0"),
-        ("a b --spec c.toml", "--spec: got 2 robots; expected one"),
-        ("", "ROBOT: missing"),
-        ("a --package my=.", "--package: got no robot file among a"),
-        ("a b --xacro-arg arm:=false", "--xacro-arg: got no robot file among a, b"),
-        ("a --ignore 'MSH=no meshes'", "--ignore: got no robot file"),
-        ("a --spec a.toml", "--spec: got no robot file"),
-        ("a -o .", "it is a folder"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "smoke_test_rejects_options"))
 def test_smoke_test_rejects_options_first(rejected, calls, words, message):
     assert message in rejected(f"smoke-test {words}")
     assert calls == []

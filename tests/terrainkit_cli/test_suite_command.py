@@ -1,6 +1,7 @@
 import pytest
 
 from terrainkit import TerrainMap, generate_suite, suite_hash, suite_names, suites
+from tests.tables import read_table
 
 
 def test_list_prints_all_suites(terrainkit):
@@ -28,18 +29,7 @@ def test_generate_writes_the_verified_map(terrainkit, rejected, tmp_path):
     assert "m.npz" in rejected("suite generate natural-1 -o m.npz")
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("show basic-1", "no suite 'basic-1'; did you mean 'basics-1'? There are: basics-1, "),
-        ("show", "no suite ''; there are: basics-1, response-1-small, "),
-        ("generate basics-1", "--output: missing; expected a file"),
-        ("list basics-1", "suite list: got 'basics-1'; expected no name"),
-        ("show basics-1 -o a.npz", "--output: got suite show; expected suite generate"),
-        ("list --overwrite", "--overwrite: got suite list; expected suite generate"),
-        ("", "missing; see terrainkit suite --help"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "invalid_arguments"))
 def test_invalid_arguments_are_one_line(rejected, tmp_path, words, message):
     assert message in rejected(f"suite {words}")
     assert not list(tmp_path.iterdir())

@@ -5,6 +5,7 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.terrain import registry
 from terrainkit.terrain.paper import paper_names
+from tests.tables import read_table
 
 
 def test_list_names_every_terrain(terrainkit):
@@ -12,21 +13,7 @@ def test_list_names_every_terrain(terrainkit):
     assert {*registry.terrain_names()} < {*names}
 
 
-@pytest.mark.parametrize(
-    ("name", "line"),
-    [
-        ("pyramid_stairs", "step_height 0.05 0.23 Rise of a step [m]."),
-        ("legged_gym", "gap 1 width=0:1, depth=5, platform=3"),
-        ("hard", "gap_track 4 length=0.05:0.5, depth=1, min_spacing=1.2,"),
-        ("natural", "rough 1"),
-        ("extreme_parkour", "steps 1 order=random, slot_length=3.95, platform=1,"),
-        (
-            "beamdojo",
-            "second-hand: stones_everywhere, stone_rows, beams, stepping_beams, gap_track",
-        ),
-        ("stairs", "parameter easy hard"),  # the terrain, and not the preset
-    ],
-)
+@pytest.mark.parametrize(("name", "line"), read_table(__file__, "list_shows_parameters"))
 def test_list_shows_parameters_or_terrains(terrainkit, name, line):
     lines = terrainkit("list", name).stdout.splitlines()
     assert line in [" ".join(each.split()) for each in lines]
@@ -167,14 +154,6 @@ def test_info_budget_prints_costs(terrainkit):
     assert ".stl 0.2 kB" in rows
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--budget --foot-radius 0", "foot radius: got 0; expected a number above 0 m"),
-        ("--budget --patch 0 0", "--budget, --patch: got both; expected one of them"),
-        ("--patch 2 0", "no patch (2, 0) in a map of 2 rows and 5 columns"),
-        ("--patch -1 -1", "no patch (-1, -1) in a map of 2 rows and 5 columns"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "info_rejects_invalid_options"))
 def test_info_rejects_invalid_options(rejected, small_map, words, message):
     assert rejected(f"info {small_map} {words}") == f"{message}\n"

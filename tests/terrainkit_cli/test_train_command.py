@@ -11,6 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from tests.tables import read_table
+
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 
@@ -128,16 +130,7 @@ def test_train_interrupt_saves_checkpoint(
     assert last == (0 if saved else code)  # a signal in the last iteration is too late to stop it
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("", "ROBOT: missing; expected a folder written by terrainkit onboard, or one of: biped,"),
-        ("rover", "no task or robot folder 'rover'"),
-        ("quadruped --terrain moon", "terrain: got 'moon'; expected plane, a map (.npz)"),
-        ("quadruped --terrain gone.npz", "no file gone.npz"),
-        ("quadruped --resume nowhere", "run: got nowhere"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "train_rejects_invalid_input"))
 def test_train_rejects_invalid_input(rejected, tmp_path, words, message):
     assert message in rejected(f"train {words}")
     assert list(tmp_path.iterdir()) == []

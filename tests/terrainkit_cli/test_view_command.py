@@ -17,6 +17,7 @@ from terrainkit_cli.view_command import View
 from terrainkit_robots.description import bundled
 from terrainkit_robots.policy.export import export_policy
 from terrainkit_robots.rl.run import open_run
+from tests.tables import read_table
 
 DISPLAYS = "BROWSER", "DISPLAY", "WAYLAND_DISPLAY"
 IPV6 = pytest.mark.skipif(not socket.has_dualstack_ipv6(), reason="there is no IPv6")
@@ -111,26 +112,7 @@ def test_demo_without_its_packages_names_the_extra(rejected, monkeypatch):
     assert rejected("demo").startswith("missing packages: viser; run: pip install '.[demo]'")
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("missing.npz", "missing.npz"),
-        ("map.npz --port 0", "--port: got 0; expected an integer from 1 to 65535"),
-        ("map.npz --port 65536", "--port: got 65536; expected an integer from 1 to 65535"),
-        ("map.npz --host no.such.host.invalid", "no.such.host.invalid"),
-        ("", "MAP.npz, ROBOT or RUN: missing"),
-        ("missing.urdf", "no map, robot or run missing.urdf; bundled are"),
-        ("empty", "empty: got no robot.toml or run.toml in it"),
-        ("no_robot.urdf", "no_robot.urdf does not describe a robot"),
-        ("map.npz --terrain plane", "--terrain: got the map map.npz; expected a run"),
-        ("quadruped --checkpoint 3", "--checkpoint: got the robot quadruped; expected a run"),
-        ("quadruped_map --package a=b", "--package: got the run quadruped_map"),
-        ("quadruped --policy --checkpoint 3", "got checkpoint 3; expected one of"),
-        ("empty --policy", "empty has no run.toml"),
-        ("quadruped_map --contract policy.json", "--robot: missing; expected the robot of the pol"),
-        ("map.npz --contract policy.json", "--contract: got the map map.npz; expected a run"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), read_table(__file__, "view_rejects_invalid_input"))
 @pytest.mark.usefixtures("map_file")
 def test_view_rejects_invalid_input(rejected, tmp_path, words, message):
     (tmp_path / "empty").mkdir()

@@ -3,6 +3,7 @@ import os
 
 import cv2
 import numpy as np
+import pytest
 
 from terrainkit.terrain import plugin_file
 from terrainkit_cli.worker_pool import worker_pool
@@ -24,10 +25,11 @@ def test_worker_pool_does_not_wait_for_threads_of_opencv():
         assert executor.submit(cv2.getNumThreads).result() == 1
 
 
-def test_worker_pool_imports_plugin_files_in_processes_that_are_not_forked(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("own_registry")
+def test_worker_pool_imports_plugin_files_in_processes_that_are_not_forked(tmp_path):
     path = tmp_path / "bump.py"
     path.write_text("")
-    monkeypatch.setattr(plugin_file, "_loaded", {"plugin_bump": path})
+    plugin_file.load_plugin(path)
     method = multiprocessing.get_start_method()
     multiprocessing.set_start_method("spawn", force=True)
     try:

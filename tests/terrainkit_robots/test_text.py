@@ -1,22 +1,15 @@
 import pytest
 
 from terrainkit_robots.text import conjunction, contrast, count, free_name, names, numbers
+from tests.tables import read_table
 
 
 @pytest.mark.parametrize(
     ("value", "limit", "spec", "texts"),
-    [
-        (12.0, 3.0, ".1f", ("12.0", "3")),
-        (3.04, 3.0, ".1f", ("3.04", "3")),
-        (3.6, 3.75, ".0f", ("3.6", "3.8")),
-        (0.502, 0.5, ".0%", ("50.2%", "50%")),
-        (1000.4, 1000.0, ".3g", ("1000.4", "1000")),
-        (0.00123, 0.00120, ".2g", ("0.00123", "0.0012")),
-        (2.0, 2.0, ".1f", ("2.0000000000000000", "2")),
-    ],
+    read_table(__file__, "contrast_tells_value_and_limit_apart"),
 )
 def test_contrast_tells_value_and_limit_apart(value, limit, spec, texts):
-    assert contrast(value, limit, spec) == texts
+    assert contrast(value, limit, spec) == tuple(texts)
 
 
 def test_names_lists_the_first_words():

@@ -39,15 +39,15 @@ __all__ = ["MeshError", "Meshes", "TooLargeError"]
 _T = TypeVar("_T")
 
 _MAX_BYTES_BY_FORMAT: dict[Format, int] = {"ply": 4 * 2**20, "glb": 16 * 2**20}
-_DEFAULT_MAX_BYTES = 64 * 2**20
+DEFAULT_MAX_BYTES = 64 * 2**20
 """Maximum size of a mesh file; parsers differ in memory per byte."""
 
-_MAX_TOTAL_BYTES = 256 * 2**20
-_MAX_TOTAL_WORDS = 6_000_000
+MAX_TOTAL_BYTES = 256 * 2**20
+MAX_TOTAL_WORDS = 6_000_000
 """Limits on the data, and on the numbers in text files, of all meshes of a robot. Parsing a million
 numbers takes about a second."""
 
-_MAX_WELDED_FACES = 500_000
+MAX_WELDED_FACES = 500_000
 """Maximum number of faces whose vertices are merged; a million takes some seconds."""
 
 _MAX_COORDINATE = 1e6
@@ -229,7 +229,7 @@ class Meshes:
 
         def make() -> Surface:
             surface = self.surface(path)
-            small = len(surface.faces) <= _MAX_WELDED_FACES
+            small = len(surface.faces) <= MAX_WELDED_FACES
             return convex_hull((self.welded(path) if small else surface).points, max_vertices)
 
         return self._cached(("hull", path, max_vertices), make)
@@ -252,9 +252,9 @@ class Meshes:
 
         def weld() -> Surface:
             surface = self.surface(path)
-            if len(surface.faces) > _MAX_WELDED_FACES:
+            if len(surface.faces) > MAX_WELDED_FACES:
                 raise TooLargeError(
-                    f"has {len(surface.faces):,} faces; expected at most {_MAX_WELDED_FACES:,}"
+                    f"has {len(surface.faces):,} faces; expected at most {MAX_WELDED_FACES:,}"
                 )
             return welded(surface)
 
@@ -279,20 +279,20 @@ class Meshes:
         header = self.header(path)
         if header.problem:
             raise MeshError(header.problem)
-        max_bytes = _MAX_BYTES_BY_FORMAT.get(header.format, _DEFAULT_MAX_BYTES)
+        max_bytes = _MAX_BYTES_BY_FORMAT.get(header.format, DEFAULT_MAX_BYTES)
         if header.size > max_bytes:
             raise TooLargeError(f"has {header.size:,} bytes; expected at most {max_bytes:,}")
-        if self._bytes + header.size > _MAX_TOTAL_BYTES:
+        if self._bytes + header.size > MAX_TOTAL_BYTES:
             raise TooLargeError(
-                f"exceeds the limit of {_MAX_TOTAL_BYTES:,} bytes for all meshes of a robot"
+                f"exceeds the limit of {MAX_TOTAL_BYTES:,} bytes for all meshes of a robot"
             )
         data = self._bytes_of(path, header.size)
         self._bytes += len(data)
         if header.format not in ("stl", "msh", "glb"):
             self._words += data.count(b" ") + data.count(b"\n")
-            if self._words > _MAX_TOTAL_WORDS:
+            if self._words > MAX_TOTAL_WORDS:
                 raise TooLargeError(
-                    f"exceeds the limit of {_MAX_TOTAL_WORDS:,} numbers in all text meshes of a "
+                    f"exceeds the limit of {MAX_TOTAL_WORDS:,} numbers in all text meshes of a "
                     "robot"
                 )
         with np.errstate(all="ignore"):  # overflow is checked below

@@ -27,7 +27,7 @@ _DECIMATION = 4
 _FINAL_SECONDS = 0.1
 """A foot that touches the ground within the last tenth of a second touches it at the end [s]."""
 
-_MIN_MARGIN = 0.005
+MIN_MARGIN = 0.005
 """Distance of the center of mass from the edge of the support that a biped needs to stand with
 locked joints [m]; with point feet it does not stand at all."""
 
@@ -108,7 +108,7 @@ def why_it_balances(facts: "Facts") -> str:
     if facts.wheels:
         return "it balances on its wheels"
     has_feet = any(body.has_contacts for body in facts.bodies)  # else it falls through the floor
-    if has_feet and not facts.stance.margin > _MIN_MARGIN:
+    if has_feet and not facts.stance.margin > MIN_MARGIN:
         return "the center of mass of the biped is not above its feet"
     return ""
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-_MAX_GROWTH = 1 << 18
+MAX_GROWTH = 1 << 18
 """Largest number of rows by which a buffer grows at once, which bounds its unused memory."""
 
 
@@ -31,7 +31,7 @@ class RowBuffer:
         """
         start, self._length = self._length, self._length + len(rows)
         if self._length > len(self._rows):
-            size = len(self._rows) + min(len(self._rows), _MAX_GROWTH)
+            size = len(self._rows) + min(len(self._rows), MAX_GROWTH)
             self._resize(max(self._length, size))
         self._rows[start : self._length] = rows
         if offset:

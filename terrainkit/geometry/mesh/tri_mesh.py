@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_EDGES_PER_BLOCK = 1 << 20
+EDGES_PER_BLOCK = 1 << 20
+"""Edges that are compared at once, to bound the memory."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,9 +44,9 @@ class TriMesh:
         """
         numbers = self.edge_numbers() if numbers is None else numbers
         differs = np.ones(len(numbers) + 1, dtype=bool)
-        for start in range(1, len(numbers), _EDGES_PER_BLOCK):
-            block = numbers[start - 1 : start + _EDGES_PER_BLOCK]
-            differs[start : start + _EDGES_PER_BLOCK][: len(block) - 1] = block[1:] ^ block[:-1] > 1
+        for start in range(1, len(numbers), EDGES_PER_BLOCK):
+            block = numbers[start - 1 : start + EDGES_PER_BLOCK]
+            differs[start : start + EDGES_PER_BLOCK][: len(block) - 1] = block[1:] ^ block[:-1] > 1
         single = numbers[differs[:-1] & differs[1:]]
         edges = np.column_stack(np.divmod(single >> 1, len(self.vertices)))
         return np.where(single[:, None] & 1, edges[:, ::-1], edges)

@@ -3,6 +3,7 @@ import pytest
 
 from terrainkit.curriculum import assign_levels, assign_spawns, resample_columns
 from terrainkit.errors import ConfigError
+from tests.tables import read_table
 
 
 @pytest.mark.parametrize(
@@ -22,20 +23,7 @@ def test_assign_levels_respects_max_init_level(highest, levels):
     assert set(assign_levels(1000, 10, 20, highest, seed=0)[0].tolist()) == levels
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"num_envs": -1}, "num_envs: got -1; expected an integer >= 0"),
-        ({"rows": 0}, "rows: got 0; expected an integer >= 1"),
-        ({"cols": 0}, "cols: got 0; expected an integer >= 1"),
-        ({"max_init_level": -1}, "max_init_level: got -1; expected an integer from 0 to 9"),
-        ({"max_init_level": 10}, "max_init_level: got 10; expected an integer from 0 to 9"),
-        ({"seed": "a"}, "seed: got 'a'; expected integers >= 0"),
-        ({"seed": (1, -1)}, r"seed: got \[1, -1\]; expected integers >= 0"),
-        ({"seed": [[0], [1, 2]]}, r"seed: got .*; expected integers >= 0"),
-        ({"seed": []}, r"seed: got \[\]; expected integers >= 0"),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), read_table(__file__, "assign_levels_rejects"))
 def test_assign_levels_rejects_invalid_value(given, message):
     valid = {"num_envs": 8, "rows": 10, "cols": 20, "max_init_level": None, "seed": 0}
     with pytest.raises(ConfigError, match=f"^{message}$"):
@@ -90,13 +78,7 @@ def test_resample_columns_without_variants_changes_nothing(columns):
 
 @pytest.mark.parametrize(
     ("levels", "columns", "seed", "message"),
-    [
-        ([2], [0], 0, "levels: got 2 to 2; expected 0 to 1"),
-        ([0], [5], 0, "columns: got 5 to 5; expected 0 to 4"),
-        ([0], [-1], 0, "columns: got -1 to -1; expected 0 to 4"),
-        ([0], [0.5], 0, "columns: got values of float64; expected integers"),
-        ([0, 0], [0], 0, r"columns: got shape \(1,\); expected \(2,\)"),
-    ],
+    read_table(__file__, "resample_columns_rejects_invalid_values"),
 )
 def test_resample_columns_rejects_invalid_values(levels, columns, seed, message):
     with pytest.raises(ConfigError, match=message):

@@ -3,6 +3,7 @@ import pytest
 
 from terrainkit.curriculum import LevelSampler, assign_levels, update_levels
 from terrainkit.errors import ConfigError
+from tests.tables import read_table
 
 
 def update(levels, progress, *, rows=10, seed=0, **options):
@@ -29,20 +30,7 @@ def test_update_levels_limits_top_levels_to_rows(rows, top_levels, levels):
     assert set(solved.tolist()) == levels
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"levels": [0, 10]}, "levels: got 0 to 10; expected 0 to 9"),
-        ({"levels": [-1, 3]}, "levels: got -1 to 3"),
-        ({"levels": [0.5, 1.0]}, "levels: got values of float64; expected integers"),
-        ({"levels": [[1], [2, 3]]}, "levels: got lists of different lengths; expected one list"),
-        ({"progress": [1.0]}, r"progress: got shape \(1,\); expected \(2,\)"),
-        ({"progress": ["a", "b"]}, "progress: got values of <U1; expected numbers"),
-        ({"progress": [0.5, 1.5]}, "progress: got 1.5; expected numbers from 0 to 1, or NaN"),
-        ({"progress": [-0.1, 1]}, "progress: got -0.1; expected numbers from 0 to 1, or NaN"),
-        ({"top_levels": 0}, "top_levels: got 0; expected an integer >= 1"),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), read_table(__file__, "update_levels_rejects"))
 def test_update_levels_rejects_invalid_values(given, message):
     with pytest.raises(ConfigError, match=message):
         update(**({"levels": [0, 1], "progress": [0.0, 1.0]} | given))

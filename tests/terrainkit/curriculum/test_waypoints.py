@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.curriculum.waypoints import PROMOTION, Waypoints, route_lengths
+from tests.tables import read_table
 
 NONE = [np.nan, np.nan]
 
@@ -10,15 +11,7 @@ def make(*goals, radius=0.4):
     return Waypoints(goals=np.array(goals, float), index=np.zeros(len(goals), int), radius=radius)
 
 
-@pytest.mark.parametrize(
-    ("yaw", "command"),
-    [
-        (0.0, (0.75, 0, 0)),  # ahead
-        (0.5, (0.75 * np.cos(0.5), 0, -0.5)),  # a little to the right
-        (np.pi / 2, (0, 0, -0.8)),  # to the right: it turns first
-        (np.pi - 0.1, (0, 0, -0.8)),  # behind
-    ],
-)
+@pytest.mark.parametrize(("yaw", "command"), read_table(__file__, "waypoints_commands_turn"))
 def test_waypoints_commands_turn_to_the_goal_and_walk_ahead(yaw, command):
     got = make([[5.0, 1.0]]).commands(
         np.array([[2.0, 1.0]]), np.array([yaw]), 0.75, 1.0, (-0.8, 0.8)
@@ -48,17 +41,7 @@ def test_waypoints_robot_without_goals_never_arrives():
 
 @pytest.mark.parametrize(
     ("reached", "fallen", "commanded", "progress"),
-    [
-        (4, False, 20.0, 1.0),  # four of five goals are enough
-        (3, False, 20.0, 0.75),
-        (1, False, 20.0, 0.25),
-        (2, True, 0.0, 0.5),
-        (0, False, 0.0, np.nan),  # commanded to stand
-        (2, False, 4.5, np.nan),  # commanded to walk to the second goal
-        (1, False, 4.5, np.nan),
-        (0, False, 4.5, 0.0),
-        (0, True, 0.0, 0.0),
-    ],
+    read_table(__file__, "waypoints_progress_of_episodes"),
 )
 def test_waypoints_progress_of_episodes(reached, fallen, commanded, progress):
     waypoints = make([[2.0 * k, 0.0] for k in range(1, 6)], [NONE] * 5)

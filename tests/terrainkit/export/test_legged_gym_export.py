@@ -13,6 +13,7 @@ import terrainkit as tk
 from terrainkit.errors import ExportError
 from terrainkit.export.legged_gym_export import MODULE, heights_at_corners, x_edges
 from tests.frameworks.pages import page_block
+from tests.tables import read_table
 
 
 def make_cfg(mesh_type="trimesh", **values):
@@ -105,21 +106,7 @@ def test_terrain_mesh_is_aligned_in_leggedgym_ex(load):
 def test_terrain_writes_layout_and_friction_into_the_config(load):
     cfg = make_cfg("heightfield", horizontal_scale=0.05, num_rows=10)
     terrain = load(make_map("stairs")).Terrain(cfg)
-    assert vars(cfg) == {
-        "mesh_type": "heightfield",
-        "vertical_scale": 0.005,
-        "horizontal_scale": 0.1,
-        "border_size": 2.0,
-        "num_rows": 3,
-        "num_cols": 7,
-        "num_sub_terrains": 21,
-        "terrain_length": 8.0,
-        "terrain_width": 6.0,
-        "max_init_terrain_level": 2,
-        "static_friction": 1.0,
-        "dynamic_friction": 1.0,
-        "restitution": 0.0,
-    }
+    assert vars(cfg) == read_table(__file__, "terrain_writes_layout_and_friction_into_the_config")
     assert (terrain.length_per_env_pixels, terrain.width_per_env_pixels) == (80, 60)
     assert (terrain.env_length, terrain.env_width, terrain.border) == (8.0, 6.0, 20)
     assert (terrain.type, terrain.num_robots) == ("heightfield", None)

@@ -19,7 +19,7 @@ every_suffix = pytest.mark.parametrize("suffix", mesh_file.SUFFIXES)
 @every_suffix
 @pytest.mark.parametrize("options", [{}, {"full": True}, {"closed": True}, {"y_up": True}], ids=str)
 def test_mesh_file_has_the_triangles_of_the_map(request, tmp_path, monkeypatch, suffix, options):
-    monkeypatch.setattr(mesh_file, "_FACES_PER_BLOCK", 100)
+    monkeypatch.setattr(mesh_file, "FACES_PER_BLOCK", 100)
     terrain_map = request.getfixturevalue("solid_map" if options else "terrain_map")
     path = terrain_map.save(tmp_path / f"map{suffix}", **options)
     mesh = terrain_map.mesh(merged="full" not in options, closed="closed" in options)
@@ -91,9 +91,9 @@ def test_glb_is_a_scene_with_the_friction_as_extras(terrain_map, tmp_path):
 def test_glb_header_limits_size(terrain_map, tmp_path, monkeypatch):
     path = terrain_map.save(tmp_path / "map.glb")
     size = path.stat().st_size
-    monkeypatch.setattr(mesh_file, "_MAX_GLB_BYTES", size)
+    monkeypatch.setattr(mesh_file, "MAX_GLB_BYTES", size)
     terrain_map.save(path, overwrite=True)
-    monkeypatch.setattr(mesh_file, "_MAX_GLB_BYTES", size - 1)
+    monkeypatch.setattr(mesh_file, "MAX_GLB_BYTES", size - 1)
     message = f"a .glb file: got {size} bytes; expected at most {size - 1}; use .ply"
     with pytest.raises(ExportError, match=message):
         terrain_map.save(path, overwrite=True)
@@ -103,7 +103,7 @@ def test_glb_header_limits_size(terrain_map, tmp_path, monkeypatch):
 def test_mesh_file_is_written_in_blocks(terrain_map, tmp_path, suffix, monkeypatch):
     mesh = terrain_map.mesh()
     monkeypatch.setattr(TerrainMap, "mesh", lambda *_, **__: mesh)
-    monkeypatch.setattr(mesh_file, "_FACES_PER_BLOCK", 256)
+    monkeypatch.setattr(mesh_file, "FACES_PER_BLOCK", 256)
     # Besides the mesh, writing needs a small part of its memory.
     views = mesh.vertices.nbytes + mesh.triangles.nbytes
     path = terrain_map.save(tmp_path / f"map{suffix}")  # after all imports

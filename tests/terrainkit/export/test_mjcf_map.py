@@ -12,6 +12,7 @@ from terrainkit.export import mjcf_map
 from terrainkit.geometry.walls import wall_edges
 from terrainkit.overlays.friction_patches import FrictionPatches
 from tests.rays import cast_rays
+from tests.tables import read_table
 from tests.terrainkit.maps import plot
 
 every_collision = pytest.mark.parametrize("collision", ["hfield", "boxes"])
@@ -62,20 +63,7 @@ def assert_same_ground(model, terrain_map, cells=None):
 def test_mjcf_sets_every_attribute_of_its_class(terrain_map):
     root = written(terrain_map)
     (geom,), (site,) = root.iterfind("default/default/geom"), root.iterfind("default/default/site")
-    assert geom.attrib == {
-        "contype": "1",
-        "conaffinity": "1",
-        "condim": "3",
-        "group": "0",
-        "priority": "0",
-        "friction": "0.8 0.005 0.0001",
-        "solmix": "1",
-        "solref": "0.02 1",
-        "solimp": "0.9 0.95 0.001 0.5 2",
-        "margin": "0",
-        "gap": "0",
-        "rgba": "0.55 0.55 0.52 1",
-    }
+    assert geom.attrib == read_table(__file__, "mjcf_sets_every_attribute_of_its_class")
     assert site.attrib == {
         "type": "box",
         "size": "0.15 0.03 0.03",
@@ -140,15 +128,7 @@ def test_mjcf_narrow_or_uneven_border_belongs_to_the_heightfield(border, sample,
 
 def test_mjcf_has_a_geom_per_solid_and_a_site_per_goal(solid_map):
     *_, board, other, post, hull = written(solid_map).iterfind("worldbody/geom")
-    assert board.attrib == {
-        "class": "terrain",
-        "type": "box",
-        "pos": "1 6 0.5",
-        "size": "0.25 1 0.1",
-        "quat": "0.988771 0 0 0.149438",  # half of 0.3 rad
-        "friction": "0.3 0.005 0.0001",
-        "priority": "2",
-    }
+    assert board.attrib == read_table(__file__, "mjcf_has_a_geom_per_solid_and_a_site_per_goal")
     assert other.attrib.items() >= {("contype", "0"), ("conaffinity", "0"), ("pos", "5 6 0.5")}
     assert post.attrib.items() >= {("size", "0.2 0.4"), ("type", "cylinder"), ("group", "3")}
     assert hull.attrib == {"class": "terrain", "type": "mesh", "mesh": "solid_0"}
@@ -183,7 +163,7 @@ def test_mjcf_auto_uses_twice_as_many_boxes_as_heightfields():
 
 @pytest.mark.parametrize("row", range(11))
 def test_mjcf_auto_finds_a_slope_between_any_two_rows(monkeypatch, row):
-    monkeypatch.setattr(mjcf_map, "_ROWS_PER_BAND", 4)
+    monkeypatch.setattr(mjcf_map, "ROWS_PER_BAND", 4)
     heights = np.zeros((12, 4))
     heights[row + 1 :] = 0.05
     assert mjcf_map.collision_boxes(plot(heights), "auto") is None
@@ -269,23 +249,7 @@ def test_mjcf_ground_extends_to_the_border(tmp_path, border, centered, collision
     assert_same_ground(loaded(terrain_map, tmp_path, collision=collision), terrain_map)
 
 
-ROBOT = """
-<mujoco model="robot">
-  <default>
-    <geom contype="4" conaffinity="2" condim="6" friction="0.1 0.2 0.3" priority="1" group="4"
-          margin="0.2" gap="0.1" solref="0.5 2" solimp="0.5 0.6 0.1" solmix="7" rgba="1 0 0 1"/>
-  </default>
-  {before}
-  <worldbody>
-    <body pos="0 0 9">
-      <freejoint/>
-      <geom type="sphere" size="0.1" mass="1" contype="1" conaffinity="1" condim="3" priority="0"
-            margin="0" gap="0" solref="0.02 1" solimp="0.9 0.95 0.001"/>
-    </body>
-  </worldbody>
-  {after}
-</mujoco>
-"""
+ROBOT = read_table(__file__, "robot")
 
 
 @pytest.mark.parametrize("place", ["before", "after"])

@@ -13,6 +13,7 @@ from terrainkit.errors import MapFileError
 from terrainkit.export.npz import read_mesh
 from terrainkit.export.requirements import has_one_friction
 from terrainkit.settings.type_hint import MAX_VALUE
+from tests.tables import read_table
 from tests.terrainkit.maps import contents
 
 NAN = float("nan")
@@ -39,36 +40,15 @@ def icy_map():
 
 def test_npz_has_these_arrays(path, terrain_map):
     mesh = terrain_map.mesh()
-    found = {key: (each.dtype.str, each.shape) for key, each in arrays_of(path).items()}
+    found = {key: [each.dtype.str, *each.shape] for key, each in arrays_of(path).items()}
     texts = {key: found.pop(key) for key in ("terrain_names", "config", "parameters")}
-    assert found == {
-        "format_version": ("<i8", ()),
-        "heights": ("<f4", (184, 144)),
-        "ground_friction": ("<f4", (1, 1)),
-        "cell": ("<f8", ()),
-        "lower": ("<f8", (2,)),
-        "border": ("<f8", ()),
-        "patch_size": ("<f8", (2,)),
-        "env_origins": ("<f4", (2, 3, 3)),
-        "spawns": ("<f4", (2, 3, 1, 4)),
-        "goals": ("<f4", (2, 3, 0, 4)),
-        "terrain_types": ("<i4", (2, 3)),
-        "difficulty": ("<f4", (2, 3)),
-        "vertices": ("<f4", mesh.vertices.shape),
-        "triangles": ("<i4", mesh.triangles.shape),
-        "boxes": ("<f4", (0, 10)),
-        "cylinders": ("<f4", (0, 10)),
-        "hull_vertices": ("<f4", (0, 3)),
-        "hull_counts": ("<i4", (0,)),
-        "solid_friction": ("<f4", (0,)),
-        "solid_collides": ("|b1", (0,)),
-        "solid_visible": ("|b1", (0,)),
-        "solid_patch": ("<i4", (0, 2)),
-        "friction": ("<f8", (2,)),
-        "restitution": ("<f8", ()),
+    meshes = {
+        "vertices": ["<f4", *mesh.vertices.shape],
+        "triangles": ["<i4", *mesh.triangles.shape],
     }
-    assert {dtype[:2] for dtype, _ in texts.values()} == {"<U"}
-    assert [shape for _, shape in texts.values()] == [(3,), (), ()]
+    assert found == read_table(__file__, "arrays") | meshes
+    assert {dtype[:2] for dtype, *_ in texts.values()} == {"<U"}
+    assert [shape for _, *shape in texts.values()] == [[3], [], []]
 
 
 def test_npz_config_generates_the_same_bytes(path, tmp_path):
@@ -353,20 +333,8 @@ def test_npz_invalid_header_is_rejected(good, bad, header):
     assert "heights cannot be read" in refusal(bad)
 
 
-@pytest.mark.parametrize(
-    ("key", "dtype", "shape", "limit"),
-    [
-        ("config", "<U400000000", (), 64 << 20),
-        ("parameters", "<U400000000", (), (2 + 16) * 8192),  # per patch, and 16 more
-        ("ground_friction", "<f4", (43, 12), 42 * 12 * 4),
-        ("spawns", "<f4", (2, 1, 201, 4), 2 * 200 * 16),  # one per cell
-        ("goals", "<f4", (2, 1, 1001, 4), 2 * 1000 * 16),
-        ("boxes", "<f4", (10**9, 10), 1 << 30),
-        ("vertices", "<f4", (10**12, 3), 20 * 12 * 44 * 14),  # 20 per cell, with one more around
-        ("triangles", "<i4", (10**12, 3), 20 * 12 * 44 * 14),
-    ],
-)
+@pytest.mark.parametrize(("key", "dtype", "shape", "limit"), read_table(__file__, "npz_oversized"))
 def test_npz_oversized_array_is_not_read(good, bad, key, dtype, shape, limit):
-    repack(good, bad, {key: npy_that_declares(dtype, shape)})
+    repack(good, bad, {key: npy_that_declares(dtype, tuple(shape))})
     read = read_mesh if key in ("vertices", "triangles") else TerrainMap.load
     assert refusal(bad, read).endswith(f" bytes; expected at most {limit}")

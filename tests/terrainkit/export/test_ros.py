@@ -5,24 +5,12 @@ import pytest
 import terrainkit as tk
 from terrainkit.errors import ExportError, TerrainkitWarning
 from terrainkit.export.ros import occupied_cells
+from tests.tables import read_table
 from tests.terrainkit.maps import plot
 
 HEIGHTS = np.zeros((7, 6))
 HEIGHTS[2:4, 3] = 65535 / 2**18  # gray levels of 2**-18 m
-YAML = """\
-# Occupancy for map_server: cells at the top of steps higher than 0.2 m are occupied.
-image: "map.pgm"
-mode: trinary
-resolution: 0.1
-origin: [-0.1, -0.1, 0.0]
-negate: 0
-occupied_thresh: 0.65
-free_thresh: 0.25
-# Heights of the same cells, a 16-bit image: height = elevation_offset + elevation_scale * gray [m]
-elevation_image: "map.png"
-elevation_scale: 3.814697265625e-06
-elevation_offset: 0.0
-"""
+YAML = read_table(__file__, "yaml")
 
 
 def test_yaml_and_occupancy_by_hand(tmp_path):

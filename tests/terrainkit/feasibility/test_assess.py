@@ -13,64 +13,13 @@ from terrainkit.feasibility import assess_map, assess_patch
 from terrainkit.geometry.solids import make_boxes
 from terrainkit.terrain.registry import terrain_names
 from tests.limits import LIMITS
+from tests.tables import read_table
 from tests.terrainkit.maps import contents
 
-CASES = {
-    # A step of h: h / step_up, or h / step_down where the robot starts at the top.
-    "stairs": ({"step_height": 0.15}, 0.75, "step_up"),
-    "pyramid_stairs": ({"step_height": 0.15}, 0.6, "step_down"),
-    "stairs_turning": ({"riser": 0.1}, 0.5, "step_up"),
-    "spiral_stairs": ({"riser": 0.1, "tread": 0.4}, 0.5, "step_up"),
-    "open_stairs": ({"riser": 0.1, "tread": 0.5}, 0.5, "step_up"),
-    "pit": ({"depth": 0.1}, 0.5, "step_up"),
-    "rails": ({"height": 0.15, "width": 0.2}, 0.75, "step_up"),
-    "hurdles": ({"height": 0.15}, 0.75, "step_up"),
-    # A gap of w: w / gap.
-    "gap": ({"width": 0.3}, 0.75, "gap"),
-    "gap_track": ({"length": 0.3}, 0.75, "gap"),
-    "course": ({"elements": [{"terrain": "gap_track", "length": 0.2}]}, 0.5, "gap"),
-    "rings": ({"gap": 0.2, "width": 0.4, "variation": 0.0}, 0.5, "gap"),
-    "stepping_stones": ({"stone": 0.8}, 0.25, "gap"),  # one cell between two stones
-    "stone_rows": ({"stone": 0.4, "gap": 0.2, "variation": 0.0}, 0.5, "gap"),
-    "stones_everywhere": ({"stone": 0.6, "gap": 0.2, "shift": 0, "variation": 0}, 0.5, "gap"),
-    "stakes": ({"diameter": 0.3, "gap": 0.2, "variation": 0.0}, 0.5, "gap"),
-    "stepping_beams": ({"width": 0.3, "gap": 0.2, "yaw": 0.0}, 0.5, "gap"),
-    "side_ramps": ({"roll": 0.2, "gap": 0.2}, 0.5, "gap"),
-    # A slope of g: g / slope. The edge of a pyramid is less steep by sqrt(2).
-    "slope": ({"grade": 0.3}, 0.6, "slope"),
-    "pyramid_slope": ({"grade": 0.3}, 0.6 / 2**0.5, "slope"),
-    "rough_slope": ({"grade": 0.3, "amplitude": 0.0}, 0.6 / 2**0.5, "slope"),
-    # A clearance of c: (0.6 - c) / (0.6 - 0.3).
-    "crawl": ({"clearance": 0.45}, 0.5, "crouched_height"),
-    "tunnel": ({"clearance": 0.45, "depth": 1.2}, 0.5, "crouched_height"),
-    "ceiling": ({"clearance": 0.45}, 0.5, "crouched_height"),
-    # A passage of w: 2 - w / body_width.
-    "rooms": ({"door": 0.6}, 0.5, "body_width"),
-    "maze": ({"corridor": 0.6}, 0.5, "body_width"),
-    # Ground that the robot can walk around.
-    "flat": ({}, 0.0, ""),
-    "obstacles": ({"height": 0.1}, 0.0, ""),
-    "contour": ({"step_height": 0.1}, 0.0, ""),
-    "poles": ({"gap": 0.9}, 0.0, ""),
-    "gutter": ({"roll": 0.2}, 0.0, ""),
-    "k_rails": ({"height": 0.15}, 0.0, ""),
-    "pallets": ({}, 0.0, ""),
-    "continuous_ramps": ({"grade": 0.2}, 0.0, ""),
-}
+CASES = read_table(__file__, "cases")
 """Parameters of a terrain, its demand and the limit that determines it."""
 
-BOUNDS = {
-    "beams": ({"width": 0.3, "gap": 0.2, "yaw": 0.0}, 0.5, 0.6),  # the last gap ends at a cell
-    "star": ({"number": 4, "width": 0.15}, 0.33, 0.67),  # 2 - 0.15 / 0.1, up to a column
-    "floating_islands": ({"walkway": 0.15}, 0.33, 0.67),
-    # The opening of 1.5 x 0.35 m is 2 - 0.525 / 0.4, up to a column.
-    "slit": ({"opening": 1.5, "body_width": 0.35}, 0.6, 0.78),
-    "boxes": ({"height": 0.1}, 0.25, 0.5),  # in two layers
-    "crossing_ramps": ({"grade": 0.2}, 0.0, 0.4),
-    "stepfield": ({"unit": 0.05}, 0.25, 1.0),  # at least one unit up
-    "ladder": ({}, np.inf, np.inf),  # rungs are no footholds
-    "rough": ({"amplitude": 0.05}, 0.0, 0.5),
-}
+BOUNDS = read_table(__file__, "bounds")
 """Parameters of a terrain, and the lowest and the highest demand; 0 to 1 of all others."""
 
 

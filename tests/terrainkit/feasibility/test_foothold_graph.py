@@ -5,19 +5,10 @@ import pytest
 
 from terrainkit.feasibility.foothold_graph import FootholdGraph, ratio
 from tests.limits import LIMITS, columns_of
+from tests.tables import read_table
 
 
-@pytest.mark.parametrize(
-    ("name", "values", "ratios"),
-    [
-        ("step_up", [-0.1, 0.0, 0.1, 0.2, 0.3], [0, 0, 0.5, 1, 1.5]),
-        ("slope", [0.25, 0.5], [0.5, 1]),
-        ("friction", [0, 1 / 3, 2 / 3], [0, 0.5, 1]),
-        ("foothold", [0.05, 0.1, 0.15, 0.2, 0.3], [1.5, 1, 0.5, 0, 0]),
-        ("body_width", [0.4, 0.6, 0.8, np.inf], [1, 0.5, 0, 0]),
-        ("crouched_height", [0.15, 0.3, 0.45, 0.6, np.inf], [1.5, 1, 0.5, 0, 0]),
-    ],
-)
+@pytest.mark.parametrize(("name", "values", "ratios"), read_table(__file__, "ratio_is_1"))
 def test_ratio_is_1_at_the_limit(name, values, ratios):
     assert ratio(name, np.array(values), LIMITS) == pytest.approx(ratios)
 

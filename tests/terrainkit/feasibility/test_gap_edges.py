@@ -103,7 +103,7 @@ def test_easiest_gaps_are_kept_for_each_combination_of_keys():
 )
 def test_easiest_gaps_from_a_node_to_a_component_are_tried(monkeypatch, wall, one_each, ends):
     """From two stones to a beam, in a batch each, with a wall of some columns in between."""
-    monkeypatch.setattr(gaps_module, "_MAX_PAIRS", 1)
+    monkeypatch.setattr(gaps_module, "MAX_PAIRS", 1)
     heights = np.full((12, 14), -1.0)
     heights[4, [3, 13]] = heights[8, 3:] = 0.0
     heights[6, :wall] = 1.0
@@ -116,7 +116,7 @@ def test_easiest_gaps_from_a_node_to_a_component_are_tried(monkeypatch, wall, on
 
 
 def test_batches_have_at_least_the_number_of_pairs(monkeypatch):
-    monkeypatch.setattr(gaps_module, "_MAX_PAIRS", 5)
+    monkeypatch.setattr(gaps_module, "MAX_PAIRS", 5)
     parts = [edges_of(np.full(n, n)) for n in (3, 2, 6, 1, 3)]
     batches = [each.gap.tolist() for each in gaps_module._batches(parts)]
     assert batches == [[3, 3, 3, 2, 2], [6] * 6, [1, 3, 3, 3]]

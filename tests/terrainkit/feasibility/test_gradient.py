@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.feasibility.gradient import gradient_of, step
+from tests.tables import read_table
 
 
 def grades(profile, spacing=0.1):
@@ -12,19 +13,7 @@ def grades(profile, spacing=0.1):
     return found
 
 
-@pytest.mark.parametrize(
-    ("profile", "grade"),
-    [
-        ([0, 0.03, 0.06, 0.09, 0.12], 0.3),
-        ([0, 0.03, 0.06, 0.08, 0.10], 0.2),  # the smaller one
-        ([0.12, 0.09, 0.06, 0.03, 0], 0.3),
-        ([0, 0.03, 0.06, 0.03, 0], 0.3),  # a ridge
-        ([0.06, 0.03, 0, 0.03, 0.06], 0.3),  # a valley
-        ([0.05, 0.03, 0, 0.03, 0.06], 0.2),
-        ([0.06, 0.06, 0, 0.06, 0.06], 0.0),  # a groove
-        ([0, 0, 0.15, 0.15, 0.3], 0.0),  # a tread of two columns
-    ],
-)
+@pytest.mark.parametrize(("profile", "grade"), read_table(__file__, "slope_continues"))
 def test_slope_continues_on_both_sides(profile, grade):
     assert grades(profile)[2] == pytest.approx(grade)
 

@@ -13,6 +13,7 @@ from terrainkit.feasibility.report import (
     to_json,
 )
 from tests.limits import LIMITS
+from tests.tables import read_table
 
 EASY = PatchFeasibility(
     row=0,
@@ -86,18 +87,7 @@ def test_json_has_null_for_what_is_not_finite():
     assert report.pop("terrains") == {"stairs": counts}
     assert report == {"schema_version": 1, "robot": "a", "max_demand": 2.0, "passable": False}
     assert limits == vars(LIMITS)
-    assert patches[0] == {
-        "row": 0,
-        "col": 0,
-        "terrain": "stairs",
-        "difficulty": 0.5,
-        "demand": 0.75,
-        "passable": True,
-        "limit": "step_up",
-        "value": 0.15,
-        "place": [1.0, 2.0, 0.075],
-        "path": [[0.0, 2.0, 0.0], [2.0, 2.0, 0.15]],
-    }
+    assert patches[0] == read_table(__file__, "json_has_null_for_what_is_not_finite")
     none = {"demand": None, "passable": False, "limit": None, "value": None, "place": None}
     assert patches[1] == patches[0] | none | {"row": 2, "path": [[0.0, 2.0, 0.0]]}
     assert to_json([EASY], LIMITS)["passable"]

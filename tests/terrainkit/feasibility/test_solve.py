@@ -13,6 +13,7 @@ from terrainkit.map.patch import build_patch
 from terrainkit.terrain.registry import make_overlay
 from terrainkit.terrains.course import Element
 from tests.limits import LIMITS
+from tests.tables import read_table
 
 
 def solve(terrain, demand=(0.2, 0.9), size=(6.0, 6.0), **parameters):
@@ -22,16 +23,7 @@ def solve(terrain, demand=(0.2, 0.9), size=(6.0, 6.0), **parameters):
     return solved
 
 
-@pytest.mark.parametrize(
-    ("terrain", "name", "easy", "hard"),
-    [
-        # The largest steps of at most 0.2 and 0.9 of the limits; the range has 512 values.
-        ("pyramid_stairs_inverted", "step_height", 0.2 * 0.2, 0.9 * 0.2),
-        ("pyramid_stairs", "step_height", 0.2 * 0.25, 0.9 * 0.25),
-        ("pit", "depth", 0.2 * 0.2, 0.9 * 0.2),
-        ("slope", "grade", 0.2 * 0.5, 0.9 * 0.5),
-    ],
-)
+@pytest.mark.parametrize(("terrain", "name", "easy", "hard"), read_table(__file__, "ranges_end"))
 def test_ranges_end_at_the_requested_demands(terrain, name, easy, hard):
     base, inverted = terrain.removesuffix("_inverted"), terrain.endswith("_inverted")
     solved = solve(base, **({"inverted": True} if inverted else {}))

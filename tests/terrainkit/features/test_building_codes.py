@@ -10,36 +10,16 @@ from terrainkit.terrains.open_stairs import OpenStairs
 from terrainkit.terrains.spiral_stairs import SpiralStairs
 from terrainkit.terrains.stairs import Stairs
 from terrainkit.terrains.stairs_turning import StairsTurning
+from tests.tables import read_table
 from tests.terrains import GRID
 
 PUBLIC = Flight(
     riser=0.178, going=0.279, number=8, width=1.2, landing=1.2, nosing=0.032, handrail=0.9
 )
-CODES = {
-    "residential": ("irc", "wac"),
-    "public": ("ibc", "aba"),
-    "industrial": ("osha", "iso_14122_3"),
-    "fire_escape": ("fire_escape",),
-}
+CODES = read_table(__file__, "codes")
 
 
-@pytest.mark.parametrize(
-    ("change", "clause"),
-    [
-        ({}, []),
-        ({"riser": 0.179}, ["1011.5.2"]),
-        ({"going": 0.278}, ["1011.5.2"]),
-        ({"nosing": 0.033}, ["1011.5.5"]),
-        ({"headroom": 2.032}, []),
-        ({"headroom": 2.031}, ["1011.3"]),
-        ({"landing": 1.19}, ["1011.6"]),
-        ({"width": 3.0, "landing": 1.219}, []),
-        ({"riser_difference": 0.0095}, []),
-        ({"riser_difference": 0.0096}, ["1011.5.4"]),
-        ({"handrail": 0.863}, ["1014.2"]),
-        ({"handrail": 0.0}, ["1014.2"]),
-    ],
-)
+@pytest.mark.parametrize(("change", "clause"), read_table(__file__, "check_flight_has_limits"))
 def test_check_flight_has_limits_on_both_sides(change, clause):
     assert [each.clause for each in check_flight(replace(PUBLIC, **change), "ibc")] == clause
 

@@ -91,7 +91,7 @@ def make_group(folder, kind, limit, cached=0):
     ],
 )
 def test_free_memory_respects_control_groups(tmp_path, monkeypatch, kind, groups, cached, free):
-    monkeypatch.setattr(memory, "_PROCESS", tmp_path)
+    monkeypatch.setattr(memory, "PROCESS", tmp_path)
     monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=7 * GB))
     make_process(tmp_path, kind)
     for name, limit in groups.items():
@@ -100,7 +100,7 @@ def test_free_memory_respects_control_groups(tmp_path, monkeypatch, kind, groups
 
 
 def test_free_memory_of_a_process_outside_of_the_mount_is_that_of_its_root(tmp_path, monkeypatch):
-    monkeypatch.setattr(memory, "_PROCESS", tmp_path)
+    monkeypatch.setattr(memory, "PROCESS", tmp_path)
     make_process(tmp_path, "container")
     (tmp_path / "cgroup").write_text("5:memory:/docker/another\n")
     make_group(tmp_path / "groups", "container", 2 * GB + 9)
@@ -116,8 +116,8 @@ def test_limit_allocations_raises_where_the_kernel_would_kill(tmp_path, kind):
 from pathlib import Path
 import numpy as np
 from terrainkit.files import memory
-memory._PROCESS = Path({str(tmp_path)!r})
-(memory._PROCESS / "statm").write_text(Path("/proc/self/statm").read_text())
+memory.PROCESS = Path({str(tmp_path)!r})
+(memory.PROCESS / "statm").write_text(Path("/proc/self/statm").read_text())
 memory.limit_allocations(0)
 np.ones(10**8, dtype=np.int8)
 try:

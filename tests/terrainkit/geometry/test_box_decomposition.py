@@ -11,6 +11,7 @@ from terrainkit.geometry.box_decomposition import (
 )
 from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.ground_surface import surface_at
+from tests.tables import read_table
 from tests.terrainkit.geometry.heightfields import HEIGHTFIELDS, for_any, samples
 
 any_walls = for_any(heights=HEIGHTFIELDS, threshold=st.sampled_from([0.5, 1.5, 2.5]))
@@ -78,23 +79,8 @@ def test_boxes_never_exceed_a_map_with_slopes(terrain_map):
     assert (top_at(cover, off) < terrain_map.height(off) + 1e-3).all()
 
 
-STEPS = {"step_width": 0.5, "step_height": 0.2, "size": (5.0, 5.0)}
-STAIRS = {"step_height": 0.2, "step_width": 0.4, "landing": 1.0}
-
-
 @pytest.mark.parametrize(
-    ("terrain", "parameters", "number"),
-    [
-        # Steps of half a meter on either side of the platform, in a patch of 5 m: a stack.
-        ("pyramid_stairs", STEPS | {"platform": 4.0}, 1 + 1),
-        ("pyramid_stairs", STEPS | {"platform": 1.0}, 4 + 1),
-        ("pyramid_stairs", STEPS | {"platform": 2.0, "inverted": True}, 3 * 4 + 1),
-        ("pit", {"depth": 1.0, "side": 2.0}, 4 + 1),
-        # Five treads of 0.4 m up and down: boxes under all higher ones, or treads of a valley.
-        ("stairs", STAIRS, 6),
-        ("stairs", STAIRS | {"inverted": True}, 2 * 5 + 1),
-        ("slope", {"grade": 0.3, "landing": 1.5}, 0),  # without walls, it is a heightfield
-    ],
+    ("terrain", "parameters", "number"), read_table(__file__, "boxes_of_a_terrain")
 )
 def test_boxes_of_a_terrain_are_few(terrain, parameters, number):
     assert len(patch(terrain, **parameters).boxes().centers) == number

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid, whole_cells
+from tests.tables import read_table
 from tests.terrainkit.geometry.heightfields import for_any
 
 
@@ -17,15 +18,7 @@ def test_grid_has_the_positions_of_its_cells():
     assert block == Grid(shape=(4, 5), cell=0.5, lower=(2.0, 0.5))
 
 
-@pytest.mark.parametrize(
-    ("length", "cell", "count"),
-    [
-        (0.3, 0.1, 3),  # 0.3 / 0.1 is 2.9999999999999996
-        (0.24, 0.1, 2),
-        (1.15, 0.1, 12),  # 1.15 / 0.1 is 11.499999999999998
-        (0.25, 0.1, 3),
-    ],
-)
+@pytest.mark.parametrize(("length", "cell", "count"), read_table(__file__, "grid_cells_round_half"))
 def test_grid_cells_round_half_up(length, cell, count):
     assert Grid(shape=(1, 1), cell=cell).cells(length) == count
 
@@ -43,19 +36,9 @@ def test_grid_length_inverts_cells(count, cell):
     assert grid.length(count) == float(f"{count * cell:.9f}")  # 0.3, not 0.30000000000000004
 
 
-@pytest.mark.parametrize(
-    ("shape", "size", "counts"),
-    [
-        ((80, 40), 3.04, (30, 30)),
-        ((80, 80), 3.1, (32, 32)),
-        ((73, 51), 3.0, (31, 31)),
-        ((80, 51), 3.0, (30, 31)),
-        ((80, 80), 0.09, (0, 0)),
-        ((81, 81), 0.09, (1, 1)),
-    ],
-)
+@pytest.mark.parametrize(("shape", "size", "counts"), read_table(__file__, "grid_centered"))
 def test_grid_centered_has_the_parity_of_the_axis(shape, size, counts):
-    assert Grid(shape=shape, cell=0.1).centered(size) == counts
+    assert Grid(shape=shape, cell=0.1).centered(size) == tuple(counts)
 
 
 @pytest.mark.parametrize(
@@ -98,15 +81,7 @@ def test_whole_cells_accepts_rounding(length, cell, count):
     assert whole_cells("border", 0.0, cell, minimum=0) == 0
 
 
-@pytest.mark.parametrize(
-    ("length", "nearest"),
-    [
-        (0.0, "0.1 m or 0.2 m"),
-        (8.05, "8 m or 8.1 m"),
-        (0.300002, "0.3 m or 0.4 m"),
-        (0.299998, "0.2 m or 0.3 m"),
-    ],
-)
+@pytest.mark.parametrize(("length", "nearest"), read_table(__file__, "whole_cells_lists_nearest"))
 def test_whole_cells_lists_nearest_lengths(length, nearest):
     message = f"border: got {length:g} m; expected a whole number of cells of 0.1 m, such as "
     with pytest.raises(ConfigError) as error:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from terrainkit.geometry.ground_surface import HeightfieldSurface, SurfacePoints, surface_at
+from tests.tables import read_table
 
 
 def quad(*corners):
@@ -67,14 +68,7 @@ def test_surface_gradient_matches_finite_differences(threshold):
 
 @pytest.mark.parametrize(
     ("place", "height", "gradient"),
-    [
-        ((-3, 0.5), 2.5, (0, 5)),
-        ((3, 0.5), 4.5, (0, 5)),
-        ((0.5, -1), 1.0, (2, 0)),
-        ((-1, 4), 5.0, (0, 0)),
-        ((1, 1), 7.0, (2, 5)),
-        ((0, 0), 0.0, (2, 5)),
-    ],
+    read_table(__file__, "surface_continues_level_beyond_the_samples"),
 )
 def test_surface_continues_level_beyond_the_samples(place, height, gradient):
     slope = quad(0, 2, 7, 5)  # 2 along x, 5 along y
@@ -123,17 +117,7 @@ def heightfield(u, v, box_top=None):
     return surface.height(x, y).item()
 
 
-@pytest.mark.parametrize(
-    ("place", "height"),
-    [
-        ((0.75, 0.25), 2.0),  # 0 + (2 - 0) * 0.75 + (4 - 2) * 0.25
-        ((0.25, 0.75), 1.5),  # 0 + (1 - 0) * 0.75 + (4 - 1) * 0.25
-        ((1.75, 1.25), 4.25),  # 4 + (3 - 4) * 0.75 + (7 - 3) * 0.25
-        ((1.25, 1.75), 7.25),  # 4 + (9 - 4) * 0.75 + (7 - 9) * 0.25
-        ((-3.0, 0.5), 0.5),
-        ((9.0, 9.0), 7.0),
-    ],
-)
+@pytest.mark.parametrize(("place", "height"), read_table(__file__, "heightfield_is_two_triangles"))
 def test_heightfield_is_two_triangles_per_cell(place, height):
     assert heightfield(*place) == height
     assert heightfield(*place, box_top=NO_BOX) == height

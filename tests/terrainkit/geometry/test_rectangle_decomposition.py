@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.geometry.rectangle_decomposition import _maximal_rectangles, decompose_rectangles
+from tests.tables import read_table
 from tests.terrainkit.geometry.heightfields import MASKS, for_any
 
 
@@ -18,17 +19,7 @@ def cells(spans, shape):
 
 @pytest.mark.parametrize(
     ("wanted", "allowed", "number"),
-    [
-        ("....", "....", 0),
-        ("#### ####", "#### ####", 1),
-        ("#... #... ####", "#... #... ####", 2),  # an L
-        (".#. ### .#.", ".#. ### .#.", 2),  # a cross: two bars that overlap
-        ("#### #..# ####", "#### #..# ####", 4),  # a ring
-        ("#.. .#. ..#", "#.. .#. ..#", 3),  # corners that only touch
-        ("##### #...# #####", "##### ##### #####", 1),  # a ring that may be filled
-        ("#..# .... ....", "#### #..# ####", 1),
-        ("#...# #...#", "##### #...#", 2),
-    ],
+    read_table(__file__, "rectangle_decomposition_is_minimal_for_simple_shapes"),
 )
 def test_rectangle_decomposition_is_minimal_for_simple_shapes(wanted, allowed, number):
     wanted, allowed = mask(wanted), mask(allowed)
@@ -50,17 +41,11 @@ def test_rectangle_decomposition_prefers_the_largest_of_a_tie():
 
 @pytest.mark.parametrize(
     ("required", "allowed", "rectangles"),
-    [
-        ([5, 1], [5, 1], [(0, 1, 4), (0, 2, 1)]),
-        ([1, 5], [1, 5], [(0, 2, 1), (1, 2, 4)]),
-        ([1, 7, 3], [1, 7, 3], [(0, 3, 1), (1, 2, 7), (1, 3, 3)]),
-        ([0, 4], [1, 5], [(1, 2, 4)]),
-        ([4, 0], [5, 0], [(0, 1, 4)]),
-    ],
+    read_table(__file__, "maximal_rectangles_cannot_grow_and_have_a_required_cell"),
 )
 def test_maximal_rectangles_cannot_grow_and_have_a_required_cell(required, allowed, rectangles):
     """Each bit of a number is a cell of a row."""
-    assert list(_maximal_rectangles(required, allowed)) == rectangles
+    assert [*map(list, _maximal_rectangles(required, allowed))] == rectangles
 
 
 @for_any(allowed=MASKS, seed=MASKS)

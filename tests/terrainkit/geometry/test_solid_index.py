@@ -114,9 +114,7 @@ def test_intervals_agree_with_mujoco(number):
     assert hits >= 20 * min(number, 10)
 
 
-@pytest.mark.parametrize(
-    ("name", "value"), [("_MAX_PAIRS", 5), ("_MIN_BIN", 50.0), ("_MAX_BINS", 4)]
-)
+@pytest.mark.parametrize(("name", "value"), [("MAX_PAIRS", 5), ("MIN_BIN", 50.0), ("MAX_BINS", 4)])
 def test_intervals_do_not_depend_on_blocks_and_bins(monkeypatch, name, value):
     rng = np.random.default_rng(0)
     solids, xy = random_solids(rng, 10), rng.uniform(-6, 6, (200, 2))

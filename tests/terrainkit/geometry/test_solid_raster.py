@@ -5,24 +5,12 @@ from terrainkit.geometry import solid_raster
 from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solid_raster import PIXEL, SolidRaster
 from terrainkit.geometry.solids import Solids, make_boxes, make_cylinders
+from tests.tables import read_table
 
 STACK = make_boxes([[0, 0, 0.5], [0, 0, 1.5], [5, 5, 0.1]], (1, 1, 0.2))
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "z", "top"),
-    [
-        (0.0, 0.0, 0.39, -np.inf),  # the solids are above the robot
-        (0.0, 0.0, 0.41, 0.6),
-        (-9.0, 99.0, 2.0, -np.inf),
-        (-0.49, -0.49, 2.0, 1.6),
-        (-0.51, 0.0, 2.0, -np.inf),
-        (0.0, -0.51, 2.0, -np.inf),
-        (5.49, 5.49, 2.0, 0.2),
-        (5.54, 5.0, 2.0, -np.inf),
-        (5.0, 5.54, 2.0, -np.inf),
-    ],
-)
+@pytest.mark.parametrize(("x", "y", "z", "top"), read_table(__file__, "solid_raster"))
 def test_solid_raster_has_the_solids_below_the_robot(x, y, z, top):
     x, y, z = (np.array([value]) for value in (x, y, z))
     found = SolidRaster(STACK).top(x, y, z)
@@ -36,7 +24,7 @@ def test_solid_raster_without_solids_has_no_tops():
 
 @pytest.mark.parametrize("band", [1000, 500_000])
 def test_solid_raster_agrees_with_the_index_within_a_pixel(monkeypatch, band):
-    monkeypatch.setattr(solid_raster, "_BAND", band)
+    monkeypatch.setattr(solid_raster, "PIXELS_PER_BAND", band)
     rng = np.random.default_rng(0)
     center = rng.uniform(-3, 3, (20, 3))
     boxes = make_boxes(center[:10], rng.uniform(0.2, 1, (10, 3)), rpy=[0, 0, 0.5])

@@ -2,18 +2,13 @@ import numpy as np
 import pytest
 
 from terrainkit.geometry.walls import wall_edges
+from tests.tables import read_table
 from tests.terrainkit.geometry.heightfields import samples
 
 
 @pytest.mark.parametrize(
     ("heights", "threshold", "along_x", "along_y"),
-    [
-        ([[0, 0], [1, 0], [1, 1]], 0.5, [[1, 0], [0, 1]], [[0], [1], [0]]),
-        ([[1], [0]], 0.5, [[1]], [[], []]),
-        ([[0], [0.5], [1.25]], 0.5, [[0], [1]], [[], [], []]),  # the threshold is no wall
-        ([[0, 1e30], [-1e30, 0]], np.inf, [[0, 0]], [[0], [0]]),
-        ([[3]], 0.5, [], [[]]),
-    ],
+    read_table(__file__, "wall_edges_are_separate_by_axis"),
     ids=["both axes", "down", "threshold", "infinite", "single"],
 )
 def test_wall_edges_are_separate_by_axis(heights, threshold, along_x, along_y):

@@ -6,16 +6,9 @@ import pytest
 from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing.asc import read
 from terrainkit.importing.import_options import ReadOptions
+from tests.tables import read_table
 
-GRID = """ncols 3
-nrows 2
-xllcorner 500000.0
-yllcorner 5400000.5
-cellsize 2.0
-NODATA_value -9999
-1.5 2 3
-4 -9999 6.25
-"""
+GRID = read_table(__file__, "grid")
 
 
 @pytest.fixture
@@ -31,40 +24,21 @@ def read_text(tmp_path):
 
 @pytest.mark.parametrize(
     ("old", "new", "lower"),
-    [
-        ("", "", (500000.0, 5400000.5)),
-        ("2 3\n4", "\r\n2 3 4\n", (500000.0, 5400000.5)),  # rows may wrap
-        ("xllcorner", "xllcenter", (499999.0, 5400000.5)),
-        ("yllcorner", "YLLCENTER", (500000.0, 5399999.5)),
-        ("xllcorner 500000.0\nyllcorner 5400000.5\n", "", (0.0, 0.0)),
-        ("NODATA_value -9999\n", "", (500000.0, 5400000.5)),
-    ],
+    read_table(__file__, "asc_first_row_has_highest_y"),
     ids=["plain", "wrapped", "x center", "y center", "no corner", "no nodata"],
 )
 def test_asc_first_row_has_highest_y(read_text, old, new, lower):
     raster = read_text(GRID.replace(old, new), scale=0.5)
     np.testing.assert_array_equal(raster.values, [[2, 0.75], [np.nan, 1], [3.125, 1.5]])
-    assert (raster.cell, raster.lower) == (2.0, lower)
+    assert (raster.cell, *raster.lower) == (2.0, *lower)
     assert raster.upper == (lower[0] + 6, lower[1] + 4)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("6.25\n", "\n", r"got 5 heights; its header states 2 rows of 3"),
-        ("6.25\n", "6.25 7\n", r"got 7 heights; its header states 2 rows of 3"),
-        ("ncols 3", "ncols 300000000000", r"its header states 2 rows of 3e\+11"),
-        ("nrows 2\n", "nrows 0.5\n", r"its header states 0\.5 rows of 3"),
-        ("ncols 3\nnrows 2\n", "ncols -3\nnrows -2\n", r"its header states -2 rows of -3"),
-        ("nrows 2", "nrows inf", r"its header states inf rows of 3"),
-        ("nrows 2", "nrows two", "could not convert string to float: 'two'"),
-        ("nrows 2\n", "", r"expected ncols, nrows"),
-        ("nrows 2\n", "nrows 2\nnrovs 2\n", r"nrovs.* in its header; expected ncols, nrows"),
-        ("cellsize 2.0", "cellsize 0", r"got cells of 0 x 0 m; expected"),
-        ("6.25", "high", r"got text instead of heights"),
+        *read_table(__file__, "asc_invalid_is_rejected"),
         pytest.param("6.25\n", "1 " * 3_000_000, "got 60000.. bytes of heights; its", id="more"),
-        ("1.5 2 3\n4 -9999 6.25\n", "1 2  3 4 5 ", "got 5 heights; its header states 2 rows"),
-        ("1.5 2 3\n4 -9999 6.25\n", "1 2 3 4 5", "got 9 bytes of heights; its header states"),
         pytest.param(GRID, "1 2\n", "ASCII grid with nothing in its header", id="no header"),
     ],
 )

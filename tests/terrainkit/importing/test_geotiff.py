@@ -151,9 +151,9 @@ def test_geotiff_whose_bands_opencv_drops_is_rejected(tmp_path, monkeypatch):
 
 def test_geotiff_tags_of_many_values_are_not_read(tmp_path, monkeypatch):
     path = write(tmp_path / "a.tif")
-    monkeypatch.setattr(geotiff, "_MAX_VALUES", 8)
+    monkeypatch.setattr(geotiff, "MAX_VALUES", 8)
     assert read(path, ReadOptions()).cell == 2.0  # the keys are 8 numbers
-    monkeypatch.setattr(geotiff, "_MAX_VALUES", 7)
+    monkeypatch.setattr(geotiff, "MAX_VALUES", 7)
     with pytest.raises(HeightFileError, match="tag 34735 has 8 values of type 3"):
         read(path, ReadOptions())
 

@@ -72,14 +72,14 @@ def test_columns_beside_the_mesh_are_nan():
 def test_columns_in_small_blocks_are_the_same(monkeypatch, cells):
     mesh = trimesh.util.concatenate([FLOOR, DECK, trimesh.creation.icosphere(2, 1.5)])
     expected = columns_of(mesh, X, Y)
-    monkeypatch.setattr(columns_module, "_CELLS_PER_STRIP", cells)
-    monkeypatch.setattr(columns_module, "_PAIRS_PER_BLOCK", 5)
+    monkeypatch.setattr(columns_module, "CELLS_PER_STRIP", cells)
+    monkeypatch.setattr(columns_module, "PAIRS_PER_BLOCK", 5)
     found = columns_of(mesh, X, Y)
     np.testing.assert_array_equal(found.ceiling, expected.ceiling)
     np.testing.assert_array_equal(found.top, expected.top)
 
 
 def test_columns_of_too_many_pairs_are_rejected(monkeypatch):
-    monkeypatch.setattr(columns_module, "_MAX_PAIRS", 10)
+    monkeypatch.setattr(columns_module, "MAX_PAIRS", 10)
     with pytest.raises(HeightFileError, match="got 4 triangles over 8 x 4 samples"):
         columns_of(FLOOR, X, Y)

@@ -11,6 +11,7 @@ from terrainkit.importing import height_source, mesh_source
 from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.mesh_source import read
 from tests.meshes import box
+from tests.tables import read_table
 
 
 def wedge():
@@ -89,17 +90,7 @@ def test_dae_states_its_unit_and_axis(tmp_path, old, new, scale, axis):
         read(tmp_path / "a.dae", ReadOptions())
 
 
-@pytest.mark.parametrize(
-    ("suffix", "options"),
-    [
-        ("obj", {}),
-        ("glb", {}),
-        ("dae", {}),
-        ("obj", {"up": "y"}),
-        ("glb", {"up": "z"}),
-        ("stl", {"scale": 0.001}),
-    ],
-)
+@pytest.mark.parametrize(("suffix", "options"), read_table(__file__, "mesh_file_heights_and_axes"))
 def test_mesh_file_heights_and_axes(tmp_path, suffix, options):
     mesh = wedge()
     # glTF has y up, and so has COLLADA, unless the file states another axis.

@@ -8,29 +8,9 @@ from terrainkit.errors import HeightFileError, TerrainkitWarning
 from terrainkit.importing.height_source import open_source
 from terrainkit.importing.import_options import ReadOptions
 from tests.rays import cast_rays
+from tests.tables import read_table
 
-SCENE = """
-<mujoco>
-  <asset>
-    <hfield name="h" nrow="4" ncol="5" size="1 0.8 0.5 0.1"
-      elevation="0 1 2 3 4  1 5 2 7 0  3 1 4 1 5  9 2 6 5 3"/>
-    <mesh name="m" vertex="0 0 0  1 0 0  0 1 0  0 0 1" scale="0.7 0.7 0.7"/>
-    <mesh name="robot" file="missing.obj"/>
-  </asset>
-  <worldbody>
-    <geom type="plane" size="0 0 1" pos="0 0 0.1" euler="0 2 0"/>
-    <geom type="box" size="0.5 0.3 0.2" pos="3 0 0.5" euler="10 20 30"/>
-    <geom type="cylinder" size="0.4 0.3" pos="5 0 0.2"/>
-    <geom type="capsule" size="0.3 0.4" pos="0 3 0.5" euler="0 70 0"/>
-    <geom type="sphere" size="0.5" pos="3 3 0"/>
-    <geom type="ellipsoid" size="0.5 0.8 0.4" pos="5 3 0" euler="0 0 40"/>
-    <geom type="box" size="0.5 0.3 9" pos="0 0 0" contype="0" conaffinity="0"/>
-    <body pos="0 0 0.3" euler="0 0 30"><geom type="hfield" hfield="h"/></body>
-    <body pos="0 -3 0.3"><geom type="mesh" mesh="m"/></body>
-    <body name="robot" pos="0 0 5"><freejoint/><geom type="mesh" mesh="robot"/></body>
-  </worldbody>
-</mujoco>
-"""
+SCENE = read_table(__file__, "scene")
 
 
 def save(folder, text):
@@ -55,38 +35,7 @@ def test_scene_has_the_heights_of_rays(tmp_path):
     assert np.median(difference) < 1e-6
 
 
-ROBOT = """
-<mujoco>
-  <asset>
-    <material name="red"/>
-    <hfield name="missing" file="missing.png" size="1 1 1 1"/>
-  </asset>
-  <worldbody>
-    <geom name="floor" type="box" size="1 1 1"/>
-    <site name="start" material="red"/>
-    <light mode="targetbody" target="trunk"/>
-    <camera mode="targetbodycom" target="leg"/>
-    <body name="post"><geom size="0.1"/><light mode="targetbodycom" target="leg"/></body>
-    <body name="trunk">
-      <freejoint/><geom name="trunk" size="0.1"/><site name="trunk"/>
-      <body name="leg" pos="1 0 0"><joint name="knee"/><geom type="hfield" hfield="missing"/></body>
-    </body>
-  </worldbody>
-  <custom><tuple name="a"><element objtype="body" objname="trunk"/></tuple></custom>
-  <contact><exclude body1="post" body2="leg"/><pair geom1="floor" geom2="trunk"/></contact>
-  <tendon>
-    <spatial name="a" material="red"><site site="start"/><site site="trunk"/></spatial>
-    <fixed name="b"><joint joint="knee" coef="1"/></fixed>
-  </tendon>
-  <equality>
-    <weld body1="post" body2="leg"/><weld site1="start" site2="trunk"/>
-    <joint joint1="knee"/><tendon tendon1="b"/>
-  </equality>
-  <sensor><framepos objtype="body" objname="trunk"/><gyro site="trunk"/></sensor>
-  <actuator><position joint="knee"/></actuator>
-  <keyframe><key qpos="0 0 0 1 0 0 0 0"/></keyframe>
-</mujoco>
-"""
+ROBOT = read_table(__file__, "robot")
 
 
 @pytest.mark.filterwarnings("ignore:.*bodies with joints")
@@ -146,13 +95,7 @@ def test_scene_that_claims_much_is_rejected_before_mujoco_reads_it(tmp_path, tex
 
 @pytest.mark.parametrize(
     ("inside", "world", "outside"),
-    [
-        ("", '<flexcomp name="f" type="grid" count="2000 2000 900" spacing=".1 .1 .1"/>', ""),
-        ("", '<body><composite type="cable" count="1000000 1 1" size="1"/></body>', ""),
-        ('<texture type="2d" builtin="flat" width="90000" height="90000"/>', "", ""),
-        ('<texture type="2d" file="pipe.stl"/><skin file="pipe.stl"/>', "", ""),
-        ("", "", '<size memory="900G"/><custom><numeric size="2000000000"/></custom>'),
-    ],
+    read_table(__file__, "parts_of_a_scene_that_are_no_ground_are_not_read"),
 )
 def test_parts_of_a_scene_that_are_no_ground_are_not_read(tmp_path, inside, world, outside):
     os.mkfifo(tmp_path / "pipe.stl")

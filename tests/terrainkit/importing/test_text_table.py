@@ -4,6 +4,7 @@ import pytest
 from terrainkit.errors import HeightFileError
 from terrainkit.importing.import_options import ReadOptions
 from terrainkit.importing.text_table import read
+from tests.tables import read_table
 
 METER = ReadOptions(file_cell=1.0)
 
@@ -17,23 +18,7 @@ def read_text(tmp_path):
     return run
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "0.5 1 2\n3 -4 5e0\n",
-        "0.5,1,2\r\n3,-4,5\r\n",
-        "0.5, 1, 2\n3, -4, 5\n",
-        "0.5,1,2,\n3,-4,5,\n",  # as PyBullet's examples
-        "0.5,\t1,\t2,\n3,\t-4,\t5,\n",
-        "0.5;1;2\n3;-4;5",
-        "\ufeff0.5\t1\t2\n\n3\t-4\t5\n",
-        "# a comment\n% another\nheights of a hill\nin meters\n0.5 1 2\n3 -4 5\n",
-        " 0.5  1   2 \n 3  -4   5 \n",
-        "2 3\n0.5 1 2\n3 -4 5\n",
-        "rows cols\n2 3\n0.5,1,2,\n3,-4,5,\n",
-        "# size\n3,2,0.1,0.1\n\n0.5;1;2\n3;-4;5\n",
-    ],
-)
+@pytest.mark.parametrize("text", read_table(__file__, "text_has_rows_along_x"))
 @pytest.mark.parametrize("name", ["a.csv", "A.TXT"])
 def test_text_has_rows_along_x(read_text, text, name):
     raster = read_text(text, name)
@@ -46,16 +31,7 @@ def test_text_empty_cells_are_missing(read_text):
     np.testing.assert_array_equal(values, [[1, np.nan, 3], [4, np.nan, 6], [np.nan, 8, 9]])
 
 
-@pytest.mark.parametrize(
-    ("text", "first"),
-    [
-        (",0,1,2\n0,0.5,1,2\n1,3,-4,5\n2,6,7,8\n", [0.5, 1, 2]),
-        ("0,1,2\n0.5,1,2\n3,-4,5\n6,7,8\n", [0.5, 1, 2]),
-        ("0,1,2\n3,4,5\n6,7,8\n", [0, 1, 2]),  # a ramp
-        ("0.0,1.0,2.0\n0.5,1,2\n", [0, 1, 2]),
-        (",1,2\n0,0.5,1\n", [np.nan, 1, 2]),
-    ],
-)
+@pytest.mark.parametrize(("text", "first"), read_table(__file__, "text_row_and_column_of_pandas"))
 def test_text_row_and_column_of_pandas_are_skipped(read_text, text, first):
     np.testing.assert_array_equal(read_text(text).values[0], first)
 

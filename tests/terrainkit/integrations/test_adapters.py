@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from terrainkit.integrations import column_names, load_map, pad_points
+from tests.tables import read_table
 
 NAN = (np.nan,) * 3
 
@@ -26,16 +27,7 @@ def test_column_names_are_unique(parkour, parkour_path):
     assert load_map(str(parkour_path)).config == parkour.config
 
 
-@pytest.mark.parametrize(
-    ("name", "package"),
-    [
-        ("genesis", "genesis"),
-        ("isaaclab", "isaaclab"),
-        ("mjlab", "mjlab"),
-        ("playground", "jax"),
-        ("pybullet", "pybullet"),
-    ],
-)
+@pytest.mark.parametrize(("name", "package"), read_table(__file__, "missing_framework_is_one_line"))
 def test_missing_framework_is_one_line(load_adapter, name, package):
     with pytest.raises(ModuleNotFoundError, match=r"^.* is not installed; install it with: .+$"):
         load_adapter(name, {package: None})

@@ -7,6 +7,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.map.patch_edges import PatchEdges
 from terrainkit.map.validate import validate
 from tests.rays import cast_rays
+from tests.tables import read_table
 from tests.terrainkit.maps import contents
 
 # The patch extends from (0, 0) to (8, 6), the border from (-1, -1) to (9, 7).
@@ -21,15 +22,7 @@ def bordered(terrain="flat", **values):
     return generate(MapConfig(terrains=(SubTerrain(terrain=terrain),), **config))
 
 
-@pytest.mark.parametrize(
-    ("values", "expected"),
-    [
-        ({"border_height": 1.0}, [1, 1, 1, 1, 0, 0]),
-        ({"border_height": -0.5, "centered": True}, [-0.5, -0.5, -0.5, -0.5, 0, 0]),
-        ({"border_height": 1.0, "border_rim": 0.3 + 0.4}, [1, 1, 0, 0, 0, 0]),
-        ({"border_height": -0.5, "border_rim": 1.0}, [-0.5, -0.5, -0.5, -0.5, 0, 0]),
-    ],
-)
+@pytest.mark.parametrize(("values", "expected"), read_table(__file__, "border_has_its_height"))
 def test_border_has_its_height_up_to_exact_edges(tmp_path, values, expected):
     terrain_map = bordered(**values)
     xy = LINES + terrain_map.grid.lower + [1.0, 1.0]
@@ -59,17 +52,7 @@ def test_border_with_a_height_is_no_cliff():
     assert [each.max().height for each in edges] == pytest.approx([1.61, 2.0])
 
 
-@pytest.mark.parametrize(
-    ("values", "problem"),
-    [
-        ({"border_height": 1.0, "border": 0.0}, "border_height: got 1 m without a border; exp"),
-        ({"border_height": 1.0, "border_rim": 1.1}, "border_rim: got 1.1 m; expected at most t"),
-        ({"border_rim": 0.5}, "and a border_height, such as 1 m"),
-        ({"border_height": 1.0, "border_rim": 0.25}, "border_rim: got 0.25 m; expected a whole"),
-        ({"border_height": float("nan")}, "border_height: got nan"),
-        ({"border_height": -1e7}, "border_height: got -1"),
-    ],
-)
+@pytest.mark.parametrize(("values", "problem"), read_table(__file__, "border_height_rejects"))
 def test_border_height_rejects_invalid_values(values, problem):
     with pytest.raises(ConfigError, match=problem):
         bordered(**values)

@@ -5,6 +5,7 @@ from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
 from terrainkit.overlays.noise import Noise
 from terrainkit.overlays.rotate import Rotate
+from tests.tables import read_table
 
 FLAT = SubTerrain(terrain="flat")
 GAP = '[[terrains]]\nterrain = "gap"\n'
@@ -37,27 +38,7 @@ def test_toml_has_the_preset_or_the_terrains():
 
 
 def test_handwritten_file_is_read():
-    text = """
-        rows = 4
-        patch_size = [8, 4]     # whole numbers will do
-        slope_threshold = "none"
-
-        [[terrains]]
-        terrain = "stairs"
-        proportion = 2
-        step_height = [0.05, 0.2]
-
-        [[terrains]]
-        terrain = "gap"
-        name = "down"
-        friction = [1, 0.5]
-        [[terrains.overlays]]
-        overlay = "noise"
-        amplitude = [0, 0.1]
-        [[terrains.overlays]]
-        overlay = "rotate"
-        degrees = "random"
-    """
+    text = read_table(__file__, "handwritten_file_is_read")
     overlays = (Noise(amplitude=(0.0, 0.1)), Rotate(degrees="random"))
     config = MapConfig.from_toml(text)
     assert config == MapConfig(
@@ -76,16 +57,7 @@ def test_handwritten_file_is_read():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("row = 3", "config has no key 'row'; did you mean 'rows'. It has: rows, cols, patch_"),
-        ('slope_threshold = "never"', "slope_threshold: got 'never'; expected a number .* or none"),
-        ("terrains = 3", r"terrains: got 3; expected one or more \[\[terrains\]\] tables"),
-        ("terrains = []", r"terrains: got \[\]; expected one or more"),
-        ('terrains = ["flat"]', r"terrains: got \['flat'\]; expected one or more"),
-        ('[terrains]\nterrain = "flat"', r"terrains: got \{.*\}; expected one or more"),
-        (
-            'preset = "rough"\n[[terrains]]\nterrain = "flat"',
-            "preset, terrains: got both; expected",
-        ),
+        *read_table(__file__, "invalid_toml_is_rejected_on_one_line"),
         (GAP + 'width = "1"', r"terrains\[0\]: gap\.width: got '1'; expected a number"),
         (GAP + 'overlays = [{overlay = "nois"}]', r"overlays\[0\]: no overlay 'nois' .*'noise'"),
     ],

@@ -6,6 +6,7 @@ import pytest
 import terrainkit as tk
 from terrainkit.geometry.solids import make_boxes
 from terrainkit.map.validate import validate
+from tests.tables import read_table
 from tests.terrainkit.maps import contents
 
 FLAT = tk.MapConfig(
@@ -102,23 +103,7 @@ def test_validate_finds_solid_beyond_custom_map(flat):
     assert messages(flat.edited(solids=boxes)) == issues
 
 
-@pytest.mark.parametrize(
-    ("goal", "message"),
-    [
-        ((1.0, 1.0, 0.0, 0.0), None),
-        ((3.5, 0.5, 1.0, 0.0), None),  # on the block
-        ((1.0, np.nan, 0.0, 0.0), "is not finite"),
-        ((np.nan, np.nan, np.nan, np.nan), "is not finite"),  # before the last goal
-        ((1.0, 1.0, 0.0, np.inf), "is not finite"),
-        ((4.01, 1.0, 0.0, 0.0), "is outside the patch"),
-        ((1.0, -0.01, 0.0, 0.0), "is outside the patch"),
-        ((4.0, 0.0, 1.0, 0.0), None),
-        ((1.0, 1.0, -0.002, 0.0), "is 0.002 m below the ground"),
-        ((1.0, 1.0, -0.0009, 0.0), None),
-        ((3.5, 0.5, 0.998, 0.0), "is inside a solid"),
-        ((3.5, 0.5, 0.9991, 0.0), None),
-    ],
-)
+@pytest.mark.parametrize(("goal", "message"), read_table(__file__, "validate_finds_invalid_goal"))
 def test_validate_finds_invalid_goal_of_custom_map(flat, goal, message):
     goals = np.full((2, 3, 4, 4), np.nan, dtype=np.float32)
     goals[0, 0, :3] = [(1.0, 1.0, 0.0, 0.0), goal, (3.0, 2.0, 0.0, 0.0)]

@@ -10,9 +10,10 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate, make_patch
 from terrainkit.errors import ConfigError, MemoryLimitError
 from terrainkit.map.generation import pad_poses
+from tests.tables import read_table
 from tests.terrainkit.maps import contents
 
-OBSTACLES, ROUGH, STAIRS = (SubTerrain(terrain=name) for name in ("obstacles", "rough", "stairs"))
+OBSTACLES, STAIRS = SubTerrain(terrain="obstacles"), SubTerrain(terrain="stairs")
 SMALL = MapConfig(
     rows=3, cols=4, patch_size=(8.0, 6.0), border=1.0, terrains=(OBSTACLES, STAIRS), seed=5
 )
@@ -150,31 +151,13 @@ def test_generate_with_an_executor_reports_the_first_error_and_cancels_the_rest(
 
 @pytest.mark.parametrize(
     ("terrain", "given", "message"),
-    [
-        (
-            "rough",
-            {"amplitude": 0.004},
-            "rough.amplitude on 3 patches, such as 0 instead of 0.004; r",
-        ),
-        (
-            "stepping_stones",
-            {"distance": (0.05, 0.1)},
-            "distance is the same as before in rows 1, 2; u",
-        ),
-        (
-            "stepping_stones",
-            {"stone": (0.26, 0.34)},
-            "stone is .* use smaller cells or larger r",
-        ),
-        ("pit", {"side": 1.0}, "at the preferred spawn position: pit on 2 patches"),
-        ("stairs", {"landing": 1.0, "step_width": 0.7}, "spawn position: stairs on 3 patches"),
-    ],
+    read_table(__file__, "generate_warns_of_what_the_cells_or_patches_do_not_allow"),
 )
 def test_generate_warns_of_what_the_cells_or_patches_do_not_allow(terrain, given, message):
     config = one_column(SubTerrain(terrain=terrain, parameters=given))
     with pytest.warns(TerrainkitWarning, match=message):
         generate(config)
-    if isinstance(next(iter(given.values())), tuple):
+    if isinstance(next(iter(given.values())), list):
         generate(replace(config, rows=1))  # one value is no range
         if terrain == "stepping_stones":
             generate(replace(config, cell=0.02))

@@ -5,6 +5,7 @@ import pytest
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, TerrainkitWarning
 from terrainkit.map.layout import allocate_columns, column_types, terrain_and_difficulty
+from tests.tables import read_table
 
 
 def mix(**proportions):
@@ -26,17 +27,7 @@ def difficulties(**config):
 
 @pytest.mark.parametrize(
     ("proportions", "num_columns", "counts"),
-    [
-        # Shares 4.7, 1.6, 1.58, 1.2, 0.61, 0.31: seven whole ones, then 0.7, 0.61 and 0.6 win.
-        ([47, 16, 15.8, 12, 6.1, 3.1], 10, [5, 2, 1, 1, 1, 0]),
-        # Shares 1, 1, 3.5, 2.5, 2: the tie goes to the earlier.
-        ([0.1, 0.1, 0.35, 0.25, 0.2], 10, [1, 1, 4, 2, 2]),
-        ([0.1, 0.1, 0.1], 10, [4, 3, 3]),
-        # Shares 1/3, 1/3, 7/3 tie on paper, though not in floats.
-        ([0.1, 0.1, 0.7], 3, [1, 0, 2]),
-        ([0.1, 0.4, 0.4], 6, [1, 3, 2]),
-        ([1, 0, 1], 3, [2, 0, 1]),
-    ],
+    read_table(__file__, "allocate_columns_uses_largest_remainder"),
 )
 def test_allocate_columns_uses_largest_remainder(proportions, num_columns, counts):
     assert allocate_columns(proportions, num_columns) == counts

@@ -5,6 +5,7 @@ import pytest
 from terrainkit import MapConfig, SubTerrain
 from terrainkit.errors import ConfigError
 from terrainkit.terrain import presets
+from tests.tables import read_table
 
 FLAT, GAP = SubTerrain(terrain="flat"), SubTerrain(terrain="gap")
 
@@ -77,17 +78,7 @@ def test_map_side_is_limited_to_a_million_cells():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("rows", 0, "got 0; expected an integer from 1 to 1000000"),
-        ("patch_size", (8.0, 4.03), r"got 4\.03 m; expected .* 4 m or 4\.1 m"),
-        ("patch_size", 8.0, r"got 8\.0; expected 2 values"),
-        ("border", 0.25, r"got 0\.25 m; expected a whole number of cells .* 0\.2 m or 0\.3 m"),
-        ("seed", -1, "got -1; expected an integer from 0 to"),
-        ("slope_threshold", 0.0, r"got 0\.0; .* from 0\.0001 to .*, or none"),
-        ("difficulty_range", (0.0, 1.1), r"got .*each a number from 0 to 1"),
-        ("difficulty_range", (0.8, 0.2), r"got \[0\.8, 0\.2\]; expected .*, the lower one first"),
-        ("random_difficulties", (), r"got \[\]; expected a non-empty list"),
-        ("restitution", 1.2, r"got 1\.2; expected a number from 0 to 1"),
-        ("mode", "random", "got 'random'; .* custom; did you mean 'randomized'"),
+        *read_table(__file__, "map_config_rejects_invalid_values"),
         ("terrains", (FLAT, "gap"), r"\[1\]: got 'gap'; expected a table \(SubTerrain\)"),
         ("terrains", (GAP, FLAT, GAP), "got 2 of name 'gap'; expected unique names"),
     ],

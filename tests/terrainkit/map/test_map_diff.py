@@ -7,6 +7,7 @@ from terrainkit import MapConfig, SubTerrain, TerrainMap, generate
 from terrainkit.geometry.solids import make_boxes, make_cylinders
 from terrainkit.map.map_diff import MapDiff, diff_maps
 from terrainkit.overlays.mirror import Mirror
+from tests.tables import read_table
 from tests.terrainkit.maps import changed
 
 NAN = float("nan")
@@ -112,15 +113,7 @@ def test_diff_maps_ignores_the_frame(terrain_map):
 
 @pytest.mark.parametrize(
     ("change", "config", "grid"),
-    [
-        ({"cols": 3}, "cols: 2 -> 3", "1 x 2 -> 1 x 3 patches; the common ones are compared"),
-        (
-            {"cell": 0.2},
-            "cell: 0.1 -> 0.2",
-            "patches of 80 x 80 cells of 0.1 m -> 40 x 40 cells of 0.2 m; their contents are not "
-            "compared",
-        ),
-    ],
+    read_table(__file__, "diff_maps_with_other_grids_compares_what_is_common"),
 )
 def test_diff_maps_with_other_grids_compares_what_is_common(change, config, grid):
     small = MapConfig(rows=1, cols=2, border=0.0, terrains=(ROUGH,))

@@ -8,6 +8,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.map.patch import PatchParameters, with_heading
 from terrainkit.terrains.obstacles import Obstacles
 from terrainkit.terrains.rough import Rough
+from tests.tables import read_table
 
 
 def test_make_patch_describes_itself():
@@ -83,19 +84,7 @@ def test_make_patch_is_seeded_by_row_and_column_or_by_column(seed, terrain, entr
 
 @pytest.mark.parametrize(
     ("terrain", "parameters", "message"),
-    [
-        (
-            "rough",
-            {"platform": 0.4},
-            r"a: no disk of radius 0\.5 m is flat within 0\.01 m and free",
-        ),
-        ("pit", {"side": 9.0}, "pit: side 9 m does not fit in a patch of 8 m x 8 m"),
-        (
-            "pyramid_slope",
-            {"grade": 0.76},
-            r"got 0\.76; expected at most slope_threshold \(0\.75\)",
-        ),
-    ],
+    read_table(__file__, "make_patch_rejects_terrain_that_does_not_fit"),
 )
 def test_make_patch_rejects_terrain_that_does_not_fit(terrain, parameters, message):
     choice = SubTerrain(terrain=terrain, name="a", parameters=parameters)

@@ -3,6 +3,7 @@ import warnings
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, TerrainkitWarning, generate
+from tests.tables import read_table
 
 
 def warnings_of(terrain, rows=6, **options):
@@ -20,37 +21,11 @@ def gap(easy, hard):
     return SubTerrain(terrain="gap", parameters={"width": (easy, hard), "depth": (0.5, 1.0)})
 
 
-@pytest.mark.parametrize(
-    ("terrain", "said"),
-    [
-        # 0.04, 0.08, 0.12, 0.16, 0.2 and 0.24 m become 0, 1, 1, 2, 2 and 2 cells.
-        (
-            gap(0.04, 0.24),
-            "gap: width is 0 in rows 0 and is the same as before in rows 2, 4, 5; use at "
-            "most 3 rows or smaller cells or larger ranges",
-        ),
-        (gap(0.03, 0.53), "gap: width is 0 in rows 0; use smaller cells or larger ranges"),
-        (gap(0.0, 0.5), None),  # 0 was requested
-        (gap(0.3, 0.3), None),  # the same on purpose
-        (
-            gap(0.31, 0.30999),
-            "gap: width is the same as before in rows 1, 2, 3, 4, 5; use smaller",
-        ),
-        (
-            SubTerrain(terrain="pallets"),
-            "layers is the same as before in rows 1, 3, 5; use at most 3",
-        ),
-        (SubTerrain(terrain="floating_islands"), None),  # fewer islands, or narrower walkways
-        (
-            SubTerrain(terrain="rough", parameters={"amplitude": (0.01, 0.025)}),
-            "use at most 4 rows o",
-        ),
-    ],
-)
-def test_repeated_levels_name_parameter_rows_and_remedy(terrain, said):
-    found = warnings_of(terrain)
-    assert len(found) == (said is not None)
-    assert said is None or said in found[0]
+@pytest.mark.parametrize(("terrain", "parameters", "said"), read_table(__file__, "said"))
+def test_repeated_levels_name_parameter_rows_and_remedy(terrain, parameters, said):
+    found = warnings_of(SubTerrain(terrain=terrain, parameters=parameters))
+    assert len(found) == bool(said)
+    assert all(said in text for text in found)
 
 
 def test_repeated_levels_are_one_warning_per_terrain_and_heed_the_remedy():

@@ -9,6 +9,7 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.geometry.solids import Solids, make_boxes
 from terrainkit.map.map_config import MapConfig
 from terrainkit.map.spawn import SpawnGround
+from tests.tables import read_table
 
 PLOT = Grid(shape=(40, 40), cell=0.1)
 EVERY = slice(None)
@@ -105,17 +106,7 @@ def test_find_spawn_avoids_solids_within_the_radius(side, distance, is_free):
     assert (spawn(ground(), solids=post) == (2.0, 2.0, 0.0)) == is_free
 
 
-@pytest.mark.parametrize(
-    ("grade", "cell", "tolerance"),
-    [
-        (0.02, 0.1, 0.024),  # the samples that influence a disk are up to 1.2 m apart
-        (0.0987, 0.1, 0.12),  # 0.11844 m, rounded up
-        # Within one cell the slope counts: the disk is 1 m wide, and the samples are 2 m apart.
-        (0.25, 1.0, 0.25),
-        (0.7, 30.0, 0.7),
-        (0.0, 0.1, 0.0),
-    ],
-)
+@pytest.mark.parametrize(("grade", "cell", "tolerance"), read_table(__file__, "flattest_tolerance"))
 def test_flattest_tolerance_of_a_slope(grade, cell, tolerance):
     grid = Grid(shape=(10, 10) if cell > 0.1 else (40, 40), cell=cell)
     heights = np.broadcast_to((grade * grid.axis(0)).astype(np.float32), grid.shape)

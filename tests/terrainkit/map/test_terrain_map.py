@@ -6,6 +6,7 @@ import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError, ExportError, TerrainkitWarning
+from tests.tables import read_table
 from tests.terrainkit.maps import plot
 
 RAMP = plot(np.tile(0.05 * np.arange(20)[:, None], (1, 12)))
@@ -37,13 +38,7 @@ def test_views_of_the_surface_keep_the_shape(solid_map, shape):
 
 @pytest.mark.parametrize(
     ("view", "points", "message"),
-    [
-        ("height", 1.0, r"xy: got shape \(\); expected finite values of shape \(\.\.\., 2\)"),
-        ("clearance", [np.nan, 0.0], r"xy: got shape \(2,\)"),
-        ("height", [[0.0, np.inf]], r"xy: got shape \(1, 2\)"),
-        ("scan", [0.0, 0.0], r"points: got shape \(2,\); .* shape \(\.\.\., 3\)"),
-        ("scan", [0.0, 0.0, np.nan], r"points: got shape \(3,\)"),
-    ],
+    read_table(__file__, "views_of_the_surface_reject_invalid_points"),
 )
 def test_views_of_the_surface_reject_invalid_points(solid_map, view, points, message):
     with pytest.raises(ConfigError, match=message):

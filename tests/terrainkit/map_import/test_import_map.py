@@ -14,6 +14,7 @@ from terrainkit.map.import_report import ImportReport
 from terrainkit.map.validate import validate
 from terrainkit.map_import.differences import _height_errors
 from tests.meshes import box, save_bridge
+from tests.tables import read_table
 
 
 def save(tmp_path, heights):
@@ -107,21 +108,9 @@ def test_import_other_cell_interpolates(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        *read_table(__file__, "import_rejects_options"),
         ({"origin": (-0.049, -0.049, 0.0)}, None),  # half of a cell before the file
         ({"rows": 2, "cols": 1, "patch_size": (3.0, 4.0), "origin": (0.049, 0.049, 0.0)}, None),
-        ({"patch_size": (7.0, 1.0)}, r"patches along x: got 1 of 7 m; .* has 6 m from the origin"),
-        ({"rows": 4, "patch_size": (2.0, 1.0)}, r"patches along x: got 4 of 2 m; .* has 6 m"),
-        ({"cols": 100}, r"patches along y: got 100 of 0\.1 m; .* has 4 m"),
-        (
-            {"rows": 2, "patch_size": (3.0, 4.0), "origin": (0.051, 0.0, 0.0)},
-            r"patches along x: got 2 of 3 m; .* has 5\.949 m from",
-        ),
-        ({"origin": (0.0, 4.0, 0.0)}, "origin: got y = 4 m; the file extends from 0 m to 4 m"),
-        ({"origin": (5.951, 0.0, 0.0)}, r"origin: got x = 5\.951 m; the file extends"),
-        ({"origin": (-0.051, 0.0, 0.0)}, r"got x = -0\.051 m; the file extends from 0 m to 6 m"),
-        ({"patch_size": (1.05, 1.0)}, r"patch_size: got 1\.05 m; expected a whole number of cells"),
-        ({"solids": True}, r"solids: got .*a\.npy; expected a mesh"),
-        ({"scale": 5.01e4}, r"got 1 heights beyond 1,000,000 m"),
     ],
 )
 def test_import_rejects_options(tmp_path, options, message):
@@ -321,13 +310,7 @@ def save_wall(folder, center=4.0, width=0.03):
 
 @pytest.mark.parametrize(
     ("center", "width", "is_lost", "is_thin"),
-    [
-        (4.0, 0.03, True, True),  # between two samples, at 3.95 m and 4.05 m
-        (4.05, 0.03, False, True),  # on a sample: the map's wall is wider
-        (4.05, 0.0995, False, True),
-        (4.05, 0.101, False, False),
-        (4.0, 0.25, False, False),
-    ],
+    read_table(__file__, "import_of_a_thin_wall_is_reported_or_a_solid"),
 )
 def test_import_of_a_thin_wall_is_reported_or_a_solid(tmp_path, center, width, is_lost, is_thin):
     path = save_wall(tmp_path, center, width)

@@ -4,6 +4,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit.perception import HeightScan, exact_surface
+from tests.tables import read_table
 
 
 @pytest.mark.parametrize(
@@ -52,18 +53,7 @@ def test_tensors_give_tensors(step_map):
     assert torch.equal(found, torch.tensor(scan.below(position.numpy(), yaw.numpy())))
 
 
-@pytest.mark.parametrize(
-    ("position", "yaw", "message"),
-    [
-        ([[0, 0]], [0], r"position: got shape \(1, 2\); expected \(n, 3\)"),
-        ([[0, 0, 0]], [0, 0], r"yaw: got shape \(2,\); expected \(1\)"),
-        ([[1e300, 0, 0]], [0], r"position: got a value that is not finite, or above 1e\+06"),
-        ([[0, -1.1e6, 0]], [0], "position: got a value"),
-        ([[0, 0, 0]], [1e18], "yaw: got a value"),
-        ([[0, 0, np.nan]], [0], "position: got a value that is not finite"),
-        ([["a", "b", "c"]], [0], "position: got values of <U1; expected finite numbers"),
-    ],
-)
+@pytest.mark.parametrize(("position", "yaw", "message"), read_table(__file__, "invalid_poses"))
 def test_invalid_poses_are_rejected(step_map, position, yaw, message):
     with pytest.raises(ConfigError, match=message):
         HeightScan(step_map).below(position, yaw)

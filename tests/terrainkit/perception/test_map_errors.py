@@ -4,6 +4,7 @@ import torch
 
 from terrainkit.errors import ConfigError
 from terrainkit.perception import HeightScan, MapErrorOptions, MapErrors, RayCaster
+from tests.tables import read_table
 from tests.terrainkit.maps import plot
 
 N = 400
@@ -92,19 +93,7 @@ def test_same_seed_gives_same_errors_whichever_robots_are_reset(make):
     assert not np.isclose(scans[0], scans[2]).any()
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"missing": 1.1}, "missing: got 1.1; expected a number, 0 to 1"),
-        ({"noise": np.nan}, "noise: got nan; expected a number, 0 to 10"),
-        ({"drift": "much"}, r"drift: got 'much'; expected a number"),
-        ({"delay": (2, 1)}, r"delay: got \(2, 1\); expected the lowest first"),
-        ({"delay": (0, 1.5)}, "delay: got values of float64; expected integers"),
-        ({"delay": (0, 101)}, "delay: got 0 to 101; expected 0 to 100"),
-        ({"delay": 3}, r"delay: got shape \(\); expected \(2,\)"),
-        ({"sensor": (0, 0)}, r"sensor: got shape \(2,\); expected \(3\)"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), read_table(__file__, "invalid_options"))
 def test_invalid_options_are_rejected(options, message):
     with pytest.raises(ConfigError, match=message):
         MapErrorOptions(**options)

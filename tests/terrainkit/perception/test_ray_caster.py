@@ -6,24 +6,12 @@ import torch
 from terrainkit.errors import ConfigError
 from terrainkit.integrations.mujoco import make_spec
 from terrainkit.perception import RayCaster, depth_directions, lidar_directions
+from tests.tables import read_table
 from tests.terrainkit.test_every_view import mesh_model
 
 
 @pytest.mark.parametrize(
-    ("origin", "direction", "distance"),
-    [
-        ((0.45, 1.0, 0.25), (1, 0, 0), 0.55),  # the wall
-        ((0.45, 1.0, 0.51), (1, 0, 0), np.inf),  # above it, over the edge of the map
-        ((1.55, 1.0, 0.75), (-1, 0, 0), np.inf),
-        ((0.45, 1.0, 0.25), (0, 0, -2), 0.25),
-        ((1.0 + 1e-4, 1.0, 1.0), (0, 0, -1), 0.5),
-        ((1.0 - 1e-4, 1.0, 1.0), (0, 0, -1), 1.0),
-        ((0.7, 0.7, 0.3), (3, 0, 4), np.inf),
-        ((0.7, 1.0, 0.4), (3, 0, -4), 0.5),  # the ground, 0.3 m ahead
-        ((0.7, 1.0, 0.4), (3, 4, 0), 0.5),
-        ((-0.5, 1.0, 0.3), (1, 0, -0.1), 1.5 * 1.01**0.5),  # from beyond the map
-        ((1.5, 1.0, 0.4), (0, 0, 1), 0.0),  # below the ground
-    ],
+    ("origin", "direction", "distance"), read_table(__file__, "distance_to_a_step")
 )
 def test_distance_to_a_step(step_map, origin, direction, distance):
     found = RayCaster(step_map).cast([origin], [direction])

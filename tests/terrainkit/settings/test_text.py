@@ -7,6 +7,7 @@ from terrainkit.settings.text import (
     format_numbers,
     truncate,
 )
+from tests.tables import read_table
 
 
 def test_truncate_cuts_long_text():
@@ -17,14 +18,7 @@ def test_truncate_cuts_long_text():
 @pytest.mark.parametrize(
     ("word", "names", "ratio", "expected"),
     [
-        ("colision", ["collision", "visual"], 0.7, "collision"),
-        ("vendor", ["collision", "visual"], 0.7, ""),
-        ("", ["a"], 0.7, ""),
-        ("fl_foot", ["FL_foot", "lf_foot"], 0.6, "FL_foot"),  # case first, then the same letters
-        ("fl_foot", ["lf_foot", "fl_foo"], 0.6, "lf_foot"),
-        ("link_12", ["link_21", "link_1"], 0.6, "link_1"),  # digits are not swapped
-        ("abcx", ["abcy"], 0.75, "abcy"),
-        ("abcx", ["abcy"], 0.76, ""),
+        *read_table(__file__, "closest_finds_misspelled_names"),
         ("x" * 100, ["x" * 101, "x" * 99], 0.7, "x" * 99),
         ("x" * 101, ["x" * 100], 0.7, ""),
         ("y" * 100, [f"link_{number:095d}" for number in range(5000)], 0.6, ""),  # which is fast

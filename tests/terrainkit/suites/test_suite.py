@@ -10,19 +10,9 @@ from terrainkit.errors import ConfigError, TerrainkitError
 from terrainkit.geometry.solids import Solids
 from terrainkit.map.validate import validate
 from terrainkit.terrain.parameter import parameters_of
+from tests.tables import read_table
 
-HASHES = {
-    "basics-1": "f00eae7013071e577ab8dfeb8efb6ea464dd30820d7b6eee018763b3b3dc4828",
-    "response-1-small": "afb64ea74ff350166d01d4a3a9dbdfd1f28c0ebdc2d6d3f25c13f94ae8def120",
-    "response-1-medium": "966425ba941ffaa038ac353fd7712d9c38a84a1ee33fffd751d1b4f1ade051f5",
-    "response-1-large": "92eab26ec60a165462843ee6d5b2e1acbc7b56c128d68a9458d6da7a8226e2d5",
-    "parkour-1": "e1214a35cada47f5545abd67a8eccd3b46b94eb4ef0b612cef28c61b49982d28",
-    "sparse-1": "9a53958938b2c3051901a6c295b2178bc4ebe7f1d0b22a2a71ab3cc32f08e987",
-    "confined-1": "c94dc43000531de302a2f7598e645993f3e036cca17c6c12d5d58a5533d7af62",
-    "natural-1": "7e89511ecb0cd594d221c8ec404df2b2904a8808233316448becd661b1ca820f",
-    "indoor-1": "8d04da472acc7bc6074828513368bb65b04900eeb09a8fec6151dfff8b20e1c8",
-    "street-1": "328326e8b5a3dd6b1c15eccd43871e357292a9cee2ea5ad4aa3b6614176f63ee",
-}
+HASHES = read_table(__file__, "hashes")
 """Those that were released never change: a changed suite needs a new version."""
 
 

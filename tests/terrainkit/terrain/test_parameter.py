@@ -1,4 +1,3 @@
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import parameter
 from terrainkit.terrain.parameter import Parameter
 from terrainkit.terrains.flat import Flat
+from tests.tables import read_table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,20 +86,7 @@ def test_at_difficulty_rounds_integers_and_keeps_equal_ends():
     assert {parameter.at_difficulty((0.31, 0.31), k / 9) for k in range(10)} == {0.31}
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "realized"),
-    [
-        ("rise", 0.123, 0.123),
-        ("width", 0.31, 0.3),
-        ("width", 0.04, 0.1),
-        ("gap", 0.04, 0.0),
-        ("landing", 3.1, 3.2),
-        ("grade", 0.35, 0.35),
-        ("spacing", 0.27, 0.27),
-        ("number", 7, 7),
-        ("inverted", True, True),
-    ],
-)
+@pytest.mark.parametrize(("name", "value", "realized"), read_table(__file__, "parameter_realized"))
 def test_parameter_realized_snaps_to_cells(name, value, realized):
     assert HURDLE[name].realized(value, GRID) == realized
 
@@ -115,18 +102,7 @@ def test_realized_length_is_shorter_where_ground_sloped_edge():
         assert length.realized(2.0, grid) == realized
 
 
-@pytest.mark.parametrize(
-    ("declared", "allowed"),
-    [
-        ({}, 0.1),  # 5 %
-        ({"tolerance": 0.2}, 0.2),
-        ({"tolerance": 0.01}, 0.1),
-        ({"snap": "cells"}, 0.05),
-        ({"snap": "centered"}, 0.1),
-        ({"snap": "cells", "sloped_edge": True}, 0.1),
-        ({"snap": "centered", "sloped_edge": True}, 0.2),
-    ],
-)
+@pytest.mark.parametrize(("declared", "allowed"), read_table(__file__, "parameter_deviates"))
 def test_parameter_deviates_by_more_than_snapping(declared, allowed):
     known = Parameter(easy=1.0, hard=1.0, **declared)
     for sign in (-1, 1):
@@ -155,27 +131,8 @@ def test_parameter_of_other_type_deviates_if_it_differs():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("rise", -0.1, r"got -0\.1; expected a number from 0 to 1000000"),
-        ("rise", 1000000.1, r"got 1000000\.1; expected a number from 0 to 1000000"),
-        ("rise", math.nan, r"got nan; expected a number from 0 to 1000000"),
-        ("rise", "high", r"got 'high'; expected a number"),
-        ("width", 0.0, r"got 0\.0; expected a number > 0 and <= 1000000"),
-        ("landing", 0, r"got 0; expected a number > 0 and <= 1000000"),
-        ("spacing", 0.0, r"got 0\.0; expected a number > 0 and <= 1000000"),
-        ("bar", 0.0, r"got 0\.0; expected a number > 0 and <= 1000000"),
-        ("number", 0, r"got 0; expected an integer > 0 and <= 10000"),
-        ("number", 10_001, r"got 10001; expected an integer > 0 and <= 10000"),
-        ("number", True, r"got True; expected an integer"),
-        ("number", (1, 4), r"got \[1, 4\]; expected one value$"),
-        ("rungs", (1, 0), r"got 0; expected an integer > 0"),
-        ("inverted", 1, r"got 1; expected true or false"),
-        ("surface", 3, r"got 3; expected a string of at most 200 characters$"),
+        *read_table(__file__, "parameter_rejects_invalid_values"),
         ("surface", 201 * "x", "expected a string of at most 200 characters"),
-        ("profile", "curvd", "expected one of: straight, curved; did you mean 'curved'"),
-        ("turns", True, r"got True; expected one of: 1, 2, 4"),
-        ("offset", (1, 2), r"got \[1, 2\]; expected 3 values, each a number"),
-        ("offset", (1, 2, math.nan), "expected 3 values, each a number"),
-        ("offset", (1, 2, -1000000.1), "expected 3 values, each a number"),
     ],
 )
 def test_parameter_rejects_invalid_values(name, value, message):

@@ -3,7 +3,7 @@ import sys
 import pytest
 
 from terrainkit.errors import ConfigError, PluginError
-from terrainkit.terrain import plugin_file, registry
+from terrainkit.terrain import registry
 from terrainkit.terrain.plugin_file import load_plugin, plugin_files
 
 BUMP = """
@@ -38,8 +38,6 @@ class Unfinished(Terrain):
 @pytest.fixture
 def write(tmp_path, monkeypatch, own_registry):  # noqa: ARG001
     """Return a function that writes a plugin file; what it imports is forgotten."""
-    monkeypatch.setattr(plugin_file, "_loaded", {})
-    monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     modules = {*sys.modules}
 

@@ -207,7 +207,7 @@ def test_register_overlay_replaces_class_defined_again():
     assert MapConfig.from_toml(toml).sub_terrains[0].overlays == (again(height=0.2),)
 
 
-def test_map_of_own_classes_is_custom_without_them(tmp_path):
+def test_map_of_own_classes_is_custom_without_them(own_registry, tmp_path):
     ramp, lift = make_ramp(), make_lift()
     sub_terrains = (SubTerrain(terrain=ramp, overlays=(lift(),)),)
     config = MapConfig(rows=2, cols=1, border=0.0, terrains=sub_terrains)
@@ -220,8 +220,7 @@ def test_map_of_own_classes_is_custom_without_them(tmp_path):
         (registry.register_overlay, lift, "no terrain 'ramp_up' is built in, installed, or "),
         (registry.register_terrain, ramp, r"overlays\[0\]: no overlay 'lift' is built in, inst"),
     ):
-        registry._registered.clear()
-        registry._get.cache_clear()
+        own_registry()
         register(own)
         loaded = load_custom(path, problem)
         assert loaded.save(tmp_path / "copy.npz", overwrite=True).read_bytes() == path.read_bytes()
@@ -255,14 +254,13 @@ def test_map_is_custom_where_its_class_rejects_the_parameters(tmp_path):
     load_custom(path, "ramp_up has no parameter 'height'")
 
 
-def test_map_with_own_element_of_a_course_is_custom_without_it(tmp_path):
+def test_map_with_own_element_of_a_course_is_custom_without_it(own_registry, tmp_path):
     registry.register_terrain(make_ramp())
     elements = {"elements": [{"terrain": "ramp_up"}, {"terrain": "flat"}]}
     course = SubTerrain(terrain="course", parameters=elements)
     config = MapConfig(rows=2, cols=1, border=0.0, terrains=(course,))
     path = generate(config).save(tmp_path / "map.npz")
-    registry._registered.clear()
-    registry._get.cache_clear()
+    own_registry()
     load_custom(path, r"course.elements\[0\].*no terrain 'ramp_up'")
     registry.register_terrain(make_ramp())
     assert TerrainMap.load(path).config == config

@@ -1,5 +1,4 @@
 import dataclasses
-import math
 
 import pytest
 
@@ -7,6 +6,7 @@ from terrainkit.errors import ConfigError
 from terrainkit.terrain import parameter
 from terrainkit.terrain.sub_terrain import SubTerrain
 from terrainkit.terrains.flat import Flat
+from tests.tables import read_table
 
 
 @pytest.mark.parametrize(
@@ -23,14 +23,8 @@ def test_ranges_are_interpolated(parameters, widths, depth):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"terrain": 3}, "terrain: got 3; expected a string"),
+        *read_table(__file__, "invalid_field_is_rejected"),
         ({"name": None}, "name: got None; expected a string"),
-        ({"proportion": "1"}, r"gap\.proportion: got '1'; expected a number"),
-        ({"proportion": -1}, r"gap\.proportion: got -1; .* from 0 to 1000000"),
-        ({"friction": -1}, r"gap\.friction: got -1; expected a number from 0"),
-        ({"friction": (1, 2, 3)}, r"gap\.friction: got \[1, 2, 3\]; expected one value or a pair"),
-        ({"overlays": ("noise",)}, r"gap\.overlays\[0\]: got 'noise'; expected a table"),
-        ({"overlays": 3}, r"gap\.overlays: got 3; expected a list"),
     ],
 )
 def test_invalid_field_is_rejected(given, message):
@@ -38,16 +32,7 @@ def test_invalid_field_is_rejected(given, message):
         SubTerrain(**{"terrain": "gap", **given})
 
 
-@pytest.mark.parametrize(
-    ("parameters", "message"),
-    [
-        ({"widht": 0.3}, "'widht'; did you mean 'width'. It has: width, depth, platform"),
-        ({"width": (0.1, -0.2)}, r"gap\.width: got -0\.2; expected a number from 0"),
-        ({"platform": (0.0, 3.0)}, r"gap\.platform: got 0\.0; .* > 0 and <= 1000000"),
-        ({"width": (0.1, 0.2, 0.3)}, r"0\.3\]; expected .* pair \(easy, hard\)"),
-        ({"width": math.nan}, r"^gap\.width: got nan; expected a number from 0 to 1000000"),
-    ],
-)
+@pytest.mark.parametrize(("parameters", "message"), read_table(__file__, "invalid_parameter"))
 def test_invalid_parameter_is_rejected(parameters, message):
     with pytest.raises(ConfigError, match=message):
         SubTerrain(terrain="gap", parameters=parameters)
@@ -80,19 +65,7 @@ def test_sub_terrain_has_a_copy_of_its_parameters():
     assert gap.at(1.0).width == 0.2
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        (
-            {"terrain": "gap", "overlays": 3},
-            r"overlays: got 3; expected \[\[terrains\.ov",
-        ),
-        ({"terrain": "gap", "overlays": ["noise"]}, r"overlays: got .*; expected \[\[terrains"),
-        ({"terrain": "gap", "overlays": [{}]}, r"overlays\[0\]: overlay: got None; expected a str"),
-        ({"terain": "gap"}, r"got the key 'terain'; did you mean 'terrain'\?"),
-        ({"terrain": "gap", "elements": {}}, r"elements: got a table; expected \[\[terrains\.elem"),
-    ],
-)
+@pytest.mark.parametrize(("table", "message"), read_table(__file__, "invalid_table_is_rejected"))
 def test_invalid_table_is_rejected(table, message):
     with pytest.raises(ConfigError, match=rf"^terrains: {message}"):
         SubTerrain.from_table(table, path="terrains.")

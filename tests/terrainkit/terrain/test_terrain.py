@@ -7,6 +7,7 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit.geometry.grid import Grid
 from terrainkit.terrain import FlatTerrain, Terrain, parameter
+from tests.tables import read_table
 from tests.terrains import goals_of, heights_of, solids_of
 
 
@@ -23,22 +24,11 @@ GRID = Grid(shape=(40, 20), cell=0.1, lower=(3.0, -1.0))
 
 
 @pytest.mark.parametrize(
-    ("shape", "side", "problem"),
-    [
-        ((40, 40), 0.04, "is smaller than a cell; expected at least 0.1 m"),
-        ((40, 40), 0.1, None),
-        ((40, 40), 3.89, None),
-        ((40, 40), 3.9, "fills the whole patch of 4 m x 4 m"),
-        ((40, 40), 4.05, "fills the whole patch of 4 m x 4 m"),
-        ((40, 40), 4.06, "does not fit in a patch of 4 m x 4 m"),
-        ((40, 20), 2.05, None),  # as wide as the patch
-        ((20, 40), 2.05, None),
-        ((40, 20), 2.06, "does not fit in a patch of 4 m x 2 m"),
-    ],
+    ("shape", "side", "problem"), read_table(__file__, "block_that_does_not_fit_is_rejected")
 )
 def test_block_that_does_not_fit_is_rejected(shape, side, problem):
-    grid, mesa = Grid(shape=shape, cell=0.1), Mesa(platform=side)
-    if problem is None:
+    grid, mesa = Grid(shape=tuple(shape), cell=0.1), Mesa(platform=side)
+    if not problem:
         assert (heights_of(mesa, grid=grid) == 1.0).all()
     else:
         with pytest.raises(ConfigError, match=f"^mesa: platform {side:g} m {problem}$"):

@@ -9,6 +9,7 @@ from terrainkit.map.validate import validate
 from terrainkit.overlays.side_walls import SideWalls
 from terrainkit.terrain import registry
 from terrainkit.terrains.course import Course, Element
+from tests.tables import read_table
 from tests.terrains import edges, heights_of
 
 BLOCK = {"min_spacing": 1.0, "max_spacing": 1.0, "min_thickness": 0.4, "max_thickness": 0.4}
@@ -116,15 +117,8 @@ def test_course_takes_every_terrain(name):
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"elements": []}, r"course\.elements: got 0; expected 1 to 100"),
+        *read_table(__file__, "course_rejects_bad_elements"),
         ({"elements": [{"terrain": "pit"}] * 101}, r"course\.elements: got 101; expected 1 to 100"),
-        ({"elements": "hurdles"}, r"course\.elements: got 'hurdles'; expected a list, each val"),
-        ({"elements": {"terrain": "gap"}}, r"got a table; expected \[\[terrains.elements\]\]"),
-        ({"elements": [{}]}, r"course\.elements\[0\]: terrain: missing; expected a string"),
-        ({"elements": [{"terrain": "course"}]}, r"elements\[0\]: terrain: got course; expected a"),
-        ({"elements": [{"terrain": "pit", "friction": 1.0}]}, r"pit: got friction of an element"),
-        ({"elements": [{"terrain": "pit", "name": "hole"}]}, r"pit: got name of an element"),
-        ({"elements": [{"terrain": "pit", "element_length": -1.0}]}, r"element_length: got -1\.0"),
     ],
 )
 def test_course_rejects_bad_elements(parameters, message):

@@ -19,6 +19,7 @@ from terrainkit.views.preview import (
     write_preview,
 )
 from terrainkit.views.preview_layout import ABOVE, BELOW, LEFT, RIGHT, make_blocks
+from tests.tables import read_table
 
 PAPER = (250, 249, 246)
 FLAT = tk.SubTerrain(terrain="flat")
@@ -63,16 +64,7 @@ def test_preview_has_the_width(pits, width):
 
 @pytest.mark.parametrize(
     ("rows", "cols", "axis", "parts"),
-    [
-        (3, 3, 1, 1),
-        (5, 10, 1, 1),  # tall: 1.25 times as high as wide
-        # 24 m x 480 m. Three blocks of 24 m x 160 m have 12.5 px for a meter, four only 8.9 px:
-        # 1600 px are 4 x 24 m and three margins of 250 px.
-        (3, 60, 1, 3),
-        # 480 m x 24 m. Four blocks of 120 m x 24 m have 13.3 px for a meter, five 14.7 px:
-        # 2000 px are 5 x 24 m and four margins of 60 px.
-        (60, 3, 0, 5),
-    ],
+    read_table(__file__, "preview_divides_long_maps_to_fit_a_screen"),
 )
 def test_preview_divides_long_maps_to_fit_a_screen(rows, cols, axis, parts):
     terrain_map = map_of(FLAT, rows=rows, cols=cols, cell=0.2)
@@ -177,15 +169,7 @@ def test_write_preview_keeps_existing_file(pits, tmp_path):
     assert write_preview(pits, path, overwrite=True).read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
-    ("name", "width", "said"),
-    [
-        ("a.jpg", 300, "expected a .png file"),
-        ("a.png", 99, "width: got 99; expected 100 to 10000"),
-        ("a.png", 10_001, "width: got 10001; expected 100 to 10000"),
-        ("file/a.png", 300, "is not a folder"),
-    ],
-)
+@pytest.mark.parametrize(("name", "width", "said"), read_table(__file__, "write_preview_rejects"))
 def test_write_preview_rejects_invalid_input(pits, tmp_path, name, width, said):
     (tmp_path / "file").write_text("")
     with pytest.raises(ExportError, match=said):

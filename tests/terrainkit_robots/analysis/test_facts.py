@@ -6,6 +6,7 @@ from terrainkit_robots.analysis.facts import Facts, cached_fact
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from tests.small_robots import facts, joint, link, mjcf
+from tests.tables import read_table
 
 PARTS = (
     link("a"),
@@ -73,16 +74,7 @@ def test_total_mass_derived_from_mesh_is_nan():
     assert robot('size="0.1" mass="1"').total_mass == 3
 
 
-@pytest.mark.parametrize(
-    ("actuators", "driven"),
-    [
-        ("", ["i", "j"]),
-        ('<motor joint="j"/>', ["j"]),
-        ('<motor joint="j"/><position joint="i"/>', ["i", "j"]),
-        ('<motor tendon="t"/>', ["i", "j"]),
-        ('<motor tendon="t"/><motor joint="i"/>', ["i"]),
-    ],
-)
+@pytest.mark.parametrize(("actuators", "driven"), read_table(__file__, "actuated_joints_of_mjcf"))
 def test_actuated_joints_of_mjcf(actuators, driven):
     robot = mjcf(
         '<body name="a"><freejoint/><geom size="0.1"/><body name="b"><joint name="i"/>'

@@ -2,21 +2,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import read
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "kind", "codes"),
-    [
-        ("r.urdf", '<robot name="r"/>', "urdf", []),
-        ("r.xml", '<robot name="r"/>', "urdf", []),
-        ("r.urdf", "<mujoco/>", "mjcf", []),
-        ("r.urdf", "<sdf/>", "urdf", ["XML002"]),
-        ("r.xml", "<sdf/>", "mjcf", ["XML002"]),
-        ("r.xacro", "<sdf/>", "xacro", ["XML002"]),
-        ("r.urdf", "", "urdf", ["XML001"]),
-        ("r.xml", "", "mjcf", ["XML001"]),
-    ],
+    ("name", "text", "kind", "codes"), read_table(__file__, "kind_is_that_of_root_or_file")
 )
 def test_kind_is_that_of_root_or_file(name, text, kind, codes):
     model = read(text, Path(name))

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.description.model import Dynamics, Geometry, Joint, Limit, RobotModel, Source
+from tests.tables import read_table
 
 SOURCE = Source(file=Path("robot.urdf"), line=1)
 JOINT = Joint(name="j", source=SOURCE, kind="revolute", parent="a", child="b")
@@ -42,16 +43,7 @@ def test_range_has_both_limits_in_order(kind, ends, wanted):
     assert replace(JOINT, kind=kind).range is None
 
 
-@pytest.mark.parametrize(
-    ("axis", "wanted"),
-    [
-        ((0, 3, 4), (0, 0.6, 0.8)),
-        ((0, 1.1e-12, 0), (0, 1, 0)),
-        ((0, 0.9e-12, 0), (1, 0, 0)),
-        ((0, 1e300, 1e300), (1, 0, 0)),  # its length is infinite
-        ((0, np.nan, 1), (1, 0, 0)),
-    ],
-)
+@pytest.mark.parametrize(("axis", "wanted"), read_table(__file__, "direction_is_x_unless_the_axis"))
 def test_direction_is_x_unless_the_axis_has_a_length(axis, wanted):
     with np.errstate(over="ignore"):
         assert replace(JOINT, axis=np.array(axis)).direction == pytest.approx(wanted)

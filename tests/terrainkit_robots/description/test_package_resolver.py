@@ -10,6 +10,7 @@ from terrainkit_robots.description.package_resolver import (
     is_package_uri,
     resolve_in,
 )
+from tests.tables import read_table
 
 
 def resolve(name, file, packages=None):
@@ -43,30 +44,10 @@ def place(root):
     return make
 
 
-DOG, DOGS_FOOT, WS = "dog/urdf/dog.urdf", "dog/meshes/foot.stl", "ws/a/urdf/dog.urdf"
+DOG = "dog/urdf/dog.urdf"
 
 
-@pytest.mark.parametrize(
-    ("robot", "others", "name", "how"),
-    [
-        (DOG, (DOGS_FOOT,), "../meshes/foot.stl", "path"),
-        (DOG, (DOGS_FOOT,), "../Meshes/FOOT.STL", "search"),
-        (DOG, (DOGS_FOOT,), "..\\meshes\\foot.stl", "search"),
-        (DOG, (DOGS_FOOT,), "/home/x/dog/meshes/foot.stl", "search"),
-        (DOG, (DOGS_FOOT,), "C:\\x\\dog\\meshes\\foot.stl", "search"),
-        (DOG, (DOGS_FOOT,), "meshes/foot.stl", "search"),
-        (DOG, (DOGS_FOOT,), "foot.stl", "search"),
-        (DOG, ("dog/package.xml", "dog/m/foot.stl"), "package://dog_pkg/m/foot.stl", "package"),
-        (DOG, ("dog/m/foot.stl",), "package://dog/m/foot.stl", "search"),
-        (DOG, ("dog/m/foot.stl",), "package://dog/M/Foot.STL", "search"),
-        (WS, ("ws/legs/m/foot.stl",), "package://legs/m/foot.stl", "search"),
-        (WS, ("ws/b/package.xml", "ws/b/m/foot.stl"), "package://b_pkg/m/foot.stl", "package"),
-        (WS, ("ws/b/package.xml", "ws/b/m/foot.stl"), "package://b/m/foot.stl", "package"),
-        ("dog/dog/dog.urdf", ("dog/m/foot.stl",), "package://dog/m/foot.stl", "search"),
-        ("dog-main/urdf/dog.urdf", ("dog-main/m/foot.stl",), "package://dog/m/foot.stl", "search"),
-        ("dog.urdf", ("wheel.obj",), "package://wheel.obj", "search"),
-    ],
-)
+@pytest.mark.parametrize(("robot", "others", "name", "how"), read_table(__file__, "file_is_found"))
 def test_file_is_found(robot, others, name, how, place):
     file, *_, mesh = place(robot, *others)
     path, found_by = resolve(name, file)
@@ -79,17 +60,7 @@ def test_absolute_names(place):
         assert resolve(str(name), robot) == (mesh, "path")
 
 
-@pytest.mark.parametrize(
-    ("name", "path"),
-    [
-        ("a/hand.stl", "a/hand.stl"),
-        ("/a/hand.stl", "/a/hand.stl"),
-        ("https://example.org/foot.stl", "foot.stl"),  # nothing is downloaded
-        ("a/Foot.stl", "a/Foot.stl"),  # two files could be meant
-        ("package://cat/hand.stl", "hand.stl"),
-        ("package://a", "a"),  # a folder is no mesh
-    ],
-)
+@pytest.mark.parametrize(("name", "path"), read_table(__file__, "missing_file_has_expected_path"))
 def test_missing_file_has_expected_path(name, path, place):
     robot, *_ = place("dog.urdf", "foot.stl", "a/foot.stl", "a/FOOT.stl")
     assert resolve(name, robot) == (robot.parent / path, "nothing")
@@ -195,24 +166,10 @@ def test_resolve_in_folders(place):
     ]
 
 
-@pytest.mark.parametrize(
-    ("name", "right"),
-    [
-        ("./meshes//foot.stl", None),
-        ("meshes/Foot.STL", "meshes/foot.stl"),
-        ("../x/Meshes/foot.stl", "../x/meshes/foot.stl"),
-        ("meshes\\foot.stl", "meshes/foot.stl"),
-        ("package://dog/Meshes\\foot.stl", "package://dog/meshes/foot.stl"),
-        ("$(find dog)/meshes/FOOT.stl", "$(find dog)/meshes/foot.stl"),
-        ("file://Meshes/foot.stl", "file://meshes/foot.stl"),
-        ("stl/foot.stl", None),
-        ("/x/Meshes/foot.stl", None),
-        ("C:\\x\\Meshes\\foot.stl", None),
-    ],
-)
+@pytest.mark.parametrize(("name", "right"), read_table(__file__, "filename_on_disk"))
 def test_filename_on_disk(place, name, right):
     (mesh,) = place("x/meshes/foot.stl")
-    assert filename_on_disk(name, mesh) == right
+    assert filename_on_disk(name, mesh) == (right or None)
 
 
 def test_filename_on_disk_case_insensitive(place, monkeypatch):

@@ -3,29 +3,23 @@ import pytest
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.export.unsupported import unsupported_elements
+from tests.tables import read_table
 
 MJCF = """<mujoco>{rest}<worldbody><body name="a"><geom size="0.1" {geom}/>
   <body><joint name="j" {joint}/><joint name="k" stiffness="0 0.0"/><geom size="0.1"/></body></body>
   </worldbody><tendon>{tendons}</tendon></mujoco>"""
 PULL = '<actuator><motor name="pull" tendon="t"/></actuator>'
-EQUALITY = '<equality><joint joint1="j"/><joint joint1="j" joint2="k"/></equality>'
 TENDON = '<fixed name="{}"><joint joint="j" coef="1"/></fixed>'
 
 
 @pytest.mark.parametrize(
     ("parts", "told"),
     [
-        ({}, ""),
-        ({"joint": 'stiffness="5" frictionloss="0.5"'}, "stiffness of joints (1 element)"),
+        *read_table(__file__, "unsupported_elements_are_counted"),
         ({"tendons": TENDON.format("t")}, "<tendon> (1 element)"),
         (
             {"tendons": TENDON.format("t") + TENDON.format("u"), "rest": PULL},
             "<tendon> (2 elements); 1 actuator without a joint: pull",
-        ),
-        ({"rest": EQUALITY}, "<equality> (1 element)"),  # the other is a mimic
-        (
-            {"rest": '<default><geom condim="6"/></default>', "geom": 'friction="1" priority="1"'},
-            "friction and contact parameters of geoms (2 elements)",
         ),
     ],
 )

@@ -17,6 +17,7 @@ from terrainkit_robots.export.urdf import urdf_text
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.transforms import quat_to_matrix, rpy_to_matrix
 from tests.robots import ROBOTS
+from tests.tables import read_table
 from tests.terrainkit_robots.export.made_models import (
     SOURCE,
     at,
@@ -52,37 +53,7 @@ def test_urdf_of_box():
         visuals=(shape("box", 0.1, 0.2, 0.3, origin=turned, color=(1, 0, 0.5, 1)),),
         collisions=(shape("cylinder", 0.1, 0.2), shape("sphere", 1, contype=0, conaffinity=0)),
     )
-    expected = """\
-<robot name="r">
-  <!-- Written by terrainkit onboard. SI units and radians. -->
-  <mujoco>
-    <compiler fusestatic="false" discardvisual="false" strippath="false" balanceinertia="false" \
-inertiafromgeom="false"/>
-  </mujoco>
-  <material name="color_1">
-    <color rgba="1 0 0.5 1"/>
-  </material>
-  <link name="base">
-    <inertial>
-      <origin xyz="0.1 0 0" rpy="0 0 0"/>
-      <mass value="2"/>
-      <inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.25"/>
-    </inertial>
-    <visual>
-      <origin xyz="0 0 0" rpy="0 0 1.570796327"/>
-      <geometry>
-        <box size="0.2 0.4 0.6"/>
-      </geometry>
-      <material name="color_1"/>
-    </visual>
-    <collision>
-      <geometry>
-        <cylinder radius="0.1" length="0.4"/>
-      </geometry>
-    </collision>
-  </link>
-</robot>
-"""
+    expected = read_table(__file__, "urdf_of_box")
     assert urdf_text(model(base)) == expected
 
 

@@ -16,24 +16,12 @@ from pathlib import Path
 import pytest
 
 from terrainkit_robots.lint.rule import FAMILIES
+from tests.tables import read_table
 from tests.terrainkit_robots.lint.test_every_rule import ALL_CASES, Case, lint_case, text_of_robot
 
 FINDINGS = Path(__file__).with_name("all_findings.json")
 
-NUMBERS = {
-    "mass": r'<mass value="([^"]*)"',
-    "moment": r'ixx="([^"]*)"',
-    "product": r'ixy="([^"]*)"',
-    "center": r'<inertial>\s*<origin xyz="\S+ (\S+)',
-    "thigh": r'_calf_joint".*?<origin xyz="\S+ \S+ ([^"]*)"',
-    "lower limit": r'lower="([^"]*)"',
-    "upper limit": r'upper="([^"]*)"',
-    "effort": r'effort="([^"]*)"',
-    "velocity": r'velocity="([^"]*)"',
-    "radius": r'radius="([^"]*)"',
-    "length": r'length="([^"]*)"',
-    "axis": r'axis xyz="\S+ (\S+)',
-}
+NUMBERS = read_table(__file__, "numbers")
 """Numbers of a URDF by name, as patterns with one group."""
 
 STEP = 1 if os.environ.get("TERRAINKIT_ALL_RULES") or __name__ == "__main__" else 10

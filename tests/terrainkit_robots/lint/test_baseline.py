@@ -7,6 +7,7 @@ from terrainkit_robots.lint.baseline import Baseline
 from terrainkit_robots.lint.check import check_robot
 from terrainkit_robots.lint.report import FORMATS, to_text
 from terrainkit_robots.lint.settings import Settings
+from tests.tables import read_table
 
 LINK = '<link name="{}"><inertial><mass value="{}"/></inertial></link>'
 
@@ -124,14 +125,8 @@ def test_every_format_hides_accepted_findings(robot, file):
 @pytest.mark.parametrize(
     "text",
     [
-        "",
-        "[]",
+        *read_table(__file__, "malformed_baseline_is_rejected"),
         "\udcff",
-        '{"version": 1}',
-        '{"version": 2, "robots": {}}',
-        '{"version": 1, "robots": {"a": ["INR002"]}}',
-        '{"version": 1, "robots": {"a": {"INR002": "b"}}}',
-        '{"version": 1, "robots": {"a": {"INR002": [1]}}}',
         '{"version": 1, "robots": {}, "deep": ' + "[" * 100_000,
     ],
     ids=lambda text: text[:40],

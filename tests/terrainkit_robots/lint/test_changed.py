@@ -5,25 +5,9 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.lint.changed import changed_robots
 from terrainkit_robots.lint.settings import Settings
+from tests.tables import read_table
 
-XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
-FILES = {
-    "arm/arm.urdf": '<robot name="arm"><link name="a"><visual><geometry>'
-    '<mesh filename="hull.stl"/></geometry></visual></link></robot>',
-    "dog/dog.urdf.xacro": f'<robot {XACRO} name="dog"><xacro:include filename="macros/leg.xacro"/>'
-    '<xacro:leg side="left"/></robot>',
-    "dog/macros/leg.xacro": f'<robot {XACRO}><xacro:macro name="leg" params="side">'
-    '<link name="${side}"/></xacro:macro></robot>',
-    "dog/macros/unused.xacro": f'<robot {XACRO}><xacro:macro name="m"/></robot>',
-    "dog/package.xml": "<package><name>dog</name></package>",
-    "mj/scene.xml": '<mujoco><include file="body.xml"/></mujoco>',
-    "mj/body.xml": '<mujoco><include file="defaults.xml"/><worldbody><body name="b"><freejoint/>'
-    "</body></worldbody></mujoco>",
-    "mj/defaults.xml": "<mujoco><default/></mujoco>",
-    "broken/half.urdf": '<robot name="half"><link',
-    "broken/missing.xacro": f'<robot {XACRO} name="$(arg nothing)"/>',
-    ".hidden/arm.urdf": '<robot name="arm"><link name="a"/></robot>',
-}
+FILES = read_table(__file__, "files")
 
 
 @pytest.fixture(autouse=True)
@@ -34,24 +18,7 @@ def repository(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("changed", "robots"),
-    [
-        ("arm/arm.urdf", ["arm/arm.urdf"]),
-        ("arm/hull.stl", ["arm/arm.urdf"]),  # a deleted mesh
-        ("dog/dog.urdf.xacro", ["broken/missing.xacro", "dog/dog.urdf.xacro"]),
-        ("dog/macros/leg.xacro", ["broken/missing.xacro", "dog/dog.urdf.xacro"]),
-        ("dog/macros/unused.xacro", ["broken/missing.xacro"]),
-        ("dog/package.xml", []),
-        ("mj/scene.xml", []),
-        ("mj/body.xml", ["mj/body.xml"]),
-        ("mj/defaults.xml", ["mj/body.xml"]),
-        ("broken/half.urdf", ["broken/half.urdf"]),
-        ("broken/missing.xacro", ["broken/missing.xacro"]),
-        (".hidden/arm.urdf", []),
-        ("none.urdf", []),
-    ],
-)
+@pytest.mark.parametrize(("changed", "robots"), read_table(__file__, "changed_robots_reads"))
 def test_changed_robots_reads_changed_file(changed, robots):
     assert changed_robots([Path(changed)], Settings()) == tuple(map(Path, robots))
 

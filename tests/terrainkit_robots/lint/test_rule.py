@@ -5,21 +5,9 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.lint import rule as module
 from terrainkit_robots.lint.rule import FAMILIES, IMPORTANCE, Violation, get_rule, rule, rules
+from tests.tables import read_table
 
-PAGE = """A mass is negative.
-
-    Simulators divide
-    by it.
-
-    And it is not physical.
-
-    Fix:
-        Write the mass
-        of the part.
-
-    Source:
-        A book, chapter 3.
-    """
+PAGE = read_table(__file__, "page")
 
 
 @pytest.fixture
@@ -42,16 +30,7 @@ def test_rule_page_is_parsed(empty):
     function = check()
     given = {"fixes": "safe", "needs": ("legs",)}
     assert rule("INR099", "negative-mass", "error", **given)(function) is function
-    expected = given | {
-        "code": "INR099",
-        "name": "negative-mass",
-        "severity": "error",
-        "family": "INR",
-        "title": "A mass is negative.",
-        "why": "Simulators divide by it.\n\nAnd it is not physical.",
-        "how_to_fix": "Write the mass of the part.",
-        "reference": "A book, chapter 3.",
-    }
+    expected = given | read_table(__file__, "rule_page_is_parsed")
     assert {name: getattr(empty["INR099"], name) for name in expected} == expected
     rule("INR098", "n", "error")(check())
     assert (empty["INR098"].fixes, empty["INR098"].needs) == ("no", ())
@@ -60,14 +39,8 @@ def test_rule_page_is_parsed(empty):
 @pytest.mark.parametrize(
     "text",
     [
+        *read_table(__file__, "incomplete_page_is_rejected"),
         None,
-        "",
-        "A title.",
-        "A title.\n\nWhy.",
-        "A title.\n\nWhy.\n\nFix:\n    This.",
-        "A title.\n\nWhy.\n\nSource:\n    That.",
-        "A title.\n\nFix:\n    This.\n\nSource:\n    That.",
-        "A title\nover lines.\n\nWhy.\n\nFix:\n    This.\n\nSource:\n    That.",
     ],
 )
 def test_incomplete_page_is_rejected(empty, text):

@@ -7,6 +7,7 @@ from terrainkit_robots.lint.check import Suppressed, lint_selected, select_rules
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.settings import Settings, matching
 from tests.small_robots import link
+from tests.tables import read_table
 
 
 def codes(found):
@@ -48,25 +49,9 @@ MASS = "<inertial>\n<mass value='-1'/>"
 A, B = link("a", mass=-1), link("b", mass=-1)
 
 
-@pytest.mark.parametrize(
-    ("text", "left"),
-    [
-        (f"{NOTE}\n{A}\n{B}", ["b"]),
-        (f"{A}\n{NOTE}\n{B}", ["a"]),
-        (f"{A} {NOTE}\n{B}", ["b"]),
-        (f"{A}\n{NOTE} {B}", ["a"]),
-        (f"{A}\n<!-- other -->{NOTE}<!-- words -->\n{B}", ["a"]),
-        (f"<link name='a'>\n{NOTE}\n{MASS}\n</inertial></link>\n{B}", ["b"]),
-        (f"<link name='a'>\n{MASS}</inertial>\n{NOTE}\n</link>\n{B}", ["b"]),
-        (f"<link name='a'>\n{MASS} {NOTE}\n</inertial></link>", []),
-        (f"{A}\n{B}\n{NOTE}", ["a", "b"]),
-        (f"{A}\n<!-- terrainkit: ignore negative-mass a balloon -->\n{B}", ["a"]),
-        (f"{A}\n<!-- terrainkit: ignore INR001, INR002: a balloon -->\n{B}", ["a"]),
-        (f"{A}\n<!--terrainkit:ignore inr002\n   a\n   balloon-->\n{B}", ["a"]),
-        (f"{A}\n<!-- terrainkit says: ignore INR002 x -->\n{B}", ["a", "b"]),
-    ],
-)
+@pytest.mark.parametrize(("text", "left"), read_table(__file__, "suppressed"))
 def test_comment_suppresses_its_element(file, text, left):
+    text = text.format(A=A, B=B, NOTE=NOTE, MASS=MASS)
     report = check(file, f'<robot name="r">\n{text}\n</robot>\n')
     assert [finding.subject for finding in report.findings] == left
     ignored = [skipped for skipped in report.skipped if isinstance(skipped, Suppressed)]
@@ -114,16 +99,7 @@ def test_replaced_contents_have_own_comments(file):
     assert len(lint_selected(facts, Settings(select=("INR002",))).findings) == 1
 
 
-@pytest.mark.parametrize(
-    ("comment", "said"),
-    [
-        ("ignore INR002", "missing reason; expected <!-- terrainkit: ignore INR002 reason -->"),
-        ("ignore INR999 it is light", "unknown rule 'INR999'; expected"),
-        ("ignore", "missing rule; expected <!-- terrainkit: ignore CODE reason -->"),
-        ("disable INR002 it is light", "unknown word 'disable'; expected"),
-        ("", "unknown word ''; expected"),
-    ],
-)
+@pytest.mark.parametrize(("comment", "said"), read_table(__file__, "invalid_comment_is_reported"))
 def test_invalid_comment_is_reported(file, comment, said):
     report = check(file, f'<robot name="r">\n<!-- terrainkit: {comment} -->\n{A}\n</robot>')
     assert codes(report.findings) == {"INR002"}

@@ -7,6 +7,7 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.lint.rule import rules
 from terrainkit_robots.lint.settings import Settings, matching, package_folder, read_settings
+from tests.tables import read_table
 
 
 def codes(found):
@@ -53,13 +54,7 @@ def test_command_line_overrides_file(tmp_path):
     )
 
 
-TABLE = """
-select = ["INR", "unnamed-robot"]
-ignore = { INR004 = "a dummy" }
-package = { my_robot = "meshes" }
-xacro-arg = { arm = true, legs = 4, name = "b" }
-strict = true
-"""
+TABLE = read_table(__file__, "table")
 
 
 @pytest.mark.parametrize(

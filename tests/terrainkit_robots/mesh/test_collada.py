@@ -6,6 +6,7 @@ import pytest
 
 from terrainkit_robots.mesh.collada import read_dae
 from terrainkit_robots.mesh.surface import MeshError
+from tests.tables import read_table
 
 TRIANGLES = (
     '<triangles><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2 0 2 3</p></triangles>'
@@ -87,16 +88,7 @@ def test_strips_have_consistent_winding():
     assert normals.tolist() == [[0, 0, 1], [0, 0, 1]]
 
 
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [
-        ("<translate>1 2 3</translate>", [2, 2, 3]),
-        ("<scale>2 3 4</scale>", [2, 0, 0]),
-        ("<rotate>0 0 1 90</rotate>", [0, 1, 0]),
-        ("<matrix>0 -1 0 5 1 0 0 6 0 0 1 7 0 0 0 1</matrix>", [5, 7, 7]),
-        ("<translate>1 0 0</translate><scale>2 2 2</scale>", [3, 0, 0]),
-    ],
-)
+@pytest.mark.parametrize(("before", "after"), read_table(__file__, "transforms"))
 def test_transforms(before, after):
     corner = read_dae(dae(geometry(), scene=f"<node>{before}{INSTANCE}</node>")).points[1]
     assert corner == pytest.approx(after, abs=1e-6)

@@ -163,10 +163,10 @@ def test_partial_diagonal(mesh, name, data, diagonal):
 @pytest.mark.parametrize(
     ("limit", "value", "ask", "data", "message"),
     [
-        ("_DEFAULT_MAX_BYTES", 684, "vertices", BOX, "has 684 bytes; expected at most 683"),
-        ("_MAX_TOTAL_BYTES", 684, "vertices", BOX, "exceeds the limit of 683 bytes"),
-        ("_MAX_TOTAL_WORDS", 21, "vertices", SQUARE, "exceeds the limit of 20 numbers"),
-        ("_MAX_WELDED_FACES", 12, "solid_volume", BOX, "has 12 faces; expected at most 11"),
+        ("DEFAULT_MAX_BYTES", 684, "vertices", BOX, "has 684 bytes; expected at most 683"),
+        ("MAX_TOTAL_BYTES", 684, "vertices", BOX, "exceeds the limit of 683 bytes"),
+        ("MAX_TOTAL_WORDS", 21, "vertices", SQUARE, "exceeds the limit of 20 numbers"),
+        ("MAX_WELDED_FACES", 12, "solid_volume", BOX, "has 12 faces; expected at most 11"),
     ],
 )
 def test_limits(mesh, monkeypatch, limit, value, ask, data, message):
@@ -181,7 +181,7 @@ def test_limits(mesh, monkeypatch, limit, value, ask, data, message):
 
 
 def test_limits_are_those_of_all_meshes(mesh, monkeypatch):
-    monkeypatch.setattr(module, "_MAX_TOTAL_BYTES", 2 * 684 - 1)
+    monkeypatch.setattr(module, "MAX_TOTAL_BYTES", 2 * 684 - 1)
     meshes = Meshes()
     meshes.vertices(mesh())
     with pytest.raises(TooLargeError, match="limit of 1,367 bytes"):

@@ -15,9 +15,10 @@ from terrainkit_robots.onboarding.equivalence import (
 )
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from tests.robots import QUADRUPED
+from tests.tables import read_table
 
-FOOT = 'name="RR_foot" pos="0 0 -0.213"'
-EXACT = pytest.approx(0, abs=1e-8)
+DIFFERENCES = read_table(__file__, "differences")
+"""What is replaced in the file, the names and the numbers of the result, and its failures."""
 
 
 @pytest.fixture(scope="module")
@@ -44,48 +45,15 @@ def compared(source, written):
     return run
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "expected", "failures"),
-    [
-        ("", "", {"distance": EXACT, "angle": EXACT, "mass": EXACT, "inertia": EXACT}, []),
-        (
-            FOOT,
-            FOOT.replace("0.213", "0.203"),
-            {"link": "RR_foot", "distance": pytest.approx(0.01), "mass": EXACT},
-            ["the position of RR_foot is off by 10 mm", "the inertia about RR_"],
-        ),
-        (
-            FOOT,
-            f'{FOOT} quat="0.9998 0 0.02 0"',
-            {"angle_link": "RR_foot", "angle": pytest.approx(0.04, rel=1e-3), "distance": EXACT},
-            ["the orientation of RR_foot is off by 2.29 degrees"],
-        ),
-        (
-            '<joint name="FL_calf_joint" axis="0 1 0"',
-            '<joint name="FL_calf_joint" axis="0 -1 0"',
-            {"link": "FL_foot", "mass": EXACT},
-            ["the position of FL_foot", "the orientation of FL_"],
-        ),
-        (
-            'mass="0.154"',
-            'mass="0.254"',
-            {"mass": pytest.approx(0.1 / 15.017, rel=1e-6), "distance": EXACT},
-            ["the mass is off by 0.67%", "the inertia about FL_thigh_joint"],
-        ),
-        (  # masses and frames are the same, but a center of mass is off by 1 cm
-            '<inertial pos="0.00548 -0.000975 -0.115"',
-            '<inertial pos="0.00548 -0.000975 -0.125"',
-            {"mass": EXACT, "distance": EXACT, "joint": "FL_calf_joint"},
-            ["the inertia about FL_calf_joint is off by"],
-        ),
-    ],
-    ids=["copy", "position", "orientation", "axis", "mass", "center of mass"],
-)
-def test_compare_models_finds_the_difference(compared, written, old, new, expected, failures):
+@pytest.mark.parametrize("title", DIFFERENCES)
+def test_compare_models_finds_the_difference(compared, written, title):
+    old, new, names, numbers, failures = DIFFERENCES[title]
     text = mjcf_text(written.model, Extras())
     assert old in text
     result = compared(text.replace(old, new, 1))
-    assert {name: getattr(result, name) for name in expected} == expected
+    assert {name: getattr(result, name) for name in names} == names
+    measured = {name: getattr(result, name) for name in numbers}
+    assert measured == pytest.approx(numbers, rel=1e-6, abs=1e-8)
     assert len(result.failures) == len(failures)
     for found, start in zip(result.failures, failures, strict=True):
         assert found.startswith(start)
@@ -113,4 +81,4 @@ def test_compare_models_finds_merged_links_as_sites(compared, written):
     )
     assert "RR_foot" in {site.name for site in sites}
     result = compared(mjcf_text(single.model, Extras(frames=sites)))
-    assert (result.failures, result.distance) == ((), EXACT)
+    assert (result.failures, result.distance) == ((), pytest.approx(0, abs=1e-8))

@@ -1,4 +1,3 @@
-import math
 from dataclasses import replace
 
 import pytest
@@ -9,6 +8,7 @@ from terrainkit_robots.onboarding.joint_table import format_number, joint_table
 from terrainkit_robots.spec.robot_spec import JOINT_TABLES
 from tests.robots import QUADRUPED
 from tests.small_robots import facts, joint, link
+from tests.tables import read_table
 
 
 @pytest.fixture
@@ -66,16 +66,7 @@ def test_joint_table_leaves_unknown_values_empty(quadruped, make_spec):
 @pytest.mark.parametrize(
     ("value", "text"),
     [
-        (0.0, "0"),
-        (-0.0, "0"),
-        (-2.7227, "-2.72"),
-        (9999.0, "9999"),
-        (10000.0, "1e+04"),
-        (1e-4, "0.0001"),
-        (9.9e-5, "9.9e-05"),
-        (9.9999, "10"),
-        (math.inf, "unlimited"),
-        (math.nan, ""),
+        *read_table(__file__, "format_number"),
         (None, ""),
     ],
 )

@@ -8,6 +8,7 @@ from terrainkit_robots.policy.contracts.contract_repairs import Repair
 from terrainkit_robots.policy.open_policy import find_contract, read_contract
 from terrainkit_robots.rl.tasks import get_task
 from terrainkit_robots.spec.robot_arrays import Robot
+from tests.tables import read_table
 
 
 @pytest.fixture
@@ -25,26 +26,7 @@ def contract(found, robot):
     return read_contract(found, robot)
 
 
-@pytest.mark.parametrize(
-    ("changes", "code", "got"),
-    [
-        ({"step_dt": 0.0079}, "POL003", "step_dt 0.0079 s"),
-        ({"default_pose": (0, 43, -86) * 4}, "POL004", "default position of FL_thigh_joint 43"),
-        ({"action_offset": (0,) * 12}, "POL005", "action offset of FL_thigh_joint 0"),
-        ({"action_scale": (-0.25,) + (0.25,) * 11}, "POL006", "action scale of FL_hip_joint -0.25"),
-        (
-            {"action_scale": (14.3,) * 12},
-            "POL007",
-            "an action of 1 moves FL_hip_joint with 858 N m",
-        ),
-        ({"stiffness": (2,) * 12, "damping": (60,) * 12}, "POL008", "stiffness 0.0333 times as in"),
-        (
-            {"stiffness": (60,) * 11 + (50,)},
-            "POL009",
-            "stiffness of RL_calf_joint 60, of its mirror",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("changes", "code", "got"), read_table(__file__, "values_that_do_not_fit"))
 def test_values_that_do_not_fit_are_found(contract, robot, changes, code, got):
     assert list(check_values(contract, robot)) == []
     findings = list(check_values(replace(contract, **changes), robot))

@@ -20,6 +20,7 @@ from terrainkit_robots.policy.metrics import ErrorMean
 from terrainkit_robots.policy.policy_rollout import EvaluationRollout
 from terrainkit_robots.rl.config import Commands, DomainRand, Task, Terrain
 from terrainkit_robots.rl.run import open_run
+from tests.tables import read_table
 
 
 def run_still(run, config, seconds=0.1, **options):
@@ -99,18 +100,7 @@ def test_policy_keeps_its_observations_on_another_terrain(make_run, map_file):
         assert env.terrain.is_plane == (terrain in ("plane", None))
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"seconds": 0.0}, "seconds: got 0"),
-        ({"seconds": float("nan")}, "seconds: got nan"),
-        ({"seconds": 1e9}, "<= 3600"),
-        ({"num_envs": 0}, "num_envs: got 0"),
-        ({"seed": -1}, "seed: got -1"),
-        ({"command": (1.0, float("inf"), 0.0)}, "expected 3 values"),
-        ({"command": (1.0, 0.0, 0.0), "random_commands": True}, "expected one of them"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), read_table(__file__, "evaluation_config_rejects"))
 def test_evaluation_config_rejects_invalid_values(options, message):
     with pytest.raises(ConfigError, match=message):
         EvaluationConfig(**options)

@@ -24,6 +24,7 @@ from terrainkit_robots.rl.run import PolicySpec, open_run
 from terrainkit_robots.rl.runner import LeggedRunner
 from terrainkit_robots.rl.terrain import load_terrain
 from tests.child_functions import odd_policy
+from tests.tables import read_table
 
 SMALL = Task(env=Env(num_threads=1))
 SHORT = EvaluationConfig(num_envs=3, seconds=0.3, command=(0.5, 0.0, 0.2))
@@ -320,15 +321,9 @@ def test_policy_with_a_batch_of_one_runs_row_by_row(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"shape": ("n", 3, 8, 8), "op": "Relu"}, "not a policy: got the inputs .*3, 8, 8"),
-        ({"shape": (), "op": "Relu"}, r"got the inputs obs tensor\(float\) \[\]; expected one"),
+        *read_table(__file__, "other_networks_are_rejected"),
         ({"kind": TensorProto.INT64, "op": "Abs"}, r"got the outputs tensor\(int64\); expected"),
         ({"kind": TensorProto.STRING, "op": "Identity"}, r"got the outputs tensor\(string\)"),
-        ({"shape": (5, 47)}, r"got the inputs obs tensor\(float\) \[5, 47\]; expected one"),
-        ({"shape": ("n", "k")}, r"got the inputs obs tensor\(float\) \['n', 'k'\]; expected one"),
-        ({"op": "Size"}, "is not a policy"),
-        ({"shape": ("n", 45), "op": "Relu"}, "got 45 observations and 45 actions; expected 47 and"),
-        ({"size": 10}, "got 47 observations and 10 actions; expected 47 and 12"),
     ],
 )
 def test_other_networks_are_rejected(mine, options, message):
@@ -370,19 +365,7 @@ def test_evaluation_starts_without_the_state_of_another(trained):
 SIZES = {"sizes": [47, 12], "metadata": "{}"}
 
 
-@pytest.mark.parametrize(
-    "first",
-    [
-        {},
-        {"sizes": [47], "metadata": "{}"},
-        {"sizes": ["a", "b"], "metadata": "{}"},
-        {"sizes": 3, "metadata": "{}"},
-        {"sizes": [47, 12]},
-        {"sizes": [47, 12], "metadata": "["},
-        {"sizes": [47, 12], "metadata": [1, 2]},
-        {"sizes": [47, 12], "metadata": '{"a": 3}'},
-    ],
-)
+@pytest.mark.parametrize("first", read_table(__file__, "odd_first_answer_is_an_error"))
 def test_odd_first_answer_is_an_error(tmp_path, monkeypatch, first):
     monkeypatch.setattr(policy_file, "run_model", partial(odd_policy, first=first, second={}))
     with pytest.raises(ConfigError, match=r"mine\.onnx is not a policy: "):

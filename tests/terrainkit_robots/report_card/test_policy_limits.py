@@ -4,6 +4,8 @@ import math
 import numpy as np
 import pytest
 
+from tests.tables import read_table
+
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
 from terrainkit.feasibility import RobotLimits
@@ -105,17 +107,7 @@ def test_slopes_across_are_as_steep_as_slopes_up(measure):
 
 def test_values_of_the_tests_follow_the_limits_of_the_robot():
     tests = {each.name: each for each in limit_tests(LIMITS)}
-    expected = {
-        "step up": (0.02, 0.4),
-        "step down": (0.025, 0.5),
-        "stairs": (0.02, 0.4),
-        "gap": (0.04, 0.8),
-        "slope up and down": (0.0577, 1.154),
-        "slope across": (math.atan(0.0577), math.atan(1.154)),
-        "clearance": (0.72, 0.29),  # 1.2 * 0.6 to 0.35 - 0.1 * 0.6
-        "stone": (0.8, 0.05),
-        "corridor": (1.2, 0.2),
-    }
+    expected = read_table(__file__, "values_of_the_tests_follow_the_limits_of_the_robot")
     assert {name: each.values for name, each in tests.items()} == {
         name: pytest.approx(values) for name, values in expected.items()
     }

@@ -11,6 +11,7 @@ from terrainkit_robots.checkpoint import save_checkpoint
 from terrainkit_robots.rl.config import Commands, Env, InitState, Terrain
 from terrainkit_robots.rl.curriculum import TerrainCurriculum
 from terrainkit_robots.rl.terrain import Plane
+from tests.tables import read_table
 
 
 class Patches(Plane):
@@ -51,15 +52,7 @@ class TestLog:
         statistics = curriculum.sampler.statistics
         statistics.success[2, 0], statistics.success[3, 0] = 0.5, 0.25
         statistics.returns[3, 0], statistics.visits[2:4, 0] = 12.0, [2, 1]
-        assert curriculum.log() == {
-            "Curriculum/level": 5.25,
-            "Curriculum/level_flat": 2.5,
-            "Curriculum/success_flat": 0.375,
-            "Curriculum/return_flat": 12,
-            "Curriculum/visits_flat": 3,
-            "Curriculum/level_rough": 8.0,
-            "Curriculum/visits_rough": 0,
-        }
+        assert curriculum.log() == read_table(__file__, "log_has_values_of_each_terrain")
 
     def test_log_combines_patches_of_the_same_terrain(self):
         terrain = Patches(rows=2)

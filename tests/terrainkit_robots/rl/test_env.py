@@ -24,6 +24,7 @@ from terrainkit_robots.rl.observations import ObservationTerm
 from terrainkit_robots.rl.symmetry import has_symmetry
 from terrainkit_robots.rl.terrain import MapGround, Plane
 from terrainkit_robots.spec.robot_arrays import Robot
+from tests.tables import read_table
 
 SHORT = Env(num_envs=5, num_threads=1, episode_length_s=0.4)
 
@@ -508,24 +509,7 @@ def torques(nominal_env, cart):
 
 class TestControl:
     @pytest.mark.parametrize(
-        ("action", "settings", "expected"),
-        [
-            # Hinges: kp (default + scale a - q) - kd dq. Wheel, without stiffness: kd (12 a - dq).
-            # The second torque would be 5.5, but the effort is 5; with V, it would be 7.5.
-            ((0.2, 0.4, 0.1), {}, [0.4 * (2.4 - 2.0), 5.0, 20 * (0.35 - 0.5) - 1.5 * 0.5]),
-            (
-                (0.5, 0.2, 0.1),
-                {"stiffness": 10.0, "damping": 0.2, "action_scale": 1.0},
-                [0.2 * (0.5 - 2.0), 10 * 0.3 + 0.2 * 1.0, 10 * (0.4 - 0.5) - 0.2 * 0.5],
-            ),
-            # Without stiffness, every joint is controlled like a wheel: by its velocity.
-            ((0.5, 0.2, 0.1), {"stiffness": 0.0}, [0.4 * (6 - 2.0), 1.5 * 1.05, 1.5 * -0.45]),
-            # An action of 1 is the joint's velocity limit.
-            ((0.1, 0.4, -0.1), {"control_type": "V"}, [0.4 * (3 - 2), 5.0, 1.5 * -1.5]),
-            # An action of 1 is the effort, or the task's scale.
-            ((0.5, -0.2, -9.0), {"control_type": "T"}, [1.5, -1.0, -6.0]),
-            ((0.5, -0.2, 0.1), {"control_type": "T", "action_scale": 2.0}, [1.0, -0.4, 0.2]),
-        ],
+        ("action", "settings", "expected"), read_table(__file__, "torques_by_hand")
     )
     def test_torques_by_hand(self, torques, action, settings, expected):
         np.testing.assert_allclose(torques(action, **settings), expected, rtol=1e-6)

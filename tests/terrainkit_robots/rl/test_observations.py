@@ -21,32 +21,15 @@ from terrainkit_robots.rl.observations import (
     policy_terms,
     privileged_terms,
 )
+from tests.tables import read_table
 from tests.terrainkit_robots.rl.made_states import made_env, shapes
 
 _SHAPES = shapes(joints=12, feet=4, penalized=8, points=187)
 
-_TASK_TABLE = [
-    ("commands", 3),
-    ("projected_gravity", 3),
-    ("base_ang_vel", 3),
-    ("dof_pos", 12),
-    ("dof_vel", 12),
-    ("actions", 12),
-    ("gait_phase", 2),
-    ("height_scan", 187),
-]
+_TASK_TABLE = read_table(__file__, "task_table")
 """Terms of the policy group in order: 47 numbers for 12 joints, and the height scan."""
 
-_SECRETS = [
-    ("base_lin_vel", 3),
-    ("mean_vel", 3),
-    ("friction", 1),
-    ("added_mass", 1),
-    ("com_shift", 3),
-    ("joint_offset", 12),
-    ("push_vel", 3),
-    ("foot_force", 12),
-]
+_SECRETS = read_table(__file__, "secrets")
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +96,7 @@ class TestGroups:
         env = make(2)
         policy, privileged = policy_terms(env), privileged_terms(env)
         for group, table in ((policy, _TASK_TABLE), (privileged, _TASK_TABLE + _SECRETS)):
-            assert [(name, each.function(env).shape[1]) for name, each in group.items()] == table
+            assert [[name, each.function(env).shape[1]] for name, each in group.items()] == table
         assert compute(policy, env).shape == (2, 234)
         env.has_height_scan = False
         assert [*policy] == [*policy_terms(env), "height_scan"]
@@ -194,13 +177,7 @@ class TestGroups:
         assert np.abs(seen).max() == 1.25
 
 
-_NOISE = {
-    "projected_gravity": 0.05,
-    "base_ang_vel": 0.2 * 0.25,
-    "dof_pos": 0.01,
-    "dof_vel": 1.5 * 0.05,
-    "height_scan": 0.1 * 5,
-}
+_NOISE = read_table(__file__, "noise")
 """Half ranges of the noise of the default task, after scaling."""
 
 

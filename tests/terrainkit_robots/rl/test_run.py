@@ -26,6 +26,7 @@ from terrainkit_robots.rl.run import (
 )
 from terrainkit_robots.rl.terrain import load_terrain
 from terrainkit_robots.spec.robot_arrays import Robot
+from tests.tables import read_table
 
 
 @pytest.fixture
@@ -155,8 +156,8 @@ def test_run_folder_replaces_the_task(run, task):
     assert open_run(run).task == other
 
 
-def test_open_run_finds_bundled_policy_by_name(task, mine, monkeypatch):
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+@pytest.mark.usefixtures("own_tasks")
+def test_open_run_finds_bundled_policy_by_name(task, mine):
     shipped = tasks.register_task("rover_of_this_test", mine).trained_run
     with pytest.raises(ConfigError, match="no policy is shipped with rover_of_this_test"):
         open_run("rover_of_this_test")
@@ -166,7 +167,8 @@ def test_open_run_finds_bundled_policy_by_name(task, mine, monkeypatch):
     assert opened.info.robot == "rover_of_this_test"
 
 
-def test_missing_keys_of_a_run_have_the_defaults_of_the_schema(tmp_path, monkeypatch):
+@pytest.mark.usefixtures("own_tasks")
+def test_missing_keys_of_a_run_have_the_defaults_of_the_schema(tmp_path):
     """A new option is off in an old run, whatever the registered task says today."""
 
     @dataclass(frozen=True, kw_only=True)
@@ -174,7 +176,6 @@ def test_missing_keys_of_a_run_have_the_defaults_of_the_schema(tmp_path, monkeyp
         height: float
         effort: float = 1.0
 
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
     today = Task(
         observations=Observations(foot_contact=True),
         rewards=Rewards(torques=-7.0),
@@ -213,17 +214,7 @@ def test_open_run_rejects_other_folders(tmp_path, monkeypatch, name, told):
         open_run(name)
 
 
-@pytest.mark.parametrize(
-    ("file", "old", "new", "told"),
-    [
-        (RUN_FILE, "version = 1", "version = 2", "format_version: got 2; expected one of: 1"),
-        (RUN_FILE, 'robot = "quadruped"', "robot = 3", "robot: got 3; expected a string"),
-        (RUN_FILE, 'robot = "quadruped"', 'robot = "gone"', "folder 'gone'"),
-        (RUN_FILE, 'terrain = "plane"', "", "terrain: missing; expected a string"),
-        (RUN_FILE, "seed", "seed =", "not a TOML file"),
-        (TASK_FILE, "tracking_lin_vel", "tracking_lin_vle", "tracking_lin_vle"),
-    ],
-)
+@pytest.mark.parametrize(("file", "old", "new", "told"), read_table(__file__, "malformed_files"))
 def test_open_run_rejects_malformed_files(run, file, old, new, told):
     path = run / file
     path.write_text(path.read_text().replace(old, new, 1))

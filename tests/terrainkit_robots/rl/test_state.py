@@ -8,6 +8,7 @@ import torch
 from terrainkit_robots.rl.config import Commands, Terrain
 from terrainkit_robots.rl.state import CONTACT_FORCE, NEAR_FOOT
 from terrainkit_robots.rl.terrain import Plane
+from tests.tables import read_table
 
 
 @pytest.fixture
@@ -181,19 +182,7 @@ class _Steps(Plane):
 
 
 # Distances in units of `NEAR_FOOT`, for a foot at 0 that moves to the left.
-@pytest.mark.parametrize(
-    ("steps", "clearance"),
-    [
-        ([(0.9, 9, 0.1)], 0.1),  # an edge ahead
-        ([(1.1, 9, 0.1)], 0),  # not yet
-        ([(-9, 0.9, 0.1)], 0),  # on a step, before its edge
-        ([(-9, -0.1, 0.1)], 0),  # a step down
-        ([(-0.1, 1.1, -1)], 1),  # in a gap
-        ([(-2.1, 9, -1)], 0),  # in a pit, far from its edge
-        ([(-9, 9, -1), (-9, -1.9, 0), (1.9, 9, 0)], 1),  # in the middle of a gap
-        ([(-9, 9, -1), (-9, -1.9, 0), (2.1, 9, 0)], 0),  # the gap is too wide
-    ],
-)
+@pytest.mark.parametrize(("steps", "clearance"), read_table(__file__, "clearance_is_above_edges"))
 def test_clearance_is_above_edges_ahead_and_gaps(nominal_env, quadruped, steps, clearance):
     ground = _Steps()
     env, (_, foot) = env_and_foot(nominal_env, ground)

@@ -14,15 +14,12 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.rl import scene, tasks
 from terrainkit_robots.rl.config import Env, Runner, Task
 from terrainkit_robots.rl.tasks import get_task, register_task, task_names
+from tests.tables import read_table
 
 MINE = replace(Task(), env=Env(num_envs=7))
 QUADRUPED = get_task("quadruped").folder
 
-
-@pytest.fixture(autouse=True)
-def restored_tasks(monkeypatch):
-    """Restore the registered tasks after each test."""
-    monkeypatch.setattr(tasks, "_registered", dict(tasks._registered))
+pytestmark = pytest.mark.usefixtures("own_tasks")
 
 
 @pytest.fixture
@@ -126,16 +123,7 @@ def test_entry_point_is_imported_on_use(tmp_path, monkeypatch, plugin):
         sys.modules.pop("rover_tasks", None)
 
 
-@pytest.mark.parametrize(
-    ("value", "told"),
-    [
-        ("no_such_package", r"task rover \(no_such_package\) cannot be loaded: ModuleNotFoundErr"),
-        ("math:no_such_name", r"rover \(math:no_such_name\) cannot be loaded: AttributeError"),
-        ("math", r"task rover \(math\) cannot be loaded: expected a call of register_task"),
-        ("broken_tasks", r"cannot be loaded: RuntimeError: two lines$"),
-        ("ended_tasks", r"task rover \(ended_tasks\) cannot be loaded: SystemExit: 0$"),
-    ],
-)
+@pytest.mark.parametrize(("value", "told"), read_table(__file__, "invalid_entry_point_fails"))
 def test_invalid_entry_point_fails_on_use(tmp_path, monkeypatch, plugin, value, told):
     (tmp_path / "broken_tasks.py").write_text("raise RuntimeError('two\\nlines')\n")
     (tmp_path / "ended_tasks.py").write_text("raise SystemExit(0)\n")

@@ -2,20 +2,9 @@ import pytest
 
 from terrainkit_robots.simulation.declared_gains import declared_gains, standing_gains
 from terrainkit_robots.simulation.pd_gains import suggest_gains
+from tests.tables import read_table
 
-PENDULUM = """
-<mujoco>
-  <worldbody>
-    <body name="base"><inertial pos="0 0 0" mass="5" diaginertia="1 1 1"/>
-      <body name="a" pos="0 0.2 0"><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
-        <joint name="a" axis="0 0 1" range="-1 1" damping="{damping}"/></body>
-      <body name="b" pos="0 -0.2 0"><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
-        <joint name="b" axis="0 0 1" range="-1 1"/></body>
-    </body>
-  </worldbody>
-  <actuator><position joint="a" {a}/><position joint="b" {b}/></actuator>
-</mujoco>
-"""
+PENDULUM = read_table(__file__, "pendulum")
 """Two joints of 0.01 kg m2 about vertical axes on a fixed base."""
 
 
@@ -36,15 +25,7 @@ def test_declared_gains_are_used(pendulum):
 
 
 # Critical damping of 0.01 kg m2 at 9 N m/rad is 2 sqrt(0.09) = 0.6 N m s/rad.
-@pytest.mark.parametrize(
-    ("gains", "damping", "expected"),
-    [
-        ('kp="9" kv="0.5"', 0.2, 0.5),
-        ('kp="9"', 0.2, 0.2),
-        ('kp="9"', 0, 0.6),
-        ('kp="9" dampratio="1"', 0, 0.6),
-    ],
-)
+@pytest.mark.parametrize(("gains", "damping", "expected"), read_table(__file__, "declared_damping"))
 def test_declared_damping(pendulum, gains, damping, expected):
     found = declared_gains(pendulum(gains, gains, damping)).gains["a"]
     assert found.damping == pytest.approx(expected)

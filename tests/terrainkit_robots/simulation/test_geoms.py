@@ -3,20 +3,10 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.simulation.geoms import box_corners
+from tests.tables import read_table
 
 
-@pytest.mark.parametrize(
-    ("shape", "half_size"),
-    [
-        ('type="sphere" size="0.3"', (0.3, 0.3, 0.3)),
-        ('type="box" size="0.1 0.2 0.3"', (0.1, 0.2, 0.3)),
-        ('type="box" size="0.1 0.2 0.3" euler="90 0 0"', (0.1, 0.3, 0.2)),
-        ('type="cylinder" size="0.1 0.4"', (0.1, 0.1, 0.4)),
-        ('type="capsule" size="0.1 0.4"', (0.1, 0.1, 0.5)),
-        ('type="capsule" size="0.1 0.4" euler="0 90 0"', (0.5, 0.1, 0.1)),
-        ('type="ellipsoid" size="0.1 0.2 0.3"', (0.1, 0.2, 0.3)),
-    ],
-)
+@pytest.mark.parametrize(("shape", "half_size"), read_table(__file__, "box_corners_bound_shape"))
 def test_box_corners_bound_shape(shape, half_size):
     body = f'<body pos="1 2 3"><freejoint/><geom {shape}/></body>'
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")

@@ -8,6 +8,7 @@ from terrainkit_robots.simulation.sim_model import TIME_STEP, make_sim_model
 from terrainkit_robots.simulation.time_step import max_stable_time_step
 from tests.robots import BUNDLED, PENDULUM
 from tests.small_robots import chain, facts, joint, link, shape
+from tests.tables import read_table
 
 CAR = (
     link("body", mass=5)
@@ -32,25 +33,14 @@ SIDES = {"left": 0.1, "right": -0.1}
 
 
 @pytest.mark.parametrize(
-    ("name", "joints", "stand", "train"),
-    [
-        ("quadruped.urdf", "FL_hip FL_thigh FL_calf", (60, 2), (20, 0.5)),
-        ("quadruped.xml", "FL_hip FL_thigh FL_calf", (60, 2), (25, 0.6)),
-        ("biped.urdf", "left_hip_pitch left_hip_roll", (80, 4), (60, 1.5)),
-        ("biped.urdf", "left_hip_yaw", (60, 1.5), (60, 1.5)),
-        ("biped.urdf", "left_knee", (150, 4), (80, 2)),
-        ("biped.urdf", "left_ankle_pitch left_ankle_roll", (50, 1.5), (50, 1.5)),
-        ("biped.xml", "left_hip_pitch left_hip_yaw", (80, 2.5), (80, 2)),
-        ("biped.xml", "left_knee", (150, 6), (80, 2)),
-        ("biped.xml", "left_ankle_pitch left_ankle_roll", (50, 1), (50, 1)),
-    ],
+    ("name", "joints", "stand", "train"), read_table(__file__, "gains_of_bundled_robots")
 )
 def test_gains_of_bundled_robots(bundled, name, joints, stand, train):
     robot = bundled(name)
     for gains, expected in ((suggest_gains(robot), stand), (suggest_training_gains(robot), train)):
         for name in joints.split():
             gain = gains[f"{name}_joint"]
-            assert (gain.stiffness, gain.damping) == expected, name
+            assert [gain.stiffness, gain.damping] == expected, name
 
 
 @pytest.mark.parametrize("name", BUNDLED)

@@ -5,6 +5,7 @@ import pytest
 from terrainkit.errors import ConfigError
 from terrainkit_robots.description import bundled
 from terrainkit_robots.simulation.robot_limits import derive_limits
+from tests.tables import read_table
 
 FOLDER = Path(bundled.__file__).parent
 
@@ -12,17 +13,7 @@ FOLDER = Path(bundled.__file__).parent
 def test_limits_of_the_quadruped_by_hand():
     """Legs of 0.448 m, feet of 0.022 m, and 0.328 m from hip to hip; it stands 0.4 m high."""
     derived = derive_limits(FOLDER / "quadruped")
-    expected = {
-        "step_up": 0.4 * 0.448,
-        "step_down": 0.5 * 0.448,
-        "gap": 0.7 * 0.448,
-        "slope": 0.577,
-        "friction": 2 / 3,
-        "foothold": 4 * 0.022,
-        "body_width": 0.328,
-        "standing_height": 0.4,
-        "crouched_height": 0.4 - 0.4 * 0.448,
-    }
+    expected = read_table(__file__, "limits_of_the_quadruped_by_hand")
     assert vars(derived.limits) == pytest.approx(expected, abs=5e-3)  # the pose may change
     assert set(derived.reasons) == set(expected)
     assert derived.reasons["step_up"] == "0.4 x leg_length (0.448 m)"

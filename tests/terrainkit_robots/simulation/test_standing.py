@@ -9,6 +9,7 @@ from terrainkit_robots.simulation.pd_gains import suggest_gains
 from terrainkit_robots.simulation.sim_model import make_sim_model
 from terrainkit_robots.simulation.standing import contact_areas, ground_normal, stand_test
 from tests.robots import PENDULUM
+from tests.tables import read_table
 
 
 def stand(facts, gains=None, **keys):
@@ -102,19 +103,7 @@ def test_locked_robot_settles_on_its_soles(bundled):
 
 def test_ground_normal_of_inclined_soles(robot):
     # Two boxes that are turned by 0.05 rad about y, without joints to level them.
-    leg = """<link name="{s}_thigh"><inertial><mass value="1"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
-    <joint name="{s}_hip" type="revolute"><parent link="base"/><child link="{s}_thigh"/>
-      <origin xyz="0 {y} 0"/><axis xyz="1 0 0"/>
-      <limit lower="-0.5" upper="0.5" effort="50" velocity="9"/></joint>
-    <link name="{s}_foot"><inertial><mass value="1"/>
-      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-      <collision><origin rpy="0 0.05 0"/>
-        <geometry><box size="0.15 0.08 0.02"/></geometry></collision>
-    </link>
-    <joint name="{s}_yaw" type="revolute"><parent link="{s}_thigh"/><child link="{s}_foot"/>
-      <origin xyz="0 0 -0.5"/><axis xyz="0 0 1"/>
-      <limit lower="-0.5" upper="0.5" effort="50" velocity="9"/></joint>"""
+    leg = read_table(__file__, "leg")
     legs = leg.format(s="left", y=0.1) + leg.format(s="right", y=-0.1)
     base = """<link name="base"><inertial><mass value="5"/>
       <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""

@@ -17,6 +17,7 @@ from terrainkit_robots.smoke_test import checks as module
 from terrainkit_robots.smoke_test.short_training import TrainingRecord
 from terrainkit_robots.spec.robot_arrays import Robot
 from tests.robots import QUADRUPED
+from tests.tables import read_table
 
 RECORD = TrainingRecord(
     losses=[{"value": 0.1}],
@@ -78,16 +79,7 @@ def test_invalid_spec_fails_the_first_check(quadruped):
     assert "'tail'" in check.measured
 
 
-@pytest.mark.parametrize(
-    ("offset", "passed", "height"),
-    [
-        (0.0, True, "1.0 cm"),
-        (0.0095, True, "2.0 cm"),
-        (0.0105, False, "2.1 cm"),
-        (-0.0105, True, "0.0 cm"),
-        (-0.0115, False, "-0.1 cm"),
-    ],
-)
+@pytest.mark.parametrize(("offset", "passed", "height"), read_table(__file__, "spawn_height"))
 def test_spawn_height_is_that_of_the_feet(quadruped, offset, passed, height):
     robot = replace_spec(quadruped, spawn_height=quadruped.spec.spawn_height + offset)
     check = module.check_spawn_height(still_env(robot))

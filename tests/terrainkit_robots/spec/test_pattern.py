@@ -6,22 +6,10 @@ from hypothesis import strategies as st
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.spec.pattern import compile_pattern, max_matches
+from tests.tables import read_table
 
 
-@pytest.mark.parametrize(
-    ("pattern", "longest", "most"),
-    [
-        ("FL_hip_joint", 20, 1),
-        (".*_joint", 20, 21),
-        (".*_(hip|thigh)_joint", 20, 42),
-        (r"(FL|FR)_\*[*+?|(]_joint", 20, 2),
-        ("a|b|cd", 20, 3),
-        ("(a|b(c|d))?e", 20, 6),
-        ("(?:a|b)(?!.*c)x{2}", 9, 2 * 10 * 10),
-        ("a{b", 20, 1),
-        ("[]a*]x", 20, 1),
-    ],
-)
+@pytest.mark.parametrize(("pattern", "longest", "most"), read_table(__file__, "max_matches_is_an"))
 def test_max_matches_is_an_upper_bound(pattern, longest, most):
     compile_pattern(pattern)
     assert max_matches(pattern, longest) == most

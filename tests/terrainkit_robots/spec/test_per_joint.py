@@ -4,6 +4,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.spec.per_joint import by_joint, match_joints
+from tests.tables import read_table
 
 JOINTS = ("FL_hip_joint", "FL_calf_joint", "FR_hip_joint", "FR_calf_joint")
 
@@ -26,18 +27,7 @@ def test_pattern_matches_whole_name():
         by_joint({"hip": 1.0}, JOINTS)
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ({".*_hip_joint": 1}, "joints FL_calf_joint, FR_calf_joint are matched by no key of gain"),
-        ({"FL.*": 1, "FR_hip_joint": 1}, "joint FR_calf_joint is matched by no key of gain"),
-        ({".*": 1, "FL_hip_joint": 2}, 'joint FL_hip_joint is matched by ".*" and FL_hip_joint of'),
-        ({".*": 1, "FL_hip_jiont": 2}, "gain.FL_hip_jiont matches no joint; did you mean FL_hip_j"),
-        ({".*": 1, "x": 2}, "gain.x matches no joint$"),
-        ({".*": 1, "*_x": 2}, 'gain."*_x" is not a regular expression: nothing to repeat at posi'),
-        ({".*": 1, "(a+)+": 2}, 'gain."(a+)+" is a group that is repeated by +; only ? may follow'),
-    ],
-)
+@pytest.mark.parametrize(("table", "message"), read_table(__file__, "by_joint_error_names_key"))
 def test_by_joint_error_names_key_and_joint(table, message):
     expected = re.escape(message).replace(r"\$", "$")
     with pytest.raises(ConfigError, match=expected):

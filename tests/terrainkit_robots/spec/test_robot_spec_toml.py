@@ -7,6 +7,7 @@ import pytest
 
 from terrainkit.errors import ConfigError
 from terrainkit_robots.spec.robot_spec import MirrorJoint, Provenance, RobotSpec, unit_of
+from tests.tables import read_table
 
 NAMES = ["a", "Käfer", "a.b", '"', "\\", 'x\nversion = 2\n"', "#", "\u2028", " ", "\x7f"]
 NAMES += ["😀", "[a]"]
@@ -78,30 +79,13 @@ def test_inline_tables_and_integers_are_read(text):
     assert RobotSpec.from_toml(spec.to_toml()) == spec
 
 
-VERSION, BASE, MIRROR = "format_version = 1", 'base = "trunk"', "[mirror]"
-EFFORT, ORIGIN = "[effort]  # N m or N\na = 1.0", "\n[provenance]"
+EFFORT = "[effort]  # N m or N\na = 1.0"
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (VERSION, "", "format_version: got nothing; expected 1"),
-        (VERSION, "format_version = 2", "format_version: got 2; expected 1"),
-        (VERSION, "format_version = true", "format_version: got True; expected 1"),
-        (BASE, "", "base: missing; expected a non-empty string"),
-        (BASE, "base = 3", "base: got 3; expected a non-empty"),
-        (BASE, "base", "not a TOML file: Expected '=' after a key"),
-        (BASE, "base = 'a'\nbase = 'b'", "not a TOML file: Cannot overwrite a value"),
-        ("[effort]", "[efort]", "config has no key 'efort'; did you mean 'effort'? It has: name"),
-        ("\n[mirror]", "\n[[mirror]]", "mirror: got [a table]; expected a table"),
-        (MIRROR, "[mirror]\na = 3", "mirror.a: got 3; expected a table (MirrorJoint)"),
-        (MIRROR, "[mirror]\na = { joint = 'b' }", "mirror.a.sign: missing; expected"),
-        (MIRROR, "[mirror]\na = { joint = 'b', sign = 2 }", "mirror.a.sign: got 2;"),
-        (MIRROR, "[mirror]\na.b = { joint = 'b', sign = 1 }", "(a key with a dot needs quotes)"),
-        (ORIGIN, f"{ORIGIN}\neffort = {{ origin = 'me' }}", "provenance.effort.origin: got"),
-        (ORIGIN, f"{ORIGIN}\nx = {{ origin = 'solved' }}", "provenance: got 'x'; expected"),
-        (ORIGIN, f"{ORIGIN}\neffort = {{ orgin = 'solved' }}", "provenance.effort has no key 'or"),
-        (EFFORT, "[effort]\na.c = 1.0", "effort.a: got a table; expected a number"),
+        *read_table(__file__, "error_names_the_key"),
         (EFFORT, f"[effort]\na = {'9' * 30}", "effort.a: got an integer beyond 64 bits"),
     ],
 )
@@ -148,16 +132,7 @@ def test_load_error_names_the_file(tmp_path, data, message):
         RobotSpec.load(path)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("none.toml", r"cannot read .*: No such file or directory"),
-        ("a\0b", "cannot read"),
-        ("pipe", "cannot read .*pipe: not a regular file"),
-        (".", "not a regular file"),
-        ("/dev/zero", "cannot read /dev/zero: not a regular file"),
-    ],
-)
+@pytest.mark.parametrize(("name", "message"), read_table(__file__, "load_rejects_other"))
 def test_load_rejects_other_than_regular_files(tmp_path, name, message):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ConfigError, match=message):

@@ -17,6 +17,7 @@ from terrainkit_robots.viewer.show_robot import (
     slider_range,
 )
 from tests.small_robots import ball, joint, link
+from tests.tables import read_table
 
 
 @pytest.fixture
@@ -164,16 +165,7 @@ GRIPPER = (
 )
 
 
-@pytest.mark.parametrize(
-    ("shape", "size", "upper"),
-    [
-        ("box", (1, 2, 3), (1, 2, 3)),
-        ("cylinder", (1, 2), (1, 1, 2)),
-        ("capsule", (1, 2), (1, 1, 3)),
-        ("sphere", (2,), (2, 2, 2)),
-        ("ellipsoid", (1, 2, 3), (1, 2, 3)),
-    ],
-)
+@pytest.mark.parametrize(("shape", "size", "upper"), read_table(__file__, "surfaces_of_shapes"))
 def test_surfaces_of_shapes(shape, size, upper):
     points = shape_surface(SimpleNamespace(shape=shape, size=size), None).points
     np.testing.assert_allclose(points.max(axis=0), upper, rtol=0.01)

@@ -23,7 +23,7 @@ from terrainkit_robots.transforms import Matrix, matrix_to_quat, quat_to_matrix
 _MAX_SHAPES = 400
 """A robot with more collision shapes is not checked, because the number of pairs is quadratic."""
 
-_MAX_PAIRS = 10_000
+MAX_PAIRS = 10_000
 """Number of pairs that are measured in one sweep; if there are more, the closest ones."""
 
 _MIN_THICKNESS = 1e-6
@@ -107,7 +107,7 @@ class OverlapScene:
             data.geom_xpos[:] = world[:, :3, 3]
             data.geom_xmat[:] = world[:, :3, :3].reshape(-1, 9)
             found = []
-            for a, b in self._close_pairs(poses, _MAX_PAIRS // count):
+            for a, b in self._close_pairs(poses, MAX_PAIRS // count):
                 depth = -mujoco.mj_geomDistance(model, data, a, b, 0.0, None)
                 if depth > 0:
                     first, second = self._shapes[a][1], self._shapes[b][1]

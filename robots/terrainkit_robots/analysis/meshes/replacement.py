@@ -14,7 +14,7 @@ MAX_COLLISION_FACES = 20_000
 """A collision mesh with more faces is usually a copy of the visual mesh. Most collision meshes have
 fewer than 5,000, and a hull of 1,000 faces deviates by less than 1% of its size."""
 
-_SIMPLIFIED_FACES = 100_000
+MAX_SIMPLIFIED_FACES = 100_000
 """Maximum number of faces of a simplified mesh: half of MuJoCo's limit."""
 
 _INITIAL_CELLS = 512
@@ -73,7 +73,7 @@ def simplified_stl(used: UsedMesh) -> bytes:
         coarse = cluster_vertices(surface, cells)
         if not len(coarse.faces):
             raise MeshError("has no faces left after its vertices are merged")
-        share = _SIMPLIFIED_FACES / len(coarse.faces)
+        share = MAX_SIMPLIFIED_FACES / len(coarse.faces)
         if share >= 1:
             return binary_stl(coarse)
         # The number of faces grows with the square of the number of cells.

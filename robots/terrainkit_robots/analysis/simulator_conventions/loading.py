@@ -25,7 +25,7 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 if TYPE_CHECKING:
     from lxml import etree
 
-_MAX_BODIES = 600
+MAX_BODIES = 600
 """The time of MuJoCo's compiler grows with the third power of a chain: half a second for these."""
 
 _MAX_BYTES = 32 * 2**20
@@ -37,7 +37,7 @@ _MAX_PIXELS = 4096 * 4096
 _MAX_ALLOCATION = 1_000
 """Largest number in <size>, which allocates user data of every element, and keyframes."""
 
-_MAX_PATHS = 20_000
+MAX_PATHS = 20_000
 """Number of paths at which files are searched."""
 
 _UNSAFE_PROBLEMS = frozenset({"XML001", "XML010"})
@@ -136,9 +136,9 @@ def check_mujoco_cost(model: RobotModel, *, with_files: bool = True) -> None:
     """
     if model.kind == "xacro":
         raise NotAttemptedError("MuJoCo does not read xacro, and the expanded text has no file")
-    if len(model.links) > _MAX_BODIES:
+    if len(model.links) > MAX_BODIES:
         raise NotAttemptedError(
-            f"number of bodies: got {len(model.links)}; expected at most {_MAX_BODIES} for MuJoCo"
+            f"number of bodies: got {len(model.links)}; expected at most {MAX_BODIES} for MuJoCo"
         )
     if not is_utf8(model.file):
         raise NotAttemptedError("MuJoCo opens only paths that are UTF-8")
@@ -254,9 +254,9 @@ def _check_cost(files: tuple[Path, ...], *, with_files: bool) -> None:
         return
     parents = {source.parent for source in files}
     paths = len(names) * len(parents) * len(directories)
-    if paths > _MAX_PATHS:
+    if paths > MAX_PATHS:
         raise NotAttemptedError(
-            f"number of files and folders: got {paths} paths; expected at most {_MAX_PATHS}"
+            f"number of files and folders: got {paths} paths; expected at most {MAX_PATHS}"
         )
     _check_files({path for name in names for path in _candidates(name, parents, directories)})
 

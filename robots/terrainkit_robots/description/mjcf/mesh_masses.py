@@ -10,7 +10,7 @@ from terrainkit_robots.description.mjcf.tree import Node
 from terrainkit_robots.files import open_regular
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 
-_MAX_BYTES = 32 * 2**20
+MAX_BYTES = 32 * 2**20
 """Size of all files that are weighed; MuJoCo needs about a second for them."""
 
 _FORMATS = frozenset({".stl", ".obj", ".msh"})
@@ -84,12 +84,12 @@ class MeshMasses:
         if data is None:
             try:
                 with open_regular(file.path) as stream:
-                    data = stream.read(_MAX_BYTES - self._bytes + 1)
+                    data = stream.read(MAX_BYTES - self._bytes + 1)
             except (OSError, ValueError):
                 return False
         self._bytes += len(data)
         self._files[name] = f"{len(self._files)}{file.path.suffix.lower()}", data
-        return self._bytes <= _MAX_BYTES
+        return self._bytes <= MAX_BYTES
 
     def _write(self, spec: Any, mesh: Any, name: str) -> None:
         """Add a mesh to a spec, with the data that was read."""

@@ -20,10 +20,10 @@ from terrainkit_robots.quiet_mujoco import quiet_mujoco
 if TYPE_CHECKING:
     import mujoco
 
-_MAX_ATTEMPTS = 50
+MAX_ATTEMPTS = 50
 """Maximum number of parser runs; a file with more kinds of errors is not MJCF."""
 
-_MAX_SECONDS = 4.0
+MAX_SECONDS = 4.0
 """Time after which the parser is not run again [s]."""
 
 _MIN_SIMILARITY = 0.7
@@ -91,7 +91,7 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
         _check_numbers(tree, node)
     start = time.monotonic()
     message = ""
-    for _ in range(_MAX_ATTEMPTS):
+    for _ in range(MAX_ATTEMPTS):
         limit_size(tree)
         text, attached, lines = tree.write()
         try:
@@ -102,7 +102,7 @@ def parse_mjcf(tree: MjcfTree) -> tuple["mujoco.MjSpec | None", list[Node]]:
             message = _clean_message(str(error))
             if not _repair(tree, lines, str(error)):
                 return None, lines
-        if time.monotonic() - start > _MAX_SECONDS:
+        if time.monotonic() - start > MAX_SECONDS:
             break
     reason = f"MuJoCo still rejects the file without the reported elements ({message}); "
     tree.add_problem(tree.root, "XML011", reason + "the robot is not checked")

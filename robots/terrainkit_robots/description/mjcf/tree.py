@@ -30,7 +30,7 @@ MAX_ELEMENTS = 8_000
 _MAX_DEPTH = 400
 """Maximum depth of nested elements; MuJoCo's parser stops at 500."""
 
-_MAX_FILES = 200
+MAX_FILES = 200
 """Maximum number of files of a model."""
 
 _CHARS_PER_ELEMENT = 1000
@@ -315,7 +315,7 @@ class _TreeReader:
         return path in self._contents or exists(path)
 
     def _read(self, path: Path, source: Source, name: str) -> XmlDocument | None:
-        if len(self.files) >= _MAX_FILES or self._bytes > MAX_BYTES:
+        if len(self.files) >= MAX_FILES or self._bytes > MAX_BYTES:
             self._report(
                 source, f"{name} is not read: too many included files, or too much data", name
             )

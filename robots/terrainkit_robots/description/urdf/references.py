@@ -42,10 +42,10 @@ _PLUGIN_TAGS: Mapping[str, str] = {
 
 _NUMBERS = re.compile(r"\d+")
 
-_MAX_SUGGESTIONS = 20
+MAX_SUGGESTIONS = 20
 """Maximum number of wrong names for which a similar name is suggested."""
 
-_MAX_COMPARED = 20_000
+MAX_COMPARED = 20_000
 """Maximum number of names to search for a suggestion."""
 
 
@@ -70,7 +70,7 @@ def _unknown_names(doc: XmlDocument, links: set[str], joints: set[str]) -> Itera
         if not name or name in known[kind] or name in found or has_variable(name):
             continue
         near = ""
-        if len(found) < _MAX_SUGGESTIONS and len(known[kind]) <= _MAX_COMPARED:
+        if len(found) < MAX_SUGGESTIONS and len(known[kind]) <= MAX_COMPARED:
             near = closest(name, known[kind])
             # Another number is another element, not a misspelling.
             near = "" if _NUMBERS.sub("", near) == _NUMBERS.sub("", name) else near

@@ -24,7 +24,7 @@ MAX_BYTES = 32 * 2**20
 MAX_ELEMENTS = 50_000
 """Maximum number of elements of a document; the largest humanoids have a few thousand."""
 
-_MAX_ATTRIBUTES = 1000
+MAX_ATTRIBUTES = 1000
 """Maximum number of attributes of an element; libxml2 needs quadratic time in their number."""
 
 _MAX_ERRORS = 20
@@ -109,8 +109,8 @@ def parse_xml(file: Path, data: bytes) -> XmlDocument:
     if len(elements) > MAX_ELEMENTS:
         message = f"the file has more than {MAX_ELEMENTS} elements; it is not parsed"
         return _rejected(file, data, message)
-    if any(len(element.attrib) > _MAX_ATTRIBUTES for element in elements):
-        message = f"an element has more than {_MAX_ATTRIBUTES} attributes; the file is not parsed"
+    if any(len(element.attrib) > MAX_ATTRIBUTES for element in elements):
+        message = f"an element has more than {MAX_ATTRIBUTES} attributes; the file is not parsed"
         return _rejected(file, data, message)
     line_offset = data[: len(data) - len(text)].count(b"\n")
     sources = _sources(file, text, elements, line_offset)

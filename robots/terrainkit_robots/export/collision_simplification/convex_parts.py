@@ -22,7 +22,7 @@ PARAMETERS = {**SEARCH, "threshold": 0.05, "max_convex_hull": 16}
 """CoACD's default threshold, and a number of parts that a simulator of thousands of robots can
 handle."""
 
-_MAX_FACES = 50_000
+MAX_FACES = 50_000
 """Larger meshes are decimated first."""
 
 
@@ -41,7 +41,7 @@ def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
     file = None if cache is None else cache / f"{key}.npz"
     parts = None if file is None else read_parts(file)
     if parts is None:
-        parts = _decompose(decimate(surface, _MAX_FACES))
+        parts = _decompose(decimate(surface, MAX_FACES))
         if file is not None:
             write_parts(file, parts)
     return parts
@@ -49,7 +49,7 @@ def convex_parts(surface: Surface, cache: Path | None) -> tuple[Surface, ...]:
 
 def _key(surface: Surface) -> str:
     """Return a hash of the surface, the parameters and the version of CoACD."""
-    what = json.dumps([dict(PARAMETERS), _MAX_FACES, _version()], sort_keys=True)
+    what = json.dumps([dict(PARAMETERS), MAX_FACES, _version()], sort_keys=True)
     points = np.ascontiguousarray(surface.points, dtype="<f8")
     faces = np.ascontiguousarray(surface.faces, dtype="<i8")
     digest = hashlib.sha256(f"{what} {len(points)} {len(faces)} ".encode())

@@ -13,7 +13,7 @@ from terrainkit.errors import ExportError
 from terrainkit.files.atomic_write import atomic_write
 from terrainkit_robots.mesh.surface import Surface
 
-_MAX_BYTES = 64 * 2**20
+MAX_BYTES = 64 * 2**20
 """Maximum size of a cache file."""
 
 _NPZ_ERRORS = (
@@ -38,7 +38,7 @@ def cache_folder() -> Path:
 def read_parts(file: Path) -> tuple[Surface, ...] | None:
     """Return the parts in an npz file; None if it does not exist, is too large or is damaged."""
     try:
-        if not file.is_file() or file.stat().st_size > _MAX_BYTES:
+        if not file.is_file() or file.stat().st_size > MAX_BYTES:
             return None
         # from memory, because numpy does not close the file if it is damaged
         with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as arrays:

@@ -34,7 +34,7 @@ _MAX_HULL_VERTICES = 500
 _MAX_HULL_RATIO = 2.0
 """Meshes with a larger ratio of hull volume to volume are decomposed, as in rule MSH014."""
 
-_MAX_WELDED_FACES = 500_000
+MAX_WELDED_FACES = 500_000
 """Larger meshes are decimated before their vertices are merged."""
 
 
@@ -185,8 +185,8 @@ class _Simplifier:
 
     def _welded(self, path: Path) -> Surface:
         surface = self._meshes.surface(path)
-        if len(surface.faces) > _MAX_WELDED_FACES:
-            return welded(decimate(surface, _MAX_WELDED_FACES))
+        if len(surface.faces) > MAX_WELDED_FACES:
+            return welded(decimate(surface, MAX_WELDED_FACES))
         return self._meshes.welded(path)
 
     def _is_nonconvex(self, mesh: MeshFile) -> bool:

@@ -17,7 +17,7 @@ ROUGH = (SubTerrain(terrain="rough"),)
 def test_node_grid_estimates_the_memory_of_a_mesh(monkeypatch, build, terrain):
     terrain_map = generate(MapConfig(rows=5, cols=10, border=1.0, **terrain))
     estimates = []
-    monkeypatch.setattr("terrainkit.geometry.mesh.row_buffer._MAX_GROWTH", 1 << 12)
+    monkeypatch.setattr("terrainkit.geometry.mesh.row_buffer.MAX_GROWTH", 1 << 12)
     monkeypatch.setattr(
         "terrainkit.geometry.mesh.node_grid.check_memory",
         lambda needed, _: estimates.append(tracemalloc.get_traced_memory()[0] + needed),

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from terrainkit.geometry.mesh.wall_quads import wall_quads
+from tests.tables import read_table
 from tests.terrainkit.geometry.heightfields import node_grid_of
 
 CELL = 0.1
@@ -19,17 +20,7 @@ def test_wall_quads_of_no_quads_are_empty():
     assert not list(wall_quads(node_grid_of([[0, 0]], 0.1), np.array([], dtype=np.int64), 7))
 
 
-@pytest.mark.parametrize(
-    ("corners", "centers"),
-    [
-        ((0, 1, 1, 0), [0.0, 1.0]),
-        ((1, 0, 0, 0), [0.0, 1.0]),
-        ((0, 1, 2, 3), [0.0, 1.0, 2.0, 3.0]),
-        ((0, 0.0625, 1, 3), [0.03125, 1.0, 3.0]),  # 0 and 0.0625 are joined
-        ((0, 0.09375, 0.1875, 0.09375), [0.09375]),  # no wall at all
-        ((0, 0.0625, 0.125, 0.1875), [0.09375]),  # one wall: (0 + 1 + 2 + 3) / 4 sixteenths
-    ],
-)
+@pytest.mark.parametrize(("corners", "centers"), read_table(__file__, "wall_quads_center"))
 def test_wall_quads_center_has_one_vertex_per_height(corners, centers):
     triangles, vertices = center_quad(corners)
     np.testing.assert_allclose(vertices, [(CELL, CELL, z) for z in centers], rtol=1e-6)

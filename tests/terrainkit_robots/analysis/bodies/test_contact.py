@@ -16,6 +16,7 @@ from terrainkit_robots.description.model import Geometry, Link, Source
 from terrainkit_robots.mesh.mesh_cache import Meshes
 from terrainkit_robots.transforms import rpy_to_matrix
 from tests.small_robots import URDF
+from tests.tables import read_table
 
 SOURCE = Source(file=URDF, line=1)
 SIDEWAYS = np.array([0.0, 1.0, 0.0])
@@ -138,18 +139,7 @@ def test_flat_foot_angle_of_round_foot_is_zero(body):
     assert flat_foot_angle(body, pose(), SIDEWAYS, Meshes()) == 0
 
 
-@pytest.mark.parametrize(
-    ("points", "expected"),
-    [
-        ([*SQUARE, [1, 1], [1, 0], [0, 0]], SQUARE),
-        ([[1, 2]], [[1, 2]]),
-        ([[1, 2], [1, 2], [1, 2]], [[1, 2]]),
-        ([[1, 2], [1 + 4e-10, 2]], [[1, 2]]),
-        ([[1, 2], [0, 0]], [[0, 0], [1, 2]]),
-        ([[0, 0], [2, 2], [1, 1], [0.5, 0.5]], [[0, 0], [2, 2]]),
-        ([[0, 0], [1, 0], [0, 1]], [[0, 0], [1, 0], [0, 1]]),
-    ],
-)
+@pytest.mark.parametrize(("points", "expected"), read_table(__file__, "convex_hull"))
 def test_convex_hull(points, expected):
     assert convex_hull(np.array(points, dtype=float)).tolist() == expected
 

@@ -172,7 +172,7 @@ def test_scene_without_shapes():
 
 @pytest.mark.parametrize(("limit", "count"), [(10, 3), (2, 2), (1, 1)])
 def test_sweep_measures_the_closest_pairs(monkeypatch, limit, count):
-    monkeypatch.setattr(overlap, "_MAX_PAIRS", limit)
+    monkeypatch.setattr(overlap, "MAX_PAIRS", limit)
     balls = "".join(ball(0.1, f"0 0 {z}") for z in (0.15, 0, 0.1))
     found = depths(apart(ball(0.1), balls, "0 0 0"))
     assert found == [0.2, 0.1, 0.05][:count]

@@ -12,15 +12,10 @@ from terrainkit_robots.description.model import Geometry, MeshFile, Source
 from terrainkit_robots.mesh.mesh_cache import MeshError, Meshes
 from terrainkit_robots.transforms import rpy_to_matrix
 from tests.small_robots import URDF
+from tests.tables import read_table
 
 SOURCE = Source(file=URDF, line=1)
-SIZES = {
-    "box": (0.1, 0.2, 0.3),
-    "sphere": (0.5,),
-    "cylinder": (0.1, 0.4),
-    "capsule": (0.1, 0.4),
-    "ellipsoid": (0.1, 0.2, 0.3),
-}
+SIZES = read_table(__file__, "sizes")
 every_shape = pytest.mark.parametrize("shape", SIZES)
 
 
@@ -53,14 +48,7 @@ def wedge(tmp_path):
 
 @pytest.mark.parametrize(
     ("shape", "along_x", "along_z", "diagonal", "content"),
-    [
-        # The diagonal direction is (0.6, 0, -0.8).
-        ("box", 0.1, 0.3, 0.06 + 0.24, 0.2 * 0.4 * 0.6),
-        ("sphere", 0.5, 0.5, 0.5, math.pi / 6),
-        ("cylinder", 0.1, 0.4, 0.06 + 0.32, math.pi * 0.01 * 0.8),
-        ("capsule", 0.1, 0.5, 0.1 + 0.32, math.pi * 0.01 * 0.8 + math.pi / 6 * 0.008),
-        ("ellipsoid", 0.1, 0.3, math.hypot(0.06, 0.24), 4 / 3 * math.pi * 0.006),
-    ],
+    read_table(__file__, "support_and_volume_by_hand"),
 )
 def test_support_and_volume_by_hand(shape, along_x, along_z, diagonal, content):
     directions = np.array([[1, 0, 0], [0, 0, 1], [0.6, 0, -0.8]])

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from terrainkit_robots.analysis.bodies.tree import build_tree
 from terrainkit_robots.description.model import Joint, Link, RobotModel, Source
 from tests.small_robots import URDF
+from tests.tables import read_table
 
 SOURCE = Source(file=URDF, line=1)
-LOST = "unknown-link"
+TREES = read_table(__file__, "trees")
 
 
 def robot(links, joints, kind="urdf"):
@@ -38,31 +39,9 @@ def rejected(tree):
     return {joint.name: reason for joint, reason in tree.rejected}
 
 
-@pytest.mark.parametrize(
-    ("links", "joints", "roots", "order", "reasons"),
-    [
-        pytest.param("", "", "", "", {}, id="no links"),
-        pytest.param("e d c b a", "ab bc ad de", "a", "abcde", {}, id="depth first"),
-        pytest.param("a b c d", "ad ab ac", "a", "adbc", {}, id="in the order of the joints"),
-        pytest.param("x a b p q r", "ab pq qr", "pax", "pqr", {}, id="most descendants"),
-        pytest.param("b a", "", "ba", "b", {}, id="first of equal roots"),
-        pytest.param("a b", "abj abj", "a", "ab", {"j": "duplicate"}, id="twice"),
-        pytest.param("a b c", "abj acj", "a", "abc", {}, id="equal names"),
-        pytest.param("a b", "ax yb", "ab", "a", {"a-x": LOST, "y-b": LOST}, id="unknown links"),
-        pytest.param("a b c", "ab ac bc", "a", "abc", {"b-c": "second-parent"}, id="second parent"),
-        pytest.param("a b", "ab aa", "a", "ab", {"a-a": "cycle"}, id="below itself"),
-        # Every link has a parent, so the cycle is cut above its first link.
-        pytest.param("a b c d", "ab bc ca cd", "b", "bcad", {"a-b": "cycle"}, id="cycle"),
-        pytest.param(
-            "a b c d", "ab ba cd dc", "bd", "ba", {"a-b": "cycle", "c-d": "cycle"}, id="two cycles"
-        ),
-        # The root of the robot never had a parent, although the others have more links.
-        pytest.param("a b p q r", "ab pq qr rp", "aq", "ab", {"p-q": "cycle"}, id="cycle beside"),
-        pytest.param("p q r a b", "xp pq qr ab", "ap", "ab", {"x-p": LOST}, id="lost parent"),
-        pytest.param("c", "wc", "c", "c", {"w-c": LOST}, id="no world"),
-    ],
-)
-def test_tree(links, joints, roots, order, reasons):
+@pytest.mark.parametrize("title", TREES)
+def test_tree(title):
+    links, joints, roots, order, reasons = TREES[title]
     found = tree(links, joints)
     assert ("".join(found.roots), "".join(found.order)) == (roots, order)
     assert rejected(found) == reasons
@@ -94,7 +73,7 @@ def test_first_link_of_a_name_is_kept():
     ("links", "kind", "order", "reasons"),
     [
         (["a", "b"], "mjcf", ("a", "b"), {}),
-        (["a", "b"], "urdf", ("a", "b"), {"world-a": LOST}),
+        (["a", "b"], "urdf", ("a", "b"), {"world-a": "unknown-link"}),
         (["world", "a", "b"], "urdf", ("world", "a", "b"), {}),
         (["world", "a", "b"], "mjcf", ("world", "a", "b"), {}),
     ],

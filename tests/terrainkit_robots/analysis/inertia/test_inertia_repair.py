@@ -9,6 +9,7 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.edits import EditedBytes
 from tests.small_robots import facts, link
+from tests.tables import read_table
 
 QUADRUPED = bundled.urdf_path("quadruped")
 THIGH = 'fullinertia="0.00584 0.0058 0.00103 8.72e-05 -0.000289 0.000808"'
@@ -41,16 +42,7 @@ def repaired(tmp_path):
     return make
 
 
-@pytest.mark.parametrize(
-    ("axes", "removed"),
-    [
-        ("", []),
-        ('quat="1 0 0 0"', ["quat"]),
-        ('quat="0.5 0.5 0.5 0.5"', ["quat"]),
-        ('euler="0 0.3 0"', ["euler"]),
-        ('zaxis="1 0 1"', ["zaxis"]),
-    ],
-)
+@pytest.mark.parametrize(("axes", "removed"), read_table(__file__, "fix_takes_inertia_of_mirror"))
 def test_fix_takes_inertia_of_mirror_image(repaired, axes, removed):
     text = QUADRUPED.with_suffix(".xml").read_text()
     assert THIGH in text

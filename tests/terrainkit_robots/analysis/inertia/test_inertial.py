@@ -11,21 +11,10 @@ from terrainkit_robots.analysis.inertia.inertial import (
 from terrainkit_robots.analysis.inertia.merged_inertia import merged_inertia, parallel_axis
 from terrainkit_robots.description.model import Inertial, Source
 from tests.small_robots import URDF, facts, link
+from tests.tables import read_table
 
 
-@pytest.mark.parametrize(
-    ("mass", "is_valid", "has_mass"),
-    [
-        (1, True, True),
-        (0, True, False),
-        (1e-14, True, False),
-        (1.1e-14, True, True),
-        (-1, False, False),
-        ("x", False, False),
-        (0.99e12, True, True),
-        (1e12, False, False),
-    ],
-)
+@pytest.mark.parametrize(("mass", "is_valid", "has_mass"), read_table(__file__, "mass_is_valid"))
 def test_mass_is_valid_in_a_range(mass, is_valid, has_mass):
     (body,) = facts(link("a", mass=mass)).bodies
     assert (has_valid_mass(body), list(bodies_with_mass([body]))) == (is_valid, [body] * has_mass)

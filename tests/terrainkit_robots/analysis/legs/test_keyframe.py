@@ -10,6 +10,7 @@ from terrainkit_robots.analysis.legs.keyframe import (
 )
 from terrainkit_robots.analysis.legs.standing_pose import solve_standing_pose
 from tests.small_robots import box, chain, facts, link
+from tests.tables import read_table
 
 ROOTS = {"FL": (0.3, 0.2), "FR": (0.3, -0.2), "RL": (-0.3, 0.2), "leg": (-0.3, -0.2)}
 
@@ -30,22 +31,7 @@ def table(knee=0.0, trunk_z=0.0, lift=0.0, com=0.0, joints=slice(None)):
     return Facts(replace(model, keyframe=dict(list(positions.items())[joints]))).leg_model
 
 
-@pytest.mark.parametrize(
-    ("changes", "defect"),
-    [
-        ({}, ""),
-        # At least 0.01 of the length above the ground.
-        ({"trunk_z": -0.5637}, ""),
-        ({"trunk_z": -0.5639}, "trunk lies on the ground"),
-        # At most 0.1 of the length above the ground.
-        ({"lift": 0.0619}, ""),
-        ({"lift": 0.0621}, "leg1 is 0.062 m above the ground"),
-        # At most 0.03 of the length outside of the feet at x = +-0.3.
-        ({"com": 0.3185}, ""),
-        ({"com": 0.3187}, "the center of mass is 0.019 m outside of the feet"),
-        ({"com": -0.3187}, "the center of mass is 0.019 m outside of the feet"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "defect"), read_table(__file__, "keyframe_defect_names_cause"))
 def test_keyframe_defect_names_cause(changes, defect):
     robot = table(**changes)
     assert keyframe_defect(robot) == defect

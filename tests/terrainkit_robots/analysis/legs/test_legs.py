@@ -10,6 +10,7 @@ from terrainkit_robots.analysis.legs.legs import _pitch_axis, _roles, mean_lengt
 from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from tests.small_robots import ball, box, chain, facts, joint, link, shape
+from tests.tables import read_table
 
 DOG = ("roll", "hip", "knee")
 HUMAN = ("hip", "roll", "yaw", "knee", "ankle", "roll")
@@ -273,24 +274,7 @@ def tilted(degrees, axis=Y, other=Z):
     return math.cos(angle) * axis + math.sin(angle) * other
 
 
-@pytest.mark.parametrize(
-    ("axes", "roles"),
-    [
-        (("1 0 0", "0 1 0", "0 1 0"), "roll hip knee"),
-        (("0 0 1", "0 1 0", "0 1 0"), "yaw hip knee"),
-        (("0 0 1", "1 0 0", "0 1 0", "0 1 0", "0 1 0"), "yaw roll hip knee ankle"),
-        (("0 1 0", "1 0 0", "0 1 0"), "hip roll knee"),
-        (("0 -1 0", "0 1 0"), "hip knee"),
-        (("0 0.866 0.5", "1 0 0", "0 0 1", "0 1 0", "0 1 0"), "hip roll yaw knee ankle"),
-        (("0 0.707 0.707", "1 0 0", "0 0 1", "0 1 0", "0 1 0"), "hip roll yaw knee ankle"),
-        # An axis that is tilted up by 52 degrees bends the leg, and one by 54 degrees does not.
-        (("0 0.616 0.788", "0 1 0", "0 1 0"), "hip knee ankle"),
-        (("0 0.588 0.809", "0 1 0", "0 1 0"), "yaw hip knee"),
-        # It moves the foot forward rather than sideways up to 45 degrees.
-        (("0.695 0.719 0", "0 1 0", "0 1 0"), "hip knee ankle"),
-        (("0.719 0.695 0", "0 1 0", "0 1 0"), "roll hip knee"),
-    ],
-)
+@pytest.mark.parametrize(("axes", "roles"), read_table(__file__, "roles_follow_axes"))
 def test_roles_follow_axes(axes, roles):
     # The last two links have 0.2 and 0.1 m; the other joints are at one point.
     lengths = (*[1e-9] * (len(axes) - 3), 0.2, 0.2, 0.1)[-len(axes) :]
@@ -298,15 +282,7 @@ def test_roles_follow_axes(axes, roles):
     assert [" ".join(leg.roles) for leg in found] == [roles] * 2
 
 
-@pytest.mark.parametrize(
-    ("heights", "roles"),
-    [
-        ((0, 0.2, 0.4), "hip knee"),
-        ((0, 0.1, 0.4, 0.5), "hip knee ankle"),
-        ((0, 0.1, 0.3, 0.5), "hip hip knee"),
-        ((0, 0.2, 0.3, 0.4, 0.5), "hip knee ankle ankle"),
-    ],
-)
+@pytest.mark.parametrize(("heights", "roles"), read_table(__file__, "knee_is_the_joint_closest"))
 def test_knee_is_the_joint_closest_to_the_middle(heights, roles):
     path = [np.array([0, 0, -height]) for height in heights]
     bending = range(len(path) - 1)

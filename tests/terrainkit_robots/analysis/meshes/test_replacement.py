@@ -64,8 +64,8 @@ def test_simplified_mesh_has_few_faces(used, monkeypatch):
     mesh = used()
     assert simplified_stl(mesh)[84:] != b""
     assert faces(simplified_stl(mesh)) == 1280
-    monkeypatch.setattr(replacement, "_SIMPLIFIED_FACES", 300)
+    monkeypatch.setattr(replacement, "MAX_SIMPLIFIED_FACES", 300)
     assert 100 < faces(simplified_stl(mesh)) <= 300
-    monkeypatch.setattr(replacement, "_SIMPLIFIED_FACES", 1)
+    monkeypatch.setattr(replacement, "MAX_SIMPLIFIED_FACES", 1)
     with pytest.raises(replacement.MeshError, match="has no faces left"):
         simplified_stl(mesh)

@@ -19,18 +19,9 @@ from terrainkit_robots.description.fix import WriteFile
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.lint.fixes.edits import EditedBytes
 from terrainkit_robots.mesh.mesh_cache import Meshes
+from tests.tables import read_table
 
-TWO_LINKS = """<robot name="r">
-  <link name="a">
-    <visual><geometry><mesh filename="m/foot.stl"/></geometry></visual>
-    <collision><geometry><mesh filename="./m/foot.stl"/></geometry></collision>
-  </link>
-  <link name="b">
-    <collision><geometry><mesh filename="m/foot.stl"/></geometry></collision>
-    <visual><geometry><mesh filename="m/hand.stl"/></geometry></visual>
-    <visual><geometry><box size="1 1 1"/></geometry></visual>
-  </link>
-</robot>"""
+TWO_LINKS = read_table(__file__, "two_links")
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ from terrainkit_robots.analysis.simulator_conventions.fixed_joints import (
     merged_joints,
 )
 from tests.small_robots import facts, mjcf, tree_text
+from tests.tables import read_table
 
 
 def merged_tree(robot, simulator):
@@ -15,16 +16,7 @@ def merged_tree(robot, simulator):
     return merge_joints(robot.tree, robot.bodies, merged)
 
 
-@pytest.mark.parametrize(
-    ("simulator", "bodies"),
-    [
-        ("MuJoCo", "baaaa"),
-        ("Genesis", "baaaa"),
-        ("Isaac Gym", "baatt"),
-        ("Isaac Lab", "baatt"),
-        ("PyBullet", "bamtc"),
-    ],
-)
+@pytest.mark.parametrize(("simulator", "bodies"), read_table(__file__, "attribute_keeps_a_link"))
 def test_attribute_keeps_a_link_where_it_is_read(simulator, bodies):
     # Links that are fixed to a link that is kept are merged into that.
     robot = facts(tree_text("ja: b > a", "jm!: a > m", "jt!*: m > t", "jc!: t > c"))

@@ -7,6 +7,7 @@ import pytest
 from terrainkit_robots.description import bundled
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from tests.small_robots import facts, floating, mjcf, tree_text
+from tests.tables import read_table
 
 GEOM = '<geom size="0.1" mass="1"/>'
 
@@ -73,24 +74,9 @@ def test_kept_link_is_a_body():
     }
 
 
-ALL_SIMULATORS = ["MuJoCo", "Isaac Gym", "Isaac Lab", "Genesis", "PyBullet"]
-
-
 @pytest.mark.parametrize(
     ("tree", "gym", "lab", "uncertain"),
-    [
-        ("ja: b > a, jc: b > c, jd: a > d, je: c > e", "ja jd jc je", "ja jc jd je", []),
-        # If merged, c is a sibling of a; otherwise it is one level below, after d.
-        ("ja: b > a, jb!: b > bb, jc: bb > c, jd: a > d", "ja jd jc", "ja jc jd", ["Isaac Lab"]),
-        # In the file, - sorts before 1. In USD it becomes _ and sorts after 1.
-        ("a1: b > p, a-z: b > q", "a1 a-z", "a1 a-z", []),
-        # By the names of the links, q is after p.
-        ("a1: b > q, a2: b > p", "a1 a2", "a1 a2", ["Isaac Gym"]),
-        # In the order of the file, a2 is first.
-        ("a2: b > p, a1: b > q", "a1 a2", "a1 a2", ["Isaac Gym", "Isaac Lab"]),
-        # One joint is rejected.
-        ("ja: b > a, jc: b > c, jd: a > c", "ja jc", "ja jc", ALL_SIMULATORS),
-    ],
+    read_table(__file__, "orders_are_certain_if_all_variants_agree"),
 )
 def test_orders_are_certain_if_all_variants_agree(tree, gym, lab, uncertain):
     robot = urdf(*tree.split(", "))

@@ -16,6 +16,7 @@ from terrainkit_robots.description import bundled
 from terrainkit_robots.description.load import load_robot
 from tests.robots import ROBOTS
 from tests.small_robots import ball, joint, link, shape
+from tests.tables import read_table
 
 BODY = '<body><freejoint/><geom size="0.1"/></body>'
 LINK = '<robot name="r"><link name="a"/></robot>'
@@ -102,14 +103,7 @@ GENERATED = "<asset><texture name='t' type='2d' builtin='flat' width='{}' height
 @pytest.mark.parametrize(
     ("inside", "why"),
     [
-        ('<worldbody><replicate count="9"><body/></replicate></worldbody>', "<replicate>"),
-        ('<worldbody><body><composite type="cable"/></body></worldbody>', "<composite>"),
-        ('<extension><plugin plugin="mujoco.pid"/></extension>', "<extension>"),
-        ('<asset><hfield name="h" nrow="9" ncol="9" size="1 1 1 1"/></asset>', "<hfield"),
-        ('<custom><numeric name="n" size="9"/></custom>', "<numeric size"),
-        ('<size nuser_geom="1001"/>', "<size nuser_geom"),
-        ('<size nkey="-1001"/>', "<size nkey"),
-        ('<size nkey="many"/>', "<size nkey"),
+        *read_table(__file__, "costly_elements_are_not_passed_to_mujoco"),
         (GENERATED.format(4097), "texture: got 4097 pixels per side; expected at most 4096"),
     ],
 )
@@ -128,11 +122,11 @@ def test_cheap_elements_are_passed_to_mujoco_and_comments_not_counted(read, monk
 @pytest.mark.parametrize(
     ("limit", "load", "message"),
     [
-        ("_MAX_BODIES", in_mujoco, "number of bodies: got 3; expected at most 2 for MuJoCo"),
+        ("MAX_BODIES", in_mujoco, "number of bodies: got 3; expected at most 2 for MuJoCo"),
         ("MAX_ELEMENTS", in_mujoco, "number of elements: expected at most 2"),
         ("MAX_ELEMENTS", in_yourdfpy, "number of elements: got 5; expected at most 2"),
         # 1 name, 1 folder of the file, and 3 folders: its own, and 2 of the compiler.
-        ("_MAX_PATHS", in_mujoco, "number of files and folders: got 3 paths; expected at most 2"),
+        ("MAX_PATHS", in_mujoco, "number of files and folders: got 3 paths; expected at most 2"),
     ],
 )
 def test_large_files_are_not_passed(read, monkeypatch, limit, load, message):

@@ -11,6 +11,7 @@ from terrainkit_robots.analysis.symmetry.asymmetry import (
 )
 from terrainkit_robots.description import bundled
 from tests.small_robots import facts, joint, link
+from tests.tables import read_table
 
 
 def arms(
@@ -82,17 +83,7 @@ def test_rotated_frame_of_a_leg_is_named_by_the_joint_below(com, right_com, name
 
 @pytest.mark.parametrize(
     ("other", "sign", "expected"),
-    [
-        # The range of 1 rad has a tolerance of 0.01 + 0.02 * 1 rad.
-        ((-0.229, 0.8), 1, True),
-        ((-0.231, 0.8), 1, False),
-        ((-0.2, 0.829), 1, True),
-        ((-0.2, 0.831), 1, False),
-        ((-0.8, 0.2), 1, False),
-        ((-0.8, 0.2), -1, True),
-        ((-0.831, 0.2), -1, False),
-        ((-0.2, 0.8), -1, False),
-    ],
+    read_table(__file__, "limits_are_mirrored_within_a_share_of_the_range"),
 )
 def test_limits_are_mirrored_within_a_share_of_the_range(other, sign, expected):
     assert limits_match((-0.2, 0.8), other, sign) is expected

@@ -17,9 +17,9 @@ from terrainkit_robots.description import bundled
 from tests import small_robots
 from tests.robots import BUNDLED
 from tests.small_robots import chain, facts, joint, link
+from tests.tables import read_table
 
 Y = "0 1 0"
-LEFT_RIGHT = "left_a right_a 1; left_b right_b 1"
 
 
 def robot(*joints):
@@ -43,15 +43,7 @@ def pairs(robot):
 
 @pytest.mark.parametrize(
     ("name", "other"),
-    [
-        ("left_knee", "right_knee"), ("LeftKnee", "RightKnee"), ("LEFT_KNEE", "RIGHT_KNEE"),
-        ("knee_left", "knee_right"), ("FL_calf", "FR_calf"), ("RL_calf", "RR_calf"),
-        ("LF_KFE", "RF_KFE"), ("LH_KFE", "RH_KFE"), ("lf_foot", "rf_foot"), ("hl.hx", "hr.hx"),
-        ("l_knee", "r_knee"), ("knee_l", "knee_r"), ("L_hip", "R_hip"), ("FLHip", "FRHip"),
-        ("leg_left_6_link", "leg_right_6_link"), ("LLeg_knee", "RLeg_knee"), ("fl1", "fr1"),
-        ("left/hip", "right/hip"), ("bl_a", "br_a"), ("lb_a", "rb_a"), ("lm_a", "rm_a"),
-        ("ml_a", "mr_a"), ("LArm", "RArm"), ("larm_1", "rarm_1"), ("lleg.knee", "rleg.knee"),
-    ],
+    read_table(__file__, "swap_sides_exchanges_left_and_right")
 )  # fmt: skip
 def test_swap_sides_exchanges_left_and_right(name, other):
     assert (swap_sides(name), swap_sides(other)) == (other, name)
@@ -110,58 +102,14 @@ def test_mirror_of_bundled_robots(name, bundled):
 
 
 @pytest.mark.parametrize(
-    ("axis", "other", "kind", "sign"),
-    [
-        # Roll and yaw are negated by the reflection, pitch is not.
-        ("0 1 0", "0 1 0", "continuous", 1),
-        ("0 1 0", "0 -1 0", "continuous", -1),
-        ("1 0 0", "1 0 0", "continuous", -1),
-        ("1 0 0", "-1 0 0", "continuous", 1),
-        ("0 0 1", "0 0 1", "continuous", -1),
-        ("0 0 1", "0 0 -1", "continuous", 1),
-        ("1 0 0", "0 1 0", "continuous", 0),
-        ("1 1 0", "-1 1 0", "continuous", 1),
-        ("0 1 0", "0 0.71 0.70", "continuous", 1),  # a cosine of 0.7 and more is aligned
-        ("0 1 0", "0 0.69 0.72", "continuous", 0),
-        ("0 1 0", "0 -1 0", "prismatic", 1),
-        ("0 1 0", "0 1 0", "prismatic", -1),
-        ("1 0 0", "1 0 0", "prismatic", 1),
-        ("0 0 1", "0 0 -1", "prismatic", -1),
-        ("0 1 0", "0 1 0", "planar", 0),
-    ],
+    ("axis", "other", "kind", "sign"), read_table(__file__, "sign_of_mirrored_joints")
 )
 def test_sign_of_mirrored_joints(axis, other, kind, sign):
     left, right = ("trunk", "left", "0 1 0"), ("trunk", "right", "0 -1 0")
     assert pairs(robot((*left, axis, kind), (*right, other, kind))) == f"left right {sign}"
 
 
-@pytest.mark.parametrize(
-    ("bodies", "expected"),
-    [
-        ("x 0.1 1 0; q 0.1 -1 0", "x q 1"),
-        ("l_a 0.1 1 0; r_a 0.5 -1 0", "l_a r_a 1"),  # by name
-        # The names confuse left and right; the positions are decisive.
-        ("l_a 1 1 0; r_a -1 -1 0; x 1 -1 0; y -1 1 0", "l_a x 1; y r_a 1"),
-        # At equal positions, the names are.
-        ("left_a 0 1 0; left_b 0 1 0; right_b 0 -1 0; right_a 0 -1 0", LEFT_RIGHT),
-        ("a 0 1 0; b 0.01 -1 0; c 0.005 -1 0", "a c 1"),  # the closest
-        ("l0 0 1 0; l1 0 1 0; l2 0 1 0; r0 0 -1 0; r1 0 -1 0", "l0 r0 1; l1 r1 1"),
-        ("head 1 0 0; tail -1 0 0", ""),  # in the plane
-        ("left_arm 0 0.2 0; neck 0 0 0.3", ""),
-        ("arm 0 1 0", ""),
-        # On one side.
-        ("l_a 0 1 0; r_a 0 2 0", ""),
-        ("l_a 0 2 0; r_a 0 1 0", "l_a r_a 1"),
-        # Of other types.
-        ("a 0 1 0; b 0 -1 0 prismatic", ""),
-        ("left 0 1 0; right 0 -1 0 prismatic", "left right 0"),
-        ("left 0 1 0; right 0 -1 0 planar", "left right 0"),
-        ("left 0 1 0; right 0 -1 0 fixed", ""),
-        # The robot is 2 m across, and the tolerance 0.04 m.
-        ("a 0 1 0; b 0.0398 -1 0", "a b 1"),
-        ("a 0 1 0; b 0.0402 -1 0", ""),
-    ],
-)
+@pytest.mark.parametrize(("bodies", "expected"), read_table(__file__, "pairs_of_bodies"))
 def test_pairs_of_bodies_on_the_trunk(bodies, expected):
     assert pairs(on_trunk(bodies)) == expected
 
@@ -200,19 +148,7 @@ X = np.array([1.0, 0, 0])
 STRAIGHT = SimpleNamespace(points=np.zeros((0, 3)), tip=np.zeros(3))
 
 
-@pytest.mark.parametrize(
-    ("pitches", "normal"),
-    [
-        ([], [0, 1, 0]),
-        ([(1, 0)] * 2, [1, 0, 0]),
-        ([(1, 0), (0, 1)], [0, 1, 0]),
-        ([(1, 0), (1, 0), (0, 1)], [1, 0, 0]),
-        ([(0.88, 0.47)] * 2, [1, 0, 0]),
-        ([(0.86, 0.51)] * 2, [0, 1, 0]),  # radial, as a spider's
-        ([(1, 0), (1, 0), (0.51, 0.86)], [0, 1, 0]),
-        ([(1, 0), (1, 0), (0.49, 0.87)], [1, 0, 0]),
-    ],
-)
+@pytest.mark.parametrize(("pitches", "normal"), read_table(__file__, "plane_is_across"))
 def test_plane_is_across_most_legs(pitches, normal):
     legs = [SimpleNamespace(pitch=np.array([*p, 0]), roles=(), limb=STRAIGHT) for p in pitches]
     assert _plane_normal(legs).tolist() == normal
@@ -229,15 +165,8 @@ def test_legs_that_a_yaw_joint_swings_step_along_their_pitch_axis(reach, normal)
 @pytest.mark.parametrize(
     ("starts", "trunk", "offset"),
     [
-        ((0.2, 0.0), 0.1, 0.1),
-        ((0.2, 0.0), 0.21, 0.0),  # not closer to the legs than half of its distance
-        ((0.2, 0.0), 0.19, 0.1),
-        ((0.2, 0.0), 0.07, 0.1),
-        ((0.2, 0.0), 0.06, 0.0),
-        ((0.2, 0.1, 0.0), 0.1, 0.1),
+        *read_table(__file__, "plane_is_amid_the_legs_if_the_trunk_is_too"),
         ((5.0, 0.2, 0.0, 0.1), 0.15, pytest.approx(0.15)),  # one leg is misplaced
-        ((0.2,), 0.2, 0.0),
-        ((), 0.2, 0.0),
     ],
 )
 def test_plane_is_amid_the_legs_if_the_trunk_is_too(starts, trunk, offset):

@@ -3,6 +3,7 @@ from math import pi
 import mujoco
 import pytest
 
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import body, joint, mjcf, read
 
 HAS_ARMATURE = "armature" in mujoco.mj_printSchema(False, False).partition("actuator (*)")[2]
@@ -14,36 +15,9 @@ def driven(joint_has, drives):
     return robot
 
 
-@pytest.mark.parametrize(
-    ("joint_has", "drives", "effort"),
-    [
-        ('actuatorfrcrange="-5 7"', "", 7),
-        ('actuatorfrcrange="-8 7"', "", 8),
-        ('actuatorfrcrange="-5 7" actuatorfrclimited="false"', "", None),
-        ("", '<motor joint="j" ctrlrange="-2 2" gear="3"/>', 6),
-        ("", '<motor joint="j" ctrlrange="-2 2" gear="-3" forcerange="-1 1"/>', 3),
-        ("", '<motor joint="j" ctrlrange="-1 2" gear="-3" forcerange="-9 1"/>', 6),
-        ("", '<motor joint="j"/>', None),
-        ("", '<motor joint="j" ctrlrange="-2 2" ctrllimited="false"/>', None),
-        ("", '<motor joint="j" ctrlrange="-2 2"/><motor joint="j" ctrlrange="-3 3"/>', 5),
-        ("", '<motor joint="j" ctrlrange="-2 2"/><motor joint="j"/>', None),
-        ('actuatorfrcrange="-5 5"', '<motor joint="j" ctrlrange="-2 2"/>', 2),
-        ('actuatorfrcrange="-5 5"', '<motor joint="j"/>', 5),
-        ("", '<position joint="j" kp="9" ctrlrange="-2 2"/>', None),
-        ("", '<position joint="j" kp="9" ctrlrange="-2 2" forcerange="-8 8"/>', 8),
-        ("", '<general joint="j" gainprm="4" ctrlrange="-2 2"/>', 8),
-        ("", '<general joint="j" gainprm="-4" ctrlrange="-2 2"/>', 8),
-        ("", '<general joint="j" gainprm="4" ctrlrange="-2 2" dyntype="filter"/>', 8),
-        ("", '<general joint="j" gainprm="4" ctrlrange="-2 2" dyntype="integrator"/>', None),
-        ("", '<general joint="j" gaintype="affine" ctrlrange="-2 2"/>', None),
-        ("", '<general joint="j" biastype="affine" ctrlrange="-2 2"/>', 2),
-        ("", '<general joint="j" biastype="affine" biasprm="1" ctrlrange="-2 2"/>', None),
-        ("", '<velocity joint="j" kv="9" ctrlrange="-2 2"/>', None),
-        ("", '<motor joint="j" ctrlrange="-inf inf" forcerange="-4 4"/>', 4),
-    ],
-)
+@pytest.mark.parametrize(("joint_has", "drives", "effort"), read_table(__file__, "actuator_effort"))
 def test_actuator_effort(joint_has, drives, effort):
-    assert joint(driven(joint_has, drives)).effort == effort
+    assert joint(driven(joint_has, drives)).effort == (effort or None)
 
 
 def test_actuators_have_joint():
@@ -62,24 +36,9 @@ def test_actuators_have_joint():
     ]
 
 
-AFFINE = '<general joint="j" gaintype="affine" gainprm="9" biastype="affine" biasprm="0 -9"/>'
-
-
-@pytest.mark.parametrize(
-    ("drive", "stiffness"),
-    [
-        ('<position joint="j" kp="9" gear="2"/>', 36),
-        ('<general joint="j" gainprm="9" biastype="affine" biasprm="0 -9 0"/>', 9),
-        ('<general joint="j" gainprm="9" biastype="affine" biasprm="0 -8 0"/>', None),
-        ('<general joint="j" gainprm="-9" biastype="affine" biasprm="0 9 0"/>', None),
-        ('<general joint="j" gainprm="0" biastype="affine" biasprm="0 0 0"/>', None),
-        (AFFINE, None),
-        ('<motor joint="j"/>', None),
-        ('<velocity joint="j" kv="9"/>', None),
-    ],
-)
+@pytest.mark.parametrize(("drive", "stiffness"), read_table(__file__, "stiffness_of_position"))
 def test_stiffness_of_position_actuators(drive, stiffness):
-    assert [each.stiffness for each in driven("", drive).actuators] == [stiffness]
+    assert [each.stiffness for each in driven("", drive).actuators] == [stiffness or None]
 
 
 def test_joint_limits_effort_of_its_actuators():
@@ -117,16 +76,7 @@ def test_joint_equality_becomes_mimic():
     assert slide == ("j", 2, pytest.approx(0.5 + 0.3))
 
 
-@pytest.mark.parametrize(
-    "equality",
-    [
-        '<joint joint1="k" joint2="j" polycoef="0 1 1"/>',
-        '<joint joint1="k" joint2="j" polycoef="0 1 0 0 1"/>',
-        '<joint joint1="k" joint2="j" active="false"/>',
-        '<joint joint1="k"/>',
-        '<weld body1="b" body2="a"/>',
-    ],
-)
+@pytest.mark.parametrize("equality", read_table(__file__, "other_equalities_are_no_mimics"))
 def test_other_equalities_are_no_mimics(equality):
     assert mimic_of(equality) is None
 

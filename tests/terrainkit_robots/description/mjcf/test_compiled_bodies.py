@@ -8,6 +8,7 @@ import pytest
 
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.transforms import quat_to_matrix
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import body, codes, link, mjcf, read
 
 EXACT = 1e-9 if int(mujoco.__version__.split(".")[0]) > 3 else 1e-6
@@ -117,17 +118,7 @@ def test_frame_scale_that_is_not_uniform_is_replaced_by_its_mean(scale, mean):
     assert link(robot).collisions[0].size == pytest.approx((mean,))
 
 
-@pytest.mark.parametrize(
-    "compiler",
-    [
-        'inertiafromgeom="true"',
-        'inertiafromgeom="false"',
-        'inertiagrouprange="0 1"',
-        'inertiagrouprange="2 3"',
-        'settotalmass="7"',
-        'boundmass="1.5" boundinertia="2"',
-    ],
-)
+@pytest.mark.parametrize("compiler", read_table(__file__, "masses_follow_compiler_settings"))
 def test_masses_follow_compiler_settings(compiler):
     """Body b has no inertial of its own; of a, MuJoCo may use either."""
     inside = """<freejoint/><inertial pos="1 0 0" mass="2" diaginertia="1 1 1"/>
@@ -136,17 +127,7 @@ def test_masses_follow_compiler_settings(compiler):
     assert_compiled(body(inside, f"<compiler {compiler}/>"))
 
 
-@pytest.mark.parametrize(
-    "shape",
-    [
-        'type="sphere" size="0.3"',
-        'type="box" size="0.1 0.2 0.3"',
-        'type="ellipsoid" size="0.1 0.2 0.3"',
-        'type="cylinder" size="0.1 0.4"',
-        'type="capsule" size="0.1 0.4"',
-        'type="box" size="0.1 0.2 0.3" shellinertia="true"',
-    ],
-)
+@pytest.mark.parametrize("shape", read_table(__file__, "geom_inertia_matches_mujoco"))
 def test_geom_inertia_matches_mujoco(shape):
     turned = f'<geom {shape} euler="20 30 40"/>'
     assert_compiled(body(f'<joint/>{turned}<geom {shape} pos="0.3 -0.2 0.5" mass="2"/>'))
@@ -185,16 +166,7 @@ def test_invalid_geoms_keep_their_values():
     assert link(robot).inertial.mass == pytest.approx(1)
 
 
-@pytest.mark.parametrize(
-    ("inside", "says"),
-    [
-        ('<geom size="1" type="capsule" fromto="1 1 1 1 1 1"/>', "<geom>: the two points of"),
-        ('<geom size="1" axisangle="0 0 0 1"/>', "<geom>: there is no orientation: axisangle"),
-        ('<site name="imu" axisangle="0 0 0 1"/>', "<site>: there is no orientation"),
-        ('<frame zaxis="0 0 0"><body/></frame>', "<frame>: there is no orientation"),
-        ('<inertial pos="0 0 0" mass="1" zaxis="0 0 0"/>', "<inertial>: there is no orientation"),
-    ],
-)
+@pytest.mark.parametrize(("inside", "says"), read_table(__file__, "invalid_orientations"))
 def test_invalid_orientations_are_reported(inside, says):
     robot = read(body(inside))
     assert codes(robot) == ["XML011"]

@@ -1,5 +1,6 @@
 import pytest
 
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import mjcf, read
 
 LEG = """<body name="{0}"><joint name="{0}0"/><geom size="0.1"/>
@@ -8,18 +9,7 @@ UNNAMED = '<body><joint name="tail"/><geom size="0.1"/></body>'
 TRUNK = f'<body name="a"><freejoint/><geom size="0.1"/>{{}}{{}}{UNNAMED}</body>'
 
 
-@pytest.mark.parametrize(
-    ("rest", "coupled"),
-    [
-        ('<connect body1="l_end" body2="r_end" anchor="0 0 0"/>', "l0 l1 r0 r1"),
-        ('<weld body1="l" body2="r_end"/>', "l0 r0 r1"),
-        ('<weld body1="l" body2="l_end"/>', "l1"),
-        ('<connect site1="l" site2="r"/>', "l0 l1 r0 r1"),  # not the bodies of these names
-        ('<connect body1="l_end" body2="r_end" anchor="0 0 0" active="false"/>', ""),
-        ('<connect body1="l_end" anchor="0 0 0"/>', ""),  # held by the world
-        ('<joint joint1="l0" joint2="r0"/>', ""),
-    ],
-)
+@pytest.mark.parametrize(("rest", "coupled"), read_table(__file__, "joints_of_a_loop_are_coupled"))
 def test_joints_of_a_loop_are_coupled(rest, coupled):
     inside = TRUNK.format(LEG.format("l"), LEG.format("r"))
     robot = read(mjcf(inside, f"<equality>{rest}</equality>"))

@@ -68,7 +68,7 @@ def test_mesh_that_mujoco_rejects_is_not_weighed(tmp_path, monkeypatch):
     flat = '<mesh name="m" vertex="0 0 0 1 0 0 0 1 0 1 1 0"/>'
     assert np.isnan(model(tmp_path, flat, geom)[0].links[0].inertial.mass)
     trimesh.creation.box((0.1, 0.2, 0.3)).export(tmp_path / "m.stl")
-    monkeypatch.setattr(mesh_masses, "_MAX_BYTES", 100)
+    monkeypatch.setattr(mesh_masses, "MAX_BYTES", 100)
     assert np.isnan(model(tmp_path, asset, geom)[0].links[0].inertial.mass)
 
 

@@ -7,6 +7,7 @@ import mujoco
 import pytest
 
 from terrainkit_robots.description.mjcf import parser
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import body, codes, joint, link, mjcf, read
 
 REFUSED = tomllib.loads(Path(__file__).with_name("refused.toml").read_text())
@@ -54,15 +55,7 @@ def test_defects_have_codes(refused):
 
 @pytest.mark.parametrize(
     ("names", "expected"),
-    [
-        ("mass density armature margin frictionloss springref kp kv", "a number"),
-        ("damping stiffness", "a number"),
-        ("range solref", "2 numbers"),
-        ("pos euler size scale friction", "3 numbers"),
-        ("quat rgba", "4 numbers"),
-        ("solimp", "5 numbers"),
-        ("fromto gear", "6 numbers"),
-    ],
+    read_table(__file__, "attributes_that_are_no_numbers_are_reported_with_their_count"),
 )
 def test_attributes_that_are_no_numbers_are_reported_with_their_count(names, expected):
     for name in names.split():
@@ -91,15 +84,7 @@ def test_suggested_names_are_read_unless_they_are_written():
 
 
 @pytest.mark.parametrize(
-    ("attribute", "text", "repaired"),
-    [
-        ("mass", "1,5", ["1.5"]),
-        ("size", "1, 2, 3", ["1 2 3"]),
-        ("size", "1,5", ["1 5"]),  # of one, two and three numbers, the most that are possible
-        ("size", "1;5", [""]),
-        ("size", "+1 +2", []),
-        ("rgba", "1,1,1,1", ["1 1 1 1"]),
-    ],
+    ("attribute", "text", "repaired"), read_table(__file__, "commas_are_repaired")
 )
 def test_commas_are_repaired(attribute, text, repaired):
     robot = read(body(f'<geom type="capsule" {attribute}="{text}"/>'))
@@ -153,13 +138,13 @@ def test_renamed_top_level_default():
 
 
 def test_file_with_too_many_kinds_of_errors_is_not_checked(monkeypatch):
-    monkeypatch.setattr(parser, "_MAX_ATTEMPTS", 3)
+    monkeypatch.setattr(parser, "MAX_ATTEMPTS", 3)
     words = [f'w{k}="1"' for k in range(3)]
     two, three = (read(body(f"<geom size='1' {' '.join(words[:k])}/>")) for k in (2, 3))
     assert (codes(two), len(two.links)) == (["XML007"] * 2, 1)
     assert (codes(three), three.links) == (["XML007"] * 3 + ["XML011"], ())
     assert three.problems[-1].message.startswith("MuJoCo still rejects the file")
-    monkeypatch.setattr(parser, "_MAX_SECONDS", -1)
+    monkeypatch.setattr(parser, "MAX_SECONDS", -1)
     assert codes(read(body("<geom size='1' w='1'/>"))) == ["XML007", "XML011"]
 
 

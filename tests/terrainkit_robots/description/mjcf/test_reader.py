@@ -2,6 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from tests.tables import read_table
 from tests.terrainkit_robots.description import made_robots
 from tests.terrainkit_robots.description.made_robots import body, codes, joint, link, mjcf, read
 from tests.terrainkit_robots.description.mjcf.test_compiled_bodies import EVERYTHING
@@ -169,15 +170,9 @@ def test_friction_of_geoms(written, values):
 @pytest.mark.parametrize(
     ("attributes", "kind", "bounds"),
     [
-        ('range="0.1 1"', "revolute", (0.1, 1)),
-        ('range="0 1"', "revolute", (0, 1)),
-        ('range="-1 0"', "revolute", (-1, 0)),
+        *read_table(__file__, "joint_kind_and_limits"),
         ("", "continuous", None),
         ('range="0.1 1" limited="false"', "continuous", None),
-        ('range="1 0.1"', "revolute", (1, 0.1)),
-        ('range="0 0"', "revolute", (0, 0)),
-        ('limited="true"', "revolute", (0, 0)),
-        ('type="slide" range="0.1 1"', "prismatic", (0.1, 1)),
         ('type="slide"', "prismatic", None),
     ],
 )

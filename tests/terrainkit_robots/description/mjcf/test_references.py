@@ -2,18 +2,10 @@ import re
 
 import pytest
 
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import codes, read
 
-ROBOT = """<mujoco><asset><material name="m"/></asset><worldbody>{ground}
-<body name="b"><joint name="j"/><geom name="g" size="1" material="m"/><site name="s"/>
-<body name="c"><joint name="k"/><geom name="h" size="1"/></body></body></worldbody>
-<tendon><fixed name="t"><joint joint="j" coef="1"/></fixed><spatial><site site="s"/>
-<geom geom="g" sidesite="s"/><site site="s"/></spatial></tendon>
-<equality><joint joint1="j" joint2="k"/><weld body1="b" body2="c"/><tendon tendon1="t" tendon2="t"/>
-</equality><contact><exclude body1="b" body2="c"/><pair geom1="g" geom2="h"/></contact>
-<actuator><motor joint="j"/><motor jointinparent="j"/><motor tendon="t"/><adhesion body="b"/>
-<motor site="s" refsite="s"/><motor cranksite="s" slidersite="s" cranklength="1"/></actuator>
-<sensor><accelerometer site="s"/><jointpos joint="j"/><tendonpos tendon="t"/></sensor></mujoco>"""
+ROBOT = read_table(__file__, "robot")
 
 FLOOR = '<geom name="floor" type="plane" size="1 1 1"/>'
 KINDS = {"j": "joint", "k": "joint", "b": "body", "c": "body", "g": "geom", "h": "geom"}

@@ -7,6 +7,7 @@ import trimesh
 
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.transforms import quat_to_matrix
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import body, link, read
 
 
@@ -27,15 +28,7 @@ def in_order(points):
     return points[np.lexsort(np.round(points, 4).T)]
 
 
-@pytest.mark.parametrize(
-    "asset",
-    [
-        "",
-        'scale="1 2 -3"',
-        'scale="2 2 2" refpos="0.1 0.2 0.3" refquat="1 2 3 4"',
-        'refpos="0.1 0.2 0.3" scale="1 2 3"',
-    ],
-)
+@pytest.mark.parametrize("asset", read_table(__file__, "mesh_pose_matches_mujoco"))
 def test_mesh_pose_matches_mujoco(asset, tmp_path):
     file = tmp_path / "robot.xml"
     corners = write_box(tmp_path / "parts" / "box.stl")
@@ -63,15 +56,7 @@ def test_turned_mesh_with_unequal_scales_is_no_scaled_mesh():
         assert (shape.shape, shape.mesh.scale) == (kind, (1, 2, 1))
 
 
-@pytest.mark.parametrize(
-    ("compiler", "name", "path"),
-    [
-        ("", "box.stl", "box.stl"),
-        ('meshdir="m"', "sub/box.stl", "m/sub/box.stl"),
-        ('assetdir="m/"', "box.stl", "m/box.stl"),
-        ('strippath="true" meshdir="m"', "somewhere/else/box.stl", "m/box.stl"),
-    ],
-)
+@pytest.mark.parametrize(("compiler", "name", "path"), read_table(__file__, "mesh_paths_follow"))
 def test_mesh_paths_follow_compiler_settings(compiler, name, path, tmp_path):
     file = tmp_path / "robot.xml"
     assets = f'<compiler {compiler}/><asset><mesh file="{name}" name="box"/></asset>'
@@ -102,45 +87,20 @@ def test_meshes_that_are_not_drawn_as_they_are():
     assert found == [("unknown", (), None, False), fitted, ("unknown", (), None, True)]
 
 
-@pytest.mark.parametrize(
-    ("geom", "kind", "size"),
-    [
-        ('size="1 2 3"', "sphere", (1,)),
-        ('type="capsule" size="1 2 3"', "capsule", (1, 2)),
-        ('type="cylinder" size="1 2 3"', "cylinder", (1, 2)),
-        ('type="ellipsoid" size="1 2 3"', "ellipsoid", (1, 2, 3)),
-        ('type="box" size="1 2 3"', "box", (1, 2, 3)),
-        ('type="plane" size="1 2 3"', "plane", ()),
-        ('type="hfield" hfield="h"', "unknown", ()),
-    ],
-)
+@pytest.mark.parametrize(("geom", "kind", "size"), read_table(__file__, "kind_and_size"))
 def test_kind_and_size(geom, kind, size):
     hfield = '<asset><hfield name="h" file="h.png" size="1 1 1 1"/></asset>'
     shape = collision(read(body(f"<geom {geom}/>", hfield)))
-    assert (shape.shape, shape.size) == (kind, size)
+    assert (shape.shape, *shape.size) == (kind, *size)
 
 
-@pytest.mark.parametrize(
-    ("attributes", "color"),
-    [
-        ("", None),
-        ('rgba="0.5 0.5 0.5 1"', None),
-        ('rgba="1 0 0 0.25"', (1, 0, 0, 0.25)),
-        ('material="blue"', (0, 0, 1, 1)),
-        ('material="blue" rgba="1 0 0 1"', (1, 0, 0, 1)),
-        ('material="nothing"', None),
-        ('class="painted"', (0, 0, 1, 1)),
-        ('class="red"', (1, 0, 0, 1)),
-        ('material="new"', (1, 1, 1, 1)),
-        ('rgba="1.01 0 0 1"', None),
-        ('rgba="-0.01 0 0 1"', None),
-        ('rgba="0.1 0.123456789 0 1"', (0.1, 0.123457, 0, 1)),
-    ],
-)
+@pytest.mark.parametrize(("attributes", "color"), read_table(__file__, "geom_color_or_material"))
 def test_geom_color_or_material_color(attributes, color):
     rest = (
         '<default><default class="painted"><geom material="blue"/></default>'
         '<default class="red"><geom rgba="1 0 0 1"/></default></default>'
         '<asset><material name="blue" rgba="0 0 1 1"/><material name="new"/></asset>'
     )
-    assert collision(read(body(f'<geom size="1" {attributes}/>', rest))).color == color
+    assert collision(read(body(f'<geom size="1" {attributes}/>', rest))).color == (
+        tuple(color) or None
+    )

@@ -6,6 +6,7 @@ import pytest
 from terrainkit_robots.description.load import load_robot
 from terrainkit_robots.description.mjcf import tree
 from terrainkit_robots.description.mjcf.tree import MAX_ELEMENTS
+from tests.tables import read_table
 from tests.terrainkit_robots.description import made_robots
 from tests.terrainkit_robots.description.made_robots import codes, joint, link, mjcf, read
 
@@ -75,21 +76,7 @@ def test_file_may_be_included_by_several_models(tmp_path):
     assert (robot.problems, names(robot)) == ((), ["b", "arm", "p_b"])
 
 
-@pytest.mark.parametrize(
-    ("include", "says", "subject"),
-    [
-        ('<include file="gone.xml"/>', "there is no file", "gone.xml"),
-        ("<include/>", "<include> has no file", ""),
-        ('<include file="robot.xml"/>', "robot.xml is included by itself", "robot.xml"),
-        ('<include file="circle.xml"/>', "circle.xml is included by itself", "circle.xml"),
-        ('<include file="round.xml"/>', "robot.xml is included by itself", "robot.xml"),
-        ('<include file="part.xml"/><include file="./part.xml"/>', "included twice", "./part.xml"),
-        ('<include file="empty.xml"/>', "empty.xml is empty", "empty.xml"),
-        ('<include file="."/>', "folder", "."),
-        ('<include file="part.xml"><body/></include>', "has children", "part.xml"),
-        ('<include file="large.xml"/>', "large.xml could not be parsed", "large.xml"),
-    ],
-)
+@pytest.mark.parametrize(("include", "says", "subject"), read_table(__file__, "broken_includes"))
 def test_broken_includes_are_reported(include, says, subject, tmp_path):
     robot = load(
         tmp_path,
@@ -135,16 +122,7 @@ def test_attached_model_keeps_its_settings(tmp_path):
     assert [path.name for path in robot.sources] == ["robot.xml", "hand.xml"]
 
 
-@pytest.mark.parametrize(
-    ("model", "says"),
-    [
-        ("gone.xml", "there is no file"),
-        ("", "<model> has no file"),
-        ("robot.xml", "robot.xml attaches itself"),
-        ("round.xml", "robot.xml attaches itself"),
-        ("robot.urdf", "root element of robot.urdf: got <robot>; expected <mujoco>"),
-    ],
-)
+@pytest.mark.parametrize(("model", "says"), read_table(__file__, "invalid_attachments"))
 def test_invalid_attachments_are_reported(model, says, tmp_path):
     robot = load(
         tmp_path,
@@ -205,7 +183,7 @@ def test_too_many_elements_are_reported(monkeypatch):
 
 
 def test_number_of_files_is_bounded(tmp_path, monkeypatch):
-    monkeypatch.setattr(tree, "_MAX_FILES", 3)
+    monkeypatch.setattr(tree, "MAX_FILES", 3)
     includes = "".join(f'<include file="p{k}.xml"/>' for k in range(3))
     files = {f"p{k}.xml": PART.replace('"b"', f'"b{k}"') for k in range(3)}
     robot = load(tmp_path, {"robot.xml": f"<mujoco>{includes}</mujoco>", **files})

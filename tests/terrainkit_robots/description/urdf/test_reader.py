@@ -4,6 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.tables import read_table
 from tests.terrainkit_robots.description import made_robots
 from tests.terrainkit_robots.description.made_robots import codes
 
@@ -152,21 +153,11 @@ def test_inertial_without_mass_or_inertia():
     assert inertial.origin.tolist() == np.eye(4).tolist()
 
 
-@pytest.mark.parametrize(
-    ("text", "kind", "size"),
-    [
-        ('<box size="1 2 3"/>', "box", (0.5, 1, 1.5)),
-        ('<sphere radius="0.1"/>', "sphere", (0.1,)),
-        ('<cylinder radius="0.1" length="2"/>', "cylinder", (0.1, 1)),
-        ('<capsule radius="0.1" length="2"/>', "capsule", (0.1, 1)),
-        ('<cylinder radius="0" length="0"/>', "cylinder", (0, 0)),
-        ('<box size="-1 2 3"/>', "box", (-0.5, 1, 1.5)),
-        ('<sdf filename="a"/>', "unknown", ()),
-    ],
-)
+@pytest.mark.parametrize(("text", "kind", "size"), read_table(__file__, "primitive"))
 def test_primitive(text, kind, size):
     geometry, problems = shape(text)
-    assert (geometry.shape, geometry.size, geometry.contacts, problems) == (kind, size, True, ())
+    assert (geometry.shape, *geometry.size) == (kind, *size)
+    assert (geometry.contacts, problems) == (True, ())
 
 
 @pytest.mark.parametrize(("scale", "wanted"), [(' scale="1 -2 3"', (1, -2, 3)), ("", (1, 1, 1))])

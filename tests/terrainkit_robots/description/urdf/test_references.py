@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 
 from terrainkit_robots.description.urdf import references
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import read
 
 TREE = """<link name="base"/><link name="foot"/><link name="leg1"/><joint name="ankle" type="fixed">
@@ -16,21 +17,7 @@ def told(inner, code="TRE010"):
     return [(each.message, each.subject) for each in problems]
 
 
-PLUGIN = "<gazebo><plugin><{0}> {{}} </{0}></plugin></gazebo>"
-
-
-@pytest.mark.parametrize(
-    ("text", "place", "kind"),
-    [
-        ('<gazebo reference="{}"/>', "reference of <gazebo>", "link or joint"),
-        (PLUGIN.format("bodyName"), "bodyName of a <plugin>", "link"),
-        (PLUGIN.format("left_joint"), "left_joint of a <plugin>", "joint"),
-        ('<sensor><parent link="{}"/></sensor>', "parent of a <sensor>", "link"),
-        ('<sensor><parent joint="{}"/></sensor>', "parent of a <sensor>", "joint"),
-        ('<transmission><joint name="{}"/></transmission>', "joint of a <transmission>", "joint"),
-        ('<ros2_control><joint name="{}"/></ros2_control>', "joint of a <ros2_control>", "joint"),
-    ],
-)
+@pytest.mark.parametrize(("text", "place", "kind"), read_table(__file__, "names_that_do_not_exist"))
 def test_names_that_do_not_exist_are_reported_once(text, place, kind):
     for known in {"link": ["base"], "joint": ["ankle"]}.get(kind, ["base", "ankle"]):
         assert told(text.format(known)) == []
@@ -49,9 +36,9 @@ def test_similar_name_is_suggested_unless_its_number_differs(name, suggestion):
 
 def test_number_of_suggestions_is_bounded(monkeypatch):
     wrong = '<gazebo reference="fooot"/><gazebo reference="bbase"/>'
-    monkeypatch.setattr(references, "_MAX_SUGGESTIONS", 1)
+    monkeypatch.setattr(references, "MAX_SUGGESTIONS", 1)
     assert ["did you mean" in message for message, _ in told(wrong)] == [True, False]
-    monkeypatch.setattr(references, "_MAX_COMPARED", 3)
+    monkeypatch.setattr(references, "MAX_COMPARED", 3)
     assert ["did you mean" in message for message, _ in told(wrong)] == [False, False]
 
 

@@ -1,6 +1,7 @@
 import pytest
 
 from terrainkit_robots.description.load import load_robot
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import codes, write_all
 
 URDF = """<robot name="dog"><link name="base"/><link name="foot"/><joint name="ankle" type="fixed">
@@ -17,23 +18,8 @@ def problems(tmp_path, srdf, name="urdf/robot.srdf", **others):
 @pytest.mark.parametrize(
     ("text", "kind", "place"),
     [
-        ('<group name="g"><link name="{}"/></group>', "link", "<link> of a <group>"),
-        ('<group name="g"><joint name="{}"/></group>', "joint", "<joint> of a <group>"),
-        (f'{GROUP}<group name="h"><group name="{{}}"/></group>', "group", "<group> of a <group>"),
-        ('<group name="g"><chain base_link="{}"/></group>', "link", "base_link of <chain>"),
-        ('<group name="g"><chain tip_link="{}"/></group>', "link", "tip_link of <chain>"),
-        (f'{GROUP}<end_effector group="{{}}"/>', "group", "group of <end_effector>"),
-        (f'{GROUP}<end_effector parent_group="{{}}"/>', "group", "parent_group of <end_effector>"),
-        ('<end_effector parent_link="{}"/>', "link", "parent_link of <end_effector>"),
+        *read_table(__file__, "names_that_the_robot_lacks_are_reported"),
         (GROUP + '<group_state group="{}"/>', "group", "group of <group_state>"),
-        ('<group_state><joint name="{}"/></group_state>', "joint", "<joint> of a <group_state>"),
-        ('<virtual_joint name="v" child_link="{}"/>', "link", "child_link of <virtual_joint>"),
-        ('<disable_collisions link1="{}"/>', "link", "link1 of <disable_collisions>"),
-        ('<enable_collisions link2="{}"/>', "link", "link2 of <enable_collisions>"),
-        ('<disable_default_collisions link="{}"/>', "link", "link of <disable_default_collisions>"),
-        ('<link_sphere_approximation link="{}"/>', "link", "link of <link_sphere_approximation>"),
-        ('<passive_joint name="{}"/>', "joint", "<passive_joint>"),
-        ('<joint_property joint_name="{}"/>', "joint", "<joint_property>"),
     ],
 )
 def test_names_that_the_robot_lacks_are_reported(text, kind, place, tmp_path):

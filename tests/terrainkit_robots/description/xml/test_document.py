@@ -10,6 +10,7 @@ from terrainkit_robots.description.xml.document import (
     parse_xml,
     read_bytes,
 )
+from tests.tables import read_table
 from tests.terrainkit_robots.description.made_robots import codes
 
 FILE = Path("robot.urdf")
@@ -30,20 +31,7 @@ def fixed(data, fix):
     return data[: edit.start] + edit.replacement + data[edit.end :]
 
 
-@pytest.mark.parametrize(
-    ("text", "wanted"),
-    [
-        ('<robot name="r">\n  <link name="a"/>\n\n  <link name="b"/>\n</robot>\n', [1, 2, 4]),
-        ('<robot\n name="r"\n>\n<link\n\n name="a"\n><inertial\n/></link>\n</robot>', [1, 4, 7]),
-        (
-            '<?xml version="1.0"?>\n<!-- <robot> <link/>\n -->\n<?pi <a>?>\n<robot>\n<!--\n<link/>'
-            "\n--><link/>\n<![CDATA[ <link> ]]>\n<joint/></robot>\n<!-- end -->",
-            [5, 8, 10],
-        ),
-        ("<robot>\n<xacro:macro/>\n<link/></robot>", [1, 2, 3]),  # without a namespace
-        ("\n\n  <robot/>", [3]),
-    ],
-)
+@pytest.mark.parametrize(("text", "wanted"), read_table(__file__, "line_of_start_tag"))
 def test_line_of_start_tag(text, wanted):
     document = parse(text)
     assert (lines(document), document.problems) == (wanted, ())
@@ -153,7 +141,7 @@ def test_not_xml(data):
     [
         ("MAX_BYTES", 2**20, "<a>" + " " * (2**20 - 7) + "</a>", "more than 1 MiB;"),
         ("MAX_ELEMENTS", 9, "<a>" + "<b/>" * 8 + "</a>", "more than 9 elements;"),
-        ("_MAX_ATTRIBUTES", 3, "<a><b x='' y='' z=''/></a>", "more than 3 attributes;"),
+        ("MAX_ATTRIBUTES", 3, "<a><b x='' y='' z=''/></a>", "more than 3 attributes;"),
     ],
 )
 def test_limits(name, most, text, says, monkeypatch):

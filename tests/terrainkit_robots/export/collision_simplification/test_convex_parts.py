@@ -69,7 +69,7 @@ def test_key_depends_on_mesh_version_and_parameters(monkeypatch):
 
 
 def test_large_meshes_are_decimated(calls, monkeypatch):
-    monkeypatch.setattr(module, "_MAX_FACES", 300)
+    monkeypatch.setattr(module, "MAX_FACES", 300)
     convex_parts(surface_of(trimesh.creation.icosphere(subdivisions=3)), None)
     assert 100 < len(calls[0][1]) <= 300
 

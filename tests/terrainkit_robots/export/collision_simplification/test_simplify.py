@@ -97,7 +97,7 @@ def test_number_of_vertices_is_bounded():
 
 
 def test_huge_meshes_are_decimated(monkeypatch):
-    monkeypatch.setattr(module, "_MAX_WELDED_FACES", 1000)
+    monkeypatch.setattr(module, "MAX_WELDED_FACES", 1000)
     done = simplified("hull", mesh("ball.stl"))
     assert volumes(done) == pytest.approx([BALL.volume], rel=0.05)
     assert volumes(done) != pytest.approx([BALL.volume], rel=1e-3)

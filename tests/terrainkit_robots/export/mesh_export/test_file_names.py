@@ -1,6 +1,7 @@
 import pytest
 
 from terrainkit_robots.export.mesh_export.file_names import FileNames
+from tests.tables import read_table
 
 
 def test_equal_content_shares_file():
@@ -20,14 +21,7 @@ def test_names_are_unique_without_suffix_and_case():
 @pytest.mark.parametrize(
     ("wanted", "name"),
     [
-        ("left hip", "m/left_hip.stl"),
-        ("../../etc/passwd", "m/etc_passwd.stl"),
-        ('a"><b', "m/a_b.stl"),
-        ("\u0441\u0442\u043e\u043f\u0430", "m/mesh.stl"),
-        ("", "m/mesh.stl"),
-        ("-rf", "m/rf.stl"),
-        ("NUL", "m/NUL_mesh.stl"),
-        ("hip.v2", "m/hip_v2.stl"),
+        *read_table(__file__, "names_are_valid"),
         ("x" * 500, f"m/{'x' * 80}.stl"),
     ],
 )

@@ -12,18 +12,9 @@ from terrainkit_robots.lint.compare.pose_differences import compare_link_poses, 
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots
 from terrainkit_robots.lint.compare.urdf_poses import urdf_poses
 from tests.small_robots import facts, joint, link
+from tests.tables import read_table
 
-ARM = """
-<robot name="r">
-  <link name="a"/><link name="b"/><link name="c"/>
-  <joint name="turn" type="revolute"><parent link="a"/><child link="b"/>
-    <origin xyz="0.1 0 0" rpy="0.2 -0.3 0.4"/><axis xyz="0 0.6 0.8"/>
-    <limit lower="-1" upper="2" effort="1" velocity="1"/></joint>
-  <joint name="slide" type="prismatic"><parent link="b"/><child link="c"/>
-    <origin xyz="0 0.2 0"/><axis xyz="0 0 3"/>
-    <limit lower="0" upper="0.1" effort="1" velocity="1"/></joint>
-</robot>
-"""
+ARM = read_table(__file__, "arm")
 
 
 def worst(robot, count=5):
@@ -131,13 +122,7 @@ def test_chained_mimic_joints_follow(robot_of):
     assert not held["last"].any()
 
 
-REFERENCE = """<mujoco><compiler angle="radian"/><worldbody><body name="a"><freejoint/>
-  <geom size="0.1"/><body name="b" pos="1 0 0"><geom size="0.1"/>
-    <joint name="turn" axis="0 0 1" pos="0.1 0 0" ref="0.5"/>
-    <body name="c" pos="0 1 0"><geom size="0.1"/>
-      <joint name="slide" type="slide" axis="1 0 0" ref="0.2"/>
-      <body name="d" pos="0 0 1"><geom size="0.1"/><joint name="spin" type="ball"/></body>
-    </body></body></body></worldbody></mujoco>"""
+REFERENCE = read_table(__file__, "reference")
 
 
 def test_joint_of_one_file_is_at_zero(robot_of):

@@ -2,14 +2,9 @@ import numpy as np
 import pytest
 
 from terrainkit_robots.lint.compare.robot_pairs import pair_robots, trunk_pose_in_link
+from tests.tables import read_table
 
-TWO = """
-<robot name="r">
-  <link name="base"/><link name="b"/><link name="tip"/>
-  <joint name="j" type="continuous"><parent link="base"/><child link="b"/></joint>
-  <joint name="on" type="fixed"><parent link="b"/><child link="tip"/></joint>
-</robot>
-"""
+TWO = read_table(__file__, "two")
 
 
 @pytest.mark.parametrize("name", ["quadruped", "biped"])

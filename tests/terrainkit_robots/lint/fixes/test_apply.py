@@ -20,14 +20,9 @@ from terrainkit_robots.lint.fixes.apply import fix_robot, unified_diff, write_fi
 from terrainkit_robots.lint.rule import Finding
 from terrainkit_robots.lint.runner import Report
 from terrainkit_robots.mesh.mesh_cache import MeshError
+from tests.tables import read_table
 
-ROBOT = """<robot name="r">
-  <!-- kept -->
-  <link name='a'  mass="-1"/>
-  <link name="b"
-        mass="-2" />
-</robot>
-"""
+ROBOT = read_table(__file__, "robot")
 
 
 def at(file, element):
@@ -240,19 +235,7 @@ class TestNewFiles:
         assert unified_diff(again) == ""
 
     @pytest.mark.parametrize(
-        ("where", "reason"),
-        [
-            ("../../foot.stl", "outside of"),
-            ("../../other/foot.stl", "outside of"),
-            ("link/foot.stl", "outside of"),
-            ("../.hidden/foot.stl", "outside of"),
-            ("foot.sh", "expected .obj or .stl"),
-            ("foot", "expected .obj or .stl"),
-            ("nowhere/foot.stl", "does not exist"),
-            ("there.stl", "exists with different content"),
-            ("folder.stl", "exists with different content"),
-            ("dangling.stl", "exists with different content"),
-        ],
+        ("where", "reason"), read_table(__file__, "invalid_paths_are_rejected")
     )
     def test_invalid_paths_are_rejected(self, robot, where, reason):
         package = robot.parent.parent

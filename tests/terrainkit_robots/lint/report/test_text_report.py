@@ -5,32 +5,9 @@ import pytest
 
 from terrainkit_robots.lint.check import Suppressed
 from terrainkit_robots.lint.report.text_report import format_lines, to_text
+from tests.tables import read_table
 
-TEXT = """\
-robot.urdf
-  robot     r (URDF)
-  size      0 kg, 0 links in 0 rigid bodies, 0 joints
-  legs      none detected
-
-error INR002 negative-mass
-  line 12: the mass is -1 kg; expected > 0
-      help: Weigh it.
-
-warning JNT007 degrees
-  line 40: the mass is -1 kg; expected > 0 (likely)
-  the mass is -1 kg; expected > 0
-      help: Weigh it.
-
-{note}
-
-likely: the finding depends on a heuristic, such as leg detection
-{how}details of a note: terrainkit rule CODE, such as LEG001
-skipped: not a legged robot: 2 rules do not apply
-warning: INR999: comment at robot.urdf:3: unknown rule
-skipped: INR002: suppressed: so
-
-robot.urdf: 1 error, 2 warnings, 1 note (fixable: 1 with --fix)
-"""
+TEXT = read_table(__file__, "text")
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from terrainkit_robots.simulation.drop import DropResult
 from terrainkit_robots.simulation.joint_sweep import SweepResult
 from terrainkit_robots.simulation.joint_units import PRISMATIC, REVOLUTE
 from tests.robots import QUADRUPED
+from tests.tables import read_table
 
 BIPED = bundled.urdf_path("biped")
 BOTH = (("FL_hip", "FR_hip"), ("FL_hip", "FR_hip"))
@@ -72,24 +73,14 @@ def test_unstable_drop_of_sliding_joint_is_in_meters(monkeypatch, sliding_shanks
 
 
 @pytest.mark.parametrize(
-    ("path", "tilt", "lifted", "most_legs", "severity"),
-    [
-        (QUADRUPED, 2, (), 6, None),
-        (QUADRUPED, 5, (), 6, "note"),
-        (QUADRUPED, 12, (), 6, "warning"),
-        (QUADRUPED, 5, ("toe",), 6, "warning"),
-        (QUADRUPED, 40, (), 6, "error"),
-        (QUADRUPED, 40, (), 4, "error"),
-        (QUADRUPED, 40, (), 3, "note"),
-        (BIPED, 40, (), 6, "warning"),
-        (BIPED, 5, (), 6, "note"),
-    ],
+    ("robot", "tilt", "lifted", "most_legs", "severity"),
+    read_table(__file__, "does_not_stand_severity"),
 )
-def test_does_not_stand_severity(monkeypatch, stood, path, tilt, lifted, most_legs, severity):
+def test_does_not_stand_severity(monkeypatch, stood, robot, tilt, lifted, most_legs, severity):
     fallen = replace(stood, tilt=math.radians(tilt), lifted_feet=lifted)
-    monkeypatch.setattr(stability, "_MAX_SINGLE_LEGS", most_legs)
+    monkeypatch.setattr(stability, "MAX_SINGLE_LEGS", most_legs)
     monkeypatch.setattr(stability, "stand_test", lambda *_, **__: fallen)
-    violations = check("DYN002", path)
+    violations = check("DYN002", bundled.urdf_path(robot))
     assert [violation.severity for violation in violations] == ([severity] if severity else [])
     assert all("tilts by" in violation.message for violation in violations)
 
@@ -117,7 +108,7 @@ def test_biped_needs_its_center_of_mass_above_its_feet(monkeypatch):
         (margin, ["the center of mass of the biped is not above its feet"]),
         (0.99 * margin, []),
     ):
-        monkeypatch.setattr("terrainkit_robots.simulation.standing._MIN_MARGIN", limit)
+        monkeypatch.setattr("terrainkit_robots.simulation.standing.MIN_MARGIN", limit)
         assert [each.reason for each in lint(robot, [rule]).skipped] == reasons
 
 

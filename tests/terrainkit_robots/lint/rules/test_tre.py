@@ -24,8 +24,8 @@ def links(*names):
 @pytest.mark.parametrize(("most", "hints"), [(3, ["FL_foot", "FL_calf", ""]), (2, ["", "", ""])])
 def test_unknown_link_suggests_nearest_name_of_small_robots(monkeypatch, most, hints):
     """Names are compared for two unknown links."""
-    monkeypatch.setattr(connections, "_MAX_COMPARED", most)
-    monkeypatch.setattr(connections, "_MAX_SUGGESTIONS", 2)
+    monkeypatch.setattr(connections, "MAX_COMPARED", most)
+    monkeypatch.setattr(connections, "MAX_SUGGESTIONS", 2)
     unknown = [joint(f"j{k}", "base", f"{name}_x") for k, name in enumerate(("FL_foot", "FL_calf"))]
     parts = links("base", "FL_foot", "FL_calf", "FR_calf"), *unknown, joint("j", "base", "fr_calf")
     found = report("TRE002", *parts).findings

@@ -3,22 +3,11 @@ import keyword
 import pytest
 
 from terrainkit_robots.onboarding.frameworks.naming import class_name, constant_name, package_name
+from tests.tables import read_table
 
 
 @pytest.mark.parametrize(
-    ("name", "class_", "constant", "package"),
-    [
-        ("go2", "Go2", "GO2", "go2"),
-        ("anymal_c", "AnymalC", "ANYMAL_C", "anymal_c"),
-        ("go2 description!", "Go2", "GO2", "go2"),
-        ("H1-2", "H12", "H1_2", "h1_2"),
-        ("class", "Class", "CLASS", "class_robot"),
-        ("1st", "Robot1st", "ROBOT_1ST", "robot_1st"),
-        ("Z\u00fcrich", "Zurich", "ZURICH", "zurich"),
-        ("\u673a\u5668\u4eba", "Robot", "ROBOT", "robot"),
-        ("", "Robot", "ROBOT", "robot"),
-        ('x"\nimport os', "XImportOs", "X_IMPORT_OS", "x_import_os"),
-    ],
+    ("name", "class_", "constant", "package"), read_table(__file__, "names_are_identifiers")
 )
 def test_names_are_identifiers(name, class_, constant, package):
     made = (class_name(name), constant_name(name), package_name(name))

@@ -9,6 +9,7 @@ from terrainkit_robots.onboarding.frameworks.patterns import (
     mjlab_patterns,
     usd_patterns,
 )
+from tests.tables import read_table
 
 NAMES = ("FL_hip_joint", "FL_hip", "left.knee-2", "1st", "_tail", "\u5173\u8282", "a+b")
 
@@ -53,14 +54,7 @@ def test_mjlab_patterns_match_one_name_by_prefix():
 
 @pytest.mark.parametrize(
     ("patterns", "values", "expected"),
-    [
-        ({}, {"FL_hip": 1, "FR_hip": 1, "FL_calf": 2}, {".*_hip": 1, "FL_calf": 2}),
-        # mjlab may match `hip` at the start of `hip_roll`.
-        ({}, {"hip": 1, "hip_roll": 2, "knee": 2}, {"hip": 1, "hip_roll": 2, "knee": 2}),
-        ({}, {"hip": 1, "hip_roll": 1, "knee": 2}, {"hip.*": 1, "knee": 2}),
-        # A name that differs in the framework keeps all patterns.
-        ({"a_x": "a_x$"}, {"a_x": 1, "b_x": 1}, {"a_x$": 1, "b_x": 1}),
-    ],
+    read_table(__file__, "joints_with_equal_values_share_patterns"),
 )
 def test_joints_with_equal_values_share_patterns(patterns, values, expected):
     assert merge_patterns(values, {name: name for name in values} | patterns) == expected

@@ -24,7 +24,7 @@ without defects stay below 75; motors of legged robots reach 30."""
 _DROP_HEIGHT = 0.1
 """Height of the drop test [m]."""
 
-_MAX_SINGLE_LEGS = 6
+MAX_SINGLE_LEGS = 6
 """With more legs, two branches usually form one leg through a closed loop. URDF has no loops, so
 the real robot may stand."""
 
@@ -118,7 +118,7 @@ def does_not_stand(robot: Facts) -> Violations:
         not locked and assess(_stand(robot, locked=locked, self_collision=False)).stands
     )
     level = assessment.degree
-    if len(robot.legs) > _MAX_SINGLE_LEGS:
+    if len(robot.legs) > MAX_SINGLE_LEGS:
         level = 0
     elif locked:
         level = min(level, 1)

@@ -15,20 +15,20 @@ from terrainkit_robots.text import names
 if TYPE_CHECKING:
     from terrainkit_robots.description.model import Joint
 
-_MAX_SUGGESTIONS = 20
+MAX_SUGGESTIONS = 20
 """Maximum number of unknown names for which a similar name is suggested. Generated files may have
 thousands."""
 
 _MIN_SIMILARITY = 0.6
 """Minimum share of common letters for a suggestion, as in difflib."""
 
-_MAX_COMPARED = 20_000
+MAX_COMPARED = 20_000
 """Maximum number of links to search for a suggestion. More would take seconds."""
 
 
 def _nearest(name: str, others: Sequence[str]) -> str:
     """Return the most similar name, or an empty text if none is similar."""
-    return "" if len(others) > _MAX_COMPARED else closest(name, others, _MIN_SIMILARITY)
+    return "" if len(others) > MAX_COMPARED else closest(name, others, _MIN_SIMILARITY)
 
 
 @rule("TRE002", "unknown-link", "error")
@@ -58,7 +58,7 @@ def unknown_link(robot: Facts) -> Violations:
             element=uses[0][1],
             message=f"link {truncate(name)}: does not exist, but is the {joints}; expected a "
             "link in the file",
-            hint=_suggestion(robot, name) if index < _MAX_SUGGESTIONS else "",
+            hint=_suggestion(robot, name) if index < MAX_SUGGESTIONS else "",
         )
 
 
@@ -165,10 +165,10 @@ def _roots(tree: Tree) -> tuple[str, list[str]]:
     root, *others = roots or [""]
     # A joint with an unknown child link was probably meant to hold one of these.
     unknown = [joint.child for joint, _ in tree.rejected if joint.child not in tree.links]
-    for child in unknown[:_MAX_SUGGESTIONS]:
+    for child in unknown[:MAX_SUGGESTIONS]:
         if others:
             others.remove(_nearest(child, others) or others[0])
-    return root, others[len(unknown[_MAX_SUGGESTIONS:]) :]
+    return root, others[len(unknown[MAX_SUGGESTIONS:]) :]
 
 
 def _components(tree: Tree) -> dict[str, str]:
