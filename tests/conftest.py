@@ -39,6 +39,12 @@ def make_viewer_server():
 
 
 @pytest.fixture
+def server(make_viewer_server):
+    """Start a server of the viewer at this machine's own address."""
+    return make_viewer_server()
+
+
+@pytest.fixture
 def own_registry(monkeypatch):
     """Yield a function that forgets what a test registers, installs or loads from a plugin file.
 

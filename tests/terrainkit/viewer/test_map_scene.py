@@ -12,11 +12,6 @@ from terrainkit.viewer.map_scene import FIELD_OF_VIEW, camera_position, show_map
 from terrainkit.views.preview import MIN_SHADE, height_colors, shaded_relief
 
 
-@pytest.fixture
-def server(make_viewer_server):
-    return make_viewer_server()
-
-
 def make_map(preset):
     return tk.generate(
         tk.MapConfig(rows=2, cols=10, patch_size=(8.0, 6.0), border=1.0, preset=preset)

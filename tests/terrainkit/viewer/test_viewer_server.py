@@ -15,11 +15,6 @@ from tests.viewer_client import CAMERA, connect_to, send, status_of, update, wai
 HOST_NAME = socket.gethostname()
 
 
-@pytest.fixture
-def server(make_viewer_server):
-    return make_viewer_server()
-
-
 OWN = [
     ("localhost:{port}", None),
     ("localhost:{port}", "http://localhost:{port}"),

@@ -2,11 +2,6 @@ import pytest
 
 
 @pytest.fixture
-def server(make_viewer_server):
-    return make_viewer_server()
-
-
-@pytest.fixture
 def shown(server, monkeypatch):
     """Handles of what is added to the scene and the GUI of the server, by name or label."""
     handles = {}
