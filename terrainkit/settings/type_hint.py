@@ -128,6 +128,8 @@ def convert(name: str, value: object, hint: Any) -> Any:
     suggestion = f"; did you mean {near!r}?" if near else ""
     if isinstance(value, Mapping) and "." in name:
         suggestion += " (a key with a dot needs quotes)"
+    if isinstance(value, Mapping) and is_table(kind):
+        suggestion += f"; in Python, write {kind.__name__}(...)"
     raise ConfigError(f"{name}: got {show(value)}; expected {describe(hint)}{suggestion}")
 
 

@@ -89,6 +89,7 @@ def test_convert_makes_floats_of_integers_in_lists():
         ([1.0, None], tuple[float, ...], "got [1.0, None]; expected a list, each value a number"),
         ([2, 1], Interval, "got [2, 1]; expected 2 values, each a number, the lower one first"),
         (["pit"], tuple[Motor, ...], "[0]: got 'pit'; expected a table (Motor)"),
+        ([{}], tuple[Motor, ...], "expected a table (Motor); in Python, write Motor(...)"),
         ({"a": 1}, Mapping[str, Interval], ".a: got 1; expected 2 values"),
         ({"a.b": 1}, Mapping[str, str], '."a.b": got 1; expected a string'),
         ("ab", Mapping[str, str], "got 'ab'; expected a table, each value a string"),
