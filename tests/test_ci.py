@@ -87,7 +87,7 @@ def test_api_check_finds_what_breaks(tmp_path):
         *("MapConfig.__init__", "MapConfig.rows", "TerrainMap.assign"),
         *("HeightScan.below", "Flight", "collision"),
     }
-    names = "MapConfig, rows, assign, below, Flight, torques, collision"
+    names = "`MapConfig`, `rows`, `assign`, `below`, `Flight`, `torques`, `collision`"
     changelog.write_text(f"### What breaks\n\n{names}\n\n### Added\n")
     assert check(capture_output=True).returncode == 0
 
