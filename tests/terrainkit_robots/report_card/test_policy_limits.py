@@ -4,11 +4,11 @@ import math
 import numpy as np
 import pytest
 
+from tests.limits import LIMITS as SHARED_LIMITS
 from tests.tables import read_table
 
 pytest.importorskip("torch", reason="the extra `train` is not installed")
 
-from terrainkit.feasibility import RobotLimits
 from terrainkit_robots.policy.evaluate import EvaluationConfig
 from terrainkit_robots.report_card import policy_limits as limits_module
 from terrainkit_robots.report_card.crossing import CROSSED, FELL, Attempts
@@ -21,16 +21,7 @@ from terrainkit_robots.report_card.policy_limits import (
 )
 from terrainkit_robots.rl.run import open_run
 
-LIMITS = RobotLimits(
-    step_up=0.2,
-    step_down=0.25,
-    gap=0.4,
-    slope=0.577,
-    foothold=0.1,
-    body_width=0.4,
-    standing_height=0.6,
-    crouched_height=0.35,
-)
+LIMITS = dataclasses.replace(SHARED_LIMITS, slope=0.577, crouched_height=0.35)
 
 
 @pytest.fixture
