@@ -103,7 +103,7 @@ def terrains_page() -> str:
         "",
         "![built_stairs](pictures/built_stairs.png)",
         BUILDING_CODES,
-        *(building_code_row(each) for each in clauses()),
+        *(building_code_row(clause) for clause in clauses()),
     ]
     return "\n".join(parts) + "\n"
 
@@ -121,7 +121,7 @@ from terrainkit.terrains.staircase import Staircase
 
 grid = terrainkit.MapConfig().patch_grid(0, 0)
 flight = Staircase(riser=0.19, going=0.26).flight(grid)
-assert [each.quantity for each in terrainkit.check_flight(flight, "ibc")] == ["riser", "going"]
+assert [limit.quantity for limit in terrainkit.check_flight(flight, "ibc")] == ["riser", "going"]
 ```
 
 The table has only limits of dimensions, and codes have exceptions. Values that were not read in the
@@ -133,7 +133,7 @@ are in m, and angles in rad.
 
 
 def building_code_row(clause: Clause) -> str:
-    low, high = (f"{each:.4g}" for each in (clause.minimum, clause.maximum))
+    low, high = (f"{bound:.4g}" for bound in (clause.minimum, clause.maximum))
     limit = f"{low} to {high}" if clause.minimum else f"at most {high}"
     if clause.maximum == float("inf"):
         limit = f"at least {low}"
@@ -208,11 +208,11 @@ def paper_section(name: str) -> str:
         f"![{name}](pictures/{name}.png)\n",
         "| terrain | proportion | easy:hard |\n|---|---|---|",
     ]
-    for each in paper.terrains:
-        mark = ", second-hand" if each.name in paper.second_hand else ""
-        kind = f"{each.name} ({each.terrain})" if each.name != each.terrain else each.name
-        texts = ", ".join(parameter_texts(each))
-        lines.append(f"| {kind}{mark} | {each.proportion:g} | {texts} |")
+    for part in paper.terrains:
+        mark = ", second-hand" if part.name in paper.second_hand else ""
+        kind = f"{part.name} ({part.terrain})" if part.name != part.terrain else part.name
+        texts = ", ".join(parameter_texts(part))
+        lines.append(f"| {kind}{mark} | {part.proportion:g} | {texts} |")
     settings = ", ".join(f"`{key} = {value_text(value, 100)}`" for key, value in paper.map.items())
     lines += [f"\nMap: {settings}."] if settings else []
     lines.append(f"\nFigures: {markup(paper.figures)}.")
@@ -436,7 +436,7 @@ def draw_building() -> None:
 def draw_built_stairs() -> None:
     shapes = {"residential": 2, "public": 1, "industrial": 2, "fire_escape": 1}
     stairs = [presets.get_preset(name)[k] for name, k in shapes.items()]
-    draw_patches("built_stairs", [(each, 1.0) for each in stairs])
+    draw_patches("built_stairs", [(patch, 1.0) for patch in stairs])
 
 
 def draw_patches(
@@ -467,7 +467,7 @@ def draw_patches(
 def draw_paper(name: str) -> None:
     """Render each terrain of a work once, on patches as in the work."""
     paper = get_paper(name)
-    terrains = tuple(dataclasses.replace(each, proportion=1.0) for each in paper.terrains)
+    terrains = tuple(dataclasses.replace(terrain, proportion=1.0) for terrain in paper.terrains)
     size = {"rows": 3, "cols": len(terrains), "border": 1.0, "seed": SEED}
     config = MapConfig(**{**paper.map, **size}, terrains=terrains)
     write_picture(name, render_preview(terrainkit.generate(config), width=820))

@@ -253,7 +253,9 @@ def ratios(pairs: Iterable[tuple[float, float]]) -> str:
     found = sorted(ours / theirs for ours, theirs in pairs if theirs > 0)
     if not found:
         return ""
-    middle, low, high = (f"{each:.2g}" for each in (statistics.median(found), found[0], found[-1]))
+    middle, low, high = (
+        f"{ratio:.2g}" for ratio in (statistics.median(found), found[0], found[-1])
+    )
     return middle if low == high else f"{middle} ({low} to {high})"
 
 
@@ -295,7 +297,9 @@ def page(found: Sequence[tuple[Robot, Outcome]], versions: dict[str, str]) -> It
     yield ABOUT.format(
         count=len(found),
         legged=sum(any(word in robot.kind for word in LEGGED) for robot, _ in found),
-        pinned=" ".join(f"{name}=={each}" for name, each in versions.items() if "/" not in name),
+        pinned=" ".join(
+            f"{name}=={version}" for name, version in versions.items() if "/" not in name
+        ),
         commits="\n".join(repositories),
         summary=f"{told}.\n{stood(tested)} of {len(tested)} tested robots stand; {others} stand "
         "only with a controller and were not tested.",

@@ -49,7 +49,7 @@ def render_patches(
         cuts: Height of each patch at which solids are cut off [m]; empty for no cut.
     """
     heights = cuts or [np.inf] * len(patches)
-    meshes = [block(*each, k) for k, each in enumerate(zip(patches, heights, strict=True))]
+    meshes = [block(*part, k) for k, part in enumerate(zip(patches, heights, strict=True))]
     return render_meshes(meshes, width, 45.0, 0.53)
 
 

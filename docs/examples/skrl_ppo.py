@@ -56,5 +56,5 @@ timesteps = arguments.samples // arguments.num_envs
 trainer = SequentialTrainer(env=env, agents=agent, cfg={"timesteps": timesteps, "headless": True})
 trainer.train()
 rewards = list(env.return_queue)
-first, last = (sum(each) / max(len(each), 1) for each in (rewards[:100], rewards[-100:]))
+first, last = (sum(values) / max(len(values), 1) for values in (rewards[:100], rewards[-100:]))
 print(f"reward of the first 100 of {len(rewards)} episodes: {first:.2f}; of the last: {last:.2f}")

@@ -49,4 +49,4 @@ exported = export_policy(open_run(runner.folder), folder, example=True, overwrit
 session = onnxruntime.InferenceSession(folder / "policy.onnx")
 actions = session.run(None, {"obs": np.zeros((1, exported.num_observations), np.float32)})[0]
 print(f"{exported.num_observations} observations, actions of shape {actions.shape}")
-print(f"wrote {folder}: {', '.join(sorted(each.name for each in folder.iterdir()))}")
+print(f"wrote {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")

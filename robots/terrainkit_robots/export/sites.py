@@ -95,5 +95,5 @@ def _base(facts: "Facts") -> Body:
 
 def pose_in_body(body: Body, link: str) -> Matrix:
     """Return the pose of a link in the frame of its body."""
-    names = [link.name for link in body.links]
+    names = [part.name for part in body.links]
     return body.poses[names.index(link)]

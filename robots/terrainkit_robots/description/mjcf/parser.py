@@ -224,10 +224,10 @@ def _unknown_attribute(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool
         attribute=name,
         severity="error",
     )
-    for node in nodes:
-        value = node.attributes.pop(name)
-        if suggestion and suggestion not in node.attributes and is_allowed(node.tag, suggestion):
-            node.attributes[suggestion] = value  # otherwise it would be reported as missing
+    for same in nodes:
+        value = same.attributes.pop(name)
+        if suggestion and suggestion not in same.attributes and is_allowed(same.tag, suggestion):
+            same.attributes[suggestion] = value  # otherwise it would be reported as missing
     return True
 
 
@@ -246,15 +246,15 @@ def _unknown_element(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         what + _count_suffix(nodes) + (f"; did you mean <{suggestion}>?" if suggestion else ""),
         severity="error",
     )
-    for node in nodes:
+    for same in nodes:
         if (
             suggestion
             and is_allowed(suggestion)
-            and all(is_allowed(suggestion, k) for k in node.attributes)
+            and all(is_allowed(suggestion, k) for k in same.attributes)
         ):
-            node.tag = suggestion  # its children are read as well
+            same.tag = suggestion  # its children are read as well
         else:
-            node.remove()
+            same.remove()
     return True
 
 
@@ -312,8 +312,9 @@ def _repeated_name(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         _report_rejected(tree, node, match[0])
     taken = {n.attributes.get("name") for n in tree.nodes()}
     numbers = itertools.count(2)
-    for node in duplicates:
-        node.attributes["name"] = next(new for k in numbers if (new := f"{name}_{k}") not in taken)
+    for duplicate in duplicates:
+        free = (new for k in numbers if (new := f"{name}_{k}") not in taken)
+        duplicate.attributes["name"] = next(free)
     return True
 
 
@@ -325,8 +326,8 @@ def _invalid_value(tree: MjcfTree, node: Node, match: re.Match[str]) -> bool:
         return False
     nodes = _similar_nodes(tree, node, attribute=name, value=value)
     _report_rejected(tree, node, f"{match[0]} in {name}{_count_suffix(nodes)}")
-    for node in nodes:
-        del node.attributes[name]
+    for same in nodes:
+        del same.attributes[name]
     return True
 
 
@@ -369,8 +370,8 @@ def _unknown_childclass(tree: MjcfTree, node: Node, match: re.Match[str]) -> boo
         return False
     nodes = _similar_nodes(tree, node, attribute="childclass", value=value)
     _report_rejected(tree, node, f"{match[0]} {value!r}{_count_suffix(nodes)}")
-    for node in nodes:
-        del node.attributes["childclass"]
+    for same in nodes:
+        del same.attributes["childclass"]
     return True
 
 
