@@ -163,15 +163,16 @@ def quat_rotate_inverse(quat: FloatArray, vector: FloatArray) -> FloatArray:
     Returns:
         Vectors in the body frames, shape (n, 3).
     """
-
-    def cross(a: FloatArray, b: FloatArray) -> FloatArray:  # np.cross takes three times as long
-        ax, ay, az = a.T
-        bx, by, bz = b.T
-        return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
-
-    w, u = quat[:, :1], quat[:, 1:]
-    twice = 2 * cross(u, vector)
-    return vector - w * twice + cross(u, twice)
+    # Numbers of one component at a time take a third of the time of np.cross.
+    w, x, y, z = quat.T
+    a, b, c = vector.T
+    p, q, r = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    components = [
+        a - w * p + (y * r - z * q),
+        b - w * q + (z * p - x * r),
+        c - w * r + (x * q - y * p),
+    ]
+    return np.stack(components, axis=1)
 
 
 def projected_gravity(quat: FloatArray) -> FloatArray:

@@ -91,7 +91,9 @@ class CommandTerm:
             rng: Generator of the random numbers.
             steps: Steps of each environment since its reset, shape (n,).
         """
-        self.resample(rng, np.flatnonzero((steps % self._interval == 0) & (steps > 0)))
+        env_ids = np.flatnonzero((steps % self._interval == 0) & (steps > 0))
+        if len(env_ids):
+            self.resample(rng, env_ids)
 
 
 class VelocityCommand(CommandTerm):

@@ -368,7 +368,7 @@ class LeggedEnv(VecEnv):
 
     def set_observations(self, groups: Mapping[str, torch.Tensor]) -> None:
         """Replace the current observations of each group, shape (n, width)."""
-        self._observations = TensorDict(groups, batch_size=[self.num_envs]).to(self.device)
+        self._observations = TensorDict(groups, [self.num_envs], device=self.device)
 
     def _call_events(self, when: str, *arguments: Any) -> None:
         """Call the functions of all events for `startup`, `reset` or `step`."""

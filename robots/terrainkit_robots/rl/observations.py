@@ -6,6 +6,7 @@ terms without noise, and terms that only a simulation has. Exported policies use
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
@@ -65,11 +66,6 @@ class ObservationTerm:
 
     unit: str | tuple[str, ...] = "1"
     """Unit of the value, or of each number, for the description of exported policies."""
-
-    def value(self, env: "LeggedEnv") -> FloatArray:
-        """Return the values minus the offset, clipped, shape (n, width)."""
-        value = self.function(env) - self.offset
-        return value if self.clip is None else np.clip(value, *self.clip)
 
 
 ObsTerms = Mapping[str, Mapping[str, ObservationTerm]]
@@ -222,21 +218,34 @@ def compute_observations(
     Returns:
         Observations, shape (n, width).
     """
-    group = terms.values()
     clip = env.cfg.normalization.clip_observations
-    values = [term.value(env) for term in group]
-    widths = [value.shape[1] for value in values]
+    values = [term.function(env) for term in terms.values()]
+    widths = tuple(value.shape[1] for value in values)
     observations = np.concatenate(values, axis=1, dtype=np.float32)
-    level = env.cfg.noise.noise_level
-    noise = np.repeat([level * term.noise for term in group], widths).astype(np.float32)
-    if rng is not None and noise.any():
+    offset, low, high, noise, scale = _columns(tuple(terms.values()), widths)
+    observations -= offset
+    np.clip(observations, low, high, out=observations)
+    if rng is not None and env.cfg.noise.noise_level and noise.any():
+        noise = np.float32(env.cfg.noise.noise_level) * noise
         noisy = np.flatnonzero(noise)
         start, stop = noisy[0], noisy[-1] + 1  # one block is faster than single columns
         sample = rng.random((len(observations), stop - start), dtype=np.float32)
         observations[:, start:stop] += (2 * sample - 1) * noise[start:stop]
-    scales = [np.broadcast_to(term.scale, width) for term, width in zip(group, widths, strict=True)]
-    observations *= np.concatenate(scales, dtype=np.float32)
+    observations *= scale
     return np.clip(observations, -clip, clip, out=observations)
+
+
+@lru_cache(maxsize=16)
+def _columns(terms: tuple[ObservationTerm, ...], widths: tuple[int, ...]) -> FloatArray:
+    """Return offset, limits, noise and scale of each number of a group, shape (5, width)."""
+    rows = [
+        (term.offset, *(term.clip or (-np.inf, np.inf)), term.noise, term.scale) for term in terms
+    ]
+    columns = [
+        [np.broadcast_to(value, width) for value in row]
+        for row, width in zip(rows, widths, strict=True)
+    ]
+    return np.concatenate(columns, axis=1, dtype=np.float32)
 
 
 def fill_history(env: "LeggedEnv", observations: FloatArray) -> None:

@@ -26,7 +26,7 @@ from terrainkit_robots.checkpoint import (
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.env import LeggedEnv
 from terrainkit_robots.rl.env_state import env_state, load_env_state
-from terrainkit_robots.rl.symmetry import has_symmetry
+from terrainkit_robots.rl.symmetry import has_symmetry, mirrored_update
 
 _NETWORKS = "actor", "critic", "student", "teacher", "rnd"
 """Names of networks that an algorithm of rsl-rl may have."""
@@ -154,6 +154,8 @@ class LeggedRunner(OnPolicyRunner):
         self.is_main_process = self.gpu_global_rank == 0
         self.logger = MetricsLogger(self)
         symmetry = getattr(self.alg, "symmetry", None)
+        if symmetry:
+            self.alg.update = mirrored_update(env, self.alg)
         if symmetry and not symmetry.use_mirror_loss:
             # rsl-rl runs the actor once more in each mini-batch, only to log this loss.
             symmetry.compute_loss = lambda *_: torch.zeros(())

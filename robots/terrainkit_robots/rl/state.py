@@ -123,6 +123,9 @@ class Sensors:
         foot_force = -sim.sensor("foot_force", rows)
         penalized = sim.sensor("penalized_force", rows)
         ground, edges = self._ground_of_feet(foot_pos, quat, commands)
+        scan = np.zeros((len(pos), 0), np.float32)
+        if self._scan.offsets.size:
+            scan = self.scan_points(pos, quat)[2]
         torques = sim.torque[rows].astype(np.float32)
         vel = np.concatenate([lin_vel[:, :2], ang_vel[:, 2:]], axis=1)
         last_vel, dof_acc = np.zeros_like(vel), np.zeros_like(dof_vel)
@@ -153,7 +156,7 @@ class Sensors:
             "foot_force": foot_force,
             "foot_air_time": air_time,
             "penalized_force": np.sqrt(np.einsum("npi,npi->np", penalized, penalized)),
-            "height_scan": pos[:, 2:3] - self.scan_points(pos, quat)[2],
+            "height_scan": pos[:, 2:3] - scan,
             "fallen": np.zeros(len(pos), bool),
         }
 
@@ -170,6 +173,9 @@ class Sensors:
             Height of the ground under each foot and one step behind, ahead, right and left of it
             [m], shape (n, f, 5), and of the edges [m], shape (n, f).
         """
+        if self._terrain.is_plane:
+            flat = np.zeros((*foot_pos.shape[:2], 5), np.float32)
+            return flat, flat[..., 0]
         yaw = transforms.quat_to_yaw(quat)
         cos, sin, (forward, left) = np.cos(yaw), np.sin(yaw), commands[:, :2].T
         ahead = np.stack([cos * forward - sin * left, sin * forward + cos * left], axis=1)

@@ -6,8 +6,8 @@ permutation that is its own inverse. See Mittal et al., Symmetry Considerations 
 Symmetric Robot Policies, 2024.
 """
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-3
 """Allowed difference between left and right: default pose [rad], scan points [m], and action
 scale, gains and effort, relative."""
+
+_IMAGES = "mirror_images"
+"""Key of the images of all samples among the observations in rsl-rl's storage."""
 
 
 class MirrorMaps(NamedTuple):
@@ -106,22 +109,58 @@ def augment(
 
     Args:
         env: The environment, which has the mirror maps.
-        obs: Observations of n samples by group, or None.
+        obs: Observations of n samples by group, or None; with their images in `mirrored_update`.
         actions: Actions, shape (n, a), or None.
 
     Returns:
         Observations and actions of 2 n samples: the given samples, then their mirror images.
     """
-    maps = env.mirror_maps
-
-    def doubled(values: torch.Tensor, image: SignedPermutation) -> torch.Tensor:
-        index, sign = (torch.from_numpy(array).to(values.device) for array in vars(image).values())
-        return torch.cat([values, values[:, index] * sign])
-
+    images = None if obs is None else obs.pop(_IMAGES, None)
+    if images is None:
+        images = _images(env.mirror_maps, obs, actions)
+    if actions is not None:
+        actions = torch.cat([actions, images["actions"]])
     if obs is not None:
-        groups = {name: doubled(values, maps.groups[name]) for name, values in obs.items()}
+        groups = {name: torch.cat([values, images[name]]) for name, values in obs.items()}
         obs = TensorDict(groups, [2 * obs.batch_size[0]], device=obs.device)
-    return obs, None if actions is None else doubled(actions, maps.actions)
+    return obs, actions
+
+
+def mirrored_update(env: "LeggedEnv", alg: Any) -> Callable[[], dict[str, float]]:
+    """Return the update of PPO with samples that are mirrored once, not in each mini-batch.
+
+    Args:
+        env: The environment, which has the mirror maps.
+        alg: rsl-rl's PPO with symmetry.
+    """
+    update, storage = alg.update, alg.storage
+
+    def update_with_images() -> dict[str, float]:
+        images = _images(env.mirror_maps, storage.observations, storage.actions)
+        storage.observations[_IMAGES] = images
+        try:
+            losses: dict[str, float] = update()
+        finally:
+            del storage.observations[_IMAGES]
+        return losses
+
+    return update_with_images
+
+
+def _images(
+    maps: MirrorMaps, obs: TensorDict | None, actions: torch.Tensor | None
+) -> dict[str, torch.Tensor]:
+    """Return the mirror images of observations by group and of `actions`, shape (..., width)."""
+    values = {}
+    if obs is not None:
+        values = {name: (group, maps.groups[name]) for name, group in obs.items()}
+    if actions is not None:
+        values["actions"] = actions, maps.actions
+    return {
+        name: given[..., torch.from_numpy(image.index).to(given.device)]
+        * torch.from_numpy(image.sign).to(given.device)
+        for name, (given, image) in values.items()
+    }
 
 
 def _map(index: Sequence[int] | NDArray[np.int64], sign: ArrayLike) -> SignedPermutation:

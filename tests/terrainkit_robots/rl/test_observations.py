@@ -111,7 +111,7 @@ class TestGroups:
         noise = Noise(lin_vel=0.0, lin_vel_bias=0.4)
         env = nominal_env(400, observations=Observations(base_lin_vel=True), noise=noise)
         for _ in range(2):  # steps of the same episode
-            error = env.obs_terms["policy"]["base_lin_vel"].value(env) - env.state.base_lin_vel
+            error = env.obs_terms["policy"]["base_lin_vel"].function(env) - env.state.base_lin_vel
             np.testing.assert_allclose(error, env.lin_vel_bias, atol=1e-6)
             env.step(torch.zeros(400, env.num_actions))
         assert 0.39 < np.abs(env.lin_vel_bias).max() <= 0.4
