@@ -23,15 +23,19 @@ _NUM_PLACES = 20
 _NUM_RUNS = 12
 _NUM_STEPS = 50
 _NUM_ROWS = (1, 2, 4, 8)
+_NEAR_LIMITS = {"stairs": 1.6, None: 2.0, "indoor": 1.8, "street": 2.0}
+"""Limit of a step with the boxes near each robot, over a plane, by preset."""
+
 _FLAT_TERRAINS = ("pyramid_stairs_inverted", "pyramid_stairs", "stairs", "obstacles", "pit", "gap")
 """Terrains that boxes represent completely."""
 
 
 def run() -> Iterator[tuple[str, float]]:
-    for preset in ("stairs", "legged_gym", "indoor", "street"):
+    for preset, limit in _NEAR_LIMITS.items():
         terrain_map = terrainkit.generate(terrainkit.MapConfig(preset=preset))
         for name, cost in _step_times(terrain_map).items():
-            yield f"{preset}_{name}_over_plane", cost
+            suffix = f" (at most {limit})" if name == "near_boxes" else ""
+            yield f"{preset or 'default_map'}_{name}_over_plane{suffix}", cost
 
     flat = tuple(terrain for terrain in get_preset("all") if terrain.name in _FLAT_TERRAINS)
     counts, costs = [], []

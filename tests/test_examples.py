@@ -23,6 +23,7 @@ WRITTEN = {
     "own_solids": ("logs.png", "logs.xml"),
     "import_scan": ("scan.npz", "scan.ply", "scan.png"),
     "height_scan": (),
+    "near_geoms": (),
     "depth_camera": (),
     "onboard_robot": ("my_robot/robot.toml", "my_robot/mjlab_config.py"),
     "train_and_export": ("ground.npz", "policy/policy.onnx", "policy/run_policy.py"),

@@ -8,6 +8,7 @@ from terrainkit.errors import ExportError
 from terrainkit.export import mjcf_map
 from terrainkit.files.memory import check_memory
 from terrainkit.integrations import load_map
+from terrainkit.integrations.near_geoms import NearGeoms as NearGeoms
 
 if TYPE_CHECKING:
     from pathlib import Path

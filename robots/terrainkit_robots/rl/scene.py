@@ -10,12 +10,12 @@ import mujoco
 import numpy as np
 
 from terrainkit.errors import ConfigError, listing
+from terrainkit.integrations.near_geoms import NearGeoms
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rendering.appearance import set_appearance
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.terrain import Ground
 from terrainkit_robots.simulation.geoms import collides, lowest_point
-from terrainkit_robots.simulation.near_terrain import add_near_geoms, find_near_terrain
 from terrainkit_robots.spec.robot_arrays import Robot
 from terrainkit_robots.transforms import FloatArray
 
@@ -24,6 +24,9 @@ CONTACT_FORCE_BIT, NET_FORCE = 2, 3
 
 SOLE = "sole of "
 """Prefix of the sites at the feet."""
+
+MAX_SPEED = 10.0
+"""Speed that a robot does not exceed within a policy step [m/s]."""
 
 ALL_BITS = 0x7FFFFFFF
 """A `conaffinity` that matches every `contype`."""
@@ -61,14 +64,12 @@ class Scene:
                 self.model: Any = mjspec.compile()
             except ValueError as error:
                 raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
-            base = self.model.body(robot.spec.base).id
-            surface = terrain.surface
-            self.near_terrain = None  # of which the model has the geoms, if it lacks some
-            if surface is not None and not all_geoms:
-                self.near_terrain = find_near_terrain(self.model, base, surface, task.dt)
-            if self.near_terrain:
-                add_near_geoms(mjspec, self.near_terrain)
-                self.model = mjspec.compile()
+            self.near_geoms = None  # of the terrain, if the model has not all of them
+            if terrain.surface is not None and not all_geoms:
+                move = MAX_SPEED * task.dt
+                near = NearGeoms(mjspec, terrain.surface, base=robot.spec.base, max_move=move)
+                if near.is_active:
+                    self.near_geoms, self.model = near, mjspec.compile()
         model = self.model
         joints = [model.joint(name).id for name in robot.spec.joint_order]
         self.joint_qpos = model.jnt_qposadr[joints]  # indices of the joints, in the robot's order
@@ -212,6 +213,6 @@ def _measure_feet(robot: Robot, model: Any, default_qpos: Any) -> tuple[FloatArr
 
 def drawn_model(scene: Scene, robot: Robot, terrain: Ground, task: Task) -> Any:
     """Return the model of a scene with all geoms of its terrain, for pictures."""
-    if scene.near_terrain is None:
+    if scene.near_geoms is None:
         return scene.model
     return Scene(robot, terrain, task, all_geoms=True).model

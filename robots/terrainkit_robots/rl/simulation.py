@@ -12,7 +12,6 @@ from terrainkit.files.memory import check_memory
 from terrainkit_robots.quiet_mujoco import quiet_mujoco
 from terrainkit_robots.rl.config import Task
 from terrainkit_robots.rl.scene import Scene
-from terrainkit_robots.simulation.near_terrain import NearGeoms
 from terrainkit_robots.spec.robot_arrays import Robot
 
 Ids = NDArray[np.int64]
@@ -33,8 +32,8 @@ class Simulation:
         self.batch = Batch(scene.model, num_envs, num_threads)
         names = ("qpos", "qvel", "ctrl", "actuator_force", "sensordata")
         self.qpos, self.qvel, self.ctrl, self.torque, self._sensordata = map(self.batch.bind, names)
-        near = scene.near_terrain
-        self._near = near and NearGeoms(self.batch, scene.model, near, num_envs)
+        near = scene.near_geoms
+        self._update_geoms = near.bind(self.batch) if near else None
 
     def step(self, count: int) -> NDArray[np.bool_]:
         """Step every simulation `count` times.
@@ -42,8 +41,8 @@ class Simulation:
         Returns:
             Unstable simulations, shape (n,). MuJoCo has reset them to its default state.
         """
-        if self._near:
-            self._near.update(self.qpos[:, :2])
+        if self._update_geoms:
+            self._update_geoms(self.qpos[:, :2])
         # A reset also restores the counters, so only counts that start at 0 are reliable.
         self.batch.warning[:, self._unstable, 1] = 0
         with quiet_mujoco():

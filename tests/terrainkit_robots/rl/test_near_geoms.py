@@ -3,10 +3,10 @@ import numpy as np
 import pytest
 
 from terrainkit import MapConfig, SubTerrain, generate
+from terrainkit.integrations.near_geoms import reach
 from terrainkit_robots.rl.scene import Scene
 from terrainkit_robots.rl.simulation import Simulation
 from terrainkit_robots.rl.terrain import MapGround
-from terrainkit_robots.simulation.near_terrain import FAR, MIN_RATIO, _reach
 
 _NUM = 12
 
@@ -44,7 +44,7 @@ def walked(scene, ground, robot):
 
 def test_robots_move_as_on_all_geoms(scenes, ground, quadruped):
     whole, near = scenes
-    assert whole.near_terrain is None
+    assert whole.near_geoms is None
     assert near.model.ngeom < whole.model.ngeom - 40
     one, other = (walked(each, ground, quadruped) for each in scenes)
     assert np.ptp(one[:, :, 0], axis=0).min() > 1  # they reached other squares
@@ -54,26 +54,26 @@ def test_robots_move_as_on_all_geoms(scenes, ground, quadruped):
     assert first.max() < 1e-12
 
 
-def test_geoms_that_are_not_near_are_far_below(scenes, ground):
+def test_the_model_has_the_geoms_near_each_robot(scenes, ground):
     scene = scenes[1]
-    terrain, sim = scene.near_terrain, Simulation(scene, 2, 1)
+    near_geoms, sim = scene.near_geoms, Simulation(scene, 2, 1)
     sim.qpos[:, :2] = ground.env_origins[[0, 2], [0, 0], :2]
-    squares = terrain.squares(sim.qpos[:, :2])
+    places = sim.qpos[:, :2].copy()
     sim.step(1)
-    pos, kinds = sim.batch.expand("geom_pos"), sim.batch.expand("geom_type")
-    slots = [k for k in range(scene.model.ngeom) if "near_" in scene.model.geom(k).name]
-    assert len(slots) == terrain.num_near <= len(terrain.fields["geom_pos"]) / MIN_RATIO
-    for env, square in enumerate(squares):
-        near = terrain.near[terrain.starts[square] : terrain.starts[square + 1]]
-        placed = pos[env, slots, 2] != FAR
-        np.testing.assert_array_equal(pos[env, slots][placed], terrain.fields["geom_pos"][near])
-        np.testing.assert_array_equal(kinds[env, slots][placed], terrain.fields["geom_type"][near])
+    assert near_geoms.num_near <= near_geoms.num_geoms / 8
+    first, counts = scene.model.geom("near_0").id, sim.batch.expand("body_geomnum")[:, 0]
+    for env, place in enumerate(places):
+        near = near_geoms.near(*near_geoms.square(place))
+        assert counts[env] == first + len(near)
+        for name, shapes in near_geoms.shapes.items():
+            placed = sim.batch.expand(name)[env, first : counts[env]]
+            np.testing.assert_array_equal(placed, shapes[near])
 
 
 def test_few_geoms_stay(quadruped, nominal_task):
     config = MapConfig(rows=1, cols=2, terrains=(SubTerrain(terrain="pit"),), border=1.0)
     scene = Scene(quadruped, MapGround(generate(config), "boxes"), nominal_task(2))
-    assert scene.near_terrain is None
+    assert scene.near_geoms is None
 
 
 def test_reach_bounds_the_robot_in_any_pose(scenes, quadruped):
@@ -86,4 +86,4 @@ def test_reach_bounds_the_robot_in_any_pose(scenes, quadruped):
         geoms = scenes[0].geoms
         distance = np.linalg.norm(data.geom_xpos[geoms] - data.qpos[:3], axis=1)
         farthest = max(farthest, float((distance + model.geom_rbound[geoms]).max()))
-    assert 0.5 * _reach(model, scenes[0].base) < farthest <= _reach(model, scenes[0].base)
+    assert 0.5 * reach(model, scenes[0].base) < farthest <= reach(model, scenes[0].base)
