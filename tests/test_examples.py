@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import chain
 from pathlib import Path
 
 import cv2
@@ -89,8 +90,9 @@ def test_example_is_run_and_short_and_says_what_to_install(path):
     assert "pip install" in rest
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom) and node.module.startswith("terrainkit.integrations."):
-            module = (ROOT / f"{node.module.replace('.', '/')}.py").read_text()
-            defined = {getattr(each, "name", "") for each in ast.parse(module).body}
+            module = ast.parse((ROOT / f"{node.module.replace('.', '/')}.py").read_text())
+            imports = [line.names for line in module.body if isinstance(line, ast.ImportFrom)]
+            defined = {name.name for name in chain(module.body, *imports) if hasattr(name, "name")}
             assert {each.name for each in node.names} <= defined
 
 
