@@ -1,10 +1,12 @@
-"""Height scans and rays of terrainkit.perception, relative to MuJoCo's on the default map."""
+"""Height scans of terrainkit.perception, relative to MuJoCo's on the default map, and rays."""
 
 from collections.abc import Iterator
 
 import mujoco
 import numpy as np
 from clock import ratio
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
 
 import terrainkit
 from terrainkit.geometry.solids import rotation_matrices
@@ -33,30 +35,7 @@ def run() -> Iterator[tuple[str, float]]:
         ratio(lambda: scan.below(position, yaw), lambda: table[places], 15),
     )
 
-    rays, few = RayCaster(terrain_map), slice(24)
-    half = yaw[few] / 2
-    quat = np.column_stack([np.cos(half), 0 * half, 0 * half, np.sin(half)])
-    patterns = {
-        "depth": depth_directions(64, 36),
-        "lidar": lidar_directions(np.radians(np.linspace(-25, 15, 16)), 128),
-    }
-    for name, pattern in patterns.items():
-        toward = np.einsum("nij,kj->nki", rotation_matrices(quat), pattern.reshape(-1, 3))
-        geom, distance = np.zeros(toward.shape[1], np.int32), np.zeros(toward.shape[1])
-
-        def mujoco_rays(toward=toward, geom=geom, distance=distance) -> None:
-            for start, directions in zip(position[few], toward, strict=True):
-                given = directions.ravel(), None, 1, -1, geom, distance, None, len(geom), 5.0
-                mujoco.mj_multiRay(model, data, start, *given)
-
-        yield (
-            f"mj_multiRay_over_{name} (at least 5)",
-            ratio(
-                mujoco_rays,
-                lambda pattern=pattern: rays.sense(position[few], quat, pattern, 5.0),
-                7,
-            ),
-        )
+    yield from _rays()
 
     # The points of two scans of the robots.
     scans = [scan.points(position, heading) for heading in (yaw, rng.permutation(yaw))]
@@ -81,3 +60,35 @@ def run() -> Iterator[tuple[str, float]]:
         for dy in (-1e-5, 1e-5)
     ]
     yield "heights_off_by_1_mm (0)", float((np.ptp(beside, axis=0) <= 1e-3).sum())
+
+
+def _rays() -> Iterator[tuple[str, float]]:
+    """Yield the time of images and scans relative to embree's with the same rays and mesh."""
+    patterns = {
+        "depth": depth_directions(64, 36),
+        "lidar": lidar_directions(np.radians(np.linspace(-25, 15, 16)), 128),
+    }
+    for preset in ("legged_gym", "stairs", "indoor", "sparse"):
+        terrain_map = terrainkit.generate(terrainkit.MapConfig(preset=preset))
+        mesh = terrain_map.mesh()
+        scene = EmbreeScene()
+        TriangleMesh(scene, mesh.vertices, mesh.triangles)
+        rays, rng = RayCaster(terrain_map), np.random.default_rng(0)
+        origins = terrain_map.env_origins.reshape(-1, 3).astype(float)
+        position = origins[rng.integers(len(origins), size=96)] + rng.uniform(-3, 3, (96, 3))
+        position[:, 2] = terrain_map.height(position[:, :2]) + 0.4
+        half = rng.uniform(-np.pi, np.pi, len(position)) / 2
+        quat = np.column_stack([np.cos(half), 0 * half, 0 * half, np.sin(half)])
+        for name, pattern in patterns.items():
+            toward = np.einsum("nij,kj->nki", rotation_matrices(quat), pattern.reshape(-1, 3))
+            directions = toward.reshape(-1, 3).astype(np.float32)
+            starts = np.repeat(position, toward.shape[1], axis=0).astype(np.float32)
+
+            def embree(scene=scene, starts=starts, directions=directions) -> None:
+                limits = np.full(len(starts), 5.0, np.float32)
+                scene.run(starts, directions, limits, query="DISTANCE")
+
+            def sense(rays=rays, pattern=pattern, position=position, quat=quat) -> None:
+                rays.sense(position, quat, pattern, 5.0)
+
+            yield f"{name}_over_embree_on_{preset} (at most 2)", ratio(sense, embree, 15)

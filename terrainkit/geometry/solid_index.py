@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.geometry.ray_grid import NUDGE, Floats, RayGrid
 from terrainkit.geometry.segments import segment_indices
 from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
 
@@ -18,6 +17,8 @@ MAX_BINS = 1_000_000
 
 _PARALLEL = 1e-6
 """Largest cosine of the angle between a line and the normal of a face that it is parallel to."""
+
+Floats = NDArray[np.float64]
 
 Crossings = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]
 """Index of the line, index of the solid, bottom and top [m] of each crossing, shapes (k,)."""
@@ -53,7 +54,6 @@ class SolidIndex:
         # Single precision rounds by less than a tenth of a millimeter.
         margin = np.maximum(self._radius[:, None], 0.0) + 1e-4
         lower, upper = solids.bounds()
-        self._bottom, self._top = lower[:, 2] - 1e-4, upper[:, 2] + 1e-4
         self._lower, self._upper = lower[:, :2] - margin, upper[:, :2] + margin
         self._make_bins()
 
@@ -137,7 +137,9 @@ class SolidIndex:
         near = ((xy[line] >= self._lower[solid]) & (xy[line] <= self._upper[solid])).all(axis=1)
         line, solid = line[near], solid[near]
         bottom, top = self._between_planes(xy[line], None, solid)
-        round_, k = self._round(solid)
+        k = solid - self._num_boxes
+        round_ = np.flatnonzero((k >= 0) & (k < len(self._cylinders)))
+        k = k[round_]
         z = self._cylinders[k, 2]
         up = np.tile(np.array([0.0, 0.0, 1.0]), (len(k), 1))
         points = np.column_stack([xy[line[round_]], z])
@@ -147,47 +149,18 @@ class SolidIndex:
         hit = top > bottom
         return line[hit], solid[hit], bottom[hit], top[hit]
 
-    def first_hits(self, origins: Floats, directions: Floats, limits: Floats) -> Floats:
-        """Return the distance at which each ray meets a solid [m], its limit where it does not.
+    def cylinder_hits(self, starts: Floats, directions: Floats, k: NDArray[np.int64]) -> Floats:
+        """Return the distance at which each ray meets a cylinder [m], inf where it does not.
 
         Args:
-            origins: Starts [m], shape (n, 3). A ray that starts in a solid meets its far side, as
-                MuJoCo's `mj_ray` does.
+            starts: Starts [m], shape (n, 3). A ray that starts in the cylinder meets its far side.
             directions: Unit vectors, shape (n, 3).
-            limits: Largest distance of each ray [m], shape (n,).
+            k: Cylinder of each ray, shape (n,).
         """
-        result = limits.copy()
-        if not self._number:
-            return result
-        rectangle, rays = (np.zeros(2), self._shape.astype(float)), (origins, directions, limits)
-        grid = RayGrid.enter(rays, self._corner, self._bin, rectangle)
-        ends = np.concatenate([[0], self._ends])
-        while len(grid.rays):
-            i, j, leave, (low, high) = grid.square(1.0)
-            bins = np.minimum((i * self._shape[1] + j).astype(np.int64), len(self._ends) - 1)
-            row, place = segment_indices(ends[bins + 1] - ends[bins])
-            solid = self._solids[ends[bins[row]] + place]
-            near = (low[row] <= self._top[solid]) & (high[row] >= self._bottom[solid])
-            ray, solid = grid.rays[row[near]], solid[near]
-            hit = self._ray_hits(origins[ray], directions[ray], solid)
-            np.minimum.at(result, ray, hit)
-            grid.move(leave + NUDGE, result[grid.rays] > leave)
-        return result
-
-    def _ray_hits(self, starts: Floats, directions: Floats, solid: NDArray[np.int64]) -> Floats:
-        """Return the distance at which each ray meets a solid [m], inf where it does not."""
-        low, high = self._between_planes(starts, directions, solid)
-        round_, k = self._round(solid)
-        inside = self._inside_cylinders(starts[round_], directions[round_], k)
-        low[round_] = np.maximum(low[round_], inside[0])
-        high[round_] = np.minimum(high[round_], inside[1])
+        ends = self._between_planes(starts, directions, k + self._num_boxes)
+        inside = self._inside_cylinders(starts, directions, k)
+        low, high = np.maximum(ends[0], inside[0]), np.minimum(ends[1], inside[1])
         return np.where((high > low) & (high >= 0), np.where(low >= 0, low, high), np.inf)
-
-    def _round(self, solid: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the positions of the cylinders among solids, and their numbers."""
-        k = solid - self._num_boxes
-        round_ = np.flatnonzero((k >= 0) & (k < len(self._cylinders)))
-        return round_, k[round_]
 
     def _between_planes(
         self, starts: Floats, directions: Floats | None, solid: NDArray[np.int64]

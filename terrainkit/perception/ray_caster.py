@@ -8,15 +8,13 @@ from numpy.typing import NDArray
 
 from terrainkit.curriculum.arrays import like
 from terrainkit.errors import ConfigError
-from terrainkit.geometry.ground_rays import GroundRays
-from terrainkit.geometry.ray_grid import Floats
-from terrainkit.geometry.solid_index import SolidIndex
 from terrainkit.geometry.solids import rotation_matrices
 from terrainkit.map.terrain_map import TerrainMap
 from terrainkit.perception.height_scan import to_floats, to_number
+from terrainkit.perception.ray_scene import Floats, RayScene
 
-_RAYS_AT_ONCE = 16_384
-"""Rays that are cast at once, so that their arrays stay in the cache."""
+_RAYS_AT_ONCE = 65_536
+"""Rays that are cast at once, to bound the memory."""
 
 _MAX_LENGTH = 1e300
 """Largest component of a direction, which may have any length."""
@@ -37,12 +35,11 @@ class RayCaster:
 
         Args:
             terrain_map: The map.
+
+        Raises:
+            MemoryLimitError: if they would not fit in memory.
         """
-        threshold = terrain_map.config.wall_threshold
-        solids = terrain_map.solids
-        first, cell = terrain_map.first_sample, terrain_map.grid.cell
-        self._ground = GroundRays(terrain_map.heights, first, cell, threshold)
-        self._solids = SolidIndex(solids.select(solids.visible))
+        self._scene = RayScene(terrain_map)
 
     def cast(self, origins: Any, directions: Any, max_distance: float = 10.0) -> Any:
         """Return the distance along each ray to the first surface [m], inf where there is none.
@@ -60,7 +57,13 @@ class RayCaster:
         """
         starts = to_floats("origins", origins, [None, 3]).astype(np.float64)
         given = to_floats("directions", directions, [len(starts), 3], _MAX_LENGTH)
-        return like(self._cast(starts, _units(given), max_distance), origins)
+        to_number("max_distance", max_distance, 1e-6)
+        result = np.empty(len(starts), np.float32)
+        for k in range(0, len(starts), _RAYS_AT_ONCE):
+            rows = slice(k, k + _RAYS_AT_ONCE)
+            toward = _units(given[rows])[:, None]
+            result[rows] = self._scene.first_hits(starts[rows], toward, float(max_distance))[:, 0]
+        return like(result, origins)
 
     def sense(self, position: Any, quat: Any, directions: Any, max_distance: float = 10.0) -> Any:
         """Return what sensors of the same kind measure at n poses.
@@ -83,29 +86,16 @@ class RayCaster:
         starts = to_floats("position", position, [None, 3]).astype(np.float64)
         turns = rotation_matrices(_units(to_floats("quat", quat, [len(starts), 4])))
         shape = np.shape(directions)[:-1]
-        pattern = _units(
-            to_floats("directions", directions, [*shape, 3], _MAX_LENGTH).reshape(-1, 3)
-        )
+        given = to_floats("directions", directions, [*shape, 3], _MAX_LENGTH)
+        pattern = _units(given.reshape(-1, 3))
+        to_number("max_distance", max_distance, 1e-6)
         result = np.empty((len(starts), len(pattern)), np.float32)
         size = max(1, _RAYS_AT_ONCE // max(1, len(pattern)))
         for k in range(0, len(starts), size):
             rows = slice(k, k + size)
-            toward = np.einsum("nij,kj->nki", turns[rows], pattern).reshape(-1, 3)
-            origins = np.repeat(starts[rows], len(pattern), axis=0)
-            distances = self._cast(origins, toward, max_distance)
-            result[rows] = distances.reshape(result[rows].shape)
+            toward = pattern @ np.swapaxes(turns[rows], 1, 2)
+            result[rows] = self._scene.first_hits(starts[rows], toward, float(max_distance))
         return like(result.reshape(len(starts), *shape), position)
-
-    def _cast(self, origins: Floats, directions: Floats, max_distance: float) -> Any:
-        to_number("max_distance", max_distance, 1e-6)
-        result = np.empty(len(origins), np.float32)
-        for k in range(0, len(origins), _RAYS_AT_ONCE):
-            starts, toward = (values[k : k + _RAYS_AT_ONCE] for values in (origins, directions))
-            limits = np.full(len(starts), float(max_distance))
-            ground = self._ground.cast(starts, toward, limits)
-            found = self._solids.first_hits(starts, toward, ground)
-            result[k : k + _RAYS_AT_ONCE] = np.where(found < limits, found, np.inf)
-        return result
 
 
 def depth_directions(width: int, height: int, fov: float = 1.5) -> Floats:

@@ -20,7 +20,7 @@ warnings.simplefilter("ignore")
 HEIGHTS = """
 import numpy as np
 import terrainkit
-from terrainkit.perception import HeightScan
+from terrainkit.perception import HeightScan, RayCaster
 terrainkit.generate(terrainkit.MapConfig(rows=2, cols=9, preset="isaaclab")).save("map.npz")
 terrain_map = terrainkit.TerrainMap.load("map.npz")
 x, y, z = terrain_map.env_origins[1, 3]
@@ -28,6 +28,8 @@ assert abs(terrain_map.height([x, y]) - z) < 1e-3
 assignment = terrain_map.assign(64)
 assert assignment.env_origins.shape == (64, 3)
 assert HeightScan(terrain_map).below(assignment.env_origins, np.zeros(64)).shape == (64, 187)
+above = [[x, y, z + 0.5]]
+assert abs(RayCaster(terrain_map).cast(above, [[0.0, 0.0, -1.0]])[0] - 0.5) < 1e-3
 """
 
 TERRAINS = """

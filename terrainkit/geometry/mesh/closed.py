@@ -9,11 +9,12 @@ THICKNESS = 1.0
 """Thickness of solids below the lowest point of the surface [m]."""
 
 
-def closed_mesh(surface: TriMesh) -> TriMesh:
-    """Return `surface` with vertical sides and a flat bottom, `THICKNESS` below its lowest point.
+def closed_mesh(surface: TriMesh, thickness: float = THICKNESS) -> TriMesh:
+    """Return `surface` with vertical sides and a flat bottom.
 
     Args:
         surface: A mesh of this package of a rectangular map.
+        thickness: Distance of the bottom below the lowest point of the surface [m].
 
     Returns:
         A mesh in which every edge is shared by two faces, once in each direction.
@@ -37,7 +38,7 @@ def closed_mesh(surface: TriMesh) -> TriMesh:
         *_side_faces(start, end, start_foot, end_foot, below),
         np.column_stack([start_foot, end_foot, middle])[:, ::-1],
     ]
-    bottom = float(vertices[:, 2].min()) - THICKNESS
+    bottom = float(vertices[:, 2].min()) - thickness
     center = (rim.min(axis=0) + rim.max(axis=0)) / 2
     extra = np.column_stack([np.vstack([rim, center]), np.full(len(rim) + 1, bottom)])
     return TriMesh(

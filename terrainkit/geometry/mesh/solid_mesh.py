@@ -1,7 +1,7 @@
 """The triangle mesh of solids."""
 
+import itertools
 from collections.abc import Iterable, Iterator
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,15 @@ from terrainkit.geometry.mesh.row_buffer import RowBuffer
 from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, convex_hull, rotation_matrices
 
+Surface = tuple[NDArray[np.float64], NDArray[np.int64]]
+"""Vertices and faces in double precision, shapes (nv, 3) and (nf, 3)."""
+
 MAX_CHORD_ERROR = 5e-4
 """Largest distance between a cylinder and its mesh, half of it inside and half outside [m]."""
 
 _BOXES_PER_BLOCK = 1 << 14
 
-_BOX = np.array(list(product((-1.0, 1.0), repeat=3)))
+_BOX = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 _BOX_FACES = np.array(
     [
         [0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5],
@@ -29,13 +32,23 @@ _BOX_FACES = np.array(
 
 def solid_meshes(solids: Solids) -> Iterator[TriMesh]:
     """Yield the mesh of each solid, closed, in the order of the solids."""
+    return itertools.starmap(_mesh, solid_surfaces(solids, MAX_CHORD_ERROR))
+
+
+def solid_surfaces(solids: Solids, chord_error: float) -> Iterator[Surface]:
+    """Yield vertices and faces of each solid in double precision, in the order of the solids.
+
+    Args:
+        solids: The solids.
+        chord_error: Largest distance between a cylinder and its faces, half of it inside [m].
+    """
     for start in range(0, len(solids.boxes), _BOXES_PER_BLOCK):
         boxes = solids.boxes[start : start + _BOXES_PER_BLOCK]
         for vertices in _transform(_BOX * boxes[:, None, 3:6], boxes):
-            yield _mesh(vertices, _BOX_FACES)
+            yield vertices, _BOX_FACES
     for cylinder in solids.cylinders:
-        vertices, faces = _cylinder(*cylinder[[3, 5]].tolist())
-        yield _mesh(_transform(vertices[None], cylinder[None])[0], faces)
+        vertices, faces = _cylinder(float(cylinder[3]), float(cylinder[5]), chord_error)
+        yield _transform(vertices[None], cylinder[None])[0], faces
     yield from map(_hull, solids.hulls())
 
 
@@ -91,10 +104,10 @@ def _mesh(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> TriMesh:
     return TriMesh(vertices=vertices.astype(np.float32), triangles=faces.astype(np.int32))
 
 
-def _cylinder(radius: float, half_length: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _cylinder(radius: float, half_length: float, chord_error: float) -> Surface:
     """Return the vertices and faces of a prism that approximates an upright cylinder."""
     # The sides of a regular polygon are radius (1 - cos(pi / n)) inside of its circle.
-    n = max(8, int(np.ceil(np.pi / np.arccos(max(0.0, 1 - MAX_CHORD_ERROR / radius)))))
+    n = max(8, int(np.ceil(np.pi / np.arccos(max(0.0, 1 - chord_error / radius)))))
     angle = np.arange(n) * (2 * np.pi / n)
     # The mean of corners and sides is on the circle: half of the error is outside, half inside.
     around = radius * 2 / (1 + np.cos(np.pi / n))
@@ -107,7 +120,7 @@ def _cylinder(radius: float, half_length: float) -> tuple[NDArray[np.float64], N
     return np.concatenate([*ends, centers]), np.concatenate([np.column_stack(f) for f in faces])
 
 
-def _hull(vertices: NDArray[np.float32]) -> TriMesh:
+def _hull(vertices: NDArray[np.float32]) -> Surface:
     hull = convex_hull(vertices)
     faces = hull.simplices
     corners = vertices[faces].astype(float)
@@ -115,4 +128,4 @@ def _hull(vertices: NDArray[np.float32]) -> TriMesh:
     # Qhull's normals point outward, but its triangles have any orientation.
     inward = (normal * hull.equations[:, :3]).sum(axis=1) < 0
     faces[inward] = faces[inward][:, ::-1]
-    return _mesh(vertices.astype(float), faces)
+    return vertices.astype(float), faces

@@ -1,13 +1,27 @@
+import dataclasses
+import importlib.util
+import sys
+
 import mujoco
 import numpy as np
 import pytest
 import torch
 
+from terrainkit import MapConfig, SubTerrain, generate
 from terrainkit.errors import ConfigError
+from terrainkit.geometry.solids import make_cylinders
 from terrainkit.integrations.mujoco import make_spec
 from terrainkit.perception import RayCaster, depth_directions, lidar_directions
 from tests.tables import read_table
 from tests.terrainkit.test_every_view import mesh_model
+
+
+@pytest.fixture(autouse=True, params=["embree", "numpy"])
+def engine(request, monkeypatch):
+    if request.param == "numpy":
+        monkeypatch.setitem(sys.modules, "embreex", None)
+    elif importlib.util.find_spec("embreex") is None:
+        pytest.skip("embreex has no wheel here")
 
 
 @pytest.mark.parametrize(
@@ -55,6 +69,49 @@ def test_distances_are_those_of_mujoco(name, request):
 def test_ray_that_starts_in_a_solid_meets_its_far_side(solid_map):
     found = RayCaster(solid_map).cast([[5.2, 6.2, 0.5]] * 2, [[0, 0, 1], [0, 1, 0]])
     assert found.tolist() == pytest.approx([0.1, 0.3])
+
+
+def test_round_side_of_a_cylinder_is_exact(solid_map):
+    pole = make_cylinders((2, 2, 0.5), 0.2, 1.0)
+    rays = RayCaster(solid_map.edited(solids=pole))
+    y = np.array([0.0, 0.1, 0.12, 0.19])
+    origins = np.column_stack([np.ones(4), 2 + y, np.full(4, 0.5)])
+    expected = 1 - np.sqrt(0.2**2 - y**2)
+    assert rays.cast(origins, [[1, 0, 0]] * 4).tolist() == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.fixture(scope="module")
+def long_slope():
+    """Return ground that rises by 1/8 along x, 1,600 m long; its heights are exact."""
+    flat = SubTerrain(terrain="flat")
+    config = MapConfig(rows=1, cols=1, patch_size=(1600, 8), cell=0.5, border=0, terrains=(flat,))
+    heights = np.arange(3200, dtype=np.float32)[:, None] / 16 + np.zeros((3200, 16), np.float32)
+    return dataclasses.replace(generate(config), heights=heights)
+
+
+def test_rays_far_from_the_origin_are_exact(long_slope):
+    x = np.array([20.0, 800.3, 1580.3])  # the first sample is at 0.25 m
+    origins = np.column_stack([x, np.full(3, 4.1), (x - 0.25) / 8 + 0.5])
+    found = RayCaster(long_slope).cast(origins, [[1, 0, 0], [1, 0, 0], [0, 0, -1]])
+    assert found.tolist() == pytest.approx([4.0, 4.0, 0.5], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["terrain_map", "level_map", "step_map"])
+def test_no_ray_passes_between_triangles(name, request):
+    terrain_map = request.getfixturevalue(name)
+    grid = terrain_map.grid
+    # All samples, and all points between them, where walls are.
+    x, y = (grid.lower[k] + np.arange(1, 2 * grid.shape[k]) * grid.cell / 2 for k in (0, 1))
+    xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    top = terrain_map.heights.max() + 1.0
+    origins = np.column_stack([xy, np.full(len(xy), top)])
+    found = top - RayCaster(terrain_map).cast(origins, np.tile([0.0, 0.0, -1.0], (len(xy), 1)))
+    beside = [
+        terrain_map.height(xy + 1e-3 * np.array(offset))
+        for offset in ((-1, -1), (-1, 1), (1, -1), (1, 1))
+    ]
+    assert (found >= np.min(beside, axis=0) - 0.01).all()
+    assert (found <= np.max(beside, axis=0) + 0.01).all()
 
 
 def test_sensors_turn_with_their_quaternion(step_map):
