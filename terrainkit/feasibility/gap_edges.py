@@ -22,7 +22,7 @@ nodes of a component, so it does not matter where a gap ends, unless there is a 
 _MAX_SEARCHED_ENDS = 16
 """The same where one gap into each component is enough: most are not evaluated."""
 
-_LEVELS = 32
+_LEVELS = 16
 """Images of the floors at different heights."""
 
 _MORE = 8
@@ -145,12 +145,15 @@ def _have_end_near(
     import cv2
 
     # Floors that are `_LEVELS` apart, such as those of tall buildings, share an image.
-    level = columns.floor.reshape(-1) // max_height
+    floor = columns.floor.reshape(-1)
+    level, start_level = (
+        np.floor(floor[node] / max_height).astype(np.int64) % _LEVELS for node in (ends, starts)
+    )
     image = np.zeros((*columns.shape, _LEVELS), np.uint8)
-    for shift in (-1, 0, 1):
-        image[(*columns.column(ends), (level[ends] + shift).astype(np.int64) % _LEVELS)] = 1
+    image[(*columns.column(ends), level)] = 1
+    image |= np.roll(image, 1, axis=2) | np.roll(image, -1, axis=2)
     image = cv2.dilate(image, np.ones((2 * reach + 1,) * 2, np.uint8))
-    return image[(*columns.column(starts), level[starts].astype(np.int64) % _LEVELS)] > 0
+    return np.asarray(image[(*columns.column(starts), start_level)] > 0)
 
 
 def _offsets(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:
