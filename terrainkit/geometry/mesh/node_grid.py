@@ -167,10 +167,12 @@ class NodeGrid:
             extra: Positions of the extra vertices [m], shape (k, 3).
         """
         vertices, start = RowBuffer(np.float32, int(np.count_nonzero(used))), self.z.size
+        y = self.y.astype(np.float32)
         for i, used_row in enumerate(used[:start].reshape(self.z.shape)):
-            j = np.flatnonzero(used_row)
-            added = vertices.add(len(j))
-            added[:, 0], added[:, 1], added[:, 2] = self.x[i], self.y[j], self.z[i, j]
+            j = slice(None) if used_row.all() else np.flatnonzero(used_row)
+            z = self.z[i, j]
+            added = vertices.add(len(z))
+            added[:, 0], added[:, 1], added[:, 2] = self.x[i], y[j], z
         for block in itertools.chain(self.midpoints(), [extra]):
             vertices.append(block[used[start : start + len(block)]])
             start += len(block)
