@@ -58,13 +58,14 @@ class Bands:
 def _make_bands(ends: IntArray, demand: FloatArray, num_nodes: int) -> Iterator[Band]:
     labels = np.arange(num_nodes)
     for bound in _BOUNDS:
-        is_in = demand <= bound
-        yield Band(bound, labels, ends[:, is_in], demand[is_in])
-        joined = find_components(ends[:, is_in], num_nodes)
+        index = np.flatnonzero(demand <= bound)
+        inside = ends.take(index, axis=1)
+        yield Band(bound, labels, inside, demand[index])
+        joined = find_components(inside, num_nodes)
         labels, ends, num_nodes = joined[labels], joined[ends], int(joined.max()) + 1
         left = np.flatnonzero(ends[0] != ends[1])
         left = left[np.argsort(ends[0, left], kind="stable")]
-        ends, demand = ends[:, left], demand[left]
+        ends, demand = ends.take(left, axis=1), demand[left]
 
 
 def components_below(bands: Bands, max_demand: float) -> Components:

@@ -54,10 +54,10 @@ def bottleneck(ends: IntArray, demand: FloatArray, segment: Segment, num_nodes: 
         return 0.0
     order = np.argsort(ends[0], kind="stable")  # fast, since most edges are sorted
     order = order[np.isfinite(demand[order])]
-    ends, demand = ends[:, order], demand[order]
+    ends, demand = ends.take(order, axis=1), demand[order]
 
     def reaches(level: float) -> bool:
-        graph = _matrix(ends[:, demand <= level], num_nodes)
+        graph = _matrix(ends.take(np.flatnonzero(demand <= level), axis=1), num_nodes)
         reached = breadth_first_order(graph, start, return_predecessors=False)
         return bool(np.isin(targets, reached).any())
 
@@ -91,7 +91,7 @@ def shortest_path(
         # Parallel edges would be added up: keep the shortest of each pair.
         order = np.lexsort((length, key))
         order = order[np.append(True, np.diff(key[order]) > 0)]
-    matrix = _matrix(ends[:, order], num_nodes, length[order])
+    matrix = _matrix(ends.take(order, axis=1), num_nodes, length[order])
     for limit in _LIMITS:
         distance, before = dijkstra(matrix, indices=start, return_predecessors=True, limit=limit)
         target = int(targets[np.argmin(distance[targets])]) if len(targets) else start
