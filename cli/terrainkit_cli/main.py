@@ -75,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     _open_closed_streams()
-    # Imports create some 200,000 objects and no garbage; looking for it took 7 % of a short command.
+    # Imports create some 200,000 objects and no garbage; looking for it took 5 % of a command.
     gc.set_threshold(300_000)
     # Child processes render. Here, `import mujoco` would load a graphics library, which takes time
     # and fails where it is missing. gl_backend.py reads the other name.
