@@ -52,7 +52,7 @@ def merged_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> T
 
 def _merge_quads(node_grid: NodeGrid) -> tuple[Mask, list[Rectangles], list[WallRuns]]:
     """Return the mask of the quads that are not merged, and the merged rectangles and wall runs."""
-    flat_x, flat_y = node_grid.flat()
+    flat_x, flat_y = node_grid.flat_x, node_grid.flat_y
     flat = flat_x & flat_y
     sloped = ~(flat | node_grid.has_wall)
     rows_x, rows_y = flat_x & sloped, flat_y & sloped

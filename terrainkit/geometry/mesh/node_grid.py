@@ -91,18 +91,17 @@ class NodeGrid:
         check_memory(num_vertices * _BYTES_PER_VERTEX, f"a mesh of about {num_vertices} vertices")
         return num_vertices
 
-    def flat(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Return whether both edges of each quad along x are flat, and both along y."""
-        shape = self.z.shape[0] - 1, self.z.shape[1] - 1
-        x, y = np.empty(shape, dtype=bool), np.empty(shape, dtype=bool)
-        rows = max(1, QUADS_PER_BLOCK // shape[1])
-        for first in range(0, shape[0], rows):
-            block = slice(first, first + rows)
-            z = self.z[first : first + rows + 1]
-            same_x, same_y = z[:-1] == z[1:], z[:, :-1] == z[:, 1:]
-            np.logical_and(same_x[:, :-1], same_x[:, 1:], out=x[block])
-            np.logical_and(same_y[:-1], same_y[1:], out=y[block])
-        return x, y
+    @property
+    def flat_x(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along x are flat."""
+        same = self.z[:-1] == self.z[1:]
+        return np.asarray(same[:, :-1] & same[:, 1:])
+
+    @property
+    def flat_y(self) -> NDArray[np.bool_]:
+        """Whether both edges of each quad along y are flat."""
+        same = self.z[:, :-1] == self.z[:, 1:]
+        return np.asarray(same[:-1] & same[1:])
 
     def corners(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the vertices at the corners of quads.

@@ -8,9 +8,6 @@ from numpy.typing import NDArray
 Ids = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-_ROWS = 64
-"""Rows of a mask that are read at once: a cache line of each column of a transposed mask."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Polygons:
@@ -64,14 +61,9 @@ def runs(mask: Mask) -> tuple[Ids, Ids, Ids]:
     Returns:
         Row, start and end (exclusive) of each run, each of shape (k,).
     """
-    parts = []
-    padded = np.zeros((_ROWS, mask.shape[1] + 2), dtype=bool)
-    for first in range(0, len(mask), _ROWS):
-        block = mask[first : first + _ROWS]
-        padded[: len(block), 1:-1] = block
-        flat = padded[: len(block)].ravel()
-        change = np.flatnonzero(flat[1:] != flat[:-1])
-        row, start = np.divmod(change[::2], padded.shape[1])
-        parts.append((first + row, start, change[1::2] % padded.shape[1]))
-    row, start, stop = map(np.concatenate, zip(*parts, strict=True))
-    return row, start, stop
+    padded = np.zeros((mask.shape[0], mask.shape[1] + 2), dtype=bool)
+    padded[:, 1:-1] = mask
+    flat = padded.ravel()
+    change = np.flatnonzero(flat[1:] != flat[:-1])
+    row, start = np.divmod(change[::2], padded.shape[1])
+    return row, start, change[1::2] % padded.shape[1]

@@ -30,8 +30,8 @@ class Rectangles:
             flat: Mask of the flat quads. It is cleared where a rectangle would be too small.
         """
         row, start, stop = runs(flat)
-        # Runs over the same columns in consecutive rows are one rectangle; rows are in order.
-        order = np.argsort(start * (flat.shape[1] + 1) + stop, kind="stable")
+        # Runs over the same columns in consecutive rows are one rectangle.
+        order = np.lexsort((row, stop, start))
         row, start, stop = row[order], start[order], stop[order]
         first = np.ones(len(row), dtype=bool)
         first[1:] = (np.diff(start) != 0) | (np.diff(stop) != 0) | (np.diff(row) != 1)

@@ -8,9 +8,6 @@ from terrainkit.geometry.mesh.node_grid import NodeGrid
 from terrainkit.geometry.mesh.polygons import Ids, Mask, Polygons, runs
 from terrainkit.geometry.segments import segment_indices
 
-_BLOCK = 1 << 10
-"""Walls whose vertices are listed at once, so that intermediate arrays stay in the cache."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WallRuns:
@@ -56,25 +53,19 @@ class WallRuns:
         x, y, z, steps = grid.x, grid.y, grid.z, (grid.z.shape[1], 1)
         if self.axis:
             x, y, z, steps = y, x, z.T, steps[::-1]
-        ends = [self._midpoint(j) + side for j in (self.j0, self.j1)]
-        parts = []
-        for first in range(0, max(len(i), 1), _BLOCK):
-            block = slice(first, first + _BLOCK)
-            owner, k = segment_indices((self.j1 - self.j0 + 3)[block])
-            owner += first
-            # Two vertices at the bottom or the top of the wall, then the nodes in reverse order.
-            j = np.minimum(self.j1[owner], self.j1[owner] + 2 - k)
-            vertices = i[owner] * steps[0] + j * steps[1]
-            for place, midpoints in enumerate(ends):
-                vertices[k == place] = midpoints[block]
-            keep = (k < 2) | kept[i[owner], j]
-            parts.append((vertices[keep], owner[keep]))
+        owner, k = segment_indices(self.j1 - self.j0 + 3)
+        # Two vertices at the bottom or the top of the wall, then the nodes in reverse order.
+        j = np.minimum(self.j1[owner], self.j1[owner] + 2 - k)
+        vertices = i[owner] * steps[0] + j * steps[1]
+        for place, end in ((0, self.j0), (1, self.j1)):
+            vertices[k == place] = self._midpoint(end) + side
+        keep = (k < 2) | kept[i[owner], j]
         normal = (x[self.i] + x[self.i + 1] + 2 * x[i]) / 4
         tangent = (y[self.j0] + y[self.j1]) / 2
         xy = (tangent, normal) if self.axis else (normal, tangent)
         return Polygons(
-            vertices=np.concatenate([vertices for vertices, _ in parts]),
-            owner=np.concatenate([owner for _, owner in parts]),
+            vertices=vertices[keep],
+            owner=owner[keep],
             centers=np.column_stack([*xy, z[i, self.j0]]).astype(np.float32),
             clockwise=side != self.axis,
         )
