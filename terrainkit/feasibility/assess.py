@@ -16,7 +16,7 @@ from terrainkit.feasibility.bottleneck import Segment, shortest_path
 from terrainkit.feasibility.columns import Columns, columns_per_cell, sample_columns
 from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.foothold_graph import FootholdGraph
-from terrainkit.feasibility.node_arrays import FloatArray, IntArray
+from terrainkit.feasibility.node_arrays import IntArray
 from terrainkit.feasibility.path_edges import MAX_DEMAND, path_edges
 from terrainkit.files.memory import check_memory
 from terrainkit.files.parallel_map import parallel_map
@@ -214,42 +214,30 @@ class _Path:
         self.place = np.full(3, np.nan)
         size, position = graph.columns.floor.size, graph.columns.positions
         nodes = [segments[0][0]]
-        step_ends = graph.steps.ends
-        step_length = _lengths(graph, step_ends, graph.step_demand)
+        step_demand = graph.demand(graph.steps)
         for start, targets in segments:
             if nodes[-1] != start:
                 break
-            usable, gaps = path_edges(graph, (start, targets))
-            gap_demand = graph.demand(gaps)
-            ratios = np.append(graph.step_demand[usable], gap_demand)
-            ends = np.append(step_ends[:, usable], gaps.ends, axis=1)
-            length = np.append(step_length[usable], _lengths(graph, gaps.ends, gap_demand))
-            way = shortest_path(ends, length, start, targets, size)
+            usable = path_edges(graph, step_demand, (start, targets))
+            ratios = graph.demand(usable)
+            ends = position(usable.end) - position(usable.start)
+            # Of the least demanding paths, a short one over easy ground: a step at the limit counts
+            # as twice its length.
+            length = np.linalg.norm(ends, axis=1) * (1.0 + ratios)
+            way = shortest_path(usable, length, start, targets, size)
             if way is None:
                 self.demand = float("inf")
                 break
             if not len(way):
                 continue
-            nodes += ends[1, way].tolist()
+            nodes += usable.end[way].tolist()
             worst = way[np.argmax(ratios[way])]
             if ratios[worst] > self.demand:
-                edge = gaps.select(np.arange(len(gap_demand)) == worst - len(usable))
-                if worst < len(usable):
-                    edge = graph.steps.select(usable[[worst]])
+                edge = usable.select(np.arange(len(ratios)) == worst)
                 self.limit, self.value = graph.blocking(edge)
                 self.demand = float(ratios[worst])
-                self.place = position(ends[:, worst]).mean(axis=0)
+                self.place = (position(edge.start)[0] + position(edge.end)[0]) / 2
         self.points = position(np.array(nodes))
-
-
-def _lengths(graph: FootholdGraph, ends: IntArray, demand: FloatArray) -> FloatArray:
-    """Return the lengths of edges for the choice of a path [m], shape (n,).
-
-    Of the least demanding paths, a short one over easy ground: a step at the limit counts as twice
-    its length.
-    """
-    start, end = map(graph.columns.positions, ends)
-    return np.asarray(np.linalg.norm(end - start, axis=1) * (1.0 + demand))
 
 
 def _check_goals(patch: Patch, threshold: float) -> None:

@@ -36,11 +36,6 @@ class Edges:
     width: FloatArray
     """Free width between walls over the gap [m], shape (n,)."""
 
-    @property
-    def ends(self) -> IntArray:
-        """First and second node of each, shape (2, n)."""
-        return np.stack([self.start, self.end])
-
     @classmethod
     def concatenate(cls, parts: list[Self]) -> Self:
         """Return the edges of all parts."""

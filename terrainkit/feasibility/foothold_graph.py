@@ -5,13 +5,11 @@ ratios is its demand: 0 on level ground, 1 at the limit.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from terrainkit.feasibility.bands import Bands
 from terrainkit.feasibility.columns import Columns
 from terrainkit.feasibility.crossing_limits import RobotLimits
 from terrainkit.feasibility.edges import Edges, step_edges
@@ -38,8 +36,7 @@ class FootholdGraph:
     """The limits."""
 
     steps: Edges
-    """Edges between the nodes of neighboring columns, in both directions, in the order of the
-    nodes."""
+    """Edges between the nodes of neighboring columns, in both directions."""
 
     free_width: FreeWidth
     """The free width between walls."""
@@ -82,21 +79,11 @@ class FootholdGraph:
         return cls(
             columns=columns,
             limits=limits,
-            steps=steps.select(np.lexsort((steps.end, steps.start))),
+            steps=steps,
             free_width=free_width,
             quantities=flat,
             node_demand=demand,
         )
-
-    @cached_property
-    def step_demand(self) -> FloatArray:
-        """Demand of each step."""
-        return self.demand(self.steps)
-
-    @cached_property
-    def bands(self) -> Bands:
-        """The steps by their demand."""
-        return Bands(self.steps.ends, self.step_demand, self.columns.floor.size)
 
     def demand(self, edges: Edges) -> FloatArray:
         """Return the demand of each edge and its two nodes, shape (n,).

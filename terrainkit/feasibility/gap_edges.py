@@ -22,7 +22,7 @@ nodes of a component, so it does not matter where a gap ends, unless there is a 
 _MAX_SEARCHED_ENDS = 16
 """The same where one gap into each component is enough: most are not evaluated."""
 
-_LEVELS = 16
+_LEVELS = 32
 """Images of the floors at different heights."""
 
 _MORE = 8
@@ -145,15 +145,12 @@ def _have_end_near(
     import cv2
 
     # Floors that are `_LEVELS` apart, such as those of tall buildings, share an image.
-    floor = columns.floor.reshape(-1)
-    level, start_level = (
-        np.floor(floor[node] / max_height).astype(np.int64) % _LEVELS for node in (ends, starts)
-    )
+    level = columns.floor.reshape(-1) // max_height
     image = np.zeros((*columns.shape, _LEVELS), np.uint8)
-    image[(*columns.column(ends), level)] = 1
-    image |= np.roll(image, 1, axis=2) | np.roll(image, -1, axis=2)
+    for shift in (-1, 0, 1):
+        image[(*columns.column(ends), (level[ends] + shift).astype(np.int64) % _LEVELS)] = 1
     image = cv2.dilate(image, np.ones((2 * reach + 1,) * 2, np.uint8))
-    return np.asarray(image[(*columns.column(starts), start_level)] > 0)
+    return image[(*columns.column(starts), level[starts].astype(np.int64) % _LEVELS)] > 0
 
 
 def _offsets(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:

@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from terrainkit.feasibility.bands import components_below, least_demand
-from terrainkit.feasibility.bottleneck import Segment
+from terrainkit.feasibility.bottleneck import Segment, bottleneck
 from terrainkit.feasibility.components import Components
 from terrainkit.feasibility.edges import Edges
 from terrainkit.feasibility.foothold_graph import FootholdGraph
 from terrainkit.feasibility.gap_edges import gap_edges
-from terrainkit.feasibility.node_arrays import IntArray
+from terrainkit.feasibility.node_arrays import FloatArray
 
 MAX_DEMAND = 2.0
 """Demand above which a patch counts as infinitely demanding; wider gaps are not searched."""
@@ -18,45 +17,47 @@ _REACHES = (0.5, 1.0, float(np.nextafter(MAX_DEMAND, np.inf)))
 patches need the widest gaps."""
 
 
-def path_edges(graph: FootholdGraph, segment: Segment) -> tuple[IntArray, Edges]:
-    """Return the steps and gaps that demand no more than the least demanding path of a segment.
+def path_edges(graph: FootholdGraph, step_demand: FloatArray, segment: Segment) -> Edges:
+    """Return the edges that demand no more than the least demanding path of a segment.
 
     Gaps are only searched while they may make the best known path easier: below its demand, and
     from the nodes that are reached below it to the others.
 
     Args:
         graph: The graph.
+        step_demand: Demand of each step of the graph.
         segment: The segment. Without a path, all steps are returned.
-
-    Returns:
-        Indices of the steps, and the gaps.
     """
-    gaps = graph.steps.select(slice(0))
+    steps = graph.steps
+    num_nodes = graph.columns.floor.size
+    gaps = steps.select(slice(0))
     # Cells that touch at a corner are sqrt(2) - 1 columns apart, and all others at least one (see
     # `gap_edges`): no gap between cells demands less.
     searched = (2**0.5 - 1) * graph.columns.spacing / graph.limits.gap
-    without_gaps = least = least_demand(graph.bands, gaps.ends, graph.demand(gaps), segment)
+    without_gaps = least = bottleneck(steps, step_demand, segment, num_nodes)
     while min(least, MAX_DEMAND) > searched:
         reach = least
         if least > MAX_DEMAND:
             reach = next(length for length in _REACHES if length > searched)
-        components = components_below(graph.bands, reach)
+        is_usable = step_demand < reach
+        components = Components.build(steps, is_usable, num_nodes)
         found, is_path = _search_gaps(graph, components, _below(graph, gaps, reach), segment, reach)
         if is_path:
-            gaps = found
-            least = least_demand(graph.bands, gaps.ends, graph.demand(gaps), segment)
+            gaps, edges = found, Edges.concatenate([steps.select(is_usable), found])
+            least = bottleneck(edges, graph.demand(edges), segment, num_nodes)
         else:
             searched = reach
-    usable = np.flatnonzero(graph.step_demand <= least)
+    is_usable = step_demand <= least
+    usable = steps.select(is_usable)
     if least == without_gaps:
-        return usable, gaps.select(slice(0))
+        return usable
     # One gap into each component is enough to find the demand; a path may need to go far to it.
     # Gaps are searched below a demand: to keep those that demand `least`, it is the next number.
     above = np.nextafter(least, np.inf)
-    gaps, components = _below(graph, gaps, above), components_below(graph.bands, above)
+    gaps, components = _below(graph, gaps, above), Components.build(steps, is_usable, num_nodes)
     is_reached = components.reached(segment[0], gaps)
     more = gap_edges(graph, components.labels, is_reached, is_reached, above)
-    return usable, Edges.concatenate([gaps, more])
+    return Edges.concatenate([usable, gaps, more])
 
 
 def _search_gaps(

@@ -4,10 +4,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from terrainkit.feasibility.bottleneck import bottleneck, find_components, shortest_path
+from terrainkit.feasibility.edges import Edges
 
 
 def edges(pairs):
-    return np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    start, end = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+    zero = np.zeros(len(start))
+    return Edges(start=start, end=end, rise=zero, drop=zero, gap=zero, clearance=zero, width=zero)
 
 
 @given(st.integers(0, 2**32 - 1))
@@ -37,6 +40,6 @@ def test_shortest_path_uses_the_shortest_of_parallel_edges():
 
 def test_components_are_joined_both_ways():
     graph = edges([(0, 1), (1, 0), (1, 2)])
-    labels = find_components(graph, 3)
+    labels = find_components(graph, np.ones(3, dtype=bool), 3)
     assert labels[0] == labels[1] != labels[2]
-    assert pytest.approx(3) == len(np.unique(find_components(edges([]), 3)))
+    assert pytest.approx(3) == len(np.unique(find_components(graph, np.zeros(3, bool), 3)))

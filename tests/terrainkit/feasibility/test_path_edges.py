@@ -27,12 +27,11 @@ def test_demand_is_that_of_all_steps_and_gaps(seed):
     rng = np.random.default_rng(seed)
     graph = graph_of(rng.choice(LEVELS, (14, 9), p=(0.5, 0.2, 0.1, 0.1, 0.1)))
     segment, number = (4, np.arange(13 * 9, 14 * 9)), 14 * 9
-    steps, gaps = path_edges(graph, segment)
-    found = Edges.concatenate([graph.steps.select(steps), gaps])
+    found = path_edges(graph, graph.demand(graph.steps), segment)
     nodes = np.ones(number, dtype=bool)
     gaps = gap_edges(graph, np.arange(number), nodes, nodes, np.nextafter(MAX_DEMAND, np.inf))
     edges = Edges.concatenate([graph.steps, gaps])
-    found, every = (bottleneck(e.ends, graph.demand(e), segment, number) for e in (found, edges))
+    found, every = (bottleneck(e, graph.demand(e), segment, number) for e in (found, edges))
     assert found == every or min(found, every) > MAX_DEMAND
 
 
@@ -41,7 +40,7 @@ def test_path_need_not_go_far_to_a_gap():
     floor = np.zeros((14, 9))
     floor[6:8] = -1.0
     graph = graph_of(floor)
-    _, found = path_edges(graph, (4, np.arange(13 * 9, 14 * 9)))
+    found = path_edges(graph, graph.demand(graph.steps), (4, np.arange(13 * 9, 14 * 9)))
     straight = (found.gap > 0) & (found.end - found.start == 3 * 9)
     assert np.unique(found.start[straight] % 9).tolist() == list(range(9))
     assert found.gap[straight] == pytest.approx(0.2)
