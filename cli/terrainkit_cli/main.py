@@ -1,5 +1,6 @@
 """The entry point: select the command, run it, and report errors as one line."""
 
+import gc
 import importlib
 import os
 import re
@@ -18,36 +19,43 @@ if TYPE_CHECKING:
     from terrainkit_cli.parse import Command
 
 COMMAND_GROUPS = {
-    "": {"demo": "view_command"},
+    "": {"demo": "Walk the bundled quadruped over a course, live in the browser."},
     "Terrain": {
-        "generate": "generate_command",
-        "import": "import_command",
-        "list": "terrain_commands",
-        "suite": "suite_command",
-        "info": "terrain_commands",
-        "preview": "terrain_commands",
-        "view": "view_command",
-        "check-map": "terrain_commands",
-        "feasibility": "feasibility_command",
-        "diff": "terrain_commands",
-        "export": "export_command",
+        "generate": "Generate a map of terrain patches and write it to a file.",
+        "import": "Import heights, meshes or point clouds as a map.",
+        "list": "List terrains, overlays and presets, or the contents of one.",
+        "suite": "List, show or generate suites: fixed maps to compare policies.",
+        "info": "Print the size, terrains and difficulty of a map, or one patch.",
+        "preview": "Render a map from above, with terrain names and spawn origins.",
+        "view": "Show a map, a robot or a policy in the browser, in 3D.",
+        "check-map": "Validate a map: spawn origins, patches, sizes, difficulty, mesh.",
+        "feasibility": "Show whether a robot can cross each patch, and what blocks it.",
+        "diff": "Compare two maps: config, and each patch.",
+        "export": "Export a map to other formats, or a policy to ONNX.",
     },
     "Robots": {
-        "check-robot": "robot_commands",
-        "rule": "robot_commands",
-        "onboard": "onboard_command",
-        "smoke-test": "smoke_test_command",
-        "train": "train_command",
-        "average": "average_command",
-        "evaluate": "evaluate_command",
-        "play": "play_command",
-        "check-policy": "check_policy_command",
+        "check-robot": "Check URDF, xacro and MJCF files for errors.",
+        "rule": "Explain a rule of check-robot, or list all rules.",
+        "onboard": "Convert a robot file into a folder that is ready for training.",
+        "smoke-test": "Check in a minute whether a robot can be trained.",
+        "train": "Train a policy for a robot on a terrain, and save it as a run.",
+        "average": "Average the networks of the last checkpoints of a run.",
+        "evaluate": "Measure velocity errors, gait, falls and success of a policy.",
+        "play": "Record a video of a policy, and print its errors and falls.",
+        "check-policy": "Check whether a policy, its contract and a robot fit together.",
     },
 }
-"""Module of each command, so that only the one in use is imported, by the title of its group."""
+"""Summary of each command by the title of its group: the first line of the docstring of its class,
+whose module is only imported to run it."""
 
-COMMANDS = {name: module for group in COMMAND_GROUPS.values() for name, module in group.items()}
-COMMANDS["completion"] = "completion_command"
+_MODULES = {
+    "demo": "view_command",
+    **dict.fromkeys(("list", "info", "preview", "check-map", "diff"), "terrain_commands"),
+    **dict.fromkeys(("check-robot", "rule"), "robot_commands"),
+}
+"""Modules of the commands that have no module of their own."""
+
+COMMANDS = [name for group in COMMAND_GROUPS.values() for name in group] + ["completion"]
 
 _OUT_OF_MEMORY = re.compile("allocate memory|start new thread|failed to map segment")
 """Errors of torch, of threads and of shared libraries under a small limit of the memory."""
@@ -67,6 +75,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     _open_closed_streams()
+    # Imports create some 200,000 objects and no garbage; looking for it took 5 % of a command.
+    gc.set_threshold(300_000)
     # Child processes render. Here, `import mujoco` would load a graphics library, which takes time
     # and fails where it is missing. gl_backend.py reads the other name.
     if os.environ.get("MUJOCO_GL") != "disable":
@@ -183,16 +193,16 @@ def _print_overview() -> None:
     # The text fits into 24 lines, the size of a terminal.
     render.result("usage: terrainkit COMMAND [OPTIONS | --help]; see also --version, completion.")
     rows: list[tuple[str, str]] = []
-    for group, names in COMMAND_GROUPS.items():
-        summaries = ((command(name).__doc__ or "").partition("\n")[0] for name in names)
+    for group, summaries in COMMAND_GROUPS.items():
         rows += [(f"{group}:", "")] if group else []
-        rows += zip((f"  {name}" for name in names), summaries, strict=True)
+        rows += [(f"  {name}", summary) for name, summary in summaries.items()]
     render.table(rows)
 
 
 def command(name: str) -> "type[Command]":
     """Return the class of the command `name`: `check-map` is the class `CheckMap` of its module."""
-    module = importlib.import_module(f"terrainkit_cli.{COMMANDS[name]}")
+    own = f"{name.replace('-', '_')}_command"
+    module = importlib.import_module(f"terrainkit_cli.{_MODULES.get(name, own)}")
     found: type[Command] = getattr(module, name.title().replace("-", ""))
     return found
 

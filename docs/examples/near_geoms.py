@@ -20,7 +20,7 @@ terrain_map = terrainkit.generate(terrainkit.MapConfig(rows=4, cols=9))
 for only_near in (False, True):
     spec = mujoco.MjSpec.from_file(robot)
     add_map(spec, terrain_map, collision="boxes")
-    near = NearGeoms(spec, terrain_map, collision="boxes") if only_near else None
+    near = NearGeoms(spec) if only_near else None
     model = spec.compile()
     data = mujoco.MjData(model)
     if model.nkey:

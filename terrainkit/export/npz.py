@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from terrainkit.errors import ConfigError, MapFileError, TerrainkitWarning, is_built_in, listing
 from terrainkit.files.archive import MAX_TEXT_BYTES, Archive, open_archive, write_arrays
-from terrainkit.geometry.mesh.tri_mesh import TriMesh
 from terrainkit.geometry.solids import Solids, check_solids
 from terrainkit.map.import_report import ImportReport
 from terrainkit.map.map_config import MapConfig
@@ -24,6 +23,7 @@ from terrainkit.terrain.patch_geometry import MAX_GOALS
 from terrainkit.terrain.sub_terrain import SubTerrain, UnavailableSubTerrain
 
 if TYPE_CHECKING:
+    from terrainkit.geometry.mesh.tri_mesh import TriMesh
     from terrainkit.map.terrain_map import TerrainMap
 
 SUFFIXES = (".npz",)
@@ -178,13 +178,15 @@ def is_map_file(path: Path) -> bool:
         return False
 
 
-def read_mesh(path: str | Path) -> TriMesh | None:
+def read_mesh(path: str | Path) -> "TriMesh | None":
     """Return the trimesh in the .npz file `path`; None if it was written without one.
 
     Raises:
         MapFileError: if it has only one of the arrays, or a vertex index is out of range.
         MemoryLimitError: if its arrays would not fit in memory.
     """
+    from terrainkit.geometry.mesh.tri_mesh import TriMesh
+
     with open_archive(path) as archive:
         shape = _read_config(archive).grid.shape
         if archive.names().isdisjoint(("vertices", "triangles")):

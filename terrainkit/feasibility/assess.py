@@ -4,6 +4,7 @@ import itertools
 import math
 from dataclasses import dataclass, replace
 from functools import partial
+from hashlib import sha256
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -84,6 +85,8 @@ def assess_map(
 ) -> list[PatchFeasibility]:
     """Return what each patch of a map demands of a robot, row by row.
 
+    Patches with equal ground, spawn origin and goals, and without solids, are assessed once.
+
     Args:
         terrain_map: The map.
         limits: The limits of the robot.
@@ -99,13 +102,40 @@ def assess_map(
     require_finite(terrain_map)
     assess = partial(assess_patch, limits=limits, threshold=terrain_map.config.wall_threshold)
     indices = list(np.ndindex(terrain_map.difficulty.shape))
-    patches = (terrain_map.patch(row, col) for row, col in indices)
+    patches = [terrain_map.patch(row, col) for row, col in indices]
+    keys = [_content(patch) or place for patch, place in zip(patches, indices, strict=True)]
+    distinct = dict(zip(reversed(keys), reversed(patches), strict=True))
+    results = parallel_map(executor, assess, [distinct[key] for key in dict.fromkeys(keys)])
     places = progress(iter(indices), len(indices)) if progress else indices
-    results = parallel_map(executor, assess, patches)
-    return [
-        replace(result, row=row, col=col)
-        for (row, col), result in zip(places, results, strict=True)
-    ]
+    assessed: dict[object, PatchFeasibility] = {}
+    found = []
+    for (row, col), patch, key in zip(places, patches, keys, strict=True):
+        if key not in assessed:
+            assessed[key] = next(results)
+        result = assessed[key]
+        offset = np.append(np.subtract(patch.grid.lower, distinct[key].grid.lower), 0.0)
+        found.append(
+            replace(
+                result,
+                row=row,
+                col=col,
+                terrain=patch.terrain,
+                difficulty=patch.difficulty,
+                place=result.place + offset,
+                path=result.path + offset,
+            )
+        )
+    return found
+
+
+def _content(patch: Patch) -> bytes:
+    """Return the same bytes for patches that differ in their place only; none with solids."""
+    if len(patch.solids):
+        return b""
+    points = np.concatenate([patch.origin[None], patch.goals[:, :3]]) - [*patch.grid.lower, 0.0]
+    # Positions in the map are rounded to single precision.
+    arrays = patch.heights, patch.friction, np.round(points, 3), patch.far_edges
+    return sha256(b"".join(array.tobytes() for array in arrays)).digest()
 
 
 def assess_patch(patch: Patch, limits: RobotLimits, threshold: float) -> PatchFeasibility:

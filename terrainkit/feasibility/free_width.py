@@ -16,6 +16,13 @@ from terrainkit.feasibility.node_arrays import FloatArray, IntArray
 NUM_DIRECTIONS = 8
 """Number of directions in which the free width is measured."""
 
+_ANGLES = np.arange(NUM_DIRECTIONS) * (math.pi / NUM_DIRECTIONS)
+"""Directions of the lines [rad]; a line has two opposite directions."""
+
+MIN_LEVEL_NODES = 1000
+"""Nodes at one height from which lines are drawn through all columns at once, which takes as long
+as following them from so many nodes."""
+
 _TOLERANCE = 1e-4
 """Rounding of heights [m]: places whose heights differ by less are measured once."""
 
@@ -100,21 +107,69 @@ class FreeWidth:
         min_clearances, part = np.unique(
             np.rint(min_clearance[near] / _TOLERANCE), return_inverse=True
         )
-        shape = *self.columns.shape, len(heights), len(min_clearances)
-        key = np.ravel_multi_index((i[near], j[near], height, part), shape)
+        shape = len(heights), len(min_clearances), *self.columns.shape
+        key = np.ravel_multi_index((height, part, i[near], j[near]), shape)
         unique, which = np.unique(key, return_inverse=True)
-        *place, height, part = np.unravel_index(unique, shape)
+        height, part, *place = np.unravel_index(unique, shape)
         z, min_clearance = heights[height] * _TOLERANCE, min_clearances[part] * _TOLERANCE
-        found = np.full(len(unique), max_width)
-        # A line has two opposite directions, so half a turn covers all lines.
-        for angle in np.arange(NUM_DIRECTIONS) * (math.pi / NUM_DIRECTIONS):
-            ahead = self._free_length((place[0], place[1]), z, min_clearance, angle)
+        found, is_known = np.full(len(unique), max_width), np.zeros(len(unique), dtype=bool)
+        level = np.append(unique // math.prod(self.columns.shape), -1)
+        last = np.flatnonzero(np.diff(level)) + 1
+        for nodes in map(slice, [0, *last], last):
+            if nodes.stop - nodes.start >= MIN_LEVEL_NODES:
+                widths, known = self._level_widths(z[nodes.start], min_clearance[nodes.start])
+                found[nodes] = widths[place[0][nodes], place[1][nodes]]
+                is_known[nodes] = known[place[0][nodes], place[1][nodes]]
+        left = np.flatnonzero(~is_known)
+        found[left] = self._widths((place[0][left], place[1][left]), z[left], min_clearance[left])
+        width[near] = found[which]
+        return width
+
+    def _level_widths(self, z: float, min_clearance: float) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Return the free width at one height, and where it is known, shapes (nx, ny).
+
+        It is not where the shortest line may be one on which the body climbs.
+        """
+        columns, max_width = self.columns, 2 * self.limits.body_width
+        fits = columns.floor <= z + self.limits.step_up + _TOLERANCE
+        fits &= columns.ceiling - np.fmax(columns.floor, z) >= min_clearance - _TOLERANCE
+        is_level = (fits & (columns.floor <= z + _TOLERANCE)).any(axis=2)
+        # Beyond the patch, the ground continues as at its edge.
+        reach = math.ceil(max_width / columns.spacing) + 1
+        level, passable = (np.pad(mask, reach, "edge") for mask in (is_level, fits.any(axis=2)))
+        nx, ny = columns.shape
+        width, unknown = np.full((2, nx, ny), max_width)
+        for angle in _ANGLES:
+            length, is_known = np.zeros((nx, ny)), np.ones((nx, ny), dtype=bool)
+            for direction in (angle, angle + math.pi):
+                is_open, passed = np.ones((nx, ny), dtype=bool), np.zeros((nx, ny), np.uint16)
+                cells = _trace_ray(direction, max_width, columns.spacing)
+                for cell in cells:
+                    i, j = reach + cell.i, reach + cell.j
+                    place = slice(i, i + nx), slice(j, j + ny)
+                    is_known &= ~(is_open & passable[place]) | level[place]
+                    is_open &= level[place]
+                    passed += is_open
+                distances = np.array([cell.distance for cell in cells] + [max_width])
+                length = length + distances[passed]
+            width = np.minimum(width, np.where(is_known, length, max_width))
+            # A line continues at least to where the body climbs.
+            unknown = np.minimum(unknown, np.where(is_known, max_width, length))
+        return width, unknown >= width
+
+    def _widths(
+        self, place: tuple[IntArray, IntArray], z: FloatArray, min_clearance: FloatArray
+    ) -> FloatArray:
+        """Return the free width at columns and heights, shape (n,)."""
+        max_width = 2 * self.limits.body_width
+        width = np.full(len(z), max_width)
+        for angle in _ANGLES:
+            ahead = self._free_length(place, z, min_clearance, angle)
             # A line with no wall within `max_width` on one side is long enough.
             both = np.flatnonzero(ahead < max_width)
             behind = place[0][both], place[1][both]
             back = self._free_length(behind, z[both], min_clearance[both], angle + math.pi)
-            found[both] = np.minimum(found[both], ahead[both] + back)
-        width[near] = found[which]
+            width[both] = np.minimum(width[both], ahead[both] + back)
         return width
 
     def _near_walls(

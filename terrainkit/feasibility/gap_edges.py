@@ -22,6 +22,9 @@ nodes of a component, so it does not matter where a gap ends, unless there is a 
 _MAX_SEARCHED_ENDS = 16
 """The same where one gap into each component is enough: most are not evaluated."""
 
+_LEVELS = 32
+"""Images of the floors at different heights."""
+
 _MORE = 8
 """Factor by which more gaps into a component are tried where the easiest lead through a wall."""
 
@@ -90,8 +93,6 @@ def _pairs(
     max_demand: float,
 ) -> Iterator[Edges]:
     """Yield the gaps that may be useful, as if nothing was in between; see `gap_edges`."""
-    import cv2
-
     columns, floor = graph.columns, graph.columns.floor.reshape(-1)
     shape = columns.floor.shape
     max_rise, max_drop = max_demand * graph.limits.step_up, max_demand * graph.limits.step_down
@@ -101,9 +102,15 @@ def _pairs(
     n = int(moves.max(initial=0))
     is_usable = graph.node_demand < max_demand
     is_end = (end_mask & is_usable).reshape(shape)
-    # Nodes without an end within the longest gap are skipped at once.
-    near = cv2.dilate(is_end.any(axis=2).astype(np.uint8), np.ones((2 * n + 1,) * 2, np.uint8))
-    start = np.flatnonzero((start_mask & is_usable).reshape(shape) & (near[..., None] > 0))
+    starts, ends = np.flatnonzero(start_mask & is_usable), np.flatnonzero(is_end)
+    # Most nodes are in one component, and few of them near the ends in others.
+    main = np.argmax(np.bincount(components[ends], minlength=1))
+    max_height = max(max_rise, max_drop)
+    near = _have_end_near(columns, starts, ends, n, max_height)
+    in_main = near & (components[starts] == main)
+    others = ends[components[ends] != main]
+    near[in_main] = _have_end_near(columns, starts[in_main], others, n, max_height)
+    start = starts[near]
     # The nodes where an edge may end, in a frame of columns without any.
     node = np.where(is_end, np.arange(is_end.size).reshape(shape), -1)
     node = np.pad(node, ((n, n), (n, n), (0, 0)), constant_values=-1)
@@ -129,6 +136,22 @@ def _pairs(
             clearance=none,
             width=none,
         )
+
+
+def _have_end_near(
+    columns: Columns, starts: IntArray, ends: IntArray, reach: int, max_height: float
+) -> NDArray[np.bool_]:
+    """Return which nodes may have an end within some columns and some height, shape (starts,)."""
+    import cv2
+
+    # Floors that are `_LEVELS` apart, such as those of tall buildings, share an image.
+    level = columns.floor.reshape(-1) // max_height
+    image = np.zeros((*columns.shape, _LEVELS), np.uint8)
+    for shift in (-1, 0, 1):
+        image[(*columns.column(ends), (level[ends] + shift).astype(np.int64) % _LEVELS)] = 1
+    image = cv2.dilate(image, np.ones((2 * reach + 1,) * 2, np.uint8))
+    at = (*columns.column(starts), level[starts].astype(np.int64) % _LEVELS)
+    return np.asarray(image[at] > 0)
 
 
 def _offsets(columns: Columns, max_gap: float) -> tuple[IntArray, FloatArray]:

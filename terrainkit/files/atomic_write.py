@@ -1,9 +1,9 @@
 """Write files atomically: completely or not at all."""
 
 import os
+import platform
 import secrets
 import shutil
-import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -130,7 +130,7 @@ def temporary_folder(parent: Path) -> Iterator[Path]:
     Its name records the host and the process, so that the folders of killed processes of this host
     can be removed first.
     """
-    prefix = f".terrainkit-{''.join(filter(str.isalnum, socket.gethostname()))}-"
+    prefix = f".terrainkit-{''.join(filter(str.isalnum, platform.node()))}-"
     for stale in parent.glob(f"{prefix}*-*"):
         pid = stale.name.removeprefix(prefix).partition("-")[0]
         if pid.isdecimal() and not _is_running(int(pid)):

@@ -11,16 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from terrainkit.errors import ExportError
-from terrainkit.export import mjcf_map
-from terrainkit.geometry.ground_surface import HeightfieldSurface
-from terrainkit.integrations import load_map
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import mujoco
-
-    from terrainkit.map.terrain_map import TerrainMap
 
 _WINDOW = 0.25
 """Side of the squares in which all positions of a base have the same geoms [m]."""
@@ -76,33 +69,21 @@ class NearGeoms:
     """
 
     def __init__(
-        self,
-        spec: "mujoco.MjSpec",
-        source: "TerrainMap | HeightfieldSurface | str | Path",
-        *,
-        base: str | None = None,
-        max_move: float = 0.2,
-        collision: mjcf_map.Collision = "auto",
+        self, spec: "mujoco.MjSpec", *, base: str | None = None, max_move: float = 0.2
     ) -> None:
-        """Find the geoms near each place of the map, and replace those of `spec`.
+        """Find the geoms near each place, and replace those of `spec`.
 
         Args:
-            spec: Robot on the map, which `add_map` or an exported MJCF file adds. Its static geoms
-                that collide alike are those of the map; planes and other ones stay.
-            source: The map, its path, or the surface that the robot collides with.
+            spec: Robot on a map. The static geoms that collide alike are those of the map; planes
+                and other ones stay.
             base: Body of the robot's base; by default the first one with a free joint.
             max_move: Distance that the base moves at most between two updates [m].
-            collision: Geometry with which `spec` has the map.
 
         Raises:
-            ExportError: If the robot has no such base, or `spec` does not compile.
+            ExportError: If `spec` has no free joint, or does not compile.
         """
         import mujoco
 
-        if isinstance(source, HeightfieldSurface):
-            surface = source
-        else:
-            surface = mjcf_map.collision_surface(load_map(source), collision)
         try:
             model = spec.compile()
         except ValueError as error:
@@ -112,44 +93,27 @@ class NearGeoms:
         self.shapes = {name: getattr(model, name)[geoms].copy() for name in _SHAPE}
         if len(geoms) <= _MIN_GEOMS:
             return
+        free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE]
+        if base is None and not len(free):
+            raise ExportError("robot: got no free joint; expected one, or the base")
+        distance = reach(model, int(free[0]) if base is None else model.body(base).id) + max_move
         data = mujoco.MjData(model)
         mujoco.mj_kinematics(model, data)
-        rotation = data.geom_xmat[geoms].reshape(-1, 3, 3)
-        center = data.geom_xpos[geoms] + np.einsum(
-            "nij,nj->ni", rotation, model.geom_aabb[geoms, :3]
-        )
-        half = np.einsum("nij,nj->ni", np.abs(rotation), model.geom_aabb[geoms, 3:])
-        distance = reach(model, _base(model, base)) + max_move
-        self._find_near(center - half, center + half, surface, distance)
-        num_near = int(np.diff(self._starts).max())
+        rotation = data.geom_xmat[geoms].reshape(-1, 3, 3)[:, :2]
+        boxes = model.geom_aabb[geoms]
+        center = data.geom_xpos[geoms, :2] + np.einsum("nij,nj->ni", rotation, boxes[:, :3])
+        half = np.einsum("nij,nj->ni", np.abs(rotation), boxes[:, 3:]) + distance
+        self._lower = (center - half).min(axis=0)
+        self._first, self._last = self.square(center - half), self.square(center + half)
+        # A sum over both axes of +1 and -1 at the corners of each geom counts the geoms of squares.
+        counts = np.zeros(self._last.max(axis=0) + 2, np.int32)
+        for i, i_sign in ((self._first[:, 0], 1), (self._last[:, 0] + 1, -1)):
+            for j, j_sign in ((self._first[:, 1], 1), (self._last[:, 1] + 1, -1)):
+                np.add.at(counts, (i, j), i_sign * j_sign)
+        num_near = int(counts.cumsum(axis=0).cumsum(axis=1).max())
         if num_near * _MIN_RATIO <= len(geoms):
             self.num_near = num_near
             _replace_geoms(spec, set(geoms.tolist()), num_near)
-
-    def _find_near(
-        self,
-        lower: NDArray[np.float64],
-        upper: NDArray[np.float64],
-        surface: HeightfieldSurface,
-        distance: float,
-    ) -> None:
-        """Find the geoms, with these corners, within a distance of each square of the map."""
-        lowest, self._lower = _lowest_ground(surface, distance)
-        self._num_squares = lowest.shape
-        first, last = (lower - distance)[:, :2], (upper + distance)[:, :2]
-        start = np.clip(np.floor((first - self._lower) / _WINDOW).astype(int), 0, lowest.shape)
-        stop = np.clip(np.ceil((last - self._lower) / _WINDOW).astype(int), 0, lowest.shape)
-        top = upper[:, 2] + 1e-4  # of rounding
-        squares = []
-        for number, (i0, j0), (i1, j1) in zip(range(len(top)), start, stop, strict=True):
-            # A geom below all ground near a square is out of reach.
-            i, j = np.nonzero(top[number] >= lowest[i0:i1, j0:j1])
-            squares.append((i + i0) * lowest.shape[1] + j + j0)
-        geoms = np.repeat(np.arange(len(top)), [len(square) for square in squares])
-        squares_of_geoms = np.concatenate(squares)
-        order = np.argsort(squares_of_geoms, kind="stable")
-        self._near = geoms[order]  # of all squares in order; `_starts` has the first of each
-        self._starts = np.searchsorted(squares_of_geoms[order], np.arange(lowest.size + 1))
 
     def bind(self, target: Any) -> Callable[[NDArray[np.floating]], None]:
         """Return the function that replaces the geoms of the robots that reached another square.
@@ -181,9 +145,9 @@ class NearGeoms:
             if not moved.any():
                 return
             for robot in np.flatnonzero(moved.any(axis=1)).tolist():
-                i, j = self.square(position[robot])
-                near = self.near(i, j)
-                center[robot] = self._lower + (np.array([i, j]) + 0.5) * _WINDOW
+                square = self.square(position[robot])
+                near = self.near(square)
+                center[robot] = self._lower + (square + 0.5) * _WINDOW
                 slots = slice(first, first + len(near))
                 for name, shapes in self.shapes.items():
                     fields[name][robot][slots] = shapes[near]
@@ -197,16 +161,14 @@ class NearGeoms:
         """Whether the model has only geoms near a robot."""
         return self.num_near < self.num_geoms
 
-    def square(self, position: NDArray[np.floating]) -> tuple[int, int]:
-        """Return the square of a position x, y [m]: the nearest one outside of the map."""
-        i, j = np.floor((position - self._lower) / _WINDOW).tolist()
-        rows, cols = self._num_squares
-        return min(max(int(i), 0), rows - 1), min(max(int(j), 0), cols - 1)
+    def square(self, position: NDArray[np.floating]) -> NDArray[np.int64]:
+        """Return the square of positions x, y [m], shape (..., 2)."""
+        square: NDArray[np.int64] = np.floor((position - self._lower) / _WINDOW).astype(np.int64)
+        return square
 
-    def near(self, i: int, j: int) -> NDArray[np.int64]:
+    def near(self, square: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return which geoms of the map are near a square, shape (k,)."""
-        square = i * self._num_squares[1] + j
-        return self._near[self._starts[square] : self._starts[square + 1]]
+        return np.flatnonzero(((self._first <= square) & (square <= self._last)).all(axis=1))
 
 
 def _map_geoms(model: Any) -> NDArray[np.int64]:
@@ -221,18 +183,6 @@ def _map_geoms(model: Any) -> NDArray[np.int64]:
     contact = np.column_stack([getattr(model, name)[geoms] for name in _CONTACT])
     _, group, sizes = np.unique(contact, axis=0, return_inverse=True, return_counts=True)
     return geoms[group.ravel() == sizes.argmax()]
-
-
-def _base(model: Any, name: str | None) -> int:
-    """Return the body of the base."""
-    import mujoco
-
-    free = model.jnt_bodyid[model.jnt_type == mujoco.mjtJoint.mjJNT_FREE].tolist()
-    names = {model.body(body).name: body for body in free}
-    if (name is None and not free) or (name is not None and name not in names):
-        expected = f"one of: {', '.join(names)}" if names else "a body with a free joint"
-        raise ExportError(f"base of the robot: got {name!r}; expected {expected}")
-    return int(free[0] if name is None else names[name])
 
 
 def reach(model: Any, base: int) -> float:
@@ -253,26 +203,6 @@ def reach(model: Any, base: int) -> float:
     geoms = np.flatnonzero(collides & (model.body_rootid[model.geom_bodyid] == base))
     extents = np.linalg.norm(model.geom_pos[geoms], axis=1) + model.geom_rbound[geoms]
     return float((distance[model.geom_bodyid[geoms]] + extents).max(initial=0))
-
-
-def _lowest_ground(
-    surface: HeightfieldSurface, distance: float
-) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
-    """Return the lowest ground within a distance of each square [m], and their lower corner."""
-    import cv2
-
-    heights, cell = surface.heights, surface.cell
-    if surface.box_top is not None:  # the heights below boxes do not count
-        heights = np.where(np.isfinite(surface.box_top), surface.box_top, heights)
-    size = 2 * int(np.ceil((_WINDOW / 2 + distance) / cell)) + 3
-    lowest = cv2.erode(np.ascontiguousarray(heights), np.ones((size, size), np.uint8))
-    lower = np.subtract(surface.first_sample, cell / 2)
-    shape = np.ceil(np.multiply(heights.shape, cell) / _WINDOW).astype(int)
-    at = [
-        np.minimum(((np.arange(n) + 0.5) * _WINDOW / cell).astype(int), limit - 1)
-        for n, limit in zip(shape, heights.shape, strict=True)
-    ]
-    return lowest[np.ix_(*at)], lower
 
 
 def _replace_geoms(spec: Any, ids: set[int], num_near: int) -> None:

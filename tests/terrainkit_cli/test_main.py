@@ -6,15 +6,17 @@ import sys
 import pytest
 
 from terrainkit_cli import training_extra
-from terrainkit_cli.main import COMMANDS, command
+from terrainkit_cli.main import COMMAND_GROUPS, COMMANDS, command
 from tests.tables import read_table
 
 
 def test_no_command_lists_all_commands(terrainkit_process):
     run = terrainkit_process()
     assert run.returncode == 0
-    for name in COMMANDS:
-        assert f" {name}" in run.stdout
+    for summaries in COMMAND_GROUPS.values():
+        for name, summary in summaries.items():
+            assert f"  {name.ljust(12)}  {summary}\n" in run.stdout
+            assert summary == command(name).__doc__.partition("\n")[0]
     lines = run.stdout.splitlines()
     assert len(lines) <= 24  # a terminal
     assert max(map(len, lines)) <= 80

@@ -65,9 +65,9 @@ class Scene:
             except ValueError as error:
                 raise ConfigError(f"{robot.mjcf}: {' '.join(str(error).split())}") from None
             self.near_geoms = None  # of the terrain, if the model has not all of them
-            if terrain.surface is not None and not all_geoms:
+            if not terrain.is_plane and not all_geoms:
                 move = MAX_SPEED * task.dt
-                near = NearGeoms(mjspec, terrain.surface, base=robot.spec.base, max_move=move)
+                near = NearGeoms(mjspec, base=robot.spec.base, max_move=move)
                 if near.is_active:
                     self.near_geoms, self.model = near, mjspec.compile()
         model = self.model

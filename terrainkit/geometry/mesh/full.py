@@ -22,24 +22,27 @@ def full_mesh(heights: NDArray[np.float32], grid: Grid, threshold: float) -> Tri
         MemoryLimitError: if the mesh would not fit in memory; nothing was allocated.
     """
     node_grid = NodeGrid.from_heights(heights, grid, threshold)
-    node_grid.check_memory(node_grid.z.size, node_grid.has_wall)
-    triangles, centers = quad_faces(node_grid, np.ones_like(node_grid.has_wall))
+    num_vertices = node_grid.check_memory(node_grid.z.size, node_grid.has_wall)
+    triangles, centers = quad_faces(node_grid, np.ones_like(node_grid.has_wall), num_vertices)
     used = np.ones(node_grid.vertex_count + len(centers), dtype=bool)
     vertices = node_grid.vertices(used, centers.array())
     return TriMesh(vertices=vertices, triangles=triangles.array())
 
 
-def quad_faces(node_grid: NodeGrid, quads: NDArray[np.bool_]) -> tuple[RowBuffer, RowBuffer]:
+def quad_faces(
+    node_grid: NodeGrid, quads: NDArray[np.bool_], num_vertices: int
+) -> tuple[RowBuffer, RowBuffer]:
     """Return the triangles of some quads, and the vertices that they add.
 
     Args:
         node_grid: The nodes.
         quads: Mask of the quads.
+        num_vertices: Vertices of the whole mesh, about half as many as triangles.
 
     Returns:
         Triangles, shape (nf, 3), and positions of the extra vertices [m], shape (nv, 3).
     """
-    triangles, centers = RowBuffer(np.int32), RowBuffer(np.float32)
+    triangles, centers = RowBuffer(np.int32, 2 * num_vertices), RowBuffer(np.float32)
     _append_pairs(triangles, node_grid, quads & ~node_grid.has_wall)
     walled = np.flatnonzero(quads & node_grid.has_wall)
     for faces, extra in wall_quads(node_grid, walled, node_grid.vertex_count):
@@ -55,12 +58,14 @@ def _append_pairs(triangles: RowBuffer, node_grid: NodeGrid, quads: NDArray[np.b
     """
     ny = node_grid.z.shape[1]
     rows = max(1, QUADS_PER_BLOCK // ny)
+    quad = np.arange(rows * (ny - 1), dtype=np.int32)
+    corner = quad + quad // (ny - 1)
+    first_rows = np.stack(
+        [corner, corner + ny, corner + (ny + 1), corner, corner + (ny + 1), corner + 1], axis=1
+    )
     for start in range(0, len(quads), rows):
         quad = np.flatnonzero(quads[start : start + rows])
-        corners = quad + quad // (ny - 1) + start * ny
-        pairs = np.empty((len(corners), 2, 3), dtype=np.int32)
-        pairs[:, 0, 0] = pairs[:, 1, 0] = corners
-        pairs[:, 0, 2] = pairs[:, 1, 1] = corners + (ny + 1)
-        pairs[:, 0, 1] = corners + ny
-        pairs[:, 1, 2] = corners + 1
-        triangles.append(pairs.reshape(-1, 3))
+        added = triangles.add(2 * len(quad)).reshape(-1, 6)
+        # Other modes than "raise" write without a temporary array.
+        np.take(first_rows, quad, axis=0, out=added, mode="clip")
+        added += start * ny

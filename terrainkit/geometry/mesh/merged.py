@@ -83,9 +83,9 @@ def _faces(
         run.keep_endpoints(kept)
     # A rectangle adds its center; a wall the midpoints at its ends, and the centers of two strips.
     num_vertices = sum(len(part.i0) for part in rectangles) + 6 * sum(len(run.i) for run in runs)
-    node_grid.check_memory(num_vertices + int(np.count_nonzero(kept)), single)
+    num_vertices = node_grid.check_memory(num_vertices + int(np.count_nonzero(kept)), single)
 
-    triangles, extra = quad_faces(node_grid, single)
+    triangles, extra = quad_faces(node_grid, single, num_vertices)
     for run in runs:
         triangles.append(run.triangles())
     for polygons in itertools.chain(

@@ -74,18 +74,22 @@ class NodeGrid:
         either |= self.walls_y[1:]
         return either
 
-    def check_memory(self, num_vertices: int, quads: NDArray[np.bool_]) -> None:
-        """Raise MemoryLimitError if a mesh would not fit in memory.
+    def check_memory(self, num_vertices: int, quads: NDArray[np.bool_]) -> int:
+        """Return the approximate number of vertices of a mesh, if it fits in memory.
 
         Args:
             num_vertices: Number of vertices, without the vertices of quads with walls.
             quads: Mask of the quads that are not merged.
+
+        Raises:
+            MemoryLimitError: if it does not.
         """
         x, y = self.walls_x, self.walls_y
         for walls in (x[:, :-1], x[:, 1:], y[:-1], y[1:]):
             # Two quads share the two midpoints of a wall, and each has a center for one of them.
             num_vertices += 2 * int(np.count_nonzero(walls & quads))
         check_memory(num_vertices * _BYTES_PER_VERTEX, f"a mesh of about {num_vertices} vertices")
+        return num_vertices
 
     @property
     def flat_x(self) -> NDArray[np.bool_]:
@@ -161,10 +165,13 @@ class NodeGrid:
             used: Whether each node, midpoint and extra vertex is used, in the order of the numbers.
             extra: Positions of the extra vertices [m], shape (k, 3).
         """
-        vertices, start = RowBuffer(np.float32), self.z.size
+        vertices, start = RowBuffer(np.float32, int(np.count_nonzero(used))), self.z.size
+        y = self.y.astype(np.float32)
         for i, used_row in enumerate(used[:start].reshape(self.z.shape)):
-            j = np.flatnonzero(used_row)
-            vertices.append(np.column_stack([np.full(len(j), self.x[i]), self.y[j], self.z[i, j]]))
+            j = slice(None) if used_row.all() else np.flatnonzero(used_row)
+            z = self.z[i, j]
+            added = vertices.add(len(z))
+            added[:, 0], added[:, 1], added[:, 2] = self.x[i], y[j], z
         for block in itertools.chain(self.midpoints(), [extra]):
             vertices.append(block[used[start : start + len(block)]])
             start += len(block)

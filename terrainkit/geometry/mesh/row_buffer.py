@@ -15,8 +15,9 @@ class RowBuffer:
     Concatenating a list of parts would take twice the memory.
     """
 
-    def __init__(self, dtype: DTypeLike) -> None:
-        self._rows: NDArray[Any] = np.empty((0, 3), dtype=dtype)
+    def __init__(self, dtype: DTypeLike, capacity: int = 0) -> None:
+        # Growing fills the new rows with zeros; the pages of an empty array are not touched.
+        self._rows: NDArray[Any] = np.empty((capacity, 3), dtype=dtype)
         self._length = 0
 
     def __len__(self) -> int:
@@ -29,13 +30,18 @@ class RowBuffer:
             rows: Rows, shape (n, 3).
             offset: Number to add to all values.
         """
-        start, self._length = self._length, self._length + len(rows)
+        added = self.add(len(rows))
+        added[:] = rows
+        if offset:
+            added += offset
+
+    def add(self, number: int) -> NDArray[Any]:
+        """Return a number of new rows to write, before any others are added, shape (n, 3)."""
+        start, self._length = self._length, self._length + number
         if self._length > len(self._rows):
             size = len(self._rows) + min(len(self._rows), MAX_GROWTH)
             self._resize(max(self._length, size))
-        self._rows[start : self._length] = rows
-        if offset:
-            self._rows[start : self._length] += offset
+        return self._rows[start : self._length]
 
     def array(self) -> NDArray[Any]:
         """Return all rows, shape (n, 3); nothing may be appended afterward."""

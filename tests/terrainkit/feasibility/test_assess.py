@@ -130,6 +130,25 @@ def test_goal_in_a_wall_is_rejected():
         assess_map(wrong, LIMITS)
 
 
+def test_assess_map_tells_apart_patches_of_one_terrain():
+    """Of four equal columns, the second is leveled and the third has half the friction."""
+    slope = SubTerrain(terrain="pyramid_slope")
+    terrain_map = generate(MapConfig(terrains=(slope,), rows=2, cols=4))
+    heights, friction = terrain_map.heights.copy(), terrain_map.friction.copy()
+    heights[terrain_map.config.patch_cells(1, 1)] = 0.0
+    friction[terrain_map.config.patch_cells(1, 2)] *= 0.5
+    edited = dataclasses.replace(terrain_map, heights=heights, friction=friction)
+    results = assess_map(edited, LIMITS)
+    for result in results:
+        patch = edited.patch(result.row, result.col)
+        alone = assess_patch(patch, LIMITS, edited.config.wall_threshold)
+        assert (result.demand, result.difficulty) == (alone.demand, patch.difficulty)
+        np.testing.assert_allclose(result.path[0], alone.path[0], atol=1e-9)
+    steep, level, icy, again = results[4:]
+    assert (level.demand, again.demand) == (0.0, steep.demand)
+    assert (icy.demand, icy.limit) == (pytest.approx(steep.value / 0.5 * 1.5), "friction")
+
+
 def test_executor_gives_the_same_results():
     terrain_map = generate(MapConfig(terrains=(SubTerrain(terrain="stairs"),), rows=3, cols=2))
     expected, seen = assess_map(terrain_map, LIMITS), []

@@ -93,3 +93,21 @@ def test_wall_is_higher_than_a_step_by_more_than_rounding(rise, width):
     heights = np.full((30, 30), rise)
     heights[10:12] = 0.0
     assert widths(heights)[10:12] == pytest.approx(width)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lines_from_all_places_at_one_height_end_as_from_single_places(seed, monkeypatch):
+    """Walls, steps and roofs at random."""
+    rng = np.random.default_rng(seed)
+    floor = np.zeros((30, 30, 2))
+    floor[..., 0] = rng.choice([-0.3, 0.0, 0.15, 1.0], (30, 30), p=(0.05, 0.75, 0.1, 0.1))
+    floor[..., 1] = np.where(rng.random((30, 30)) < 0.1, 1.3, np.nan)
+    ceiling = np.full_like(floor, np.inf)
+    ceiling[..., 0] = np.where(np.isnan(floor[..., 1]), np.inf, 1.2)
+    free_width = FreeWidth.build(columns_of(floor, ceiling), WIDE)
+    found = []
+    for number in (1, 10_000):
+        monkeypatch.setattr("terrainkit.feasibility.free_width.MIN_LEVEL_NODES", number)
+        found.append(free_width.at_nodes())
+    np.testing.assert_allclose(found[0], found[1], atol=1e-9)
+    assert (found[0] < 2 * WIDE.body_width).any()

@@ -63,7 +63,7 @@ def test_the_model_has_the_geoms_near_each_robot(scenes, ground):
     assert near_geoms.num_near <= near_geoms.num_geoms / 8
     first, counts = scene.model.geom("near_0").id, sim.batch.expand("body_geomnum")[:, 0]
     for env, place in enumerate(places):
-        near = near_geoms.near(*near_geoms.square(place))
+        near = near_geoms.near(near_geoms.square(place))
         assert counts[env] == first + len(near)
         for name, shapes in near_geoms.shapes.items():
             placed = sim.batch.expand(name)[env, first : counts[env]]
