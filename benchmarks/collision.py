@@ -23,7 +23,7 @@ _NUM_PLACES = 20
 _NUM_RUNS = 12
 _NUM_STEPS = 50
 _NUM_ROWS = (1, 2, 4, 8)
-_NEAR_LIMITS = {"stairs": 1.6, None: 2.0, "indoor": 1.8, "street": 2.0}
+_NEAR_LIMITS = {"stairs": 1.8, None: 2.0, "indoor": 2.0, "street": 2.0}
 """Limit of a step with the boxes near each robot, over a plane, by preset."""
 
 _FLAT_TERRAINS = ("pyramid_stairs_inverted", "pyramid_stairs", "stairs", "obstacles", "pit", "gap")
